@@ -1,0 +1,60 @@
+# Two targets matter to a newcomer: `make demo` and `make test`. Both set up .venv by themselves.
+PYTHON ?= python3
+VENV   := .venv
+BIN    := $(VENV)/bin
+WHEELS := dist
+STAMP  := $(VENV)/.installed
+RUST   := $(shell find crates -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml
+JOBS   ?= auto
+
+.PHONY: demo test test-slow fuzz bench lint format stubs develop wheel docs clean help
+
+help:  ## list the targets
+	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/ —/'
+
+$(STAMP): pyproject.toml
+	$(PYTHON) tools/check_machine.py
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python tools/install_dependencies.py dev
+	touch $@
+
+develop: $(STAMP)  ## build the native half in place, for working on the code
+	$(BIN)/maturin develop --release --quiet
+
+wheel: $(STAMP)  ## build the wheel and install exactly that wheel
+	rm -rf $(WHEELS)
+	$(BIN)/maturin build --release --quiet --out $(WHEELS)
+	rm -f src/flightid/_native*.so
+	$(BIN)/python -m pip install --quiet --force-reinstall --no-deps $(WHEELS)/*.whl
+
+demo: wheel  ## fly a simulated quadrotor, identify it from its log, write a report to look at
+	$(BIN)/flightid run examples/quadrotor_rig/study.toml --output demo-output
+
+lint: $(STAMP)  ## formatting, lints and types of both halves
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --quiet -- -D warnings
+
+format: $(STAMP)
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+	cargo fmt --all
+
+stubs: develop  ## regenerate src/flightid/_native.pyi
+	$(BIN)/python tools/stubs.py --write
+
+test: wheel lint  ## everything that must pass before a merge
+	cargo test --workspace --quiet
+	$(BIN)/python -m pytest -n $(JOBS) --doctest-modules
+
+test-slow: wheel  ## Monte Carlo calibration of every printed interval, and the full studies
+	$(BIN)/python -m pytest -n $(JOBS) -m slow
+
+bench: wheel  ## speed against peers, same data, one run
+	$(BIN)/python -m benchmarks
+
+clean:
+	rm -rf $(VENV) $(WHEELS) target demo-output

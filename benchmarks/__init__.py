@@ -1,0 +1,1 @@
+"""Speed against peers: same data, same run, ratios printed. Run with `make bench`."""

@@ -1,0 +1,8 @@
+//! Flight-log bytes to named columns with units, gaps and errors.
+//!
+//! Input is a byte slice from a stranger: nothing here may panic, loop without end, or reserve
+//! memory in proportion to a number that the file merely claims.
+
+pub mod error;
+
+pub use error::LogError;

@@ -1,0 +1,23 @@
+//! `flightid._native`: check, release the interpreter lock, call, convert. No arithmetic here.
+//!
+//! The first line of each function's doc is its Python signature with types; `tools/stubs.py` builds
+//! `_native.pyi` from those lines and a contract test compares them with what PyO3 really accepts.
+
+use pyo3::prelude::*;
+
+pub mod error;
+
+/// version() -> str
+///
+/// Version of the native half.
+#[pyfunction]
+fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
+}
+
+/// Native half of flightid. Private: use the names of `flightid` instead.
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(version, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,61 @@
+"""Findings: coded statements about data or results, each with a sentence on what to do."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+from flightid.conventions import Light
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One verdict with its reason.
+
+    Attributes
+    ----------
+    code : str
+        Stable identifier, for example ``"rate-too-low"``; scripts test this, people read the rest.
+    light : Light
+        Verdict.
+    message : str
+        What was found, with numbers and units.
+    action : str
+        What to do about it; empty where nothing is to be done.
+
+    Example
+    -------
+    >>> print(Finding("rate-too-low", Light.RED, "RATE is logged at 10 Hz", "set LOG_BITMASK"))
+    [red] RATE is logged at 10 Hz — set LOG_BITMASK
+    """
+
+    code: str
+    light: Light
+    message: str
+    action: str = ""
+
+    def __str__(self) -> str:
+        """Verdict, message and action on one line."""
+        return f"[{self.light}] {self.message}" + (f" — {self.action}" if self.action else "")
+
+    def to_dict(self) -> dict[str, str]:
+        """Plain values.
+
+        Returns
+        -------
+        dict of str to str
+            Keys ``code``, ``light``, ``message``, ``action``.
+        """
+        return {key: str(value) for key, value in asdict(self).items()}
+
+
+def worst(findings: list[Finding] | tuple[Finding, ...]) -> Light:
+    """The worst light among findings; green where there are none.
+
+    Example
+    -------
+    >>> worst([Finding("a", Light.GREEN, "fine"), Finding("b", Light.AMBER, "doubtful")]).value
+    'amber'
+    """
+    order = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
+    lights = {finding.light for finding in findings}
+    return next((light for light in order if light in lights), Light.GREEN)

@@ -1,0 +1,146 @@
+"""The one table type behind every `summary()`: text, HTML and plain values from the same cells."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from html import escape
+
+Cell = str | float | int | bool | None
+
+
+@dataclass(frozen=True)
+class Column:
+    """Heading of a table column.
+
+    Attributes
+    ----------
+    name : str
+        Heading.
+    unit : str
+        Unit of all its numbers; empty where there is none or rows differ.
+    digits : int
+        Significant digits of its numbers.
+    """
+
+    name: str
+    unit: str = ""
+    digits: int = 4
+
+    @property
+    def heading(self) -> str:
+        """Name with unit, for example ``"bandwidth [rad/s]"``."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+    def show(self, cell: Cell) -> str:
+        """Write a cell as text; absence is a dash, never an empty place or NaN."""
+        if cell is None or (isinstance(cell, float) and math.isnan(cell)):
+            return "–"
+        if isinstance(cell, bool):
+            return "yes" if cell else "no"
+        if isinstance(cell, float):
+            return f"{cell:.{self.digits}g}"
+        return str(cell)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows under named columns, with a title and notes.
+
+    Attributes
+    ----------
+    title : str
+        What the table shows.
+    columns : tuple of Column
+        Headings.
+    rows : tuple of tuple
+        Cells, one tuple a row, as long as `columns`.
+    notes : tuple of str
+        Sentences below the table.
+
+    Example
+    -------
+    >>> table = Table("Modes", (Column("mode"), Column("frequency", "rad/s")), (("roll", 7.5),))
+    >>> print(table.to_text())
+    Modes
+    mode  frequency [rad/s]
+    ----  -----------------
+    roll                7.5
+    """
+
+    title: str
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    notes: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        for row in self.rows:
+            if len(row) != len(self.columns):
+                raise ValueError(
+                    f"table {self.title!r}: a row has {len(row)} cells, {len(self.columns)} needed"
+                )
+
+    def shown(self) -> list[list[str]]:
+        """Cells as text, headings excluded.
+
+        Returns
+        -------
+        list of list of str
+        """
+        return [
+            [column.show(cell) for column, cell in zip(self.columns, row, strict=True)]
+            for row in self.rows
+        ]
+
+    def is_numeric(self, index: int) -> bool:
+        """Tell whether a column holds numbers (and is therefore aligned to the right)."""
+        cells = [row[index] for row in self.rows if row[index] is not None]
+        return bool(cells) and all(
+            isinstance(cell, int | float) and not isinstance(cell, bool) for cell in cells
+        )
+
+    def to_text(self) -> str:
+        """Plain text with aligned columns."""
+        headings = [column.heading for column in self.columns]
+        body = self.shown()
+        widths = [max(map(len, cells)) for cells in zip(headings, *body, strict=True)]
+
+        def line(cells: list[str]) -> str:
+            return "  ".join(
+                cell.rjust(width) if self.is_numeric(index) else cell.ljust(width)
+                for index, (cell, width) in enumerate(zip(cells, widths, strict=True))
+            ).rstrip()
+
+        rule = "  ".join("-" * width for width in widths)
+        lines = [self.title, line(headings), rule, *map(line, body), *self.notes]
+        return "\n".join(text for text in lines if text)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values: title, columns with units, rows with unrounded numbers, notes."""
+        return {
+            "title": self.title,
+            "columns": [{"name": c.name, "unit": c.unit} for c in self.columns],
+            "rows": [list(row) for row in self.rows],
+            "notes": list(self.notes),
+        }
+
+    def __str__(self) -> str:
+        """Same as `to_text`."""
+        return self.to_text()
+
+    def _repr_html_(self) -> str:
+        head = "".join(f"<th>{escape(column.heading)}</th>" for column in self.columns)
+        body = "".join(
+            "<tr>"
+            + "".join(
+                f'<td class="{"number" if self.is_numeric(i) else "text"}">{escape(cell)}</td>'
+                for i, cell in enumerate(row)
+            )
+            + "</tr>"
+            for row in self.shown()
+        )
+        notes = "".join(f'<p class="note">{escape(note)}</p>' for note in self.notes)
+        return (
+            f"<table><caption>{escape(self.title)}</caption>"
+            f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{notes}"
+        )

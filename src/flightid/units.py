@@ -1,0 +1,169 @@
+"""Units as canonical strings, checked and converted by pint, at the edges only.
+
+Inside flightid values are SI and radians unless a record or model is labelled otherwise; nothing
+converts in silence. Two units *match* when they are the same unit (`deg/s` and `rad/s` do not).
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flightid.errors import UnitError
+
+if TYPE_CHECKING:
+    import pint
+    from numpy.typing import ArrayLike, NDArray
+
+DIMENSIONLESS = "1"
+
+
+@cache
+def _registry() -> pint.UnitRegistry[float]:
+    # pint takes a third of a second to load: only work with units pays for it.
+    import pint  # noqa: PLC0415
+
+    registry: pint.UnitRegistry[float] = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+    registry.define("percent = 0.01 = %") if "percent" not in registry else None
+    return registry
+
+
+@cache
+def _parse(unit: str) -> pint.Unit:
+    text = unit.strip()
+    if text in ("", "1", "-"):
+        return _registry().dimensionless
+    try:
+        return _registry().parse_units(text)
+    except Exception as error:
+        raise UnitError(
+            "unit is not known",
+            found=repr(unit),
+            needed="a unit such as 'rad/s', 'deg', 'ft/s^2', 'm/s', 'V' or '1'",
+            action="correct the spelling, or declare '1' for a number without unit",
+        ) from error
+
+
+@cache
+def canonical(unit: str) -> str:
+    """Write a unit in flightid's one spelling.
+
+    Parameters
+    ----------
+    unit : str
+        Any spelling that pint reads; `""`, `"-"` and `"1"` mean dimensionless.
+
+    Returns
+    -------
+    str
+        Canonical spelling, for example ``"rad/s"``.
+
+    Raises
+    ------
+    UnitError
+        The unit is not known.
+
+    Example
+    -------
+    >>> canonical("radian / second"), canonical("ft/s**2"), canonical("")
+    ('rad/s', 'ft/s^2', '1')
+    """
+    parsed = _parse(unit)
+    if parsed == _registry().dimensionless:
+        return DIMENSIONLESS
+    return f"{parsed:~C}".replace("**", "^")
+
+
+def conversion_factor(source: str, target: str) -> float:
+    """Multiplier that takes values in `source` to values in `target`.
+
+    Parameters
+    ----------
+    source, target : str
+        Units of the same dimension, without offset (use `convert` for temperatures).
+
+    Returns
+    -------
+    float
+        Dimensionless factor.
+
+    Raises
+    ------
+    UnitError
+        The dimensions differ; the message names both units.
+
+    Example
+    -------
+    >>> round(conversion_factor("deg/s", "rad/s"), 9)
+    0.017453293
+    """
+    return float(convert(1.0, source, target)) - float(convert(0.0, source, target))
+
+
+def convert(values: ArrayLike, source: str, target: str) -> NDArray[np.float64]:
+    """Convert values from one unit to another of the same dimension.
+
+    Parameters
+    ----------
+    values : array_like
+        Values in `source`, any shape.
+    source, target : str
+        Units.
+
+    Returns
+    -------
+    ndarray
+        Values in `target`, same shape.
+
+    Raises
+    ------
+    UnitError
+        The dimensions differ; the message names both units.
+
+    Example
+    -------
+    >>> convert([180.0], "deg", "rad")
+    array([3.14159265])
+    """
+    registry = _registry()
+    quantity = registry.Quantity(np.asarray(values, dtype=np.float64), _parse(source))
+    try:
+        return np.asarray(quantity.to(_parse(target)).magnitude, dtype=np.float64)
+    except Exception as error:
+        raise UnitError(
+            "units do not have the same dimension", found=source, needed=target
+        ) from error
+
+
+def same_dimension(first: str, second: str) -> bool:
+    """Tell whether values in one unit could be converted to the other.
+
+    Example
+    -------
+    >>> same_dimension("deg", "rad"), same_dimension("ft", "s")
+    (True, False)
+    """
+    return bool(_parse(first).dimensionality == _parse(second).dimensionality)
+
+
+def require_match(found: str, needed: str, *, subject: str) -> None:
+    """Refuse a unit that is not the very unit needed.
+
+    Raises
+    ------
+    UnitError
+        The units differ; the message names both and `subject`.
+
+    Example
+    -------
+    >>> require_match("rad/s", "radian/second", subject="channel p")
+    """
+    if canonical(found) != canonical(needed):
+        raise UnitError(
+            f"{subject} has another unit than is needed",
+            found=canonical(found),
+            needed=canonical(needed),
+            action="convert at the edge with Record.to_units, or declare the model in that unit",
+        )

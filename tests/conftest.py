@@ -1,0 +1,30 @@
+"""Fixtures shared by all tests: where the shared real logs and records are, if they are."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).parent.parent
+
+
+def _shared_data() -> Path:
+    named = os.environ.get("FLIGHTID_DATA")
+    return Path(named) if named else REPOSITORY.parent / "shared" / "data"
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Folder of the real logs and records; the test is skipped where it is absent."""
+    folder = _shared_data()
+    if not folder.is_dir():
+        pytest.skip("the shared data folder is not here (set FLIGHTID_DATA to name it)")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def repository() -> Path:
+    """Root of the checkout."""
+    return REPOSITORY
