@@ -1,13 +1,48 @@
 """flightid: flight logs and rig records to validated flight-dynamics models.
 
 The public surface is the names listed in ``__all__``; ARCHITECTURE.md says which stage each one
-belongs to.
+belongs to. A stage is loaded when its first name is used, so that ``import flightid`` and
+``flightid --help`` cost nothing: add a public name to the three lists below (a contract test
+compares them).
 """
 
-from flightid.errors import FlightidError
-from flightid.findings import Finding
-from flightid.record import Channel, Record
-from flightid.table import Table
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from flightid.version import VERSION as __version__
 
-__all__ = ["Channel", "Finding", "FlightidError", "Record", "Table", "__version__"]
+if TYPE_CHECKING:
+    from flightid.errors import FlightidError
+    from flightid.findings import Finding
+    from flightid.record import Channel, Record
+    from flightid.table import Table
+
+# Name -> the module that holds it (a public module is its own home).
+_HOMES = {
+    "Channel": "flightid.record",
+    "Finding": "flightid.findings",
+    "FlightidError": "flightid.errors",
+    "Record": "flightid.record",
+    "Table": "flightid.table",
+}
+
+__all__ = [
+    "Channel",
+    "Finding",
+    "FlightidError",
+    "Record",
+    "Table",
+    "__version__",
+]
+
+
+def __getattr__(name: str) -> object:
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module 'flightid' has no attribute {name!r}")
+    module = import_module(home)
+    return module if home == f"flightid.{name}" else getattr(module, name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,113 @@
+"""The program ``flightid``: finds its verbs, shows errors as sentences, leaves with a code."""
+
+from __future__ import annotations
+
+import pkgutil
+import traceback
+from collections.abc import Sequence
+from importlib import import_module
+from importlib.metadata import version
+
+import click
+
+import flightid.cli
+from flightid.cli.output import Exit, note
+from flightid.errors import FlightidError
+
+ORDER = ("inspect", "design", "response", "identify", "verify", "simulate", "report", "run")
+"""Verbs in the order of the work, as help lists them; others follow in alphabetical order."""
+NOT_VERBS = frozenset({"bar", "output", "program"})
+
+
+class Verbs(click.Group):
+    """A group whose commands are the files of this folder, each loaded when it is used."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Verbs in the order of the work."""
+        del ctx
+        found = {module.name for module in pkgutil.iter_modules(flightid.cli.__path__)} - NOT_VERBS
+        ordered = [verb for verb in ORDER if verb in found]
+        return [*ordered, *sorted(found - set(ordered))]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Command of a verb, or None."""
+        if cmd_name not in self.list_commands(ctx):
+            return None
+        command = import_module(f"flightid.cli.{cmd_name}").command
+        if not isinstance(command, click.Command):
+            raise TypeError(f"flightid.cli.{cmd_name}.command is not a click command")
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command; an unknown verb is answered with the nearest one."""
+        if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            from difflib import get_close_matches
+
+            near = get_close_matches(args[0], self.list_commands(ctx), n=1)
+            hint = f" Did you mean {near[0]!r}?" if near else ""
+            ctx.fail(f"There is no command {args[0]!r}.{hint}")
+        return super().resolve_command(ctx, args)
+
+
+@click.group(
+    cls=Verbs,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog="Exit codes: 0 done; 1 done, and a verdict is red; 2 input cannot be used; "
+    "70 a fault in flightid; 130 interrupted.",
+)
+@click.version_option(version("flightid"), prog_name="flightid")
+@click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
+@click.option("--quiet", is_flag=True, help="Show no progress.")
+@click.pass_context
+def program(ctx: click.Context, quiet: bool) -> None:
+    """Turn flight logs and rig records into validated flight-dynamics models."""
+    if not quiet:
+        from flightid.cli.bar import bar_display
+        from flightid.progress import shown_by
+
+        ctx.with_resource(shown_by(bar_display))
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run the program and return its exit code.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Arguments after the program's name; default: those of this process.
+
+    Returns
+    -------
+    int
+        One of `Exit`.
+    """
+    given = None if arguments is None else list(arguments)
+    try:
+        code = program.main(args=given, prog_name="flightid", standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (KeyboardInterrupt, click.Abort):
+        note("Interrupted; nothing was left half-written.")
+        return Exit.INTERRUPTED
+    except BrokenPipeError:
+        return Exit.DONE
+    except (FlightidError, OSError) as error:
+        _explain(error, given)
+        return Exit.UNUSABLE
+    except Exception as error:
+        _explain(error, given)
+        note("This is a fault in flightid. Please report it with the output of --debug.")
+        return Exit.FAULT
+    return code if isinstance(code, int) else Exit.DONE
+
+
+def _explain(error: Exception, arguments: list[str] | None) -> None:
+    import sys
+
+    if "--debug" in (sys.argv[1:] if arguments is None else arguments):
+        note(traceback.format_exc())
+    kind = "" if isinstance(error, FlightidError) else f"{type(error).__name__}: "
+    note(f"Error: {kind}{error}")

@@ -1,0 +1,10 @@
+"""Pictures: one file per noun, each with functions that take a result and return a Plotly figure.
+
+Conventions. A function is named for the picture (`bode`, `time_histories`), takes the result first
+and options by keyword, computes nothing that a result could hold, and begins with
+`flightid.plot.look.figure`. Every axis names its quantity and unit (`look.axis_title`). Frequency
+axes are logarithmic in rad/s; phase is in degrees, the one place where flightid shows degrees
+unasked. Series keep their colour throughout a report: measured grey-black, model blue, a rival
+estimate orange, truth green. Colours are Okabe and Ito's, which colour-blind readers tell apart,
+and no meaning rests on colour alone: series differ in dash or marker too.
+"""

@@ -1,0 +1,181 @@
+"""The shared look of all pictures: colours, fonts, axes, and bands of uncertainty."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import ArrayLike
+
+BLACK = "#3a3f44"
+ORANGE = "#d55e00"
+SKY = "#56b4e9"
+GREEN = "#009e73"
+YELLOW = "#e69f00"
+BLUE = "#0072b2"
+PURPLE = "#cc79a7"
+"""Okabe and Ito's colours (Color Universal Design, 2008), black softened."""
+
+MEASURED, MODEL, RIVAL, TRUTH, OTHER = BLACK, BLUE, ORANGE, GREEN, PURPLE
+SERIES = (BLUE, ORANGE, GREEN, PURPLE, YELLOW, SKY, BLACK)
+DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot", "solid")
+FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
+GRID = "rgba(128,128,128,0.22)"
+LINE = "rgba(128,128,128,0.65)"
+BAND_OPACITY = 0.16
+ROW_HEIGHT_PX = 170
+MARGIN_PX = 130
+
+
+def axis_title(quantity: str, unit: str = "") -> str:
+    """Title of an axis.
+
+    Example
+    -------
+    >>> axis_title("roll rate", "rad/s"), axis_title("coherence")
+    ('roll rate [rad/s]', 'coherence')
+    """
+    return f"{quantity} [{unit}]" if unit and unit != "1" else quantity
+
+
+def figure(
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    title: str = "",
+    row_heights: Sequence[float] | None = None,
+    column_titles: Sequence[str] | None = None,
+    shared_x: bool = True,
+    height_px: int | None = None,
+) -> go.Figure:
+    """Empty figure in the shared look, with a grid of plots that share their x axes by column.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Number of plots.
+    title : str
+        Title of the whole; a report writes it as a caption instead.
+    row_heights : sequence of float, optional
+        Relative heights.
+    column_titles : sequence of str, optional
+        One above each column.
+    shared_x : bool
+        Zooming one plot zooms those above and below.
+    height_px : int, optional
+        Height; default: by the number of rows.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    made = make_subplots(
+        rows=rows,
+        cols=columns,
+        shared_xaxes="columns" if shared_x else False,
+        vertical_spacing=0.07 / max(1, rows - 1) if rows > 1 else 0.0,
+        horizontal_spacing=0.09,
+        row_heights=list(row_heights) if row_heights else None,
+        column_titles=list(column_titles) if column_titles else None,
+    )
+    made.update_layout(
+        title={"text": title} if title else None,
+        font={"family": FONT, "size": 13},
+        height=height_px or MARGIN_PX + ROW_HEIGHT_PX * rows,
+        margin={"l": 70, "r": 20, "t": 60 if title else 40, "b": 50},
+        plot_bgcolor="rgba(0,0,0,0)",
+        paper_bgcolor="rgba(0,0,0,0)",
+        legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0.0},
+        hovermode="x unified",
+        colorway=list(SERIES),
+    )
+    box = {"showline": True, "linecolor": LINE, "mirror": True, "gridcolor": GRID}
+    made.update_xaxes(zeroline=False, ticks="outside", tickcolor=LINE, **box)
+    made.update_yaxes(zeroline=False, ticks="outside", tickcolor=LINE, title_standoff=6, **box)
+    return made
+
+
+def label_axes(
+    made: go.Figure, *, x: str, y: Sequence[str], column: int = 1, log_x: bool = False
+) -> None:
+    """Title the axes of one column; only the lowest x axis carries the title.
+
+    Parameters
+    ----------
+    made : plotly.graph_objects.Figure
+        Figure of `figure`.
+    x : str
+        Title of the shared x axis.
+    y : sequence of str
+        Titles of the y axes, top to bottom.
+    column : int
+        Column, from 1.
+    log_x : bool
+        Logarithmic frequency axis.
+    """
+    for row, title in enumerate(y, start=1):
+        made.update_yaxes(title_text=title, row=row, col=column)
+    if log_x:
+        made.update_xaxes(type="log", dtick="D1", tickfont={"size": 11}, col=column)
+        made.update_xaxes(minor={"showgrid": False}, col=column)
+    made.update_xaxes(title_text=x, row=len(y), col=column)
+
+
+def line(
+    name: str,
+    x: ArrayLike,
+    y: ArrayLike,
+    *,
+    colour: str,
+    dash: str = "solid",
+    width: float = 1.8,
+    legend: bool = True,
+    hover: str | None = None,
+) -> go.Scatter:
+    """Line of one series; series of one `name` share a legend entry and hide together."""
+    return go.Scatter(
+        x=x,
+        y=y,
+        name=name,
+        legendgroup=name,
+        showlegend=legend,
+        mode="lines",
+        line={"color": colour, "dash": dash, "width": width},
+        hovertemplate=hover,
+    )
+
+
+def band(
+    name: str, x: ArrayLike, low: ArrayLike, high: ArrayLike, *, colour: str
+) -> tuple[go.Scatter, go.Scatter]:
+    """Shaded band between two curves (its lower edge, then its upper edge with the fill).
+
+    Parameters
+    ----------
+    name : str
+        Series it belongs to; it hides with that series.
+    x, low, high : array_like, shape (n,)
+        Abscissa and the two edges.
+    colour : str
+        Colour as ``#rrggbb``.
+
+    Returns
+    -------
+    tuple of plotly.graph_objects.Scatter
+    """
+    red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
+    edge: dict[str, Any] = {
+        "x": x,
+        "legendgroup": name,
+        "showlegend": False,
+        "hoverinfo": "skip",
+        "mode": "lines",
+        "line": {"width": 0},
+    }
+    fill = f"rgba({red},{green},{blue},{BAND_OPACITY})"
+    return (go.Scatter(y=low, **edge), go.Scatter(y=high, fill="tonexty", fillcolor=fill, **edge))

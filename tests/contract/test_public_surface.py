@@ -1,0 +1,59 @@
+"""Public names: the same in the lists of `flightid/__init__.py`, each where it is said to be."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+
+import pytest
+
+import flightid
+from tests.contract.source import PACKAGE, tree
+
+
+def _names_for_the_type_checker() -> dict[str, str]:
+    found: dict[str, str] = {}
+    for node in tree(PACKAGE / "__init__.py").body:
+        if isinstance(node, ast.If):
+            for line in node.body:
+                assert isinstance(line, ast.ImportFrom)
+                for alias in line.names:
+                    found[alias.asname or alias.name] = line.module or ""
+    return found
+
+
+def test_the_three_lists_agree() -> None:
+    homes = flightid._HOMES
+    expected = {
+        name: "flightid" if home == f"flightid.{name}" else home for name, home in homes.items()
+    }
+    assert _names_for_the_type_checker() == expected
+    assert sorted(flightid.__all__) == sorted([*homes, "__version__"])
+    assert list(flightid.__all__) == sorted(flightid.__all__)
+
+
+@pytest.mark.parametrize("name", flightid.__all__)
+def test_every_name_is_where_it_is_said_to_be(name: str) -> None:
+    assert getattr(flightid, name) is not None
+    assert name in dir(flightid)
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
+        flightid.nonsense  # noqa: B018
+
+
+def test_help_does_not_load_what_it_does_not_need() -> None:
+    code = (
+        "import sys\n"
+        "from flightid.cli import main\n"
+        "try:\n"
+        "    main(['--help'])\n"
+        "except SystemExit as leave:\n"
+        "    assert leave.code == 0, leave.code\n"
+        "heavy = {'xarray', 'pandas', 'plotly', 'scipy', 'pint', 'pyarrow', 'numpy'}\n"
+        "assert not heavy & set(sys.modules), heavy & set(sys.modules)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr

@@ -1,0 +1,131 @@
+from __future__ import annotations
+
+import json
+from io import StringIO
+
+import click
+import pytest
+from rich.console import Console
+
+from flightid.cli import output, program
+from flightid.cli.bar import Bar
+from flightid.conventions import Light
+from flightid.errors import DataError
+from flightid.findings import Finding
+from flightid.table import Column, Table
+from flightid.version import VERSION
+
+
+class _Result:
+    def summary(self) -> Table:
+        return Table("Result", (Column("x", "m"),), ((1.5,),))
+
+    def to_dict(self) -> dict[str, object]:
+        return {"schema": "flightid.result/1", "x": 1.5}
+
+
+def _install(monkeypatch: pytest.MonkeyPatch, function) -> None:
+    command = click.command("probe")(output.json_option(function))
+    known = program.Verbs.list_commands
+    monkeypatch.setattr(
+        program.Verbs, "list_commands", lambda self, ctx: [*known(self, ctx), "probe"]
+    )
+    found = program.Verbs.get_command
+    monkeypatch.setattr(
+        program.Verbs,
+        "get_command",
+        lambda self, ctx, name: command if name == "probe" else found(self, ctx, name),
+    )
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert program.run(["--version"]) == 0
+    assert VERSION in capsys.readouterr().out
+
+
+def test_help_lists_every_verb_with_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    assert program.run(["--help"]) == 0
+    assert "Exit codes" in capsys.readouterr().out
+
+
+def test_result_as_text_and_as_json(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _install(monkeypatch, lambda as_json: output.emit(_Result(), as_json=as_json))
+    assert program.run(["probe"]) == 0
+    assert "x [m]" in capsys.readouterr().out
+    assert program.run(["probe", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == _Result().to_dict()
+
+
+@pytest.mark.parametrize(("light", "code"), [(Light.GREEN, 0), (Light.AMBER, 0), (Light.RED, 1)])
+def test_red_verdict_is_exit_code_one(
+    monkeypatch: pytest.MonkeyPatch, light: Light, code: int
+) -> None:
+    def body(as_json: bool) -> None:
+        output.leave_by_verdict([Finding("x", light, "so it is")])
+
+    _install(monkeypatch, body)
+    assert program.run(["probe"]) == code
+
+
+def test_flightid_error_is_a_sentence(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def body(as_json: bool) -> None:
+        raise DataError("too short", found="2 s", needed="60 s")
+
+    _install(monkeypatch, body)
+    assert program.run(["probe"]) == 2
+    shown = capsys.readouterr()
+    assert shown.err == "Error: too short: found 2 s; needed 60 s\n"
+    assert shown.out == ""
+    assert program.run(["--debug", "probe"]) == 2
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("raised", "code", "said"),
+    [
+        (KeyboardInterrupt(), 130, "Interrupted"),
+        (FileNotFoundError(2, "No such file", "x.bin"), 2, "FileNotFoundError"),
+        (RuntimeError("inner"), 70, "fault in flightid"),
+        (BrokenPipeError(), 0, ""),
+    ],
+)
+def test_every_ending_has_its_code(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    raised: BaseException,
+    code: int,
+    said: str,
+) -> None:
+    def body(as_json: bool) -> None:
+        raise raised
+
+    _install(monkeypatch, body)
+    assert program.run(["probe"]) == code
+    assert said in capsys.readouterr().err
+
+
+def test_unknown_verb_names_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatched = pytest.MonkeyPatch()
+    _install(monkeypatched, lambda as_json: None)
+    try:
+        assert program.run(["prove"]) == 2
+    finally:
+        monkeypatched.undo()
+    assert "Did you mean 'probe'?" in capsys.readouterr().err
+
+
+def test_numbers_that_are_not_finite_are_refused() -> None:
+    with pytest.raises(ValueError, match="Out of range float"):
+        output.emit_values({"x": float("nan")})
+
+
+def test_bar_is_quiet_for_short_work_and_vanishes() -> None:
+    stream = StringIO()
+    bar = Bar("short", 2, Console(file=stream, force_terminal=True))
+    bar.advance()
+    bar.close()
+    assert "short" not in stream.getvalue()
