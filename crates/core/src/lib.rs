@@ -5,6 +5,7 @@
 //! is an argument; results have the same bits for any number of threads. Nothing here knows Python,
 //! files, channel names or printing.
 
+pub mod chirp;
 pub mod error;
 
 pub use error::CoreError;

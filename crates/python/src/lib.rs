@@ -5,6 +5,7 @@
 
 use pyo3::prelude::*;
 
+pub mod chirp;
 pub mod error;
 
 /// version() -> str
@@ -19,5 +20,6 @@ fn version() -> &'static str {
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(version, module)?)?;
+    chirp::register(module)?;
     Ok(())
 }
