@@ -6,15 +6,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-def ardupilot_chirp(
-    time_s: NDArray[np.float64],
-    magnitude: float,
-    start_hz: float,
-    stop_hz: float,
-    record_s: float,
-    fade_in_s: float,
-    fade_out_s: float,
-    hold_s: float | None,
-    single_precision: bool,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def ardupilot_chirp(time_s: NDArray[np.float64], magnitude: float, start_hz: float, stop_hz: float, record_s: float, fade_in_s: float, fade_out_s: float, hold_s: float | None, single_precision: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+
 def version() -> str: ...
