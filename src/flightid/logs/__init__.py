@@ -1,0 +1,16 @@
+"""Logs: what an autopilot wrote, in its own names, and the channels made from it."""
+
+from flightid.logs.log import Log
+from flightid.logs.log_table import LogTable
+from flightid.logs.source import ByteRange, Event, Gap, LogSource, MessageInfo, ParameterChange
+
+__all__ = [
+    "ByteRange",
+    "Event",
+    "Gap",
+    "Log",
+    "LogSource",
+    "LogTable",
+    "MessageInfo",
+    "ParameterChange",
+]

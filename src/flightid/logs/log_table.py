@@ -1,0 +1,193 @@
+"""One message type of a log as columns, each read from the file when it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import MissingColumnError
+from flightid.logs.source import LogSource, MessageInfo
+from flightid.table import Column, Table
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class LogTable:
+    """Rows of one message type (or one of its instances), by column.
+
+    Columns are read on demand and kept. Numbers are scaled by the log's own multipliers and carry
+    the unit that the log declares; nothing is converted to SI here.
+
+    Parameters
+    ----------
+    source : LogSource
+        Opened log.
+    info : MessageInfo
+        The message.
+    instance : int, optional
+        Instance; default: all rows.
+
+    Raises
+    ------
+    MissingColumnError
+        The instance does not exist.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> log = fid.read_log("flight.bin")                             # doctest: +SKIP
+    >>> log.table("RATE")["R"]                                       # doctest: +SKIP
+    """
+
+    def __init__(self, source: LogSource, info: MessageInfo, instance: int | None = None) -> None:
+        if instance is not None and instance not in info.instances:
+            raise MissingColumnError(
+                f"message {info.name} has no such instance",
+                found=instance,
+                needed="one of " + (", ".join(map(str, info.instances)) or "none: it has no field"),
+            )
+        self._source = source
+        self._info = info
+        self._instance = instance
+        self._kept: dict[str, NDArray[np.float64]] = {}
+        self._time_s: NDArray[np.float64] | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the message."""
+        return self._info.name
+
+    @property
+    def instance(self) -> int | None:
+        """Instance, or None for all rows."""
+        return self._instance
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Field names in the log's order, text included."""
+        return tuple(self._info.fields)
+
+    def __len__(self) -> int:
+        """Rows."""
+        return self._source.rows(self.name, self._instance)
+
+    def __iter__(self) -> Iterator[str]:
+        """Field names."""
+        return iter(self.columns)
+
+    def __contains__(self, column: object) -> bool:
+        """Tell whether there is such a field."""
+        return column in self._info.fields
+
+    def unit(self, column: str) -> str:
+        """Unit of the scaled numbers of a column.
+
+        Raises
+        ------
+        MissingColumnError
+            There is no such field.
+        """
+        self._require(column)
+        return self._info.fields[column]
+
+    def __getitem__(self, column: str) -> NDArray[np.float64]:
+        """Scaled numbers, read-only, shape (n_rows,) or (n_rows, n_elements).
+
+        Raises
+        ------
+        MissingColumnError
+            There is no such field, or it holds text.
+        """
+        self._require(column)
+        if column in self._info.text_fields:
+            raise MissingColumnError(
+                f"field {self.name}.{column} holds text",
+                needed="a field of numbers",
+                action=f"read it with .text({column!r})",
+            )
+        if column not in self._kept:
+            values = self._source.numbers(self.name, column, self._instance)
+            values.flags.writeable = False
+            self._kept[column] = values
+        return self._kept[column]
+
+    def text(self, column: str) -> list[str]:
+        """Texts of a column, one a row.
+
+        Raises
+        ------
+        MissingColumnError
+            There is no such field, or it holds numbers.
+        """
+        self._require(column)
+        if column not in self._info.text_fields:
+            raise MissingColumnError(
+                f"field {self.name}.{column} holds numbers", needed="a field of text"
+            )
+        return self._source.texts(self.name, column, self._instance)
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """Stamps on the autopilot's clock, s, read-only, shape (n_rows,), in file order.
+
+        Raises
+        ------
+        MissingColumnError
+            The message has no stamp.
+        """
+        if self._time_s is None:
+            stamps = self._source.time_s(self.name, self._instance)
+            stamps.flags.writeable = False
+            self._time_s = stamps
+        return self._time_s
+
+    def to_pandas(self) -> pd.DataFrame:
+        """All columns as a `pandas.DataFrame`; array fields become ``name[i]``."""
+        # pandas takes half a second to load: only those who ask for a frame pay for it.
+        import pandas as pd  # noqa: PLC0415
+
+        frame: dict[str, object] = {}
+        for column in self.columns:
+            if column in self._info.text_fields:
+                frame[column] = self.text(column)
+            elif self[column].ndim == 1:
+                frame[column] = self[column]
+            else:
+                for index, values in enumerate(self[column].T):
+                    frame[f"{column}[{index}]"] = values
+        return pd.DataFrame(frame)
+
+    def summary(self) -> Table:
+        """Table of the fields with unit and range."""
+        rows = tuple(self._summary_row(column) for column in self.columns)
+        columns = (Column("field"), Column("unit"), Column("minimum"), Column("maximum"))
+        return Table(repr(self), columns, rows)
+
+    def _summary_row(self, column: str) -> tuple[str, str, float | None, float | None]:
+        if column in self._info.text_fields or len(self) == 0:
+            return column, self.unit(column), None, None
+        finite = self[column][np.isfinite(self[column])]
+        if finite.size == 0:
+            return column, self.unit(column), None, None
+        return column, self.unit(column), float(finite.min()), float(finite.max())
+
+    def __repr__(self) -> str:
+        """Rows, columns and rate on one line."""
+        instance = "" if self._instance is None else f"[{self._instance}]"
+        rate = "no rate" if self._info.rate_hz is None else f"{self._info.rate_hz:.4g} Hz"
+        return f"LogTable({self.name}{instance}, {len(self)} rows x {len(self.columns)}, {rate})"
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()
+
+    def _require(self, column: str) -> None:
+        if column not in self._info.fields:
+            raise MissingColumnError(
+                f"message {self.name} has no such field",
+                found=column,
+                needed="one of " + ", ".join(self.columns),
+            )
