@@ -2,6 +2,20 @@
 
 from flightid.record.channel import Channel
 from flightid.record.history import Step
+from flightid.record.interpolation import Interpolation
 from flightid.record.record import Record
+from flightid.record.stamps import StampPolicy
+from flightid.record.timebase import GapPolicy, to_uniform
+from flightid.record.uniform_base import UniformBase, UniformSpan
 
-__all__ = ["Channel", "Record", "Step"]
+__all__ = [
+    "Channel",
+    "GapPolicy",
+    "Interpolation",
+    "Record",
+    "StampPolicy",
+    "Step",
+    "UniformBase",
+    "UniformSpan",
+    "to_uniform",
+]

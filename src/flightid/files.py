@@ -1,0 +1,103 @@
+"""Files: written whole or not at all, and known by their SHA-256."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import secrets
+from collections.abc import Callable
+from pathlib import Path
+
+BLOCK_BYTES = 1 << 20
+
+
+def write_atomically(path: str | Path, content: bytes | str | Callable[[Path], object]) -> Path:
+    """Write a file so that a reader sees the old content or the whole new one, never a part.
+
+    The content goes to a temporary name in the same folder, is flushed to the disk, and is then
+    renamed. On any failure or interrupt the temporary file is removed and `path` is untouched.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to write; its folder must exist.
+    content : bytes, str or callable
+        Bytes; text, written as UTF-8; or a function that writes to the path it is given (the
+        temporary name, with the same suffix).
+
+    Returns
+    -------
+    Path
+        `path`.
+
+    Raises
+    ------
+    OSError
+        The folder is missing or cannot be written.
+
+    Example
+    -------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     written = write_atomically(Path(folder) / "result.json", "{}")
+    ...     written.read_text(), [entry.name for entry in Path(folder).iterdir()]
+    ('{}', ['result.json'])
+    """
+    final = Path(path)
+    # The suffix stays last: writers of other libraries choose their format by it.
+    temporary = final.with_name(f".{final.stem}.{secrets.token_hex(6)}.part{final.suffix}")
+    try:
+        if callable(content):
+            content(temporary)
+        else:
+            temporary.write_bytes(content.encode() if isinstance(content, str) else content)
+        _flush(temporary)
+        temporary.replace(final)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+    _flush(final.parent)
+    return final
+
+
+def sha256_of_file(path: str | Path) -> str:
+    """SHA-256 of a file's bytes, read in blocks.
+
+    Parameters
+    ----------
+    path : str or Path
+        File to read.
+
+    Returns
+    -------
+    str
+        64 hexadecimal digits.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+
+    Example
+    -------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     sha256_of_file(write_atomically(Path(folder) / "empty", b""))[:16]
+    'e3b0c44298fc1c14'
+    """
+    digest = hashlib.sha256()
+    with Path(path).open("rb") as stream:
+        while block := stream.read(BLOCK_BYTES):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def _flush(path: Path) -> None:
+    """Bring a file, or the names in a folder, to the disk."""
+    if path.is_dir() and os.name == "nt":
+        return  # Windows has no handle for a folder; its rename is durable by itself.
+    handle = os.open(path, os.O_RDONLY if path.is_dir() or os.name != "nt" else os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
