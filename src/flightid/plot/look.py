@@ -85,6 +85,7 @@ def figure(
     )
     made.update_layout(
         title={"text": title} if title else None,
+        template="none",
         font={"family": FONT, "size": 13},
         height=height_px or MARGIN_PX + ROW_HEIGHT_PX * rows,
         margin={"l": 70, "r": 20, "t": 60 if title else 40, "b": 50},

@@ -1,0 +1,42 @@
+"""A Plotly figure as plain values for the content tree, small enough to embed."""
+
+from __future__ import annotations
+
+import base64
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flightid.report.content import Figure
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+
+def figure_block(figure: go.Figure, caption: str) -> Figure:
+    """Take a picture into the content tree.
+
+    Parameters
+    ----------
+    figure : plotly.graph_objects.Figure
+        Picture; its samples are kept in single precision, which no screen can tell from double.
+    caption : str
+        What to see in it.
+
+    Returns
+    -------
+    Figure
+    """
+    return Figure(_in_single_precision(json.loads(figure.to_json())), caption)
+
+
+def _in_single_precision(node: Any) -> Any:  # noqa: ANN401 — any JSON value
+    if isinstance(node, list):
+        return [_in_single_precision(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    if node.get("dtype") == "f8" and "bdata" in node:
+        samples = np.frombuffer(base64.b64decode(node["bdata"]), dtype="<f8").astype("<f4")
+        return {**node, "dtype": "f4", "bdata": base64.b64encode(samples.tobytes()).decode()}
+    return {key: _in_single_precision(value) for key, value in node.items()}

@@ -1,0 +1,146 @@
+"""The content tree as one self-contained HTML page.
+
+The page asks nothing of the network: styles, plots and plotting library are inside it, and a
+content policy that names the two scripts by their hash keeps anything else from running, whatever a
+log may have smuggled into a name.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import json
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from flightid.report.content import Document, Figure
+from flightid.report.json import to_dict
+from flightid.table import Column, Table
+from flightid.version import VERSION
+
+DEFAULT_HEIGHT_PX = 420
+_VALUE = Column("value", digits=6)
+
+
+def to_html(document: Document, *, packed: bool = True) -> str:
+    """Draw a document as a page that is readable offline, with interactive plots.
+
+    Parameters
+    ----------
+    document : Document
+        What to say.
+    packed : bool
+        Compress the plotting library (2 MB instead of 5 MB; browsers since 2023 unpack it).
+
+    Returns
+    -------
+    str
+        The whole page.
+    """
+    tree = to_dict(document)
+    numbers = _Numbering()
+    sections = [numbers.section(section) for section in tree["sections"]]
+    has_plots = any(isinstance(block, Figure) for block in document.walk())
+    library = get_plotlyjs() if has_plots else ""
+    script = _resource("page.js")
+    hashes = [_script_hash(text) for text in ([script, library] if has_plots else [script])]
+    return (
+        _environment()
+        .get_template("page.html")
+        .render(
+            **{key: tree[key] for key in ("title", "subtitle", "verdict", "tally", "footer")},
+            sections=sections,
+            version=VERSION,
+            has_plots=has_plots,
+            script_sources=Markup(" ".join(f"'{value}'" for value in hashes)),
+            style=Markup(_resource("page.css")),
+            script=Markup(script),
+            packed="gzip" if packed else "no",
+            library=Markup(_packed(library) if packed else library),
+        )
+    )
+
+
+class _Numbering:
+    """Adds to plain values what the template needs: identifiers, shown cells, plot payloads."""
+
+    def __init__(self) -> None:
+        self._sections = 0
+        self._plots = 0
+
+    def section(self, values: dict[str, Any]) -> dict[str, Any]:
+        self._sections += 1
+        return {
+            **values,
+            "id": f"part-{self._sections}",
+            "blocks": [self._block(block) for block in values["blocks"]],
+            "sections": [self.section(inner) for inner in values["sections"]],
+        }
+
+    def _block(self, values: dict[str, Any]) -> dict[str, Any]:
+        match values["kind"]:
+            case "table":
+                return {**values, **_shown_table(values)}
+            case "key_values":
+                shown = [(key, _VALUE.show(value)) for key, value in values["items"]]
+                return {**values, "items": shown}
+            case "figure":
+                self._plots += 1
+                spec = values["spec"]
+                return {
+                    **values,
+                    "id": f"plot-{self._plots}",
+                    "height": int(spec.get("layout", {}).get("height") or DEFAULT_HEIGHT_PX),
+                    "payload": Markup(_script_json(spec)),
+                }
+        return values
+
+
+def _shown_table(values: dict[str, Any]) -> dict[str, Any]:
+    columns = tuple(
+        Column(column["name"], column["unit"], digits)
+        for column, digits in zip(values["columns"], values["digits"], strict=True)
+    )
+    table = Table(values["title"], columns, tuple(map(tuple, values["rows"])))
+    kinds = ["number" if table.is_numeric(index) else "text" for index in range(len(columns))]
+    headings = [
+        {"name": column.name, "unit": column.unit, "kind": kind}
+        for column, kind in zip(columns, kinds, strict=True)
+    ]
+    return {"columns": headings, "rows": table.shown()}
+
+
+def _script_json(values: object) -> str:
+    """JSON that no HTML parser can leave early: ``<`` is written as an escape."""
+    text = json.dumps(values, allow_nan=False, separators=(",", ":"))
+    return text.replace("<", "\\u003c").replace("&", "\\u0026")
+
+
+def _script_hash(text: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+@cache
+def _packed(text: str) -> str:
+    return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
+
+
+@cache
+def _resource(name: str) -> str:
+    return files("flightid.report").joinpath("templates", name).read_text(encoding="utf-8")
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.FunctionLoader(_resource),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=False,
+    )

@@ -1,0 +1,88 @@
+"use strict";
+(() => {
+  const root = document.documentElement;
+  const systemDark = matchMedia("(prefers-color-scheme: dark)");
+  const isDark = () => (root.dataset.theme || (systemDark.matches ? "dark" : "light")) === "dark";
+  const plots = [...document.querySelectorAll(".plot")];
+  const drawn = new Set();
+  let library = null;
+
+  // The library is stored as gzip in base64; the page's content policy knows its hash.
+  async function unpack() {
+    const holder = document.getElementById("library");
+    let source = holder.textContent;
+    if (holder.dataset.packed === "gzip") {
+      const bytes = Uint8Array.from(atob(source), (letter) => letter.charCodeAt(0));
+      const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+      source = await new Response(stream).text();
+    }
+    holder.remove();
+    const element = document.createElement("script");
+    element.textContent = source;
+    document.head.append(element);
+    if (!window.Plotly) throw new Error("the plotting library did not start");
+    return window.Plotly;
+  }
+
+  // Black series would vanish on a dark page.
+  const recolour = (text) => (isDark() ? text.replaceAll("#3a3f44", "#c6ccd2") : text);
+
+  async function draw(place) {
+    const holder = document.querySelector(`script[data-plot="${place.id}"]`);
+    const spec = JSON.parse(recolour(holder.textContent));
+    const style = getComputedStyle(root);
+    spec.layout.font = { ...spec.layout.font, color: style.getPropertyValue("--ink").trim() };
+    spec.layout.hoverlabel = {
+      bgcolor: style.getPropertyValue("--raised").trim(),
+      font: { color: style.getPropertyValue("--ink").trim() },
+    };
+    spec.layout.modebar = { bgcolor: "rgba(0,0,0,0)", color: style.getPropertyValue("--unknown").trim(),
+      activecolor: style.getPropertyValue("--ink").trim() };
+    spec.layout.autosize = true;
+    if (place.clientWidth < 520) {
+      spec.layout.margin = { ...spec.layout.margin, l: 52, r: 8 };
+      spec.layout.font.size = 11;
+    }
+    const options = { responsive: true, displaylogo: false, displayModeBar: "hover", scrollZoom: false,
+      modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+      toImageButtonOptions: { format: "svg", filename: place.id } };
+    library ??= unpack();
+    const plotly = await library;
+    await plotly.react(place, spec.data, spec.layout, options);
+    drawn.add(place);
+  }
+
+  const apologise = () => { document.getElementById("plain").hidden = false; };
+  const show = (place) => draw(place).catch(apologise);
+  const redraw = () => drawn.forEach(show);
+
+  if (plots.length) {
+    const near = new IntersectionObserver((entries) => {
+      for (const entry of entries) {
+        if (entry.isIntersecting) { near.unobserve(entry.target); show(entry.target); }
+      }
+    }, { rootMargin: "600px" });
+    plots.forEach((place) => near.observe(place));
+    // Paper shows all plots, in ink for white paper.
+    addEventListener("beforeprint", () => {
+      document.querySelectorAll("details").forEach((part) => { part.open = true; });
+      plots.filter((place) => !drawn.has(place)).forEach(show);
+    });
+  }
+
+  const button = document.getElementById("theme");
+  button.hidden = false;
+  button.addEventListener("click", () => {
+    root.dataset.theme = isDark() ? "light" : "dark";
+    redraw();
+  });
+  systemDark.addEventListener("change", redraw);
+
+  const links = new Map([...document.querySelectorAll("nav a")].map((a) => [a.hash.slice(1), a]));
+  const reading = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      links.get(entry.target.id)?.classList.toggle("here", entry.isIntersecting);
+    }
+  }, { rootMargin: "-10% 0px -70% 0px" });
+  document.querySelectorAll("main section").forEach((part) => reading.observe(part));
+})();

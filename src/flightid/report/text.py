@@ -1,0 +1,94 @@
+"""The content tree as plain text, for terminals and mail."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from typing import assert_never
+
+from flightid.report.content import (
+    Block,
+    Document,
+    Figure,
+    KeyValues,
+    Lights,
+    Paragraph,
+    Section,
+    TableBlock,
+)
+from flightid.table import Column
+
+WIDTH = 100
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+_VALUE = Column("value", digits=6)
+
+
+def to_text(document: Document) -> str:
+    """Draw a document as plain text.
+
+    Parameters
+    ----------
+    document : Document
+        What to say.
+
+    Returns
+    -------
+    str
+        Lines of at most 100 characters, tables excepted; control characters that a log may hold
+        are shown as ``\N{REPLACEMENT CHARACTER}`` so that no terminal obeys them.
+    """
+    parts = [document.title, "=" * len(document.title)]
+    parts += [line for line in (document.subtitle, _verdict(document)) if line]
+    for section in document.sections:
+        parts += ["", *_section(section, level=1)]
+    if document.footer:
+        parts += ["", document.footer]
+    return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", "\n".join(parts)) + "\n"
+
+
+def _verdict(document: Document) -> str:
+    if not document.tally:
+        return ""
+    return f"Verdict: {document.verdict} ({document.tally})"
+
+
+def _section(section: Section, level: int) -> list[str]:
+    mark = "-" if level == 1 else "."
+    lines = [section.title, mark * len(section.title)]
+    for block in section.blocks:
+        lines += [*_block(block), ""]
+    for inner in section.sections:
+        lines += _section(inner, level + 1)
+    return lines
+
+
+def _block(block: Block) -> list[str]:
+    match block:
+        case Paragraph(text):
+            return textwrap.wrap(text, WIDTH) or [""]
+        case Lights():
+            return _lights(block)
+        case TableBlock(table):
+            return table.to_text().split("\n")
+        case KeyValues():
+            return _key_values(block)
+        case Figure(caption=caption):
+            shown = f" ({', '.join(block.series)})" if block.series else ""
+            return textwrap.wrap(f"[Figure: {caption}{shown}]", WIDTH)
+        case _:
+            assert_never(block)
+
+
+def _lights(block: Lights) -> list[str]:
+    lines = [block.title] if block.title else []
+    for finding in block.findings:
+        head = f"{f'[{finding.light}]':<10} "
+        body = finding.message + (f" — {finding.action}" if finding.action else "")
+        lines += textwrap.wrap(body, WIDTH, initial_indent=head, subsequent_indent=" " * len(head))
+    return lines or ["Nothing was judged."]
+
+
+def _key_values(block: KeyValues) -> list[str]:
+    width = max((len(key) for key, _ in block.items), default=0)
+    lines = [f"{key:<{width}}  {_VALUE.show(value)}" for key, value in block.items]
+    return [block.title, *lines] if block.title else lines

@@ -1,0 +1,229 @@
+"""The content tree and its three faces."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import json
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flightid.conventions import Light
+from flightid.errors import FileFormatError
+from flightid.findings import Finding
+from flightid.plot import look
+from flightid.report.content import (
+    Document,
+    KeyValues,
+    Lights,
+    Paragraph,
+    Section,
+    TableBlock,
+)
+from flightid.report.figures import figure_block
+from flightid.report.html import to_html
+from flightid.report.json import from_dict, to_dict
+from flightid.report.text import to_text
+from flightid.table import Column, Table
+
+VOID = {"meta", "br", "img", "link", "hr", "input"}
+HOSTILE = "</script><img src=x onerror=alert(1)>\x1b[2J\"'&"
+
+
+def _document(text: str = "Roll rate") -> Document:
+    made = look.figure()
+    made.add_trace(look.line(text, np.arange(3.0), np.array([1.0, 2.5, 4.0]), colour=look.MODEL))
+    table = Table(text, (Column(text), Column("value", "1/s")), ((text, 1.23456789), ("b", None)))
+    lights = tuple(Finding("code", light, f"{text} {light}", text) for light in Light)
+    return Document(
+        text,
+        text,
+        (
+            Section(
+                text,
+                (
+                    Paragraph(text),
+                    Lights(lights, text),
+                    Lights(()),
+                    TableBlock(table),
+                    figure_block(made, text),
+                ),
+                (Section("Below", (TableBlock(table, folded=True), KeyValues(((text, 0.5),)))),),
+            ),
+        ),
+        text,
+    )
+
+
+class _Structure(HTMLParser):
+    """Collects tags, text and attributes, and checks that tags close in order."""
+
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.attributes: list[tuple[str, str, str]] = []
+        self.identifiers: list[str] = []
+        self.scripts: list[tuple[dict[str, str | None], str]] = []
+        self.text: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        for key, value in attrs:
+            self.attributes.append((tag, key, value or ""))
+            if key == "id":
+                self.identifiers.append(value or "")
+        if tag == "script":
+            self.scripts.append((dict(attrs), ""))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] == "script":
+            attributes, before = self.scripts[-1]
+            self.scripts[-1] = (attributes, before + data)
+        elif self.open and self.open[-1] != "style":
+            self.text.append(data)
+
+
+def _parsed(page: str) -> _Structure:
+    parser = _Structure()
+    parser.feed(page)
+    parser.close()
+    assert parser.open == []
+    return parser
+
+
+def test_page_is_well_formed_and_asks_nothing_of_the_network() -> None:
+    parser = _parsed(to_html(_document()))
+    assert len(parser.identifiers) == len(set(parser.identifiers))
+    asking = {"src", "srcset", "action", "data", "poster", "background"}
+    assert not [item for item in parser.attributes if item[1] in asking]
+    assert all(value.startswith("#") for _, key, value in parser.attributes if key == "href")
+    targets = {value[1:] for _, key, value in parser.attributes if key == "href"}
+    assert targets <= set(parser.identifiers)
+
+
+def test_policy_names_the_two_scripts_by_hash_and_nothing_else() -> None:
+    page = to_html(_document())
+    parser = _parsed(page)
+    policy = next(value for _, key, value in parser.attributes if "script-src" in value)
+    allowed = re.findall(r"sha256-[A-Za-z0-9+/=]+", policy)
+    code = [text for attributes, text in parser.scripts if "type" not in attributes]
+    packed = next(text for attributes, text in parser.scripts if "data-packed" in attributes)
+    sources = [*code, gzip.decompress(base64.b64decode(packed)).decode()]
+    hashes = [
+        "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        for text in sources
+    ]
+    assert sorted(allowed) == sorted(hashes)
+    assert "default-src 'none'" in policy
+    assert "unsafe-eval" not in policy
+
+
+def test_unpacked_page_holds_the_same_library() -> None:
+    parser = _parsed(to_html(_document(), packed=False))
+    library = next(text for attributes, text in parser.scripts if "data-packed" in attributes)
+    policy = next(value for _, _, value in parser.attributes if "script-src" in value)
+    digest = base64.b64encode(hashlib.sha256(library.encode()).digest()).decode()
+    assert f"sha256-{digest}" in policy
+
+
+def test_page_without_plots_carries_no_library() -> None:
+    page = to_html(Document("Short", "", (Section("Part", (Paragraph("text"),)),)))
+    assert len(page) < 40_000
+    assert "noscript" not in page
+
+
+def test_hostile_strings_stay_text() -> None:
+    document = _document(HOSTILE)
+    parser = _parsed(to_html(document))
+    assert not [item for item in parser.attributes if item[1].startswith("on")]
+    assert "img" not in {tag for tag, _, _ in parser.attributes}
+    assert sum("<img src=x onerror=alert(1)>" in text for text in parser.text) >= 8
+    payload = next(text for attributes, text in parser.scripts if "data-plot" in attributes)
+    assert json.loads(payload)["data"][0]["name"] == HOSTILE
+
+
+def test_terminal_is_not_steered_by_a_log() -> None:
+    assert "\x1b" not in to_text(_document(HOSTILE))
+
+
+@given(st.text(max_size=60))
+def test_any_text_survives_html_and_json(text: str) -> None:
+    document = Document(text, text, (Section(text, (Paragraph(text),)),))
+    _parsed(to_html(document))
+    assert from_dict(json.loads(json.dumps(to_dict(document)))) == document
+
+
+def test_json_holds_the_whole_tree() -> None:
+    document = _document()
+    assert from_dict(json.loads(json.dumps(to_dict(document), allow_nan=False))) == document
+
+
+def test_text_html_and_json_show_the_same_numbers() -> None:
+    document = _document()
+    values = to_dict(document)
+    cells = values["sections"][0]["blocks"][3]["rows"]
+    assert cells[0][1] == 1.23456789
+    shown = "1.235"
+    assert shown in to_text(document)
+    assert shown in "".join(_parsed(to_html(document)).text)
+    assert values["tally"] == "1 green, 1 amber, 1 red, 1 unknown"
+    for face in (to_text(document), to_html(document)):
+        assert values["tally"] in face
+
+
+def test_verdict_is_the_worst_light() -> None:
+    assert _document().verdict is Light.RED
+    assert Document("x", "", ()).verdict is Light.GREEN
+    assert Document("x", "", ()).tally == ""
+
+
+def test_figures_are_kept_in_single_precision() -> None:
+    made = look.figure()
+    values = np.linspace(0, 1, 1000) / 3
+    made.add_trace(look.line("a", values, values, colour=look.MODEL))
+    spec = figure_block(made, "caption").spec
+    packed = spec["data"][0]["x"]
+    assert packed["dtype"] == "f4"
+    assert np.array_equal(
+        np.frombuffer(base64.b64decode(packed["bdata"]), "<f4"), values.astype("<f4")
+    )
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"schema": "other/1"}, "not a report: found other/1"),
+        ({"sections": [{"title": "x"}]}, "do not fit together: found KeyError"),
+        ({"sections": 3}, "do not fit together: found TypeError"),
+        (
+            {"sections": [{"title": "x", "blocks": [{"kind": "x"}], "sections": []}]},
+            "there is no block of kind 'x'",
+        ),
+        (
+            {
+                "sections": [
+                    {
+                        "title": "x",
+                        "blocks": [{"kind": "key_values", "title": "", "items": [["a", []]]}],
+                        "sections": [],
+                    }
+                ]
+            },
+            "a cell holds list",
+        ),
+    ],
+)
+def test_a_strangers_values_are_checked(change: dict[str, object], said: str) -> None:
+    with pytest.raises(FileFormatError, match=re.escape(said)):
+        from_dict({**to_dict(_document()), **change})
