@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.record import Channel, Record
+    from flightid.simulation import LinearSystem, simulate
     from flightid.table import Table
 
 # Name -> the module that holds it (a public module is its own home).
@@ -22,17 +23,21 @@ _HOMES = {
     "Channel": "flightid.record",
     "Finding": "flightid.findings",
     "FlightidError": "flightid.errors",
+    "LinearSystem": "flightid.simulation",
     "Record": "flightid.record",
     "Table": "flightid.table",
+    "simulate": "flightid.simulation",
 }
 
 __all__ = [
     "Channel",
     "Finding",
     "FlightidError",
+    "LinearSystem",
     "Record",
     "Table",
     "__version__",
+    "simulate",
 ]
 
 

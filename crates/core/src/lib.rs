@@ -7,5 +7,7 @@
 
 pub mod chirp;
 pub mod error;
+pub mod linear_simulation;
+pub mod matrix_exponential;
 
 pub use error::CoreError;

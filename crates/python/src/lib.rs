@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 
 pub mod chirp;
 pub mod error;
+pub mod linear_simulation;
 
 /// version() -> str
 ///
@@ -21,5 +22,6 @@ fn version() -> &'static str {
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(version, module)?)?;
     chirp::register(module)?;
+    linear_simulation::register(module)?;
     Ok(())
 }

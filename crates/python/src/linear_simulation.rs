@@ -1,0 +1,76 @@
+//! Binding of linear simulation (Python side: `simulation/simulate.py`).
+
+use crate::error::from_core;
+use flightid_core::linear_simulation::{Discrete, Hold, StateSpace};
+use flightid_core::matrix_exponential::exponential;
+use numpy::ndarray::Array2;
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+type States<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
+fn matrix<'py>(
+    py: Python<'py>,
+    values: Vec<f64>,
+    rows: usize,
+    columns: usize,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let array = Array2::from_shape_vec((rows, columns), values)
+        .map_err(|error| pyo3::exceptions::PyRuntimeError::new_err(error.to_string()))?;
+    Ok(array.into_pyarray(py))
+}
+
+/// simulate_linear(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64], delays_s: NDArray[np.float64], inputs: NDArray[np.float64], initial_state: NDArray[np.float64], sample_time_s: float, first_order_hold: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+///
+/// States (n, n_samples) and outputs (p, n_samples) of a linear system over sampled inputs.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn simulate_linear<'py>(
+    py: Python<'py>,
+    a: PyReadonlyArray2<'py, f64>,
+    b: PyReadonlyArray2<'py, f64>,
+    c: PyReadonlyArray2<'py, f64>,
+    d: PyReadonlyArray2<'py, f64>,
+    delays_s: PyReadonlyArray1<'py, f64>,
+    inputs: PyReadonlyArray2<'py, f64>,
+    initial_state: PyReadonlyArray1<'py, f64>,
+    sample_time_s: f64,
+    first_order_hold: bool,
+) -> PyResult<States<'py>> {
+    let n_outputs = c.as_array().nrows();
+    let n_samples = inputs.as_array().ncols();
+    let system = StateSpace {
+        a: a.as_slice()?,
+        b: b.as_slice()?,
+        c: c.as_slice()?,
+        d: d.as_slice()?,
+        delays_s: delays_s.as_slice()?,
+        n_outputs,
+    };
+    let (u, x0) = (inputs.as_slice()?, initial_state.as_slice()?);
+    let hold = if first_order_hold { Hold::First } else { Hold::Zero };
+    let (states, outputs) = py
+        .detach(|| Discrete::new(&system, sample_time_s, hold)?.run(u, n_samples, x0))
+        .map_err(from_core)?;
+    Ok((matrix(py, states, x0.len(), n_samples)?, matrix(py, outputs, n_outputs, n_samples)?))
+}
+
+/// matrix_exponential(matrix: NDArray[np.float64]) -> NDArray[np.float64]
+///
+/// Exponential of a square matrix.
+#[pyfunction]
+fn matrix_exponential<'py>(
+    py: Python<'py>,
+    matrix: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let n = matrix.as_array().nrows();
+    let result = exponential(matrix.as_slice()?, n).map_err(from_core)?;
+    self::matrix(py, result, n, n)
+}
+
+/// Add this area to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(simulate_linear, module)?)?;
+    module.add_function(wrap_pyfunction!(matrix_exponential, module)?)?;
+    Ok(())
+}
