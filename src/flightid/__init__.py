@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.record import Channel, Record
-    from flightid.simulation import LinearSystem, simulate
+    from flightid.simulation.simulate import LinearSystem, simulate
     from flightid.table import Table
 
 # Name -> the module that holds it (a public module is its own home).
@@ -23,10 +23,10 @@ _HOMES = {
     "Channel": "flightid.record",
     "Finding": "flightid.findings",
     "FlightidError": "flightid.errors",
-    "LinearSystem": "flightid.simulation",
+    "LinearSystem": "flightid.simulation.simulate",
     "Record": "flightid.record",
     "Table": "flightid.table",
-    "simulate": "flightid.simulation",
+    "simulate": "flightid.simulation.simulate",
 }
 
 __all__ = [
