@@ -1,0 +1,91 @@
+"""Estimates with their intervals, side by side on one scale."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import plotly.graph_objects as go
+
+from flightid.plot import look
+
+ROW_PX = 34
+FRAME_PX = 130
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter as it is drawn.
+
+    Attributes
+    ----------
+    name : str
+        Parameter and model.
+    value, low, high : float
+        Estimate and its 95 % interval, any unit.
+    truth : float or None
+        True value where it is known.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    truth: float | None = None
+
+
+def parameter_intervals(estimates: Sequence[Estimate], *, name: str = "estimate") -> go.Figure:
+    """Draw 95 % intervals in percent of the reference: the truth where known, else the estimate.
+
+    Parameters
+    ----------
+    estimates : sequence of Estimate
+        Top to bottom.
+    name : str
+        Name in the legend.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    made = look.figure(height_px=FRAME_PX + ROW_PX * len(estimates))
+    references = [item.value if item.truth is None else item.truth for item in estimates]
+    scaled = [
+        [100 * (edge / reference - 1) for edge in (item.value, item.low, item.high)]
+        for item, reference in zip(estimates, references, strict=True)
+    ]
+    names = [item.name for item in estimates]
+    centres = [values[0] for values in scaled]
+    made.add_trace(
+        go.Scatter(
+            x=centres,
+            y=names,
+            name=f"{name} with 95 % interval",
+            mode="markers",
+            marker={"color": look.MODEL, "size": 8},
+            error_x={
+                "type": "data",
+                "symmetric": False,
+                "array": [max(values) - values[0] for values in scaled],
+                "arrayminus": [values[0] - min(values) for values in scaled],
+                "color": look.MODEL,
+                "thickness": 1.6,
+            },
+        )
+    )
+    known = [item.name for item in estimates if item.truth is not None]
+    if known:
+        made.add_trace(
+            go.Scatter(
+                x=[0.0] * len(known),
+                y=known,
+                name="truth",
+                mode="markers",
+                marker={"color": look.TRUTH, "symbol": "diamond", "size": 9},
+            )
+        )
+    made.update_yaxes(autorange="reversed", automargin=True)
+    reference = "truth" if known else "estimate"
+    made.update_xaxes(title_text=f"departure from the {reference} [%]")
+    made.update_layout(hovermode="closest")
+    return made

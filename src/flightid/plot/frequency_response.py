@@ -1,0 +1,125 @@
+"""Bode plots of estimated responses, with coherence and bands of random error, and of models."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+
+from flightid.plot import look
+
+DEVIATIONS_95 = 1.959964
+"""Standard deviations of a normal 95 % interval."""
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One response in a Bode plot.
+
+    Attributes
+    ----------
+    name : str
+        Name in the legend.
+    omega_rad_s : ndarray, shape (n_freqs,)
+        Frequencies, rad/s.
+    response : ndarray of complex, shape (n_freqs,)
+        Response.
+    colour, dash : str
+        Look of the line.
+    coherence : ndarray, shape (n_freqs,), optional
+        Coherence; shown below where any curve has it.
+    random_error : ndarray, shape (n_freqs,), optional
+        Normalised 1 σ random error; shown as a 95 % band.
+    """
+
+    name: str
+    omega_rad_s: NDArray[np.float64]
+    response: NDArray[np.complex128]
+    colour: str = look.MEASURED
+    dash: str = "solid"
+    coherence: NDArray[np.float64] | None = None
+    random_error: NDArray[np.float64] | None = None
+
+
+def bode(curves: Sequence[Curve], *, unit: str = "", minimum_coherence: float = 0.6) -> go.Figure:
+    """Gain, phase and coherence over frequency.
+
+    Parameters
+    ----------
+    curves : sequence of Curve
+        What to show; the phase of later ones is shifted by whole turns to lie near the first's.
+    unit : str
+        Unit of the gain's reference, for example ``"rad/s"``.
+    minimum_coherence : float
+        Guideline drawn in the coherence plot.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    has_coherence = any(curve.coherence is not None for curve in curves)
+    rows = 3 if has_coherence else 2
+    made = look.figure(rows, row_heights=(2.2, 2.0, 1.1)[:rows], height_px=560 if rows > 2 else 470)
+    for number, curve in enumerate(curves):
+        phase_deg = _unwrapped_deg(curve.response)
+        if number:
+            phase_deg = phase_deg + _whole_turns(curves[0], curve, phase_deg)
+        _add_gain(made, curve)
+        _add_phase(made, curve, phase_deg)
+        if curve.coherence is not None:
+            made.add_trace(_line(curve, curve.coherence, legend=False), row=3, col=1)
+    titles = (look.axis_title("gain", f"dB re {unit}" if unit else "dB"), "phase [deg]")
+    look.label_axes(made, x="frequency [rad/s]", y=(*titles, "coherence")[:rows], log_x=True)
+    if has_coherence:
+        made.update_yaxes(range=[0, 1.05], row=3, col=1)
+        made.add_hline(
+            minimum_coherence, line={"color": look.LINE, "dash": "dot", "width": 1}, row=3, col=1
+        )
+    return made
+
+
+def _line(curve: Curve, values: NDArray[np.float64], *, legend: bool) -> go.Scatter:
+    return look.line(
+        curve.name, curve.omega_rad_s, values, colour=curve.colour, dash=curve.dash, legend=legend
+    )
+
+
+def _add_gain(made: go.Figure, curve: Curve) -> None:
+    magnitude = np.abs(curve.response)
+    if curve.random_error is not None:
+        wide = DEVIATIONS_95 * curve.random_error
+        # A lower edge at or below zero gain has no decibels; it is drawn 40 dB down.
+        edges = (_decibel(magnitude * np.maximum(1 - wide, 0.01)), _decibel(magnitude * (1 + wide)))
+        made.add_traces(
+            look.band(curve.name, curve.omega_rad_s, *edges, colour=curve.colour), rows=1, cols=1
+        )
+    made.add_trace(_line(curve, _decibel(magnitude), legend=True), row=1, col=1)
+
+
+def _add_phase(made: go.Figure, curve: Curve, phase_deg: NDArray[np.float64]) -> None:
+    if curve.random_error is not None:
+        wide = np.minimum(np.degrees(DEVIATIONS_95 * curve.random_error), 180.0)
+        edges = (phase_deg - wide, phase_deg + wide)
+        made.add_traces(
+            look.band(curve.name, curve.omega_rad_s, *edges, colour=curve.colour), rows=2, cols=1
+        )
+    made.add_trace(_line(curve, phase_deg, legend=False), row=2, col=1)
+
+
+def _decibel(magnitude: NDArray[np.float64]) -> NDArray[np.float64]:
+    return 20 * np.log10(np.maximum(magnitude, np.finfo(np.float64).tiny))
+
+
+def _unwrapped_deg(response: NDArray[np.complex128]) -> NDArray[np.float64]:
+    return np.degrees(np.unwrap(np.angle(response)))
+
+
+def _whole_turns(first: Curve, curve: Curve, phase_deg: NDArray[np.float64]) -> float:
+    """Shift, a multiple of 360 deg, that brings a phase nearest to the first curve's."""
+    reference = np.interp(
+        np.log(curve.omega_rad_s), np.log(first.omega_rad_s), _unwrapped_deg(first.response)
+    )
+    return 360.0 * float(np.round(np.median(reference - phase_deg) / 360.0))

@@ -1,0 +1,115 @@
+"""Time histories, thinned so that a page stays small and no peak is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+
+from flightid.plot import look
+
+MAXIMUM_POINTS = 3000
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """One signal over time.
+
+    Attributes
+    ----------
+    name : str
+        Name in the legend.
+    time_s : ndarray, shape (n_samples,)
+        Stamps, s.
+    samples : ndarray, shape (n_samples,)
+        Values, in the panel's unit.
+    colour, dash : str
+        Look of the line.
+    """
+
+    name: str
+    time_s: NDArray[np.float64]
+    samples: NDArray[np.float64]
+    colour: str = look.MEASURED
+    dash: str = "solid"
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One plot of several signals with one unit.
+
+    Attributes
+    ----------
+    title : str
+        Title of its y axis, unit included.
+    traces : tuple of Trace
+        Signals.
+    """
+
+    title: str
+    traces: tuple[Trace, ...]
+
+
+def time_histories(panels: Sequence[Panel]) -> go.Figure:
+    """Draw panels below each other over one time axis.
+
+    Parameters
+    ----------
+    panels : sequence of Panel
+        Top to bottom.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    made = look.figure(len(panels))
+    named: set[str] = set()
+    for row, panel in enumerate(panels, start=1):
+        for trace in panel.traces:
+            time_s, samples = thinned(trace.time_s, trace.samples)
+            made.add_trace(
+                look.line(
+                    trace.name,
+                    time_s,
+                    samples,
+                    colour=trace.colour,
+                    dash=trace.dash,
+                    width=1.3,
+                    legend=trace.name not in named,
+                ),
+                row=row,
+                col=1,
+            )
+            named.add(trace.name)
+    look.label_axes(made, x="time [s]", y=[panel.title for panel in panels])
+    return made
+
+
+def thinned(
+    time_s: NDArray[np.float64], samples: NDArray[np.float64], maximum: int = MAXIMUM_POINTS
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Smallest and largest sample of each of many short stretches, in their order.
+
+    Parameters
+    ----------
+    time_s, samples : ndarray, shape (n_samples,)
+        Signal.
+    maximum : int
+        Largest number of points kept; a signal that is not longer is returned as it is.
+
+    Returns
+    -------
+    tuple of ndarray
+        Stamps and samples, at most `maximum` of them, with every peak of the signal among them.
+    """
+    if samples.size <= maximum:
+        return time_s, samples
+    edges = np.linspace(0, samples.size, maximum // 2 + 1).astype(int)
+    lowest = [a + int(np.argmin(samples[a:b])) for a, b in pairwise(edges)]
+    highest = [a + int(np.argmax(samples[a:b])) for a, b in pairwise(edges)]
+    kept = np.unique(np.concatenate([lowest, highest]))
+    return time_s[kept], samples[kept]

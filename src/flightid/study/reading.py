@@ -1,0 +1,182 @@
+"""Strict reading of a study file's tables: every key is asked for, typed and accounted for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from difflib import get_close_matches
+from typing import Any, TypeVar, cast
+
+from flightid.errors import StudyError
+
+Value = TypeVar("Value")
+REQUIRED: Any = object()
+"""Default of a key that must be given."""
+
+
+class TableReader:
+    """One TOML table whose keys are taken one by one; `finish` names what nobody took.
+
+    Parameters
+    ----------
+    values : mapping
+        The parsed table.
+    where : str
+        How the study file names it, for example ``"[response]"``.
+    """
+
+    def __init__(self, values: Mapping[str, Any], where: str) -> None:
+        self._values = dict(values)
+        self._where = where
+        self._known: list[str] = []
+
+    def __contains__(self, key: str) -> bool:
+        """Tell whether the table gives this key."""
+        return key in self._values
+
+    def text(self, key: str, default: str = REQUIRED) -> str:
+        """One string."""
+        return str(self._take(key, default, lambda value: isinstance(value, str), "a text"))
+
+    def flag(self, key: str, default: bool = REQUIRED) -> bool:
+        """One truth value."""
+        return bool(
+            self._take(key, default, lambda value: isinstance(value, bool), "true or false")
+        )
+
+    def choice(self, key: str, options: Iterable[str], default: str = REQUIRED) -> str:
+        """One of several words."""
+        words = tuple(options)
+        needed = "one of " + ", ".join(map(repr, words))
+        return str(self._take(key, default, lambda value: value in words, needed))
+
+    def integer(self, key: str, default: int = REQUIRED, *, minimum: int = 0) -> int:
+        """One whole number from a minimum on."""
+
+        def fits(value: object) -> bool:
+            return isinstance(value, int) and not isinstance(value, bool) and value >= minimum
+
+        return int(self._take(key, default, fits, f"a whole number from {minimum} on"))
+
+    def number(self, key: str, default: float = REQUIRED) -> float:
+        """One finite number."""
+        return float(self._take(key, default, _is_number, "a number"))
+
+    def positive(self, key: str, default: float = REQUIRED) -> float:
+        """One finite number above zero."""
+        return float(
+            self._take(
+                key, default, lambda value: _is_number(value) and value > 0, "a number above 0"
+            )
+        )
+
+    def maybe(self, read: Callable[[str], Value], key: str) -> Value | None:
+        """What `read` makes of a key, or None where it is absent."""
+        self._known.append(key)
+        return read(key) if key in self._values else None
+
+    def names(self, key: str, default: Iterable[str] = REQUIRED) -> tuple[str, ...]:
+        """Several strings, each once; one string alone may stand for a list of one."""
+
+        def fits(value: object) -> bool:
+            listed = [value] if isinstance(value, str) else value
+            return (
+                isinstance(listed, list)
+                and all(isinstance(item, str) for item in listed)
+                and len(set(listed)) == len(listed)
+            )
+
+        found = self._take(key, default, fits, "a list of different texts")
+        return (found,) if isinstance(found, str) else tuple(found)
+
+    def numbers(self, key: str, default: Iterable[float] = REQUIRED) -> tuple[float, ...]:
+        """Several finite numbers."""
+
+        def fits(value: object) -> bool:
+            return isinstance(value, list) and bool(value) and all(map(_is_number, value))
+
+        return tuple(map(float, self._take(key, default, fits, "a list of numbers")))
+
+    def interval(self, key: str) -> tuple[float, float]:
+        """Two finite numbers, the first below the second."""
+
+        def fits(value: object) -> bool:
+            return (
+                isinstance(value, list)
+                and len(value) == 2
+                and all(map(_is_number, value))
+                and value[0] < value[1]
+            )
+
+        found = self._take(key, REQUIRED, fits, "two numbers, the first below the second")
+        return float(found[0]), float(found[1])
+
+    def values(self, key: str) -> dict[str, Any]:
+        """A table taken whole, for a part that checks its own keys; empty where it is absent."""
+        return dict(self._take(key, {}, lambda value: isinstance(value, dict), "a table"))
+
+    def table(self, key: str) -> TableReader:
+        """A table below; empty where it is absent."""
+        return TableReader(self.values(key), f"[{key}]")
+
+    def tables(self, key: str) -> list[TableReader]:
+        """A list of tables below; empty where it is absent."""
+
+        def fits(value: object) -> bool:
+            return isinstance(value, list) and all(isinstance(item, dict) for item in value)
+
+        found = self._take(key, [], fits, f"tables headed [[{key}]]")
+        return [
+            TableReader(item, f"[[{key}]] number {number}")
+            for number, item in enumerate(found, start=1)
+        ]
+
+    def finish(self) -> None:
+        """Refuse keys that nobody asked for.
+
+        Raises
+        ------
+        StudyError
+            Names the key and the nearest known one.
+        """
+        for key in self._values:
+            if key not in self._known:
+                raise unknown_key(self._where, key, self._known)
+
+    def error(self, key: str, problem: str, *, found: object, needed: object) -> StudyError:
+        """Error about one key of this table, for checks that span several keys."""
+        return StudyError(
+            f"study file, {self._where}: {key} {problem}", found=repr(found), needed=needed
+        )
+
+    def _take(  # any TOML value; its type is what `fits` has checked
+        self, key: str, default: object, fits: Callable[[Any], bool], needed: str
+    ) -> Any:  # noqa: ANN401
+        self._known.append(key)
+        if key not in self._values:
+            if default is REQUIRED:
+                raise StudyError(f"study file, {self._where}: {key} is missing", needed=needed)
+            return default
+        value = self._values[key]
+        if not fits(value):
+            raise self.error(key, "does not fit", found=value, needed=needed)
+        return value
+
+
+def unknown_key(where: str, key: str, known: Iterable[str]) -> StudyError:
+    """Error for a key that has no meaning here; names the nearest one that has."""
+    options = list(known)
+    near = get_close_matches(key, options, n=1, cutoff=0.5)
+    return StudyError(
+        f"study file, {where}: there is no key {key!r}",
+        needed="one of " + ", ".join(options) if options else "no key at all",
+        action=f"write {near[0]!r}" if near else None,
+    )
+
+
+def _is_number(value: object) -> bool:
+    return (
+        isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and math.isfinite(cast(float, value))
+    )

@@ -1,0 +1,303 @@
+"""What a study file may say: its schema, read from TOML into typed settings.
+
+docs/study.md describes every key for people. A study file is data: nothing in it is run, and paths
+are relative to the file.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from flightid.errors import StudyError
+from flightid.study.reading import TableReader
+
+MAXIMUM_BYTES = 1 << 20
+METHODS = ("composite", "local_polynomial", "instrument")
+SIMULATORS = ("quadrotor",)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A named stretch of the log.
+
+    Attributes
+    ----------
+    name : str
+        Name by which models refer to it.
+    span_s : tuple of float or None
+        Start and stop, s of the log's clock.
+    sid_axis : int or None
+        Or: the system-identification run of this ``SID_AXIS``.
+    run : int
+        Which of the runs of that axis, from 0.
+    """
+
+    name: str
+    span_s: tuple[float, float] | None = None
+    sid_axis: int | None = None
+    run: int = 0
+
+
+@dataclass(frozen=True)
+class ModelSettings:
+    """One model to identify.
+
+    Attributes
+    ----------
+    name : str
+        Title in the report.
+    template : str
+        Name of a library model, or path of a model file.
+    input, output : str
+        Channels.
+    identify, verify : tuple of str
+        Segments for the fit, and segments kept for verification.
+    band_rad_s : tuple of float
+        Lowest and highest frequency of the fit, rad/s.
+    parameters : mapping
+        Overrides by parameter: value, min, max, free.
+    """
+
+    name: str
+    template: str
+    input: str
+    output: str
+    identify: tuple[str, ...]
+    verify: tuple[str, ...]
+    band_rad_s: tuple[float, float]
+    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ResponseSettings:
+    """How frequency responses are estimated.
+
+    Attributes
+    ----------
+    method : str
+        Estimator whose result is fitted.
+    compare : tuple of str
+        Estimators shown beside it.
+    n_frequencies : int
+        Frequencies in each model's band, spaced evenly in the logarithm.
+    windows_s : tuple of float
+        Window lengths, s; empty: chosen by the estimator.
+    minimum_coherence : float
+        Frequencies below it take no part in a fit.
+    """
+
+    method: str = "composite"
+    compare: tuple[str, ...] = ()
+    n_frequencies: int = 60
+    windows_s: tuple[float, ...] = ()
+    minimum_coherence: float = 0.6
+
+
+@dataclass(frozen=True)
+class Settings:
+    """A whole study, checked.
+
+    Attributes
+    ----------
+    title, aircraft, notes : str
+        Words for the report.
+    log : Path or None
+        Log to read.
+    simulator : str or None
+        Or: the simulator that flies and writes the log.
+    flight : mapping
+        Its settings, checked by the simulator.
+    channels : mapping of str to str
+        Sources of channels that differ from the autopilot's channel map.
+    sample_rate_hz : float or None
+        Rate of the records; None: the slowest needed channel's.
+    segments : tuple of Segment
+        Stretches of the log.
+    models : tuple of ModelSettings
+        What to identify.
+    response : ResponseSettings
+        How to estimate responses.
+    starts, seed : int
+        Starts of each fit, and the seed they are drawn with.
+    """
+
+    title: str
+    aircraft: str
+    notes: str
+    log: Path | None
+    simulator: str | None
+    flight: Mapping[str, Any]
+    channels: Mapping[str, str]
+    sample_rate_hz: float | None
+    segments: tuple[Segment, ...]
+    models: tuple[ModelSettings, ...]
+    response: ResponseSettings
+    starts: int
+    seed: int
+
+    def segment(self, name: str) -> Segment:
+        """Segment of this name."""
+        return next(segment for segment in self.segments if segment.name == name)
+
+
+def read_settings(path: Path) -> Settings:
+    """Read and check a study file.
+
+    Parameters
+    ----------
+    path : Path
+        TOML file.
+
+    Returns
+    -------
+    Settings
+
+    Raises
+    ------
+    StudyError
+        The file is no TOML, a key is unknown or missing, a value does not fit, or a model refers
+        to a segment that is not there; the message names the place.
+    """
+    root = TableReader(_parsed(path), "top level")
+    title = root.table("study")
+    words = (title.text("title"), title.text("aircraft", ""), title.text("notes", ""))
+    title.finish()
+    log, simulator, flight = _source(root, path.parent)
+    channels = root.table("channels")
+    sources = channels.values("sources")
+    rate = channels.maybe(channels.positive, "sample_rate_hz")
+    channels.finish()
+    segments = tuple(_segment(reader) for reader in root.tables("segment"))
+    response = _response(root.table("response"))
+    fit = root.table("fit")
+    starts, seed = fit.integer("starts", 1, minimum=1), fit.integer("seed", 0)
+    fit.finish()
+    models = tuple(_model(reader, path.parent) for reader in root.tables("model"))
+    root.finish()
+    _require_references(segments, models)
+    return Settings(
+        *words, log, simulator, flight, sources, rate, segments, models, response, starts, seed
+    )
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    if path.stat().st_size > MAXIMUM_BYTES:
+        raise StudyError(
+            "the study file is too long", found=f"{path.stat().st_size} bytes", needed="1 MiB"
+        )
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise StudyError("the study file is no TOML", found=str(error) or "deep nesting") from error
+
+
+def _source(root: TableReader, folder: Path) -> tuple[Path | None, str | None, Mapping[str, Any]]:
+    log, flight = root.table("log"), root.table("flight")
+    if ("log" in root) == ("flight" in root):
+        raise StudyError(
+            "study file: the source of the data is not clear",
+            found="both [log] and [flight]" if "log" in root else "neither [log] nor [flight]",
+            needed="one of them",
+        )
+    if "log" in root:
+        path = folder / log.text("path")
+        log.finish()
+        return path, None, {}
+    simulator = flight.choice("simulate", SIMULATORS)
+    settings = flight.values("settings")
+    flight.finish()
+    return None, simulator, settings
+
+
+def _segment(reader: TableReader) -> Segment:
+    name = reader.text("name")
+    span = reader.maybe(reader.interval, "span_s")
+    axis = reader.maybe(reader.integer, "sid_axis")
+    run = reader.integer("run", 0)
+    reader.finish()
+    if (span is None) == (axis is None):
+        raise reader.error(
+            "span_s or sid_axis", "must be given, not both", found=name, needed="one of them"
+        )
+    return Segment(name, span, axis, run)
+
+
+def _response(reader: TableReader) -> ResponseSettings:
+    usual = ResponseSettings()
+    method = reader.choice("method", METHODS, usual.method)
+    compare = reader.names("compare", ())
+    for word in compare:
+        if word not in METHODS:
+            raise reader.error("compare", "does not fit", found=word, needed=", ".join(METHODS))
+    made = ResponseSettings(
+        method,
+        compare,
+        reader.integer("n_frequencies", usual.n_frequencies, minimum=5),
+        reader.numbers("windows_s", ()),
+        reader.positive("minimum_coherence", usual.minimum_coherence),
+    )
+    reader.finish()
+    return made
+
+
+def _model(reader: TableReader, folder: Path) -> ModelSettings:
+    template = reader.text("template")
+    band = reader.interval("band_rad_s")
+    if band[0] <= 0:
+        raise reader.error("band_rad_s", "does not fit", found=band, needed="positive frequencies")
+    made = ModelSettings(
+        reader.text("name"),
+        str(folder / template) if template.endswith(".toml") else template,
+        reader.text("input"),
+        reader.text("output"),
+        reader.names("identify"),
+        reader.names("verify", ()),
+        band,
+        _overrides(reader),
+    )
+    reader.finish()
+    return made
+
+
+def _overrides(reader: TableReader) -> dict[str, dict[str, Any]]:
+    overrides: dict[str, dict[str, Any]] = {}
+    parameters = reader.table("parameters")
+    for name in reader.values("parameters"):
+        entry = parameters.table(name)
+        given: dict[str, Any] = {
+            key: entry.maybe(entry.number, key) for key in ("value", "minimum", "maximum")
+        }
+        given["free"] = entry.maybe(entry.flag, "free")
+        entry.finish()
+        overrides[name] = {key: value for key, value in given.items() if value is not None}
+    return overrides
+
+
+def _require_references(segments: tuple[Segment, ...], models: tuple[ModelSettings, ...]) -> None:
+    if not models:
+        raise StudyError("study file: nothing to identify", needed="a [[model]]")
+    for kind, named in (("segment", segments), ("model", models)):
+        names = [item.name for item in named]
+        for name in names:
+            if names.count(name) > 1:
+                raise StudyError(f"study file: two [[{kind}]]s have one name", found=repr(name))
+    known = {segment.name for segment in segments}
+    for model in models:
+        for name in (*model.identify, *model.verify):
+            if name not in known:
+                raise StudyError(
+                    f"study file, model {model.name!r}: there is no such segment",
+                    found=repr(name),
+                    needed="one of " + ", ".join(map(repr, sorted(known))),
+                )
+        both = set(model.identify) & set(model.verify)
+        if both:
+            raise StudyError(
+                f"study file, model {model.name!r}: a model is verified on data it has seen",
+                found=", ".join(sorted(both)),
+                needed="segments that the fit does not use",
+            )
