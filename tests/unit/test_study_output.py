@@ -1,0 +1,100 @@
+"""A study's output folder appears whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from flightid.errors import StudyError
+from flightid.study.output import SCHEMA, whole_folder
+
+
+def _write_results(folder: Path, mark: str) -> None:
+    (folder / "results.json").write_text(json.dumps({"schema": SCHEMA, "mark": mark}))
+
+
+def _break_off(final: Path, failure: type[BaseException]) -> None:
+    with whole_folder(final) as folder:
+        _write_results(folder, "half")
+        raise failure
+
+
+def _names(folder: Path) -> list[str]:
+    return sorted(entry.name for entry in folder.iterdir())
+
+
+def test_folder_appears_when_the_work_is_done(tmp_path: Path) -> None:
+    final = tmp_path / "deep" / "out"
+    with whole_folder(final) as folder:
+        _write_results(folder, "new")
+        assert not final.exists()
+    assert _names(final) == ["results.json"]
+    assert _names(tmp_path / "deep") == ["out"]
+
+
+@pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt])
+def test_nothing_half_written_remains(tmp_path: Path, failure: type[BaseException]) -> None:
+    with pytest.raises(failure):
+        _break_off(tmp_path / "out", failure)
+    assert _names(tmp_path) == []
+
+
+def test_an_earlier_result_is_replaced_whole(tmp_path: Path) -> None:
+    final = tmp_path / "out"
+    for mark in ("first", "second"):
+        with whole_folder(final) as folder:
+            _write_results(folder, mark)
+            (folder / mark).touch()
+    assert _names(final) == ["results.json", "second"]
+    assert _names(tmp_path) == ["out"]
+
+
+def test_an_earlier_result_survives_a_failure(tmp_path: Path) -> None:
+    final = tmp_path / "out"
+    with whole_folder(final) as folder:
+        _write_results(folder, "first")
+    with pytest.raises(KeyboardInterrupt):
+        _break_off(final, KeyboardInterrupt)
+    assert json.loads((final / "results.json").read_text())["mark"] == "first"
+    assert _names(tmp_path) == ["out"]
+
+
+def test_an_earlier_result_returns_when_the_exchange_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    final = tmp_path / "out"
+    with whole_folder(final) as folder:
+        _write_results(folder, "first")
+    replace = Path.replace
+
+    def failing(self: Path, target: Path) -> Path:
+        if self.suffix == ".part":
+            raise OSError("disk full")
+        return replace(self, target)
+
+    monkeypatch.setattr(Path, "replace", failing)
+    with pytest.raises(OSError, match="disk full"), whole_folder(final) as folder:
+        _write_results(folder, "second")
+    assert json.loads((final / "results.json").read_text())["mark"] == "first"
+    assert _names(tmp_path) == ["out"]
+
+
+@pytest.mark.parametrize("content", ["notes.txt", "results.json"])
+def test_a_strangers_folder_is_left_alone(tmp_path: Path, content: str) -> None:
+    final = tmp_path / "out"
+    final.mkdir()
+    (final / content).write_text("not json")
+    with pytest.raises(StudyError, match="holds something else"), whole_folder(final):
+        pass
+    assert (final / content).read_text() == "not json"
+
+
+def test_an_empty_folder_may_be_used_and_a_file_may_not(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    with whole_folder(tmp_path / "out") as folder:
+        _write_results(folder, "new")
+    (tmp_path / "file").touch()
+    with pytest.raises(StudyError, match="holds something else"), whole_folder(tmp_path / "file"):
+        pass

@@ -1,0 +1,135 @@
+"""A study file is checked to the last key before anything is done."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flightid.errors import StudyError
+from flightid.study.settings import read_settings
+
+GOOD = """
+[study]
+title = "Roll"
+[log]
+path = "flight.bin"
+[channels]
+sample_rate_hz = 100
+[[segment]]
+name = "sweep"
+sid_axis = 10
+[[segment]]
+name = "doublet"
+span_s = [70, 80]
+[response]
+method = "instrument"
+compare = ["composite"]
+[fit]
+starts = 3
+seed = 7
+[[model]]
+name = "roll rate"
+template = "rate_motor_lag"
+input = "tau_phi"
+output = "p"
+identify = "sweep"
+verify = ["doublet"]
+band_rad_s = [0.5, 60]
+parameters.tau_s = { value = 0.03, free = false }
+"""
+
+
+def _write(folder: Path, text: str) -> Path:
+    path = folder / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_a_whole_study_is_read(tmp_path: Path) -> None:
+    settings = read_settings(_write(tmp_path, GOOD))
+    assert settings.log == tmp_path / "flight.bin"
+    assert (settings.starts, settings.seed, settings.sample_rate_hz) == (3, 7, 100.0)
+    model = settings.models[0]
+    assert (model.identify, model.verify) == (("sweep",), ("doublet",))
+    assert model.parameters == {"tau_s": {"value": 0.03, "free": False}}
+    assert settings.segment("doublet").span_s == (70.0, 80.0)
+    assert settings.response.compare == ("composite",)
+
+
+def test_a_model_file_lies_beside_the_study(tmp_path: Path) -> None:
+    text = GOOD.replace('"rate_motor_lag"', '"own.toml"')
+    assert read_settings(_write(tmp_path, text)).models[0].template == str(tmp_path / "own.toml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('title = "Roll"', "", "[study]: title is missing"),
+        ('title = "Roll"', "title = 3", "[study]: title does not fit: found 3; needed a text"),
+        ("sample_rate_hz = 100", "sample_rate = 100", "Next: write 'sample_rate_hz'"),
+        ("sample_rate_hz = 100", "sample_rate_hz = -1", "needed a number above 0"),
+        ("sample_rate_hz = 100", "sample_rate_hz = nan", "needed a number above 0"),
+        ("sample_rate_hz = 100", "sample_rate_hz = true", "needed a number above 0"),
+        ("[fit]", "[fits]", "top level: there is no key 'fits'"),
+        ("starts = 3", "starts = 0", "needed a whole number from 1 on"),
+        ("starts = 3", "starts = 2.5", "needed a whole number from 1 on"),
+        ('method = "instrument"', 'method = "magic"', "needed one of 'composite'"),
+        ('compare = ["composite"]', 'compare = ["magic"]', "compare does not fit"),
+        ('compare = ["composite"]', "compare = [1]", "a list of different texts"),
+        ("span_s = [70, 80]", "span_s = [80, 70]", "the first below the second"),
+        ("span_s = [70, 80]", "span_s = [80]", "two numbers"),
+        ("span_s = [70, 80]", "", "span_s or sid_axis must be given, not both"),
+        ("span_s = [70, 80]", "span_s = [70, 80]\nsid_axis = 11", "must be given, not both"),
+        ('name = "doublet"', 'name = "sweep"', "two [[segment]]s have one name: found 'sweep'"),
+        ('identify = "sweep"', 'identify = "sweeps"', "no such segment: found 'sweeps'"),
+        ('verify = ["doublet"]', 'verify = ["sweep"]', "verified on data it has seen"),
+        ("band_rad_s = [0.5, 60]", "band_rad_s = [0, 60]", "needed positive frequencies"),
+        ("free = false", 'free = "no"', "[tau_s]: free does not fit"),
+        ("value = 0.03", "val = 0.03", "Next: write 'value'"),
+        ("value = 0.03", 'value = "x"', "needed a number"),
+        ("[log]\n", "[flight]\nsimulate = 'quadrotor'\n[log]\n", "found both [log] and [flight]"),
+        ('[log]\npath = "flight.bin"', "", "found neither [log] nor [flight]"),
+        ('[log]\npath = "flight.bin"', "[flight]\nsimulate = 'ufo'", "one of 'quadrotor'"),
+        ('[log]\npath = "flight.bin"', "[[log]]", "log does not fit: found [{}]; needed a table"),
+        ("[fit]", "[fit", "the study file is no TOML"),
+        ("seed = 7", "seed = 7\nwindows_s = []", "[fit]: there is no key 'windows_s'"),
+        ('compare = ["composite"]', "windows_s = []", "needed a list of numbers"),
+    ],
+)
+def test_each_fault_is_named(tmp_path: Path, old: str, new: str, said: str) -> None:
+    assert GOOD.count(old) == 1
+    with pytest.raises(StudyError, match=re.escape(said)):
+        read_settings(_write(tmp_path, GOOD.replace(old, new)))
+
+
+def test_a_study_without_models_has_nothing_to_do(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="nothing to identify"):
+        read_settings(_write(tmp_path, GOOD.split("[[model]]", maxsplit=1)[0]))
+
+
+def test_segments_that_are_no_tables(tmp_path: Path) -> None:
+    text = "segment = 3\n" + GOOD.split("[[segment]]", maxsplit=1)[0]
+    with pytest.raises(StudyError, match=re.escape("needed tables headed [[segment]]")):
+        read_settings(_write(tmp_path, text))
+
+
+def test_a_huge_file_is_not_read(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="too long"):
+        read_settings(_write(tmp_path, GOOD + "#" * (1 << 20)))
+
+
+def test_deep_nesting_is_an_error_not_a_crash(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="no TOML"):
+        read_settings(_write(tmp_path, "x = " + "[" * 5000 + "]" * 5000))
+
+
+@given(st.text(max_size=200))
+def test_any_text_is_a_study_error(tmp_path_factory: pytest.TempPathFactory, text: str) -> None:
+    path = tmp_path_factory.mktemp("any") / "study.toml"
+    path.write_bytes(text.encode("utf-8", "replace"))
+    with pytest.raises(StudyError):
+        read_settings(path)
