@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from flightid.version import VERSION as __version__
 
 if TYPE_CHECKING:
+    from flightid import excitation
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.record import Channel, Record
@@ -26,6 +27,7 @@ _HOMES = {
     "LinearSystem": "flightid.simulation.simulate",
     "Record": "flightid.record",
     "Table": "flightid.table",
+    "excitation": "flightid.excitation",
     "simulate": "flightid.simulation.simulate",
 }
 
@@ -37,6 +39,7 @@ __all__ = [
     "Record",
     "Table",
     "__version__",
+    "excitation",
     "simulate",
 ]
 

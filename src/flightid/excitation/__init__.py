@@ -1,0 +1,38 @@
+"""Excitation: inputs designed for identification, judged before they are flown.
+
+>>> from flightid import excitation
+>>> excitation.doublet(amplitude=0.1, step_s=0.5, sample_rate_hz=50.0)
+Excitation('doublet', 1 input, 350 samples, 50 Hz, 7 s, relative peak factor 1.87)
+"""
+
+from flightid.excitation.excitation import Excitation
+from flightid.excitation.multisine import deal_harmonics, multisine
+from flightid.excitation.multistep import (
+    doublet,
+    modified_3211,
+    multistep,
+    multistep_band,
+    multistep_energy,
+)
+from flightid.excitation.noise import noise, uniform_noise
+from flightid.excitation.prbs import held_density, prbs
+from flightid.excitation.spectrum import Spectrum
+from flightid.excitation.sweep import ardupilot_chirp, sweep
+
+__all__ = [
+    "Excitation",
+    "Spectrum",
+    "ardupilot_chirp",
+    "deal_harmonics",
+    "doublet",
+    "held_density",
+    "modified_3211",
+    "multisine",
+    "multistep",
+    "multistep_band",
+    "multistep_energy",
+    "noise",
+    "prbs",
+    "sweep",
+    "uniform_noise",
+]
