@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.record import Channel, Record
+    from flightid.responses import FrequencyResponse, PairResponse, estimate_response
     from flightid.simulation.simulate import LinearSystem, simulate
     from flightid.table import Table
 
@@ -24,9 +25,12 @@ _HOMES = {
     "Channel": "flightid.record",
     "Finding": "flightid.findings",
     "FlightidError": "flightid.errors",
+    "FrequencyResponse": "flightid.responses",
     "LinearSystem": "flightid.simulation.simulate",
+    "PairResponse": "flightid.responses",
     "Record": "flightid.record",
     "Table": "flightid.table",
+    "estimate_response": "flightid.responses",
     "excitation": "flightid.excitation",
     "simulate": "flightid.simulation.simulate",
 }
@@ -35,10 +39,13 @@ __all__ = [
     "Channel",
     "Finding",
     "FlightidError",
+    "FrequencyResponse",
     "LinearSystem",
+    "PairResponse",
     "Record",
     "Table",
     "__version__",
+    "estimate_response",
     "excitation",
     "simulate",
 ]

@@ -1,0 +1,72 @@
+"""Bands of a measured response: where it can be trusted, and which frequencies to take."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flightid.errors import DataError
+
+
+def usable_band(
+    omega_rad_s: NDArray[np.float64], coherence: NDArray[np.float64], minimum: float = 0.6
+) -> tuple[float, float] | None:
+    """Widest unbroken band, in decades, in which coherence stays at or above a minimum.
+
+    Parameters
+    ----------
+    omega_rad_s, coherence : ndarray, shape (n_f,)
+    minimum : float
+        Smallest coherence γ².
+
+    Returns
+    -------
+    tuple of float, or None
+        Lowest and highest frequency, rad/s; None where fewer than two neighbours reach it.
+
+    Example
+    -------
+    >>> usable_band(np.array([1.0, 2.0, 4.0, 8.0]), np.array([0.2, 0.7, 0.9, 0.5]))
+    (2.0, 4.0)
+    """
+    good = np.concatenate([[False], coherence >= minimum, [False]])
+    edges = np.flatnonzero(np.diff(good.astype(np.int8)))
+    runs = [(a, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - 1 > a]
+    if not runs:
+        return None
+    low, high = max(runs, key=lambda run: omega_rad_s[run[1]] / omega_rad_s[run[0]])
+    return float(omega_rad_s[low]), float(omega_rad_s[high])
+
+
+def nearest(grid: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Index of the grid frequency nearest to each wanted one, on a log scale."""
+    distance = np.abs(np.log(wanted)[:, None] - np.log(grid)[None, :])
+    return np.asarray(np.argmin(distance, axis=1))
+
+
+def choose_frequencies(grid: NDArray[np.float64], omega: ArrayLike | None) -> NDArray[np.intp]:
+    """Indices of the grid frequencies that a band, a log spacing or a list of frequencies means.
+
+    Raises
+    ------
+    DataError
+        No frequency lies in the band, or one is not positive.
+    """
+    if omega is None:
+        return np.arange(len(grid))
+    values = np.atleast_1d(np.asarray(omega, dtype=np.float64))
+    if np.any(values <= 0.0) or not np.all(np.isfinite(values)):
+        raise DataError("frequencies must be positive", found=omega, needed="rad/s above zero")
+    if not (isinstance(omega, tuple) and len(omega) in (2, 3)):
+        return np.unique(nearest(grid, values))
+    inside = np.flatnonzero((grid >= values[0] * (1 - 1e-9)) & (grid <= values[1] * (1 + 1e-9)))
+    if not inside.size:
+        raise DataError(
+            "no frequency of the response lies in the band",
+            found=f"{values[0]:.4g} to {values[1]:.4g} rad/s",
+            needed=f"a part of {grid[0]:.4g} to {grid[-1]:.4g} rad/s",
+        )
+    if len(omega) == 2:
+        return inside
+    wanted = np.geomspace(values[0], values[1], int(values[2]))
+    return np.unique(inside[nearest(grid[inside], wanted)])

@@ -1,0 +1,92 @@
+"""Averaged one-sided auto- and cross-spectra of all channels for one window length."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.responses.transform import HANN_POWER, FoldedBasis, WindowPlan, transform
+
+MAXIMUM_CHUNK = 1 << 22
+"""Largest number of real values of transforms that are held at a time."""
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """Spectral matrix of all channels, averaged over the windows of all records.
+
+    Attributes
+    ----------
+    plan : WindowPlan
+    matrix : ndarray of complex, shape (n_f, n_channels, n_channels)
+        ``G[f, a, b]``: one-sided cross-spectrum of channels a and b, conjugate on a, per Hz.
+    n_windows : int
+        Windows averaged.
+    n_independent : float
+        Windows without overlap that would cover the same samples: what random error depends on.
+    """
+
+    plan: WindowPlan
+    matrix: NDArray[np.complex128]
+    n_windows: int
+    n_independent: float
+
+
+def pieces(
+    samples: NDArray[np.float64], plan: WindowPlan, n_f: int
+) -> Iterator[tuple[int, NDArray[np.float64]]]:
+    """Cut a record into runs of whole windows, none twice, so that memory stays bounded.
+
+    Yields
+    ------
+    tuple of int and ndarray
+        Number of the first window of the piece, and its samples.
+    """
+    count = plan.count(samples.shape[1])
+    step = max(1, MAXIMUM_CHUNK // (2 * n_f * samples.shape[0]))
+    for first in range(0, count, step):
+        last = min(first + step, count)
+        start = first * plan.hop
+        yield first, samples[:, start : start + (last - first - 1) * plan.hop + plan.length]
+
+
+def average_spectra(
+    records: Sequence[NDArray[np.float64]],
+    basis: FoldedBasis,
+    sample_time_s: float,
+    detrend: str,
+) -> Spectra:
+    """Average spectra over every window of every record; no window spans two records.
+
+    Parameters
+    ----------
+    records : sequence of ndarray, each shape (n_channels, n_samples)
+    basis : FoldedBasis
+        Tapered cosines and sines of the window length at the chosen frequencies.
+    sample_time_s : float
+    detrend : {"none", "mean", "line"}
+
+    Returns
+    -------
+    Spectra
+    """
+    plan, n_f = basis.plan, len(basis.cosine)
+    channels = records[0].shape[0]
+    total = np.zeros((n_f, 2 * channels, 2 * channels))
+    for samples in records:
+        for _, piece in pieces(samples, plan, n_f):
+            parts = np.concatenate(transform(piece, basis, detrend), axis=1)
+            total += parts @ parts.transpose(0, 2, 1)
+    n_windows = sum(plan.count(samples.shape[1]) for samples in records)
+    real = total[:, :channels, :channels] + total[:, channels:, channels:]
+    imaginary = total[:, :channels, channels:] - total[:, channels:, :channels]
+    scale = 2.0 * sample_time_s / (HANN_POWER * plan.length * n_windows)
+    return Spectra(
+        plan,
+        scale * (real + 1j * imaginary),
+        n_windows,
+        sum(plan.independent(samples.shape[1]) for samples in records),
+    )

@@ -1,0 +1,79 @@
+"""Spectra, responses and coherences agree with SciPy's, bin for bin, and Parseval holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from flightid import Record, estimate_response
+from flightid.responses.spectra import average_spectra
+from flightid.responses.transform import FoldedBasis, WindowPlan, frames, transform
+from tests.closeness import assert_close
+
+RATE_HZ = 50.0
+
+
+def _arrays(n: int = 3000, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    u = rng.standard_normal(n)
+    y = signal.lfilter([0.2, 0.1], [1.0, -0.7], u) + 0.3 * rng.standard_normal(n)
+    return u, y
+
+
+@pytest.mark.parametrize(("length", "shifts"), [(256, 2), (200, 5), (128, 1), (96, 4)])
+@pytest.mark.parametrize("detrend", ["none", "mean", "line"])
+def test_spectral_matrix_is_that_of_csd(length: int, shifts: int, detrend: str) -> None:
+    u, y = _arrays()
+    bins = np.arange(1, length // 2)
+    basis = FoldedBasis.of(WindowPlan(length, shifts), 2 * np.pi * bins / length)
+    ours = average_spectra([np.array([u, y])], basis, 1 / RATE_HZ, detrend).matrix
+    options = {
+        "fs": RATE_HZ,
+        "window": "hann",
+        "nperseg": length,
+        "noverlap": length - length // shifts,
+        "detrend": {"none": False, "mean": "constant", "line": "linear"}[detrend],
+    }
+    for a, first in enumerate((u, y)):
+        for b, second in enumerate((u, y)):
+            _, theirs = signal.csd(first, second, **options)
+            assert_close(ours[:, a, b], theirs[bins], rtol=1e-9, atol=1e-14, why="same definition")
+
+
+def test_coherence_and_response_are_those_of_scipy() -> None:
+    u, y = _arrays()
+    bins = np.arange(4, 100)
+    omega = 2 * np.pi * bins * RATE_HZ / 256
+    record = Record.from_arrays(np.arange(3000) / RATE_HZ, inputs={"u": u}, outputs={"y": y})
+    ours = estimate_response(record, omega_rad_s=omega, window_s=256 / RATE_HZ)
+    options = {"fs": RATE_HZ, "nperseg": 256, "noverlap": 128}
+    _, uu = signal.welch(u, **options)
+    _, uy = signal.csd(u, y, **options)
+    _, gamma2 = signal.coherence(u, y, **options)
+    assert_close(ours.response[0, 0], (uy / uu)[bins], rtol=1e-9, why="same definition")
+    assert_close(ours.coherence[0, 0], gamma2[bins], rtol=1e-9, why="same definition")
+    assert_close(ours.input_spectrum[0, 0].real, uu[bins], rtol=1e-9, why="same definition")
+
+
+@pytest.mark.parametrize("length", [64, 1000])
+def test_transform_between_bins_is_that_of_the_chirp_z_transform(length: int) -> None:
+    u, _ = _arrays(1000)
+    low, high, count = 0.31, 7.7, 90
+    plan = WindowPlan(length, 2)
+    omega = 2 * np.pi * np.linspace(low, high, count) / RATE_HZ
+    real, imaginary = transform(u[None], FoldedBasis.of(plan, omega), "none")
+    windows = frames(u[None], plan)[0] * plan.taper()
+    theirs = signal.zoom_fft(windows, [low, high], m=count, fs=RATE_HZ, endpoint=True)
+    from_start = np.exp(-0.5j * omega * length)[:, None] * (real + 1j * imaginary)[:, 0]
+    assert_close(from_start, theirs.T, atol=1e-10 * np.abs(theirs).max(), why="both are exact")
+
+
+def test_parseval() -> None:
+    u, _ = _arrays(20000)
+    length = 400
+    bins = np.arange(1, length // 2)
+    basis = FoldedBasis.of(WindowPlan(length, 2), 2 * np.pi * bins / length)
+    density = np.real(average_spectra([u[None]], basis, 1 / RATE_HZ, "none").matrix[:, 0, 0])
+    power = np.sum(density) * RATE_HZ / length
+    assert_close(power, np.var(u), rtol=0.02, why="one-sided spectrum integrates to the power")
