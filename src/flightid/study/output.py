@@ -9,7 +9,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from flightid.errors import StudyError
+from flightid.errors import FileFormatError, StudyError
+from flightid.report.content import Document
+from flightid.report.json import from_dict
 
 RESULTS = "results.json"
 SCHEMA = "flightid.study/1"
@@ -92,3 +94,31 @@ def _exchange(temporary: Path, final: Path) -> None:
         aside.replace(final)
         raise
     shutil.rmtree(aside, ignore_errors=True)
+
+
+def read_report(path: Path) -> Document:
+    """Content tree of an earlier run.
+
+    Parameters
+    ----------
+    path : Path
+        Output folder of a study, or its ``results.json``.
+
+    Returns
+    -------
+    Document
+
+    Raises
+    ------
+    FileFormatError
+        The file holds no results of a study.
+    """
+    results = path / RESULTS if path.is_dir() else path
+    try:
+        values = json.loads(results.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise FileFormatError("not a results file", found=f"{results}: {error}") from error
+    if not isinstance(values, dict) or values.get("schema") != SCHEMA:
+        raise FileFormatError("not a results file", found=str(results), needed=f"schema {SCHEMA}")
+    report = values.get("report")
+    return from_dict(report if isinstance(report, dict) else {})
