@@ -6,6 +6,7 @@
 use pyo3::prelude::*;
 
 pub mod chirp;
+pub mod dataflash;
 pub mod error;
 pub mod linear_simulation;
 
@@ -23,5 +24,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(version, module)?)?;
     chirp::register(module)?;
     linear_simulation::register(module)?;
+    dataflash::register(module)?;
     Ok(())
 }

@@ -1,0 +1,208 @@
+//! Columns on demand: one field of one table, all rows or one instance, scaled to physical numbers.
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+
+use super::format::{Field, Kind, Scale, text};
+use super::{Dataflash, Table};
+
+/// Numbers of an array field in one row.
+const ARRAY_WIDTH: usize = 32;
+
+/// A little-endian number at the start of a slice; None where the slice is too short.
+macro_rules! number {
+    ($type:ty, $bytes:expr) => {
+        $bytes.first_chunk::<{ size_of::<$type>() }>().map(|chunk| <$type>::from_le_bytes(*chunk))
+    };
+}
+
+impl<B: AsRef<[u8]>> Dataflash<B> {
+    /// Scaled numbers of a field, `Kind::width` a row; empty for text.
+    ///
+    /// `instance` keeps the rows whose instance field holds that number.
+    pub fn numbers(&self, table: &Table, field: &Field, instance: Option<i64>) -> Vec<f64> {
+        self.scaled(table, field, field.scale, instance)
+    }
+
+    /// Stamps in seconds; None where the message has no stamp.
+    pub fn stamps(&self, table: &Table, instance: Option<i64>) -> Option<Vec<f64>> {
+        let (field, scale) = table.layout.stamp()?;
+        Some(self.scaled(table, field, scale, instance))
+    }
+
+    /// Texts of a field; empty where it holds numbers.
+    pub fn texts(&self, table: &Table, field: &Field, instance: Option<i64>) -> Vec<String> {
+        let Kind::Text(size) = field.kind else {
+            return Vec::new();
+        };
+        let bytes = self.bytes();
+        self.places(table, instance)
+            .iter()
+            .map(|at| {
+                let start = at + field.offset;
+                text(bytes.get(start..start + size).unwrap_or_default())
+            })
+            .collect()
+    }
+
+    /// Bytes of a text field, its zeros included; empty where it holds numbers.
+    pub fn blocks(&self, table: &Table, field: &Field) -> Vec<&[u8]> {
+        let bytes = self.bytes();
+        table
+            .offsets
+            .iter()
+            .filter_map(|at| bytes.get(at + field.offset..at + field.offset + field.kind.size()))
+            .collect()
+    }
+
+    /// Instance numbers that occur, in rising order; empty where the message has no instance field.
+    pub fn instances(&self, table: &Table) -> Vec<i64> {
+        let Some(field) = instance_field(table) else {
+            return Vec::new();
+        };
+        let mut found = BTreeSet::new();
+        let mut last = None;
+        for at in &table.offsets {
+            let instance = self.integer(*at, field);
+            if last != Some(instance) {
+                found.insert(instance);
+                last = Some(instance);
+            }
+        }
+        found.into_iter().collect()
+    }
+
+    /// Number of rows of an instance, or of all.
+    pub fn rows(&self, table: &Table, instance: Option<i64>) -> usize {
+        self.places(table, instance).len()
+    }
+
+    fn scaled(&self, table: &Table, field: &Field, scale: Scale, only: Option<i64>) -> Vec<f64> {
+        let places = self.places(table, only);
+        let mut values = self.stored(&places, field);
+        match scale {
+            Scale::One => {}
+            Scale::Multiply(factor) => values.iter_mut().for_each(|value| *value *= factor),
+            Scale::Divide(divisor) => values.iter_mut().for_each(|value| *value /= divisor),
+        }
+        values
+    }
+
+    /// Places of the rows of one instance, or of all.
+    fn places<'a>(&self, table: &'a Table, instance: Option<i64>) -> Cow<'a, [usize]> {
+        let Some(wanted) = instance else {
+            return (&table.offsets).into();
+        };
+        let Some(field) = instance_field(table) else {
+            return Vec::new().into();
+        };
+        let keeps = |at: &&usize| self.integer(**at, field) == wanted;
+        let kept: Vec<usize> = table.offsets.iter().filter(keeps).copied().collect();
+        kept.into()
+    }
+
+    fn integer(&self, at: usize, field: &Field) -> i64 {
+        let rest = self.bytes().get(at + field.offset..).unwrap_or_default();
+        match field.kind {
+            Kind::I8 => number!(i8, rest).map(i64::from),
+            Kind::U8 => number!(u8, rest).map(i64::from),
+            Kind::I16 => number!(i16, rest).map(i64::from),
+            Kind::U16 => number!(u16, rest).map(i64::from),
+            Kind::I32 => number!(i32, rest).map(i64::from),
+            Kind::U32 => number!(u32, rest).map(i64::from),
+            _ => None,
+        }
+        .unwrap_or_default()
+    }
+
+    /// Stored numbers as f64. The match stands outside the loop: each kind gets its own tight one.
+    fn stored(&self, places: &[usize], field: &Field) -> Vec<f64> {
+        let bytes = self.bytes();
+        macro_rules! column {
+            ($type:ty, $convert:expr) => {{
+                let convert = $convert;
+                places
+                    .iter()
+                    .map(|at| {
+                        let rest = bytes.get(at + field.offset..).unwrap_or_default();
+                        convert(number!($type, rest).unwrap_or_default())
+                    })
+                    .collect()
+            }};
+        }
+        match field.kind {
+            Kind::I8 => column!(i8, f64::from),
+            Kind::U8 => column!(u8, f64::from),
+            Kind::I16 | Kind::CentiI16 => column!(i16, f64::from),
+            Kind::U16 | Kind::CentiU16 => column!(u16, f64::from),
+            Kind::F16 => column!(u16, half),
+            Kind::I32 | Kind::CentiI32 | Kind::Degrees7 => column!(i32, f64::from),
+            Kind::U32 | Kind::CentiU32 => column!(u32, f64::from),
+            Kind::I64 => column!(i64, |value| value as f64),
+            Kind::U64 => column!(u64, |value| value as f64),
+            Kind::F32 => column!(f32, f64::from),
+            Kind::F64 => column!(f64, |value| value),
+            Kind::Array => arrays(bytes, places, field),
+            Kind::Text(_) => Vec::new(),
+        }
+    }
+}
+
+/// The field that `FMTU` marks, if it is an integer that can number instances.
+fn instance_field(table: &Table) -> Option<&Field> {
+    table.layout.fields.iter().find(|field| {
+        field.is_instance
+            && matches!(
+                field.kind,
+                Kind::I8 | Kind::U8 | Kind::I16 | Kind::U16 | Kind::I32 | Kind::U32
+            )
+    })
+}
+
+fn arrays(bytes: &[u8], places: &[usize], field: &Field) -> Vec<f64> {
+    let mut values = Vec::with_capacity(places.len() * ARRAY_WIDTH);
+    for at in places {
+        let start = at + field.offset;
+        let row = bytes.get(start..start + 2 * ARRAY_WIDTH).unwrap_or_default();
+        values.extend(
+            row.chunks_exact(2).map(|pair| f64::from(number!(i16, pair).unwrap_or_default())),
+        );
+    }
+    values
+}
+
+/// IEEE 754 half precision to double: exact.
+fn half(bits: u16) -> f64 {
+    let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
+    let exponent = i32::from((bits >> 10) & 0x1F);
+    let fraction = f64::from(bits & 0x03FF);
+    sign * match exponent {
+        0 => fraction * 2f64.powi(-24),
+        31 if fraction == 0.0 => f64::INFINITY,
+        31 => f64::NAN,
+        _ => (1.0 + fraction / 1024.0) * 2f64.powi(exponent - 15),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::half;
+
+    #[test]
+    fn half_precision_matches_the_values_of_ieee_754() {
+        for (bits, value) in [
+            (0x0000, 0.0),
+            (0x3C00, 1.0),
+            (0xC000, -2.0),
+            (0x7BFF, 65504.0),
+            (0x0400, 6.103_515_625e-5),
+            (0x0001, 5.960_464_477_539_063e-8),
+            (0x3555, 0.333_251_953_125),
+            (0x7C00, f64::INFINITY),
+            (0xFC00, f64::NEG_INFINITY),
+        ] {
+            assert_eq!(half(bits), value, "{bits:04x}");
+        }
+        assert!(half(0x7E00).is_nan());
+    }
+}
