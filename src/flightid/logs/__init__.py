@@ -2,6 +2,7 @@
 
 from flightid.logs.log import Log
 from flightid.logs.log_table import LogTable
+from flightid.logs.reader import read_log
 from flightid.logs.source import ByteRange, Event, Gap, LogSource, MessageInfo, ParameterChange
 
 __all__ = [
@@ -13,4 +14,5 @@ __all__ = [
     "LogTable",
     "MessageInfo",
     "ParameterChange",
+    "read_log",
 ]

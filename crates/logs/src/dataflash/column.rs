@@ -21,13 +21,20 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
     ///
     /// `instance` keeps the rows whose instance field holds that number.
     pub fn numbers(&self, table: &Table, field: &Field, instance: Option<i64>) -> Vec<f64> {
-        self.scaled(table, field, field.scale, instance)
+        let places = self.places(table, instance);
+        let mut values = self.stored(&places, field);
+        match field.scale {
+            Scale::One => {}
+            Scale::Multiply(factor) => values.iter_mut().for_each(|value| *value *= factor),
+            Scale::Divide(divisor) => values.iter_mut().for_each(|value| *value /= divisor),
+        }
+        values
     }
 
     /// Stamps in seconds; None where the message has no stamp.
     pub fn stamps(&self, table: &Table, instance: Option<i64>) -> Option<Vec<f64>> {
-        let (field, scale) = table.layout.stamp()?;
-        Some(self.scaled(table, field, scale, instance))
+        let field = table.layout.stamp()?;
+        Some(self.numbers(table, field, instance))
     }
 
     /// Texts of a field; empty where it holds numbers.
@@ -60,32 +67,21 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
         let Some(field) = instance_field(table) else {
             return Vec::new();
         };
-        let mut found = BTreeSet::new();
-        let mut last = None;
-        for at in &table.offsets {
-            let instance = self.integer(*at, field);
-            if last != Some(instance) {
-                found.insert(instance);
-                last = Some(instance);
+        if field.kind == Kind::U8 {
+            let mut seen = [false; 256];
+            for at in &table.offsets {
+                seen[usize::from(self.bytes().get(at + field.offset).copied().unwrap_or(0))] = true;
             }
+            return (0..256).zip(seen).filter(|(_, seen)| *seen).map(|(id, _)| id).collect();
         }
+        let found: BTreeSet<i64> =
+            table.offsets.iter().map(|at| self.integer(*at, field)).collect();
         found.into_iter().collect()
     }
 
     /// Number of rows of an instance, or of all.
     pub fn rows(&self, table: &Table, instance: Option<i64>) -> usize {
         self.places(table, instance).len()
-    }
-
-    fn scaled(&self, table: &Table, field: &Field, scale: Scale, only: Option<i64>) -> Vec<f64> {
-        let places = self.places(table, only);
-        let mut values = self.stored(&places, field);
-        match scale {
-            Scale::One => {}
-            Scale::Multiply(factor) => values.iter_mut().for_each(|value| *value *= factor),
-            Scale::Divide(divisor) => values.iter_mut().for_each(|value| *value /= divisor),
-        }
-        values
     }
 
     /// Places of the rows of one instance, or of all.

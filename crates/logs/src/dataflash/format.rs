@@ -217,15 +217,24 @@ impl Layout {
                 .all(|(a, b)| a.name == b.name && a.code == b.code)
     }
 
-    /// Where the stamp is, if the message has one, and what takes it to seconds.
-    pub fn stamp(&self) -> Option<(&Field, Scale)> {
-        let named = |name: &str| self.fields.iter().find(|field| field.name == name);
-        match named("TimeUS") {
-            Some(field) => Some((field, Scale::Divide(1e6))),
-            None => named("TimeMS").map(|field| (field, Scale::Divide(1e3))),
-        }
-        .filter(|(field, _)| field.kind.width() == 1)
+    /// The field that holds the stamp; its scale takes it to seconds.
+    pub fn stamp(&self) -> Option<&Field> {
+        self.fields.iter().find(|field| stamp_scale(&field.name, field.kind).is_some())
     }
+}
+
+/// Stamps are known by their name: logs without units have them too.
+fn stamp_scale(name: &str, kind: Kind) -> Option<Scale> {
+    match (name, kind.width()) {
+        ("TimeUS", 1) => Some(Scale::Divide(1e6)),
+        ("TimeMS", 1) => Some(Scale::Divide(1e3)),
+        _ => None,
+    }
+}
+
+/// The scale that holds whatever `FMTU` says, where there is one.
+pub fn fixed_scale(name: &str, kind: Kind) -> Option<Scale> {
+    kind.own_scale().or_else(|| stamp_scale(name, kind))
 }
 
 /// Read a `FMT` message (header included, `FMT_SIZE` bytes).
@@ -259,8 +268,8 @@ fn fields(format: &[u8], columns: &str) -> Option<Vec<Field>> {
                 code: char::from(code),
                 kind,
                 offset,
-                scale: kind.own_scale().unwrap_or(Scale::One),
-                unit: String::new(),
+                scale: fixed_scale(label, kind).unwrap_or(Scale::One),
+                unit: if stamp_scale(label, kind).is_some() { "s" } else { "" }.to_owned(),
                 is_instance: false,
             });
         }

@@ -34,6 +34,8 @@ pub enum SkipReason {
     CutShort(u8),
     /// The file ends inside a message.
     Truncated(u8),
+    /// The file ends inside a header.
+    EndsInHeader,
     /// One byte repeated: the unwritten rest of a block.
     Filling(u8),
 }
@@ -46,6 +48,7 @@ impl std::fmt::Display for SkipReason {
             Self::BadDefinition(id) => write!(f, "the FMT of message type {id} cannot be used"),
             Self::CutShort(id) => write!(f, "message of type {id} cut short by the next"),
             Self::Truncated(id) => write!(f, "the file ends inside a message of type {id}"),
+            Self::EndsInHeader => write!(f, "the file ends inside a message header"),
             Self::Filling(byte) => write!(f, "filled with 0x{byte:02x}"),
         }
     }
@@ -246,7 +249,7 @@ impl<'a> Scanner<'a> {
     fn adopt(&mut self, layout: Layout) {
         let slot = usize::from(layout.type_id);
         let stamp = match layout.stamp() {
-            Some((field, _)) if field.name == "TimeUS" && field.kind.size() == 8 => field.offset,
+            Some(field) if field.name == "TimeUS" && field.kind.size() == 8 => field.offset,
             _ => 0,
         };
         let same = |table: &Table| table.layout.agrees_with(&layout);
@@ -267,6 +270,9 @@ impl<'a> Scanner<'a> {
         match self.bytes.get(start..stop) {
             Some([HEADER_1, HEADER_2, type_id, ..]) if self.known(*type_id).size == 0 => {
                 SkipReason::UnknownType(*type_id)
+            }
+            Some([HEADER_1] | [HEADER_1, HEADER_2]) if stop == self.bytes.len() => {
+                SkipReason::EndsInHeader
             }
             Some([first, rest @ ..]) if rest.iter().all(|byte| byte == first) => {
                 SkipReason::Filling(*first)

@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use super::format::{Scale, terminated, text};
+use super::format::{Scale, fixed_scale, terminated, text};
 use super::{Kind, Table};
 
 /// Character of `FMTU` that marks the instance field.
@@ -34,11 +34,13 @@ pub fn declare(bytes: &[u8], tables: &mut [Table]) {
             for (index, field) in table.layout.fields.iter_mut().enumerate() {
                 let unit_id = unit_ids.get(index).copied().unwrap_or(b'-');
                 field.is_instance = unit_id == INSTANCE;
-                field.unit = units.get(&unit_id).cloned().unwrap_or_default();
+                if let Some(unit) = units.get(&unit_id).filter(|unit| !unit.is_empty()) {
+                    field.unit.clone_from(unit);
+                }
                 let declared = multiplier_ids.get(index).and_then(|id| scales.get(id));
                 // The storage's own scale holds even where FMTU says otherwise: old firmware
                 // declared "1" for hundredths.
-                if let (None, Some(scale)) = (field.kind.own_scale(), declared) {
+                if let (None, Some(scale)) = (fixed_scale(&field.name, field.kind), declared) {
                     field.scale = *scale;
                 }
             }

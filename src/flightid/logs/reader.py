@@ -1,0 +1,78 @@
+"""Open a log by what it contains, never by what its name ends in."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from flightid.errors import LogFormatError
+from flightid.logs.dataflash import open_dataflash
+from flightid.logs.log import Log
+from flightid.logs.source import LogSource
+
+ULOG_MAGIC = b"ULog\x01\x12\x35"
+DATAFLASH_HEADER = b"\xa3\x95"
+SNIFFED = 65536
+"""Bytes searched for a first DataFlash header: a log whose beginning is damaged is still a log."""
+
+# Content test, name of the format, opener.
+_FORMATS: tuple[tuple[Callable[[bytes], bool], str, Callable[[Path], LogSource]], ...] = (
+    (lambda head: DATAFLASH_HEADER in head, "ArduPilot DataFlash", open_dataflash),
+)
+# Contents that people do hand in, and what to do with them.
+_FOREIGN: tuple[tuple[bytes, str, str], ...] = (
+    (b"\x1f\x8b", "gzip data", "unpack it first"),
+    (b"PK\x03\x04", "a zip archive", "unpack it first"),
+    (b"FMT,", "an ArduPilot text log", "hand in the .bin file that it was made from"),
+    (b"\xfd", "a MAVLink telemetry stream", "hand in the log of the autopilot itself"),
+    (b"H Product:Blackbox", "a Betaflight blackbox log", "convert it to CSV with blackbox_decode"),
+)
+
+
+def read_log(path: str | Path) -> Log:
+    """Open a flight log: ArduPilot DataFlash or PX4 ULog, told apart by their content.
+
+    The file is indexed once; columns are extracted when they are asked for. Damaged places are
+    skipped and reported in `Log.skipped`.
+
+    Parameters
+    ----------
+    path : path-like
+        The file. Its name does not matter.
+
+    Returns
+    -------
+    Log
+
+    Raises
+    ------
+    LogFormatError
+        The content is no log that flightid reads; the message says what it looks like.
+    OSError
+        The file cannot be read.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> log = fid.read_log("flight.bin")                             # doctest: +SKIP
+    >>> log.messages["RATE"].rate_hz                                 # doctest: +SKIP
+    400.0
+    """
+    path = Path(path)
+    with path.open("rb") as file:
+        head = file.read(SNIFFED)
+    for holds, _, open_source in _FORMATS:
+        if holds(head):
+            return Log(path, open_source(path))
+    raise _not_a_log(path, head)
+
+
+def _not_a_log(path: Path, head: bytes) -> LogFormatError:
+    found, action = "an empty file", "copy the log from the vehicle again"
+    if head:
+        found, action = f"first bytes {head[:8].hex(' ')}", "hand in the autopilot's own log file"
+        for magic, what, advice in _FOREIGN:
+            if head.startswith(magic):
+                found, action = what, advice
+    formats = " or ".join(name for _, name, _ in _FORMATS)
+    return LogFormatError(f"{path.name} is not a log", found=found, needed=formats, action=action)
