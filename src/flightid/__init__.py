@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from flightid import excitation
     from flightid.errors import FlightidError
     from flightid.findings import Finding
+    from flightid.logs import Log, LogTable, read_log
     from flightid.record import Channel, Record
     from flightid.responses import FrequencyResponse, PairResponse, estimate_response
     from flightid.simulation.simulate import LinearSystem, simulate
@@ -27,11 +28,14 @@ _HOMES = {
     "FlightidError": "flightid.errors",
     "FrequencyResponse": "flightid.responses",
     "LinearSystem": "flightid.simulation.simulate",
+    "Log": "flightid.logs",
+    "LogTable": "flightid.logs",
     "PairResponse": "flightid.responses",
     "Record": "flightid.record",
     "Table": "flightid.table",
     "estimate_response": "flightid.responses",
     "excitation": "flightid.excitation",
+    "read_log": "flightid.logs",
     "simulate": "flightid.simulation.simulate",
 }
 
@@ -41,12 +45,15 @@ __all__ = [
     "FlightidError",
     "FrequencyResponse",
     "LinearSystem",
+    "Log",
+    "LogTable",
     "PairResponse",
     "Record",
     "Table",
     "__version__",
     "estimate_response",
     "excitation",
+    "read_log",
     "simulate",
 ]
 
