@@ -23,4 +23,16 @@ pub enum LogError {
         /// The names that exist, shortened.
         available: String,
     },
+    /// A log of the right kind that asks for something this reader cannot do.
+    #[error("{what} cannot be read")]
+    Unsupported {
+        /// What it asks for.
+        what: String,
+    },
+    /// The bytes are not those that were indexed.
+    #[error("the log changed while it was read: no sample at byte {at}")]
+    Changed {
+        /// Where a sample was.
+        at: u64,
+    },
 }

@@ -5,5 +5,10 @@
 
 pub mod dataflash;
 pub mod error;
+pub mod ulog;
+mod ulog_columns;
+pub mod ulog_entry;
+pub mod ulog_format;
+pub mod ulog_record;
 
 pub use error::LogError;

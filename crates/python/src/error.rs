@@ -35,5 +35,6 @@ pub fn from_logs(error: LogError) -> PyErr {
     match error {
         LogError::NotALog { .. } => raise("LogFormatError", message),
         LogError::Missing { .. } => raise("MissingColumnError", message),
+        LogError::Unsupported { .. } | LogError::Changed { .. } => raise("LogFormatError", message),
     }
 }

@@ -1,0 +1,299 @@
+//! PX4 ULog: bytes to an index of what the log holds (Python side: `logs/ulog.py`).
+//!
+//! The record walk is our own. The crate `px4-ulog` 0.6.1, which the tests use as a cross-check, stops
+//! for good at the first record that it cannot read, keeps no place to resume from, and panics on a
+//! parameter whose key length exceeds the record, so nothing can be built around it that a stranger's
+//! damaged file would not bring down. Here every record is judged before it is believed
+//! (`ulog_record.rs`); after damage the walk resumes at the next record that can be vouched for, and
+//! every byte range that was not read is listed with its reason.
+//!
+//! Memory: an offset of eight bytes for each sample, and entries in proportion to their records.
+
+use std::collections::HashMap;
+
+use crate::LogError;
+use crate::ulog_entry::{self, Entry, Line};
+use crate::ulog_format::{Formats, Shape, is_message_name};
+use crate::ulog_record::{
+    Known, Reason, Worth, carries_on, is_one_damaged_record, judge, next_record,
+};
+
+const MAGIC: [u8; 7] = [0x55, 0x4c, 0x6f, 0x67, 0x01, 0x12, 0x35];
+const HEADER: usize = 16;
+/// Length of the payload of a flag record: compatible, incompatible flags, three offsets.
+const FLAGS: usize = 40;
+const NO_TABLE: u32 = u32::MAX;
+
+/// Bytes that were not read, `start..stop`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Skipped {
+    /// First byte.
+    pub start: usize,
+    /// First byte after.
+    pub stop: usize,
+    /// Why.
+    pub reason: Reason,
+}
+
+/// All samples of one instance of one message.
+#[derive(Debug, Clone)]
+pub struct Table {
+    /// Name of the message.
+    pub name: Box<str>,
+    /// Instance (0 for the first sensor of a kind).
+    pub instance: u8,
+    /// Place of each sample's payload in the file, message number excluded.
+    pub offsets: Vec<u64>,
+    pub(crate) shape: Shape,
+}
+
+/// Something that happened at a time of the boot clock.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stamped<T> {
+    /// Microseconds of the boot clock: the last sample's stamp before it.
+    pub stamp_us: u64,
+    /// What happened.
+    pub item: T,
+}
+
+/// Index of a log: what it holds and where.
+#[derive(Debug, Clone, Default)]
+pub struct Ulog {
+    /// Version byte of the header.
+    pub version: u8,
+    /// Microseconds of the boot clock when logging started.
+    pub start_us: u64,
+    /// Definitions of the messages.
+    pub formats: Formats,
+    /// Samples by message and instance, in order of announcement.
+    pub tables: Vec<Table>,
+    /// Information entries, in order.
+    pub infos: Vec<Entry>,
+    /// Parts of multiple-information entries with "continues the one before".
+    pub multi_infos: Vec<(bool, Entry)>,
+    /// Parameters when logging started.
+    pub parameters: Vec<Entry>,
+    /// Default values, with the bits that say whose default (1 system, 2 this airframe).
+    pub defaults: Vec<(u8, Entry)>,
+    /// Parameters set while logging.
+    pub changes: Vec<Stamped<Entry>>,
+    /// Lines of text, plain and tagged.
+    pub lines: Vec<Line>,
+    /// Times during which the logger lost samples, ms.
+    pub dropouts: Vec<Stamped<u16>>,
+    /// Number of synchronisation records.
+    pub syncs: u64,
+    /// Where crash data was appended.
+    pub appended: Vec<usize>,
+    /// Bytes that were not read.
+    pub skipped: Vec<Skipped>,
+    by_id: Vec<u32>,
+    by_key: HashMap<(Box<str>, u8), u32>,
+    shapes: HashMap<Box<str>, Option<Shape>>,
+    in_data: bool,
+    last_us: u64,
+    last_sample: Option<(u32, usize, usize)>,
+}
+
+impl Known for Ulog {
+    fn sizes(&self, id: u16) -> Option<(usize, usize)> {
+        let table = *self.by_id.get(usize::from(id))?;
+        let shape = self.tables.get(table as usize)?.shape;
+        Some((shape.least, shape.most))
+    }
+
+    fn defines(&self, name: &[u8]) -> bool {
+        is_message_name(name)
+            && std::str::from_utf8(name).is_ok_and(|name| self.formats.contains(name))
+    }
+}
+
+impl Ulog {
+    /// Walk through a log once.
+    pub fn index(bytes: &[u8]) -> Result<Self, LogError> {
+        let head = bytes.get(..HEADER).filter(|head| head.starts_with(&MAGIC));
+        let Some((_, [version, stamp @ ..])) = head.and_then(|head| head.split_at_checked(7))
+        else {
+            return Err(LogError::NotALog {
+                expected: "PX4 ULog",
+                found: format!("first bytes {:02x?}", &bytes[..bytes.len().min(7)]),
+            });
+        };
+        let mut log = Self {
+            version: *version,
+            start_us: little_endian(stamp),
+            last_us: little_endian(stamp),
+            by_id: vec![NO_TABLE; 1 << 16],
+            ..Self::default()
+        };
+        log.read_flags(bytes)?;
+        let mut start = HEADER;
+        for stop in log.appended.clone() {
+            log.walk(&bytes[..stop], start, Reason::CutByAppended);
+            start = stop;
+        }
+        log.walk(bytes, start, Reason::Truncated);
+        Ok(log)
+    }
+
+    /// The flag record comes first or not at all; flags that change the format end the reading.
+    fn read_flags(&mut self, bytes: &[u8]) -> Result<(), LogError> {
+        let Some(flags) = bytes
+            .get(HEADER..)
+            .filter(|rest| rest.get(2) == Some(&b'B'))
+            .and_then(|rest| rest.get(3..3 + FLAGS))
+        else {
+            return Ok(());
+        };
+        let incompatible = little_endian(&flags[8..16]);
+        if incompatible & !1 != 0 {
+            return Err(LogError::Unsupported {
+                what: format!("ULog with incompatible flags {incompatible:#x}"),
+            });
+        }
+        if incompatible & 1 == 1 {
+            for place in flags[16..].chunks_exact(8).map(little_endian) {
+                let after = self.appended.last().copied().unwrap_or(HEADER);
+                match usize::try_from(place) {
+                    Ok(place) if place > after && place <= bytes.len() => self.appended.push(place),
+                    _ => {}
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn walk(&mut self, bytes: &[u8], start: usize, at_end: Reason) {
+        let mut at = start;
+        while at < bytes.len() {
+            let found = judge(bytes, at, self, false);
+            match found.worth {
+                Worth::Certain | Worth::Valid => {
+                    self.accept(bytes, at, found.kind, found.stop);
+                    at = found.stop;
+                }
+                Worth::Doubtful(reason) if carries_on(bytes, found.stop, self) => {
+                    self.skip(at, found.stop, reason);
+                    at = found.stop;
+                }
+                worth => at = self.resume(bytes, at, worth, at_end),
+            }
+        }
+    }
+
+    /// Go on behind damage at `at`; returns the place of the next record.
+    fn resume(&mut self, bytes: &[u8], at: usize, worth: Worth, at_end: Reason) -> usize {
+        let next = next_record(bytes, at + 1, self);
+        if next == bytes.len() && worth == Worth::Cut {
+            self.skip(at, next, at_end);
+            return next;
+        }
+        if let Some((table, start, stop)) = self.last_sample.take()
+            && stop == at
+            && !is_one_damaged_record(&bytes[at..next], self)
+            && let Some(table) = self.tables.get_mut(table as usize)
+        {
+            table.offsets.pop();
+            self.skip(start, stop, Reason::Suspect);
+        }
+        self.skip(at, next, Reason::Unreadable);
+        next
+    }
+
+    fn skip(&mut self, start: usize, stop: usize, reason: Reason) {
+        match self.skipped.last_mut() {
+            Some(last) if last.stop == start && last.reason == reason => last.stop = stop,
+            _ => self.skipped.push(Skipped { start, stop, reason }),
+        }
+    }
+
+    fn accept(&mut self, bytes: &[u8], at: usize, kind: u8, stop: usize) {
+        let payload = &bytes[at + 3..stop];
+        self.in_data |= matches!(kind, b'A' | b'C' | b'D' | b'L');
+        match kind {
+            b'D' => self.accept_sample(payload, at, stop),
+            b'A' if !self.announce(payload) => self.skip(at, stop, Reason::UnknownFormat),
+            b'F' => {
+                self.formats.add(payload);
+            }
+            b'I' => self.infos.extend(ulog_entry::read(payload)),
+            b'M' => self
+                .multi_infos
+                .extend(flagged(payload).map(|(first, entry)| (first & 1 == 1, entry))),
+            b'Q' => self.defaults.extend(flagged(payload)),
+            b'P' if self.in_data => {
+                self.changes.extend(
+                    ulog_entry::read(payload).map(|item| Stamped { stamp_us: self.last_us, item }),
+                );
+            }
+            b'P' => self.parameters.extend(ulog_entry::read(payload)),
+            b'L' | b'C' => self.lines.extend(Line::read(payload, kind == b'C')),
+            b'O' => self.dropouts.push(Stamped {
+                stamp_us: self.last_us,
+                item: u16::from_le_bytes([payload[0], payload[1]]),
+            }),
+            b'S' => self.syncs += 1,
+            _ => {}
+        }
+        if kind != b'D' {
+            self.last_sample = None;
+        }
+    }
+
+    fn accept_sample(&mut self, payload: &[u8], at: usize, stop: usize) {
+        let Some((id, sample)) = payload.split_first_chunk::<2>() else {
+            return;
+        };
+        let index = self.by_id[usize::from(u16::from_le_bytes(*id))];
+        let Some(table) = self.tables.get_mut(index as usize) else {
+            return;
+        };
+        table.offsets.push((at + 5) as u64);
+        self.last_sample = Some((index, at, stop));
+        let stamp = table.shape.stamp.and_then(|(primitive, offset)| {
+            primitive.unsigned(sample.get(offset..offset + primitive.size())?)
+        });
+        self.last_us = self.last_us.max(stamp.unwrap_or(0));
+    }
+
+    /// Give a message number to an instance of a message; false where it has no usable definition.
+    fn announce(&mut self, payload: &[u8]) -> bool {
+        let &[instance, low, high, ref name @ ..] = payload else {
+            return false;
+        };
+        let Ok(name) = std::str::from_utf8(name) else {
+            return false;
+        };
+        let shape = match self.shapes.get(name) {
+            Some(shape) => *shape,
+            None => {
+                let shape = self.formats.shape(name);
+                self.shapes.insert(name.into(), shape);
+                shape
+            }
+        };
+        let Some(shape) = shape else {
+            return false;
+        };
+        let key = (Box::from(name), instance);
+        let index = *self.by_key.entry(key).or_insert_with(|| {
+            self.tables.push(Table { name: name.into(), instance, offsets: Vec::new(), shape });
+            (self.tables.len() - 1) as u32
+        });
+        self.by_id[usize::from(u16::from_le_bytes([low, high]))] = index;
+        true
+    }
+}
+
+fn flagged(payload: &[u8]) -> Option<(u8, Entry)> {
+    let (&first, rest) = payload.split_first()?;
+    ulog_entry::read(rest).map(|entry| (first, entry))
+}
+
+fn little_endian(bytes: &[u8]) -> u64 {
+    let mut wide = [0_u8; 8];
+    for (target, source) in wide.iter_mut().zip(bytes) {
+        *target = *source;
+    }
+    u64::from_le_bytes(wide)
+}
