@@ -126,8 +126,7 @@ impl Ulog {
             by_id: vec![NO_TABLE; 1 << 16],
             ..Self::default()
         };
-        log.read_flags(bytes)?;
-        let mut start = HEADER;
+        let mut start = log.read_flags(bytes)?;
         for stop in log.appended.clone() {
             log.walk(&bytes[..stop], start, Reason::CutByAppended);
             start = stop;
@@ -136,14 +135,15 @@ impl Ulog {
         Ok(log)
     }
 
-    /// The flag record comes first or not at all; flags that change the format end the reading.
-    fn read_flags(&mut self, bytes: &[u8]) -> Result<(), LogError> {
-        let Some(flags) = bytes
-            .get(HEADER..)
-            .filter(|rest| rest.get(2) == Some(&b'B'))
-            .and_then(|rest| rest.get(3..3 + FLAGS))
-        else {
-            return Ok(());
+    /// The flag record comes first or not at all; returns where the records after it start. Flags
+    /// that change the format end the reading.
+    fn read_flags(&mut self, bytes: &[u8]) -> Result<usize, LogError> {
+        let Some(([low, high, b'B'], rest)) = bytes[HEADER..].split_first_chunk::<3>() else {
+            return Ok(HEADER);
+        };
+        let length = usize::from(u16::from_le_bytes([*low, *high]));
+        let Some(flags) = rest.get(..length).filter(|flags| flags.len() >= FLAGS) else {
+            return Ok(HEADER);
         };
         let incompatible = little_endian(&flags[8..16]);
         if incompatible & !1 != 0 {
@@ -152,7 +152,7 @@ impl Ulog {
             });
         }
         if incompatible & 1 == 1 {
-            for place in flags[16..].chunks_exact(8).map(little_endian) {
+            for place in flags[16..FLAGS].chunks_exact(8).map(little_endian) {
                 let after = self.appended.last().copied().unwrap_or(HEADER);
                 match usize::try_from(place) {
                     Ok(place) if place > after && place <= bytes.len() => self.appended.push(place),
@@ -160,7 +160,7 @@ impl Ulog {
                 }
             }
         }
-        Ok(())
+        Ok(HEADER + 3 + length)
     }
 
     fn walk(&mut self, bytes: &[u8], start: usize, at_end: Reason) {

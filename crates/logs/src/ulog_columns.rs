@@ -1,5 +1,8 @@
 //! Columns of a ULog table: samples gathered from their places in the file to 64-bit floats.
 
+use std::borrow::Cow;
+use std::collections::HashMap;
+
 use crate::LogError;
 use crate::ulog::{Table, Ulog};
 use crate::ulog_format::{Column, Primitive};
@@ -8,59 +11,70 @@ use crate::ulog_format::{Column, Primitive};
 const BLOCK: usize = 256;
 
 impl Ulog {
-    /// Columns of a table, in the order of its payload.
-    pub fn columns_of(&self, table: &Table) -> Vec<Column> {
-        self.formats.columns(&table.name)
-    }
-
-    /// Table of a message's instance.
-    pub fn table(&self, name: &str, instance: u8) -> Result<&Table, LogError> {
-        self.tables
-            .iter()
-            .find(|table| &*table.name == name && table.instance == instance)
-            .ok_or_else(|| LogError::Missing {
-                what: "message",
-                name: format!("{name} (instance {instance})"),
-                available: shortened(self.tables.iter().map(|table| table.name.to_string())),
-            })
-    }
-
-    /// Values of the named columns of a table; integers beyond 2^53 are rounded.
+    /// Values of the named columns of an instance, or of all instances in file order. Integers
+    /// beyond 2^53 are rounded.
     pub fn gather(
         &self,
         bytes: &[u8],
-        table: &Table,
+        message: &str,
+        instance: Option<u8>,
         names: &[String],
     ) -> Result<Vec<Vec<f64>>, LogError> {
-        let columns = self.columns_of(table);
+        let offsets = self.offsets(message, instance)?;
+        let columns = self.formats.columns(message);
+        let by_name: HashMap<&str, &Column> =
+            columns.iter().map(|column| (column.name.as_str(), column)).collect();
         let wanted = names
             .iter()
-            .map(|name| {
-                columns.iter().find(|column| column.name == *name).ok_or_else(|| {
-                    LogError::Missing {
-                        what: "field",
-                        name: name.clone(),
-                        available: shortened(columns.iter().map(|column| column.name.clone())),
-                    }
-                })
-            })
+            .map(|name| by_name.get(name.as_str()).ok_or_else(|| missing_field(name, &columns)))
             .collect::<Result<Vec<_>, _>>()?;
         let mut values: Vec<Vec<f64>> =
-            wanted.iter().map(|_| Vec::with_capacity(table.offsets.len())).collect();
-        for block in table.offsets.chunks(BLOCK) {
+            wanted.iter().map(|_| Vec::with_capacity(offsets.len())).collect();
+        for block in offsets.chunks(BLOCK) {
             for (column, values) in wanted.iter().zip(&mut values) {
                 gather_block(bytes, block, column, values)?;
             }
         }
         Ok(values)
     }
+
+    fn offsets(&self, message: &str, instance: Option<u8>) -> Result<Cow<'_, [u64]>, LogError> {
+        let chosen: Vec<&Table> = self
+            .tables
+            .iter()
+            .filter(|table| &*table.name == message)
+            .filter(|table| instance.is_none_or(|instance| table.instance == instance))
+            .collect();
+        match chosen.as_slice() {
+            [] => Err(LogError::Missing {
+                what: "message",
+                name: instance.map_or(message.to_string(), |i| format!("{message} instance {i}")),
+                available: shortened(self.tables.iter().map(|table| &*table.name)),
+            }),
+            [table] => Ok(Cow::Borrowed(&table.offsets)),
+            several => {
+                let mut all: Vec<u64> =
+                    several.iter().flat_map(|table| table.offsets.iter().copied()).collect();
+                all.sort_unstable();
+                Ok(Cow::Owned(all))
+            }
+        }
+    }
 }
 
-fn shortened(names: impl Iterator<Item = String>) -> String {
+fn missing_field(name: &str, columns: &[Column]) -> LogError {
+    LogError::Missing {
+        what: "field",
+        name: name.to_string(),
+        available: shortened(columns.iter().map(|column| column.name.as_str())),
+    }
+}
+
+fn shortened<'a>(names: impl Iterator<Item = &'a str>) -> String {
     const SHOWN: usize = 12;
-    let mut shown: Vec<String> = names.take(SHOWN + 1).collect();
+    let mut shown: Vec<&str> = names.take(SHOWN + 1).collect();
     if shown.len() > SHOWN {
-        shown[SHOWN] = "…".to_string();
+        shown[SHOWN] = "…";
     }
     shown.join(", ")
 }

@@ -9,6 +9,7 @@ pub mod chirp;
 pub mod dataflash;
 pub mod error;
 pub mod linear_simulation;
+pub mod ulog;
 
 /// version() -> str
 ///
@@ -25,5 +26,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     chirp::register(module)?;
     linear_simulation::register(module)?;
     dataflash::register(module)?;
+    ulog::register(module)?;
     Ok(())
 }

@@ -1,0 +1,53 @@
+"""Names for the numbers that PX4 logs, from its message definitions and MAVLink's enumerations."""
+
+from __future__ import annotations
+
+LEVELS = {
+    0: "emergency",
+    1: "alert",
+    2: "critical",
+    3: "error",
+    4: "warning",
+    5: "notice",
+    6: "info",
+    7: "debug",
+}
+"""Severity of a logged line; the log writes the digit as a character."""
+
+MODES = {
+    0: "MANUAL",
+    1: "ALTCTL",
+    2: "POSCTL",
+    3: "AUTO_MISSION",
+    4: "AUTO_LOITER",
+    5: "AUTO_RTL",
+    10: "ACRO",
+    12: "DESCEND",
+    13: "TERMINATION",
+    14: "OFFBOARD",
+    15: "STAB",
+    17: "AUTO_TAKEOFF",
+    18: "AUTO_LAND",
+    19: "AUTO_FOLLOW_TARGET",
+    20: "AUTO_PRECLAND",
+    21: "ORBIT",
+}
+"""vehicle_status.nav_state."""
+
+ARMED = {0: "init", 1: "disarmed", 2: "armed", 3: "armed with error", 4: "disarmed with error"}
+"""vehicle_status.arming_state; newer firmware uses 1 and 2 only."""
+
+VEHICLE_TYPES = {1: "copter", 2: "plane", 3: "rover"}
+"""vehicle_status.vehicle_type: rotary wing, fixed wing, rover."""
+
+AIRFRAMES = {
+    1: "plane",
+    2: "copter",
+    3: "copter",
+    4: "heli",
+    10: "rover",
+    13: "copter",
+    14: "copter",
+    15: "copter",
+}
+"""MAV_TYPE of MAVLink."""
