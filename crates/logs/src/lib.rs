@@ -10,5 +10,6 @@ mod ulog_columns;
 pub mod ulog_entry;
 pub mod ulog_format;
 pub mod ulog_record;
+pub mod ulog_scalar;
 
 pub use error::LogError;

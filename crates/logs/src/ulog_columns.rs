@@ -5,7 +5,8 @@ use std::collections::HashMap;
 
 use crate::LogError;
 use crate::ulog::{Table, Ulog};
-use crate::ulog_format::{Column, Primitive};
+use crate::ulog_format::Column;
+use crate::ulog_scalar::Primitive;
 
 /// Rows gathered for all columns before the next ones: their bytes stay in the first-level cache.
 const BLOCK: usize = 256;
