@@ -10,16 +10,21 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.conventions import Role
-from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
+from flightid.errors import DataError, OptionError
 from flightid.record.channel import Channel
+from flightid.record.display import plain_values, summary_table
 from flightid.record.history import Step
-from flightid.table import Cell, Column, Table
+from flightid.record.stamps import UNIFORM_TOLERANCE
+from flightid.record.validation import (
+    TIME,
+    labelled_variable,
+    require_finite,
+    uniform_sample_time,
+    unknown_channel,
+)
+from flightid.table import Cell, Table
 from flightid.units import DIMENSIONLESS, convert
 from flightid.version import VERSION
-
-TIME = "time_s"
-MAXIMUM_JITTER = 1e-3
-"""Largest departure of a stamp from the uniform grid, in sample times, that counts as rounding."""
 
 
 class Record:
@@ -60,7 +65,7 @@ class Record:
         trim: Mapping[str, float] | None = None,
         history: Iterable[Step] = (),
     ) -> None:
-        self._sample_time_s = _uniform_sample_time(np.asarray(dataset[TIME].values))
+        self._sample_time_s = uniform_sample_time(np.asarray(dataset[TIME].values))
         self._channels = {
             str(key): Channel(
                 str(key),
@@ -71,7 +76,7 @@ class Record:
             for key, variable in dataset.data_vars.items()
         }
         for key in self._channels:
-            _require_finite(key, np.asarray(dataset[key].values))
+            require_finite(key, np.asarray(dataset[key].values))
         frozen = dataset.copy(deep=True)
         for variable in frozen.variables.values():
             variable.values.flags.writeable = False
@@ -90,6 +95,7 @@ class Record:
         excitations: Mapping[str, ArrayLike] | None = None,
         others: Mapping[str, ArrayLike] | None = None,
         units: Mapping[str, str] | None = None,
+        notes: Mapping[str, str] | None = None,
         trim: Mapping[str, float] | None = None,
         name: str = "record",
         history: Iterable[Step] = (),
@@ -104,6 +110,8 @@ class Record:
             Samples by channel name; the argument decides the role.
         units : mapping of str to str, optional
             Unit by channel name; a channel left out is dimensionless.
+        notes : mapping of str to str, optional
+            Where a channel came from, by channel name.
         trim : mapping of str to float, optional
             Trim value by channel name, in the channel's unit.
         name : str
@@ -122,7 +130,7 @@ class Record:
         DataError
             Stamps not uniform, or a sample not finite.
         UnknownNameError
-            A unit or trim value for a channel that is not there.
+            A unit, note or trim value for a channel that is not there.
         """
         stamps = np.array(time_s, dtype=np.float64)
         groups = {
@@ -134,23 +142,16 @@ class Record:
         variables: dict[str, Any] = {}
         for role, group in groups.items():
             for key, samples in group.items():
-                values = np.array(samples, dtype=np.float64)
-                if values.shape != stamps.shape or stamps.ndim != 1:
-                    raise ShapeError(
-                        f"channel {key!r} does not fit the time base",
-                        found=f"shape {values.shape}",
-                        needed=f"shape {stamps.shape}, one-dimensional",
-                    )
                 if key in variables:
                     raise OptionError(
                         "a channel is named twice", found=key, needed="one role for each channel"
                     )
                 unit = (units or {}).get(key, DIMENSIONLESS)
-                channel = Channel(key, unit, role)
-                variables[key] = ((TIME,), values, {"unit": channel.unit, "role": str(role)})
-        for label in (*(units or {}), *(trim or {})):
+                channel = Channel(key, unit, role, (notes or {}).get(key, ""))
+                variables[key] = labelled_variable(channel, samples, stamps)
+        for label in (*(units or {}), *(trim or {}), *(notes or {})):
             if label not in variables:
-                raise _unknown_channel(label, variables)
+                raise unknown_channel(label, variables)
         dataset = xr.Dataset(variables, coords={TIME: stamps})
         return cls(dataset, name=name, trim=trim, history=history)
 
@@ -279,39 +280,27 @@ class Record:
             that is left out is dropped.
         name, trim : optional
             New name or trim values.
-
-        Returns
-        -------
-        Record
         """
         stamps = self.time_s if time_s is None else np.array(time_s, dtype=np.float64)
         kept = list(self._channels.values()) if channels is None else list(channels)
         given = samples or {}
         for label in given:
             if label not in {channel.name for channel in kept}:
-                raise _unknown_channel(label, {channel.name: None for channel in kept})
-        variables: dict[str, Any] = {}
-        for channel in kept:
-            values = given[channel.name] if channel.name in given else self[channel.name]
-            array = np.array(values, dtype=np.float64)
-            if array.shape != stamps.shape:
-                raise ShapeError(
-                    f"channel {channel.name!r} does not fit the time base",
-                    found=f"shape {array.shape}",
-                    needed=f"shape {stamps.shape}",
-                )
-            attributes = {"unit": channel.unit, "role": str(channel.role), "note": channel.note}
-            variables[channel.name] = ((TIME,), array, attributes)
-        done = () if step is None else (Step(step.operation, step.options, VERSION),)
-        kept_trim = {
-            key: value
-            for key, value in (self._trim if trim is None else dict(trim)).items()
-            if key in variables
+                raise unknown_channel(label, [channel.name for channel in kept])
+        variables = {
+            channel.name: labelled_variable(
+                channel,
+                given[channel.name] if channel.name in given else self[channel.name],
+                stamps,
+            )
+            for channel in kept
         }
+        done = () if step is None else (Step(step.operation, step.options, VERSION),)
+        values = self._trim if trim is None else trim
         return Record(
             xr.Dataset(variables, coords={TIME: stamps}),
             name=self._name if name is None else name,
-            trim=kept_trim,
+            trim={key: value for key, value in values.items() if key in variables},
             history=(*self._history, *done),
         )
 
@@ -373,7 +362,7 @@ class Record:
             Fewer than two samples lie in the span.
         """
         time_s = self.time_s
-        slack = self._sample_time_s * MAXIMUM_JITTER
+        slack = self._sample_time_s * UNIFORM_TOLERANCE
         inside = (time_s >= start_s - slack) & (time_s < stop_s - slack)
         if np.count_nonzero(inside) < 2:
             raise DataError(
@@ -387,60 +376,11 @@ class Record:
 
     def summary(self) -> Table:
         """Table of the channels with unit, role, mean, deviation and range."""
-        columns = (
-            Column("channel"),
-            Column("unit"),
-            Column("role"),
-            Column("mean"),
-            Column("standard deviation"),
-            Column("minimum"),
-            Column("maximum"),
-        )
-        rows = tuple(
-            (
-                key,
-                channel.unit,
-                str(channel.role),
-                float(np.mean(self[key])),
-                float(np.std(self[key])),
-                float(np.min(self[key])),
-                float(np.max(self[key])),
-            )
-            for key, channel in self._channels.items()
-        )
-        return Table(repr(self), columns, rows, tuple(str(step) for step in self._history))
+        return summary_table(self)
 
     def to_dict(self) -> dict[str, object]:
-        """Plain values, samples included.
-
-        Returns
-        -------
-        dict
-            Keys ``schema``, ``name``, ``time_s``, ``channels``, ``trim``, ``history``.
-        """
-        return {
-            "schema": "flightid.record/1",
-            "name": self._name,
-            "time_s": self.time_s.tolist(),
-            "channels": {
-                key: {
-                    "unit": channel.unit,
-                    "role": str(channel.role),
-                    "note": channel.note,
-                    "samples": self[key].tolist(),
-                }
-                for key, channel in self._channels.items()
-            },
-            "trim": dict(self._trim),
-            "history": [
-                {
-                    "operation": step.operation,
-                    "options": dict(step.options),
-                    "version": step.version,
-                }
-                for step in self._history
-            ],
-        }
+        """Plain values: ``schema``, ``name``, ``time_s``, ``channels``, ``trim``, ``history``."""
+        return plain_values(self)
 
     def __repr__(self) -> str:
         """Size, rate and channel names on one line."""
@@ -455,41 +395,4 @@ class Record:
 
     def _require(self, name: str) -> None:
         if name not in self._channels:
-            raise _unknown_channel(name, self._channels)
-
-
-def _unknown_channel(name: str, channels: Iterable[str]) -> UnknownNameError:
-    return UnknownNameError(
-        "there is no such channel", found=name, needed="one of " + ", ".join(channels)
-    )
-
-
-def _require_finite(name: str, samples: NDArray[np.float64]) -> None:
-    bad = np.flatnonzero(~np.isfinite(samples))
-    if bad.size:
-        raise DataError(
-            f"channel {name!r} holds samples that are not finite",
-            found=f"{bad.size} of {samples.size}, the first at index {bad[0]}",
-            needed="finite numbers",
-            action="cut the segment, or fill gaps with a stated policy when resampling",
-        )
-
-
-def _uniform_sample_time(time_s: NDArray[np.float64]) -> float:
-    if time_s.ndim != 1 or time_s.size < 2:
-        raise DataError("a record needs a time base", found=f"{time_s.size} stamps", needed="2")
-    if not np.all(np.isfinite(time_s)):
-        raise DataError("time stamps are not finite", needed="finite stamps in seconds")
-    sample_time_s = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
-    if sample_time_s <= 0:
-        raise DataError("time stamps do not increase", needed="increasing stamps in seconds")
-    grid = time_s[0] + sample_time_s * np.arange(time_s.size)
-    worst = float(np.max(np.abs(time_s - grid))) / sample_time_s
-    if worst > MAXIMUM_JITTER:
-        raise DataError(
-            "time stamps are not uniform",
-            found=f"a stamp {100 * worst:.3g} % of a sample time off the grid",
-            needed=f"at most {100 * MAXIMUM_JITTER:g} %",
-            action="bring the channels to one time base with conditioning.resample",
-        )
-    return sample_time_s
+            raise unknown_channel(name, self._channels)

@@ -1,0 +1,68 @@
+"""How a record shows itself: the table of its channels and its plain values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flightid.table import Column, Table
+
+if TYPE_CHECKING:
+    from flightid.record.history import Step
+    from flightid.record.record import Record
+
+
+def summary_table(record: Record) -> Table:
+    """Table of the channels with unit, role, mean, deviation and range."""
+    columns = (
+        Column("channel"),
+        Column("unit"),
+        Column("role"),
+        Column("mean"),
+        Column("standard deviation"),
+        Column("minimum"),
+        Column("maximum"),
+    )
+    rows = tuple(
+        (
+            key,
+            channel.unit,
+            str(channel.role),
+            float(np.mean(record[key])),
+            float(np.std(record[key])),
+            float(np.min(record[key])),
+            float(np.max(record[key])),
+        )
+        for key, channel in record.channels.items()
+    )
+    return Table(repr(record), columns, rows, tuple(str(step) for step in record.history))
+
+
+def plain_values(record: Record) -> dict[str, object]:
+    """Plain values, samples included."""
+    return {
+        "schema": "flightid.record/1",
+        "name": record.name,
+        "time_s": record.time_s.tolist(),
+        "channels": {
+            key: {
+                "unit": channel.unit,
+                "role": str(channel.role),
+                "note": channel.note,
+                "samples": record[key].tolist(),
+            }
+            for key, channel in record.channels.items()
+        },
+        "trim": record.trim,
+        "history": [plain_step(step) for step in record.history],
+    }
+
+
+def plain_step(step: Step) -> dict[str, object]:
+    """Plain values of one step of the history."""
+    return {
+        "operation": step.operation,
+        "options": dict(step.options),
+        "version": step.version,
+    }

@@ -1,0 +1,154 @@
+"""What every reader returns: named columns of one length, with the units the file states."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError, FileFormatError, UnitError, UnknownNameError
+from flightid.units import canonical
+
+MAXIMUM_BYTES = 4 << 30
+"""Largest amount of samples that is read into memory at once, bytes; guards against files that
+declare absurd sizes."""
+HEADING = re.compile(r"^(?P<name>.*\S)\s*\[(?P<unit>[^\[\]]*)\]$")
+
+
+@dataclass(frozen=True)
+class ColumnTable:
+    """Columns of a file, read when asked for.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    lengths : mapping of str to int
+        Length of each column by name.
+    load : callable
+        Takes a column name, returns its values (any one-dimensional array).
+    units : mapping of str to str
+        Units as the file spells them; columns left out state none.
+
+    Example
+    -------
+    >>> table = ColumnTable(Path("a.csv"), {"p": 2}, lambda name: np.zeros(2), {"p": "deg/s"})
+    >>> table.column("p"), table.units["p"]
+    (array([0., 0.]), 'deg/s')
+    """
+
+    path: Path
+    lengths: Mapping[str, int]
+    load: Callable[[str], NDArray[Any]]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    def require(self, name: str) -> None:
+        """Refuse a name that is no column.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such column; the message lists those there are.
+        """
+        if name not in self.lengths:
+            raise UnknownNameError(
+                f"{self.path.name} has no column of this name",
+                found=name,
+                needed="one of " + ", ".join(self.lengths),
+            )
+
+    def raw(self, name: str) -> NDArray[Any]:
+        """Values of a column as the file holds them."""
+        self.require(name)
+        return self.load(name)
+
+    def column(self, name: str) -> NDArray[np.float64]:
+        """Values of a column as numbers.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such column.
+        DataError
+            The column holds text or complex numbers.
+        """
+        values = self.raw(name)
+        if values.dtype.kind not in "fiub":
+            raise DataError(
+                f"column {name!r} of {self.path.name} does not hold real numbers",
+                found=f"type {values.dtype}",
+                needed="numbers",
+                action="leave the column out, or write it as numbers",
+            )
+        return np.asarray(values, dtype=np.float64)
+
+
+def require_readable_size(path: Path, n_values: int) -> None:
+    """Refuse a file that declares more samples than fit in memory.
+
+    Raises
+    ------
+    FileFormatError
+        The declared size is above `MAXIMUM_BYTES`.
+    """
+    if n_values * 8 > MAXIMUM_BYTES:
+        raise FileFormatError(
+            f"{path.name} declares more samples than are read at once",
+            found=f"{n_values} values",
+            needed=f"at most {MAXIMUM_BYTES // 8}",
+            action="split the file, or check that it is not damaged",
+        )
+
+
+def is_unit(text: str) -> bool:
+    """Tell whether a text is a known unit."""
+    try:
+        canonical(text)
+    except UnitError:
+        return False
+    return True
+
+
+def split_headings(headings: Iterable[str]) -> tuple[list[str], dict[str, str]]:
+    """Names and units of headings such as ``"p [rad/s]"``; brackets must hold a known unit.
+
+    Example
+    -------
+    >>> split_headings(["t [s]", "p", "y [1st]"])
+    (['t', 'p', 'y [1st]'], {'t': 's'})
+    """
+    names: list[str] = []
+    units: dict[str, str] = {}
+    for heading in headings:
+        match = HEADING.match(heading.strip())
+        name = heading.strip()
+        if match and is_unit(match["unit"]):
+            name = match["name"]
+            units[name] = match["unit"]
+        names.append(name)
+    return names, units
+
+
+def require_distinct(path: Path, names: Iterable[str]) -> None:
+    """Refuse two columns of one name.
+
+    Raises
+    ------
+    FileFormatError
+        A name occurs twice.
+    """
+    seen: set[str] = set()
+    for name in names:
+        if name in seen:
+            raise FileFormatError(
+                f"{path.name} has two columns of one name",
+                found=name,
+                needed="one name for each column",
+                action="rename a column in the file",
+            )
+        seen.add(name)

@@ -1,0 +1,92 @@
+"""Parquet: columns with units in the field metadata, and flightid's own labels in the schema."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from flightid.errors import FileFormatError
+from flightid.record.formats.columns import (
+    ColumnTable,
+    require_distinct,
+    require_readable_size,
+    split_headings,
+)
+
+LABELS_KEY = b"flightid"
+UNIT_KEYS = (b"unit", b"units")
+
+
+def read_columns(path: Path, *, has_labels: bool = False) -> ColumnTable:
+    """Columns of a Parquet file, each read when asked for.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    has_labels : bool
+        Headings are names as they stand: units in brackets are not taken from them.
+
+    Returns
+    -------
+    ColumnTable
+
+    Raises
+    ------
+    FileFormatError
+        The file is damaged, absurdly large or repeats a name.
+    """
+    file = _open(path)
+    headings = list(file.schema_arrow.names)
+    names, units = (headings, {}) if has_labels else split_headings(headings)
+    require_distinct(path, names)
+    of_name = dict(zip(names, headings, strict=True))
+    for name, heading in of_name.items():
+        metadata = file.schema_arrow.field(heading).metadata or {}
+        for key in UNIT_KEYS:
+            if key in metadata:
+                units[name] = metadata[key].decode()
+    return ColumnTable(
+        path,
+        dict.fromkeys(names, file.metadata.num_rows),
+        lambda name: _column(path, file, of_name[name]),
+        units,
+    )
+
+
+def read_labels(path: Path) -> str | None:
+    """The labels that flightid stored in a Parquet file; None in a file of another writer."""
+    metadata = _open(path).schema_arrow.metadata or {}
+    return metadata[LABELS_KEY].decode() if LABELS_KEY in metadata else None
+
+
+def _open(path: Path) -> pq.ParquetFile:
+    try:
+        file = pq.ParquetFile(path)
+    except (pa.ArrowException, OSError) as error:
+        raise FileFormatError(
+            f"{path.name} is not a whole Parquet file",
+            found=str(error).strip().split("\n")[0],
+            action="write or copy it again",
+        ) from error
+    require_readable_size(path, file.metadata.num_rows * max(1, file.metadata.num_columns))
+    return file
+
+
+def _column(path: Path, file: pq.ParquetFile, name: str) -> NDArray[Any]:
+    try:
+        column = file.read(columns=[name]).column(name)
+    except (pa.ArrowException, OSError) as error:
+        raise FileFormatError(
+            f"column {name!r} of {path.name} cannot be read", found=str(error).strip()
+        ) from error
+    if pa.types.is_timestamp(column.type):
+        # Exact in integers; a double of seconds since 1970 would round to 0.2 µs.
+        stamps = column.cast(pa.timestamp("ns")).to_numpy().astype("datetime64[ns]")
+        return np.asarray((stamps - stamps[0]) / np.timedelta64(1, "s"))
+    return np.asarray(column.to_numpy())

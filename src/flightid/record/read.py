@@ -1,0 +1,352 @@
+"""`read_records`: a file of samples to records, with declared names, roles, units and time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.conventions import Role
+from flightid.errors import DataError, FileFormatError, OptionError, UnitError, UnknownNameError
+from flightid.files import sha256_of_file
+from flightid.record.channel import Channel
+from flightid.record.formats import ColumnTable, FileFormat, csv, file_format, matlab, netcdf
+from flightid.record.formats import parquet as parquet_format
+from flightid.record.formats.columns import is_unit
+from flightid.record.history import Step
+from flightid.record.record import Record
+from flightid.record.stamps import GAP_FACTOR
+from flightid.record.store import RECORD_COLUMN, stored_records
+from flightid.record.timebase import to_uniform
+from flightid.table import Cell
+from flightid.units import canonical, convert
+from flightid.version import VERSION
+
+Names = Iterable[str] | Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class _Wanted:
+    """A channel of the record and the column it comes from."""
+
+    channel: Channel
+    column: str
+
+
+def read_records(
+    path: str | Path,
+    inputs: Names | None = None,
+    outputs: Names | None = None,
+    *,
+    excitations: Names | None = None,
+    others: Names | None = None,
+    time: str = "time",
+    units: Mapping[str, str] | None = None,
+    sample_time_s: float | None = None,
+    resample_to_s: float | None = None,
+    record: str | None = RECORD_COLUMN,
+) -> list[Record]:
+    r"""Read records from CSV, Parquet, MATLAB .mat (level 5 to 7.3) or netCDF.
+
+    A file that `write_records` made comes back as it was; naming channels then selects and
+    assigns roles. In any other file the time is the column `time`, or `sample_time_s` is stated;
+    neither is guessed. Rows fall into several records where the column `record` changes or where
+    the time has a gap (a spacing above 2.5 median spacings). Units come from headings such as
+    ``p [rad/s]``, from a second row of units in CSV, or from the file's metadata; `units` declares
+    them and must not contradict the file. Values are not converted.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    inputs, outputs, excitations, others : names or mapping of str to str, optional
+        Columns by role; a mapping gives new names, channel to column. With none of the four,
+        every numeric column becomes a channel of role "other".
+    time : str
+        Column of the time stamps; in s unless the file or `units` says otherwise.
+    units : mapping of str to str, optional
+        Unit by channel name, or by the name of the time column.
+    sample_time_s : float, optional
+        Sample time of a file without time column, s; the first sample is at 0 s.
+    resample_to_s : float, optional
+        Sample time, s, of a new uniform grid; for stamps that are not uniform.
+    record : str, optional
+        Column that tells manoeuvres apart, used if it is there; None: there is none.
+
+    Returns
+    -------
+    list of Record
+        One for each manoeuvre, in the order of the file.
+
+    Raises
+    ------
+    FileFormatError
+        The content is of no known format, damaged or too large.
+    UnknownNameError
+        A column that is not there.
+    UnitError
+        A unit that is not known or contradicts the file.
+    OptionError
+        Time stated twice, or not at all; a channel named twice.
+    DataError
+        Samples that are not finite, stamps that are not uniform.
+
+    Example
+    -------
+    >>> import tempfile
+    >>> from flightid.files import write_atomically
+    >>> text = "time,tau,p [deg/s]\n0,0.1,1\n0.5,0.2,2\n1.0,0.1,3\n"
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = write_atomically(Path(folder) / "roll.csv", text)
+    ...     read_records(path, inputs=["tau"], outputs=["p"])
+    [Record('roll', 3 samples, 2 Hz, 1.5 s, inputs [tau], outputs [p])]
+    """
+    source = Path(path)
+    kind = file_format(source)
+    roles = {
+        Role.INPUT: inputs,
+        Role.OUTPUT: outputs,
+        Role.EXCITATION: excitations,
+        Role.OTHER: others,
+    }
+    text = _labels(source, kind)
+    if text is not None:
+        stored = stored_records(source, text, is_parquet=kind is FileFormat.PARQUET)
+        return [_selected(item, roles, units or {}) for item in stored]
+    table = _table(source, kind)
+    stamps = _stamps(table, time, units or {}, sample_time_s)
+    wanted = _wanted(table, roles, units or {}, time, record, stamps.size)
+    columns = {item.channel.name: table.column(item.column) for item in wanted}
+    for item in wanted:
+        if columns[item.channel.name].size != stamps.size:
+            raise DataError(
+                f"column {item.column!r} is not as long as the time",
+                found=f"{columns[item.channel.name].size} samples",
+                needed=f"{stamps.size}",
+            )
+    options: dict[str, Cell] = {
+        "file": source.name,
+        "sha256": sha256_of_file(source),
+        "time": time if sample_time_s is None else None,
+        "sample_time_s": sample_time_s,
+    }
+    history = (Step("read_records", options, VERSION),)
+    records: list[Record] = []
+    for part, label in _manoeuvres(table, record, stamps, split_gaps=resample_to_s is None):
+        pieces = _piece(stamps[part], {k: v[part] for k, v in columns.items()}, resample_to_s)
+        for grid, samples, more in pieces:
+            records.append(_record(grid, samples, wanted, label or source.stem, (*history, *more)))
+    if len(records) > 1 and len({item.name for item in records}) == 1:
+        records = [item.replace(name=f"{item.name}[{index}]") for index, item in enumerate(records)]
+    return records
+
+
+def _labels(path: Path, kind: FileFormat) -> str | None:
+    if kind is FileFormat.PARQUET:
+        return parquet_format.read_labels(path)
+    return netcdf.read_labels(path) if kind is FileFormat.NETCDF else None
+
+
+def _table(path: Path, kind: FileFormat) -> ColumnTable:
+    if kind is FileFormat.CSV:
+        return csv.read_columns(path)
+    if kind is FileFormat.PARQUET:
+        return parquet_format.read_columns(path)
+    if kind is FileFormat.MATLAB:
+        return matlab.read_columns(path)
+    if kind is FileFormat.MATLAB_HDF5:
+        return matlab.read_hdf5_columns(path)
+    return netcdf.read_columns(path, classic=kind is FileFormat.NETCDF_CLASSIC)
+
+
+def _pairs(names: Names | None) -> list[tuple[str, str]]:
+    if names is None:
+        return []
+    if isinstance(names, str):
+        raise OptionError(
+            "names of channels are a list or a mapping", found=repr(names), needed=f"[{names!r}]"
+        )
+    if isinstance(names, Mapping):
+        return list(names.items())
+    return [(name, name) for name in names]
+
+
+def _stamps(
+    table: ColumnTable, time: str, units: Mapping[str, str], sample_time_s: float | None
+) -> NDArray[np.float64]:
+    if time in table.lengths:
+        if sample_time_s is not None:
+            raise OptionError(
+                "the time is stated twice",
+                found=f"column {time!r} and sample_time_s={sample_time_s}",
+                needed="one of them",
+                action="leave out sample_time_s, or name another time column",
+            )
+        unit = _unit(table, time, time, units, default="s")
+        values = table.column(time)
+        return values if unit == "s" else convert(values, unit, "s")
+    if sample_time_s is None:
+        raise OptionError(
+            f"{table.path.name} has no time column {time!r}",
+            found="columns " + ", ".join(table.lengths),
+            needed="time=<name of the column> or sample_time_s=<seconds>",
+            action="no sample time is invented: state it",
+        )
+    if not (np.isfinite(sample_time_s) and sample_time_s > 0):
+        raise OptionError("sample time is not positive", found=sample_time_s, needed="above 0 s")
+    longest = max(table.lengths.values(), default=0)
+    return np.asarray(sample_time_s * np.arange(longest), dtype=np.float64)
+
+
+def _unit(
+    table: ColumnTable, column: str, name: str, units: Mapping[str, str], default: str
+) -> str:
+    stated, declared = table.units.get(column), units.get(name)
+    if declared is None:
+        if stated is not None and not is_unit(stated):
+            raise UnitError(
+                f"the unit of column {column!r} is not known",
+                found=repr(stated),
+                needed=f"units={{{name!r}: ...}}, the unit declared",
+            )
+        return canonical(stated) if stated is not None else default
+    if stated is not None and is_unit(stated) and canonical(stated) != canonical(declared):
+        raise UnitError(
+            f"the declared unit of {name!r} contradicts the file",
+            found=f"{canonical(stated)} in {table.path.name}",
+            needed=canonical(declared),
+            action="leave the declaration out and convert with Record.to_units",
+        )
+    return canonical(declared)
+
+
+def _wanted(
+    table: ColumnTable,
+    roles: Mapping[Role, Names | None],
+    units: Mapping[str, str],
+    time: str,
+    record: str | None,
+    n_samples: int,
+) -> list[_Wanted]:
+    pairs = [(role, *pair) for role, names in roles.items() for pair in _pairs(names)]
+    if not pairs:
+        pairs = [
+            (Role.OTHER, key, key)
+            for key, length in table.lengths.items()
+            if key not in (time, record) and length == n_samples
+        ]
+    names = [name for _, name, _ in pairs]
+    if repeated := {name for name in names if names.count(name) > 1}:
+        raise OptionError(
+            "a channel is named twice", found=", ".join(sorted(repeated)), needed="one role each"
+        )
+    for name in units:
+        if name not in names and name != time:
+            raise UnknownNameError(
+                "a unit is declared for no channel", found=name, needed="one of " + ", ".join(names)
+            )
+    for _, _, column in pairs:
+        table.require(column)
+    return [
+        _Wanted(
+            Channel(
+                name,
+                _unit(table, column, name, units, default="1"),
+                role,
+                "" if name == column else f"column {column}",
+            ),
+            column,
+        )
+        for role, name, column in pairs
+    ]
+
+
+def _manoeuvres(
+    table: ColumnTable, record: str | None, stamps: NDArray[np.float64], *, split_gaps: bool
+) -> list[tuple[slice, str | None]]:
+    """Row ranges of the manoeuvres and their names, where the file has them."""
+    edges = {0, stamps.size}
+    labels = None
+    if record is not None and record in table.lengths:
+        labels = table.raw(record)
+        if labels.size != stamps.size:
+            raise FileFormatError(
+                f"column {record!r} is not as long as the time",
+                found=f"{labels.size} samples",
+                needed=f"{stamps.size}",
+            )
+        edges |= {int(i) + 1 for i in np.flatnonzero(labels[1:] != labels[:-1])}
+    parts = []
+    for first, last in _ranges(edges):
+        spacing = np.diff(stamps[first:last])
+        gaps = {first, last}
+        if split_gaps and spacing.size and np.all(spacing > 0):
+            is_gap = spacing > GAP_FACTOR * np.median(spacing)
+            gaps |= {first + int(i) + 1 for i in np.flatnonzero(is_gap)}
+        name = None if labels is None or labels.dtype.kind in "fiub" else str(labels[first])
+        parts += [(slice(a, b), name) for a, b in _ranges(gaps)]
+    return parts
+
+
+def _ranges(edges: Iterable[int]) -> list[tuple[int, int]]:
+    ordered = sorted(edges)
+    return list(pairwise(ordered))
+
+
+def _piece(
+    stamps: NDArray[np.float64],
+    samples: Mapping[str, NDArray[np.float64]],
+    resample_to_s: float | None,
+) -> list[tuple[NDArray[np.float64], Mapping[str, NDArray[np.float64]], tuple[Step, ...]]]:
+    if resample_to_s is None:
+        return [(stamps, samples, ())]
+    base = to_uniform(
+        {key: (stamps, values) for key, values in samples.items()},
+        sample_time_s=resample_to_s,
+        gaps="split",
+    )
+    step = Step("conditioning.to_uniform", base.options, VERSION)
+    return [(span.time_s, span.samples, (step,)) for span in base.spans]
+
+
+def _record(
+    time_s: NDArray[np.float64],
+    samples: Mapping[str, NDArray[np.float64]],
+    wanted: Iterable[_Wanted],
+    name: str,
+    history: tuple[Step, ...],
+) -> Record:
+    channels = [item.channel for item in wanted]
+    plain = Record.from_arrays(time_s, others=samples, name=name, history=history)
+    return plain.replace(channels=channels)
+
+
+def _selected(
+    stored: Record, roles: Mapping[Role, Names | None], units: Mapping[str, str]
+) -> Record:
+    """A stored record with only the named channels, in the roles they are named under."""
+    pairs = [(role, *pair) for role, names in roles.items() for pair in _pairs(names)]
+    named = stored if not pairs else _renamed(stored, pairs)
+    for name, unit in units.items():
+        if canonical(unit) != named.unit(name):
+            raise UnitError(
+                f"the declared unit of {name!r} contradicts the file",
+                found=named.unit(name),
+                needed=canonical(unit),
+                action="leave the declaration out and convert with Record.to_units",
+            )
+    return named
+
+
+def _renamed(stored: Record, pairs: list[tuple[Role, str, str]]) -> Record:
+    channels = [
+        Channel(name, stored.unit(column), role, stored.channels[column].note)
+        for role, name, column in pairs
+    ]
+    samples = {name: stored[column] for _, name, column in pairs}
+    step = Step("read_records", {name: column for _, name, column in pairs})
+    return stored.replace(samples, channels=channels, step=step)

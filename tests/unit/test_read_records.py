@@ -1,0 +1,284 @@
+"""Foreign files become records only by what is declared; traps are refused."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import scipy.io
+import xarray as xr
+
+from flightid.errors import DataError, FileFormatError, OptionError, UnitError, UnknownNameError
+from flightid.record import read_records
+from tests.closeness import assert_close
+
+
+def _csv(folder: Path, text: str, name: str = "roll.csv") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+ROWS = "\n".join(f"{k / 10:.1f},{k},{k * k}" for k in range(10))
+
+
+def test_csv_with_units_in_the_headings(tmp_path: Path) -> None:
+    path = _csv(tmp_path, "# from a rig\ntime [s],tau,p [deg/s]\n" + ROWS)
+    (record,) = read_records(path, inputs=["tau"], outputs={"rate": "p"})
+    assert record.unit("rate") == "deg/s"
+    assert record.channels["rate"].note == "column p"
+    assert record["rate"].tolist() == [float(k * k) for k in range(10)]
+    assert record.history[0].options["sha256"]
+
+
+def test_csv_with_a_row_of_units(tmp_path: Path) -> None:
+    rows = "\n".join(f"{100 * k};{k};{k}" for k in range(10))
+    path = _csv(tmp_path, "time;tau;p\nms;;rad/s\n" + rows)
+    (record,) = read_records(path, inputs=["tau"], outputs=["p"])
+    assert (record.unit("p"), record.unit("tau")) == ("rad/s", "1")
+    assert_close(record.sample_time_s, 0.1, rtol=1e-12, why="100 ms")
+
+
+def test_brackets_without_a_unit_stay_part_of_the_name(tmp_path: Path) -> None:
+    path = _csv(tmp_path, "time,y [first]\n0,1\n1,2\n")
+    assert read_records(path, outputs=["y [first]"])[0].outputs == ("y [first]",)
+
+
+def test_csv_numbers_are_read_to_the_last_bit(tmp_path: Path) -> None:
+    values = np.random.default_rng(0).standard_normal(300) * 10.0 ** np.arange(-150, 150)
+    text = "time,y\n" + "\n".join(f"{k},{value!r}" for k, value in enumerate(values.tolist()))
+    (record,) = read_records(_csv(tmp_path, text), outputs=["y"])
+    assert record["y"].tobytes() == values.tobytes()
+
+
+def test_without_roles_every_numeric_column_is_other(tmp_path: Path) -> None:
+    (record,) = read_records(_csv(tmp_path, "time,a,b\n" + ROWS))
+    assert list(record.channels) == ["a", "b"]
+    assert {str(c.role) for c in record.channels.values()} == {"other"}
+
+
+def test_a_gap_in_time_or_a_record_column_makes_several_records(tmp_path: Path) -> None:
+    stamps = np.concatenate([np.arange(20), np.arange(40, 70)]) / 10
+    text = "time,p\n" + "\n".join(f"{t:.1f},{t}" for t in stamps)
+    found = read_records(_csv(tmp_path, text), outputs=["p"])
+    assert [(r.name, r.n_samples) for r in found] == [("roll[0]", 20), ("roll[1]", 30)]
+    text = "time,p,record\n" + "\n".join(f"{k % 10},{k},{'ab'[k // 10]}" for k in range(20))
+    found = read_records(_csv(tmp_path, text), outputs=["p"])
+    assert [(r.name, r.n_samples) for r in found] == [("a", 10), ("b", 10)]
+    with pytest.raises(DataError, match="not uniform"):
+        read_records(_csv(tmp_path, text), outputs=["p"], record=None)
+
+
+def test_jittered_stamps_need_a_stated_grid(tmp_path: Path) -> None:
+    stamps = np.arange(200) / 50 + np.random.default_rng(1).uniform(-2e-3, 2e-3, 200)
+    text = "time,p\n" + "\n".join(f"{t!r},{float(np.sin(t))!r}" for t in stamps.tolist())
+    path = _csv(tmp_path, text)
+    with pytest.raises(DataError, match=r"not uniform.*to_uniform"):
+        read_records(path, outputs=["p"])
+    (record,) = read_records(path, outputs=["p"], resample_to_s=0.02)
+    assert_close(record["p"][5:-5], np.sin(record.time_s)[5:-5], atol=1e-5, why="spline")
+    assert record.history[-1].operation == "conditioning.to_uniform"
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "error", "message"),
+    [
+        ("t,p\n0,1\n1,2\n", {}, OptionError, "no time column 'time': found columns t, p"),
+        ("time,p\n0,1\n1,2\n", {"sample_time_s": 1.0}, OptionError, "stated twice"),
+        ("t,p\n0,1\n1,2\n", {"sample_time_s": -1.0}, OptionError, "not positive"),
+        ("time,p\n0,1\n1,2\n", {"outputs": ["q"]}, UnknownNameError, "found q; needed one of time"),
+        ("time,p\n0,1\n1,2\n", {"outputs": "p"}, OptionError, "a list or a mapping"),
+        (
+            "time,p\n0,1\n1,2\n",
+            {"inputs": ["p"], "outputs": ["p"]},
+            OptionError,
+            "named twice: found p",
+        ),
+        (
+            "time,p\n0,1\n1,2\n",
+            {"outputs": ["p"], "units": {"q": "rad"}},
+            UnknownNameError,
+            "declared for no channel: found q",
+        ),
+        (
+            "time,p [deg]\n0,1\n1,2\n",
+            {"outputs": ["p"], "units": {"p": "rad"}},
+            UnitError,
+            "contradicts the file: found deg in roll.csv; needed rad",
+        ),
+        ("time,p\n0,a\n1,b\n", {"outputs": ["p"]}, DataError, "does not hold real numbers"),
+        ("time,p\n0,1\n1,\n2,3\n", {"outputs": ["p"]}, DataError, "not finite: found 1 of 3"),
+        ("time,p\n0,1\n1\n", {}, FileFormatError, "not a table of numbers"),
+        ("time,p\n", {}, FileFormatError, "holds headings only"),
+        ("# nothing\n", {}, FileFormatError, "holds no row"),
+        ("0,1\n1,2\n", {}, FileFormatError, "no heading row"),
+        ("time,p;q\n0,1;2\n", {}, FileFormatError, "several delimiters: found ',' and ';'"),
+        ("time,p,p\n0,1,2\n", {}, FileFormatError, "two columns of one name: found p"),
+    ],
+)
+def test_csv_refusals(
+    tmp_path: Path, text: str, options: dict, error: type[Exception], message: str
+) -> None:
+    with pytest.raises(error, match=re.escape(message)):
+        read_records(_csv(tmp_path, text), **options)
+
+
+def test_files_of_no_known_format_are_refused(tmp_path: Path) -> None:
+    for content in (b"", b"\x00\x01\x02", b"\xa3\x95\x80\x80"):
+        (tmp_path / "a.bin").write_bytes(content)
+        with pytest.raises(FileFormatError, match="of no format that holds records"):
+            read_records(tmp_path / "a.bin")
+    (tmp_path / "a.csv").write_bytes(b"time,p\xff\n0,1\n")
+    with pytest.raises(FileFormatError, match=r"a\.csv is not text"):
+        read_records(tmp_path / "a.csv")
+
+
+def test_parquet_of_another_writer(tmp_path: Path) -> None:
+    stamps = pd.date_range("2026-01-01", periods=100, freq="10ms")
+    frame = pd.DataFrame({"time": stamps, "p [rad/s]": np.arange(100.0)})
+    frame.to_parquet(tmp_path / "a.parquet")
+    (record,) = read_records(tmp_path / "a.parquet", outputs=["p"])
+    assert record.unit("p") == "rad/s"
+    assert_close(record.sample_time_s, 0.01, rtol=1e-12, why="10 ms")
+    schema = pa.schema(
+        [("time", pa.float64()), pa.field("p", pa.float32(), metadata={"unit": "V"})]
+    )
+    pq.write_table(pa.table([[0.0, 1.0], [1.0, 2.0]], schema=schema), tmp_path / "b.parquet")
+    assert read_records(tmp_path / "b.parquet", outputs=["p"])[0].unit("p") == "V"
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_matlab_arrays_and_structures(tmp_path: Path, compressed: bool) -> None:
+    time = np.arange(30) / 10
+    content = {
+        "time": time,
+        "y": np.column_stack([time, time**2]),
+        "data": {"u": np.sin(time), "label": "text"},
+        "cells": np.array([1, "a"], dtype=object),
+    }
+    scipy.io.savemat(tmp_path / "a.mat", content, do_compression=compressed)
+    (record,) = read_records(
+        tmp_path / "a.mat", inputs={"u": "data.u"}, outputs=["y_1", "y_2"], units={"u": "V"}
+    )
+    assert record["y_2"].tolist() == (time**2).tolist()
+    assert record["u"].tolist() == np.sin(time).tolist()
+    assert record.unit("u") == "V"
+
+
+def test_matlab_7_3(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        for name, values in (("time", np.arange(5.0)), ("data/p", np.arange(5.0) ** 2)):
+            item = file.create_dataset(name, data=values[None, :])
+            item.attrs["MATLAB_class"] = np.bytes_("double")
+        text = file.create_dataset("label", data=np.zeros((1, 5), np.uint16))
+        text.attrs["MATLAB_class"] = np.bytes_("char")
+    (record,) = read_records(tmp_path / "a.mat")
+    assert list(record.channels) == ["data.p"]
+    assert record["data.p"].tolist() == [0, 1, 4, 9, 16]
+
+
+def test_matlab_refusals(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "a.mat", {"label": "text"})
+    with pytest.raises(FileFormatError, match="holds no numeric array"):
+        read_records(tmp_path / "a.mat")
+    scipy.io.savemat(tmp_path / "b.mat", {"time": np.arange(100.0)})
+    content = (tmp_path / "b.mat").read_bytes()
+    for length in range(140, len(content), 50):
+        (tmp_path / "b.mat").write_bytes(content[:length])
+        with pytest.raises(FileFormatError, match=r"not a whole MATLAB file|no numeric array"):
+            read_records(tmp_path / "b.mat")
+
+
+def test_columns_of_another_length_are_refused(tmp_path: Path) -> None:
+    scipy.io.savemat(tmp_path / "a.mat", {"time": np.arange(5.0), "p": np.arange(4.0)})
+    with pytest.raises(DataError, match="not as long as the time: found 4 samples; needed 5"):
+        read_records(tmp_path / "a.mat", outputs=["p"])
+    scipy.io.savemat(tmp_path / "b.mat", {"time": np.arange(5.0), "record": np.arange(4.0)})
+    with pytest.raises(FileFormatError, match="'record' is not as long"):
+        read_records(tmp_path / "b.mat")
+
+
+@pytest.mark.parametrize("format", ["NETCDF3_CLASSIC", "NETCDF4"])
+def test_netcdf_of_another_writer(tmp_path: Path, format: str) -> None:
+    data = xr.Dataset(
+        {
+            "p": ("time", np.arange(9.0), {"units": "deg/s"}),
+            "w": ("time", np.ones(9), {"units": "?"}),
+        },
+        coords={"time": ("time", np.arange(9.0), {"units": "seconds since 2026-01-01"})},
+    )
+    engine = "scipy" if format == "NETCDF3_CLASSIC" else "h5netcdf"
+    data.to_netcdf(tmp_path / "a.nc", format=format, engine=engine)
+    (record,) = read_records(tmp_path / "a.nc", outputs=["p"])
+    assert record.unit("p") == "deg/s"
+    with pytest.raises(UnitError, match=r"unit of column 'w' is not known: found '\?'"):
+        read_records(tmp_path / "a.nc", outputs=["w"])
+    assert read_records(tmp_path / "a.nc", outputs=["w"], units={"w": "1"})[0].unit("w") == "1"
+
+
+def test_hdf5_that_points_elsewhere_is_refused(tmp_path: Path) -> None:
+    secret = tmp_path / "secret"
+    secret.write_bytes(b"12345678" * 4)
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        file.create_dataset("time", (1, 4), "f8", external=[(str(secret), 0, 32)])
+    with pytest.raises(FileFormatError, match="keeps samples in other files"):
+        read_records(tmp_path / "a.mat")
+    with h5py.File(tmp_path / "a.nc", "w") as file:
+        file.create_dataset("time", (4,), "f8", external=[(str(secret), 0, 32)])
+    with pytest.raises(FileFormatError, match="keeps samples in other files"):
+        read_records(tmp_path / "a.nc")
+    with h5py.File(tmp_path / "b.mat", "w", userblock_size=512) as file:
+        file["time"] = h5py.ExternalLink(str(tmp_path / "a.nc"), "time")
+    with pytest.raises(FileFormatError, match="holds no numeric array"):
+        read_records(tmp_path / "b.mat")
+
+
+def test_absurd_sizes_are_refused(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        file.create_dataset("time", (1, 1 << 40), "f8", chunks=(1, 1 << 20))
+    with pytest.raises(FileFormatError, match="declares more samples than are read at once"):
+        read_records(tmp_path / "a.mat")
+
+
+def test_absurd_nesting_is_refused(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "a.mat", "w", userblock_size=512) as file:
+        file["loop"] = file["/"]
+    with pytest.raises(FileFormatError, match="too many or too deeply nested"):
+        read_records(tmp_path / "a.mat")
+
+
+def test_damaged_hdf5_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "a.nc").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(200))
+    with pytest.raises(FileFormatError, match="not a whole HDF5 file"):
+        read_records(tmp_path / "a.nc")
+    (tmp_path / "b.nc").write_bytes(b"CDF\x01" + b"\xff" * 60)
+    with pytest.raises(FileFormatError, match="not a whole netCDF file"):
+        read_records(tmp_path / "b.nc")
+    (tmp_path / "a.parquet").write_bytes(b"PAR1" + bytes(60) + b"PAR1")
+    with pytest.raises(FileFormatError, match="not a whole Parquet file"):
+        read_records(tmp_path / "a.parquet")
+
+
+def test_shared_records_are_readable(shared_data: Path) -> None:
+    folder = shared_data / "records"
+    (arm,) = read_records(folder / "robot_arm.csv", ["u"], ["y"], sample_time_s=1.0)
+    assert (arm.n_samples, arm.sample_time_s) == (1024, 1.0)
+    (player,) = read_records(
+        folder / "CD_player_arm.csv", ["u1", "u2"], ["y1", "y2"], sample_time_s=1.0
+    )
+    assert player.n_samples == 2048
+    (heli,) = read_records(
+        folder / "trex550_hover_forward.csv",
+        ["d_lat", "d_lon", "d_ped", "d_col"],
+        {"p": "p_radps", "q": "q_radps", "r": "r_radps"},
+        time="t_s",
+        units={"p": "rad/s", "q": "rad/s", "r": "rad/s"},
+    )
+    assert_close(heli.sample_rate_hz, 100.0, rtol=1e-9, why="100 Hz")
+    assert len(heli.inputs) == 4
