@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.logs import Log, LogTable, read_log
-    from flightid.record import Channel, Record
+    from flightid.record import Channel, Record, read_records, write_records
     from flightid.responses import FrequencyResponse, PairResponse, estimate_response
     from flightid.simulation.simulate import LinearSystem, simulate
     from flightid.table import Table
@@ -36,7 +36,9 @@ _HOMES = {
     "estimate_response": "flightid.responses",
     "excitation": "flightid.excitation",
     "read_log": "flightid.logs",
+    "read_records": "flightid.record",
     "simulate": "flightid.simulation.simulate",
+    "write_records": "flightid.record",
 }
 
 __all__ = [
@@ -54,7 +56,9 @@ __all__ = [
     "estimate_response",
     "excitation",
     "read_log",
+    "read_records",
     "simulate",
+    "write_records",
 ]
 
 
