@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from flightid import _native
 from flightid.errors import LogFormatError, MissingColumnError
-from flightid.logs import Log
+from flightid.logs import Log, read_log
 from flightid.logs.ulog import UlogSource
 from tests.ulog_builder import UlogBuilder, flight
 
@@ -39,7 +39,13 @@ def test_columns_nest_with_arrays_and_instances(tmp_path: Path) -> None:
     assert power["esc[1].rpm"].tolist() == [i + 1.0 for i in range(50)]
     assert power.text("name")[0] == "abc"
     assert log.messages["gyro"].rate_hz == pytest.approx(250.0)
-    assert power.unit("timestamp") == "us"
+    assert power.unit("timestamp") == "µs"
+
+
+def test_read_log_knows_a_ulog_by_its_content(tmp_path: Path) -> None:
+    path = tmp_path / "flight.bin"
+    path.write_bytes(bytes(flight(3)))
+    assert read_log(path).kind == "px4"
 
 
 def test_all_instances_come_in_file_order(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from flightid.errors import LogFormatError
 from flightid.logs.dataflash import open_dataflash
 from flightid.logs.log import Log
 from flightid.logs.source import LogSource
+from flightid.logs.ulog import UlogSource
 
 ULOG_MAGIC = b"ULog\x01\x12\x35"
 DATAFLASH_HEADER = b"\xa3\x95"
@@ -17,6 +18,7 @@ SNIFFED = 65536
 
 # Content test, name of the format, opener.
 _FORMATS: tuple[tuple[Callable[[bytes], bool], str, Callable[[Path], LogSource]], ...] = (
+    (lambda head: head.startswith(ULOG_MAGIC), "PX4 ULog", UlogSource),
     (lambda head: DATAFLASH_HEADER in head, "ArduPilot DataFlash", open_dataflash),
 )
 # Contents that people do hand in, and what to do with them.

@@ -19,9 +19,8 @@ from flightid.findings import Finding
 from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange
 from flightid.logs.ulog_names import AIRFRAMES, ARMED, LEVELS, MODES, VEHICLE_TYPES
 
-MAGIC = b"ULog\x01\x12\x35"
 STAMP = "timestamp"
-MICROSECONDS = "us"
+MICROSECONDS = "µs"
 DEFAULT_KINDS = {1: "system", 2: "airframe"}
 
 
