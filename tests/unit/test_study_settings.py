@@ -34,8 +34,7 @@ seed = 7
 [[model]]
 name = "roll rate"
 template = "rate_motor_lag"
-input = "tau_phi"
-output = "p"
+axis = "roll"
 identify = "sweep"
 verify = ["doublet"]
 band_rad_s = [0.5, 60]

@@ -122,7 +122,7 @@ def label_axes(
     for row, title in enumerate(y, start=1):
         made.update_yaxes(title_text=title, row=row, col=column)
     if log_x:
-        made.update_xaxes(type="log", dtick="D1", tickfont={"size": 11}, col=column)
+        made.update_xaxes(type="log", dtick="D2", tickfont={"size": 11}, col=column)
         made.update_xaxes(minor={"showgrid": False}, col=column)
     made.update_xaxes(title_text=x, row=len(y), col=column)
 

@@ -52,8 +52,8 @@ class ModelSettings:
         Title in the report.
     template : str
         Name of a library model, or path of a model file.
-    input, output : str
-        Channels.
+    axis : str or None
+        Axis of a library model that is written for any.
     identify, verify : tuple of str
         Segments for the fit, and segments kept for verification.
     band_rad_s : tuple of float
@@ -64,8 +64,7 @@ class ModelSettings:
 
     name: str
     template: str
-    input: str
-    output: str
+    axis: str | None
     identify: tuple[str, ...]
     verify: tuple[str, ...]
     band_rad_s: tuple[float, float]
@@ -252,8 +251,7 @@ def _model(reader: TableReader, folder: Path) -> ModelSettings:
     made = ModelSettings(
         reader.text("name"),
         str(folder / template) if template.endswith(".toml") else template,
-        reader.text("input"),
-        reader.text("output"),
+        reader.maybe(reader.text, "axis"),
         reader.names("identify"),
         reader.names("verify", ()),
         band,

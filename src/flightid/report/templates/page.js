@@ -24,8 +24,11 @@
     return window.Plotly;
   }
 
-  // Black series would vanish on a dark page.
-  const recolour = (text) => (isDark() ? text.replaceAll("#3a3f44", "#c6ccd2") : text);
+  // Black and blue would vanish on a dark page: both lines and their bands are lightened.
+  const lighter = [["#3a3f44", "#c6ccd2"], ["rgba(58,63,68,", "rgba(198,204,210,"],
+    ["#0072b2", "#4fa9e0"], ["rgba(0,114,178,", "rgba(79,169,224,"]];
+  const recolour = (text) =>
+    isDark() ? lighter.reduce((now, [from, to]) => now.replaceAll(from, to), text) : text;
 
   async function draw(place) {
     const holder = document.querySelector(`script[data-plot="${place.id}"]`);
