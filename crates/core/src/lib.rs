@@ -5,9 +5,17 @@
 //! is an argument; results have the same bits for any number of threads. Nothing here knows Python,
 //! files, channel names or printing.
 
+pub mod ardupilot_mixer;
+pub mod ardupilot_mode;
+pub mod ardupilot_pid;
 pub mod chirp;
 pub mod error;
+pub mod gyro_filter;
 pub mod linear_simulation;
 pub mod matrix_exponential;
+pub mod quadrotor;
+pub mod quadrotor_flight;
+pub mod random;
+pub mod turbulence;
 
 pub use error::CoreError;

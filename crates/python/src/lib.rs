@@ -9,6 +9,7 @@ pub mod chirp;
 pub mod dataflash;
 pub mod error;
 pub mod linear_simulation;
+pub mod quadrotor;
 pub mod ulog;
 
 /// version() -> str
@@ -27,5 +28,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     linear_simulation::register(module)?;
     dataflash::register(module)?;
     ulog::register(module)?;
+    quadrotor::register(module)?;
     Ok(())
 }
