@@ -5,7 +5,14 @@
 Excitation('doublet', 1 input, 350 samples, 50 Hz, 7 s, relative peak factor 1.87)
 """
 
+from flightid.excitation.design import plan
 from flightid.excitation.excitation import Excitation
+from flightid.excitation.export import (
+    ParameterFile,
+    ardupilot_parameters,
+    px4_parameters,
+    write_csv,
+)
 from flightid.excitation.multisine import deal_harmonics, multisine
 from flightid.excitation.multistep import (
     doublet,
@@ -15,14 +22,23 @@ from flightid.excitation.multistep import (
     multistep_energy,
 )
 from flightid.excitation.noise import noise, uniform_noise
+from flightid.excitation.plan import AxisForecast, Limits, Plan, assess, window_lengths
 from flightid.excitation.prbs import held_density, prbs
 from flightid.excitation.spectrum import Spectrum
 from flightid.excitation.sweep import ardupilot_chirp, sweep
+from flightid.excitation.vehicle import RateAxis
 
 __all__ = [
+    "AxisForecast",
     "Excitation",
+    "Limits",
+    "ParameterFile",
+    "Plan",
+    "RateAxis",
     "Spectrum",
     "ardupilot_chirp",
+    "ardupilot_parameters",
+    "assess",
     "deal_harmonics",
     "doublet",
     "held_density",
@@ -32,7 +48,11 @@ __all__ = [
     "multistep_band",
     "multistep_energy",
     "noise",
+    "plan",
     "prbs",
+    "px4_parameters",
     "sweep",
     "uniform_noise",
+    "window_lengths",
+    "write_csv",
 ]

@@ -1,0 +1,160 @@
+"""A rough guess of one rate axis, and what an excitation would make of it.
+
+``p = K exp(-tau s) / (T s + 1) u`` with ``u = r - k_p (p + k_phi phi)``: a first-order rate axis
+under the stabilising loop that stays on in flight. All signals are worked out in the frequency
+domain, with a silent end as long as the loop's memory, so that any delay is exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+
+from flightid.errors import ModelError
+from flightid.excitation.checks import require_not_negative, require_positive
+
+MEMORY = 12.0
+"""Time constants of the slowest closed-loop mode that the silent end lasts."""
+
+
+@dataclass(frozen=True)
+class RateAxis:
+    """Guess of a rate axis: steady gain, lag, delay, measurement noise, and the loop that stays on.
+
+    Attributes
+    ----------
+    gain : float
+        Steady rate for a unit of input, rad/s; negative where the sign is.
+    time_constant_s : float
+        Lag, s.
+    delay_s : float
+        Pure delay, s.
+    noise_rad_s : float
+        Deviation of the white noise on the measured rate, rad/s.
+    rate_feedback : float
+        Input for a unit of rate, 1/(rad/s); zero where no loop is closed.
+    attitude_feedback_per_s : float
+        Rate command for a unit of attitude, 1/s; zero leaves the attitude free.
+
+    Example
+    -------
+    >>> RateAxis(gain=40.0, time_constant_s=0.2, delay_s=0.02).slowest_s()
+    0.2
+    """
+
+    gain: float
+    time_constant_s: float
+    delay_s: float = 0.0
+    noise_rad_s: float = 0.02
+    rate_feedback: float = 0.0
+    attitude_feedback_per_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        require_positive(
+            absolute_gain=abs(self.gain),
+            time_constant_s=self.time_constant_s,
+            noise_rad_s=self.noise_rad_s,
+        )
+        require_not_negative(
+            delay_s=self.delay_s, attitude_feedback_per_s=self.attitude_feedback_per_s
+        )
+
+    def response(self, omega_rad_s: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Rate over input without feedback, (rad/s)/unit."""
+        s = 1j * omega_rad_s
+        return np.asarray(self.gain * np.exp(-self.delay_s * s) / (self.time_constant_s * s + 1))
+
+    def sensitivities(self, omega_rad_s: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Derivatives of `response` by gain, time constant and delay, shape (3, n_freqs)."""
+        s = 1j * omega_rad_s
+        rate = self.response(omega_rad_s)
+        return np.array([rate / self.gain, -s * rate / (self.time_constant_s * s + 1), -s * rate])
+
+    def slowest_s(self) -> float:
+        """Time constant of the slowest mode under feedback, s.
+
+        Raises
+        ------
+        ModelError
+            The loop of the guess is unstable.
+        """
+        poles = self._poles()
+        slowest = float(np.max(poles.real))
+        if slowest >= 0:
+            raise ModelError(
+                "the guessed loop is unstable",
+                found=f"a mode that grows at {slowest:.3g} 1/s",
+                needed="a stable loop",
+                action="lower the feedback, or check the sign of the gain",
+            )
+        return -1.0 / slowest
+
+    def fly(
+        self, excitation: NDArray[np.float64], sample_time_s: float
+    ) -> dict[str, NDArray[np.float64]]:
+        """Predicted ``input``, ``rate`` (rad/s) and ``attitude`` (rad) while it is injected.
+
+        Raises
+        ------
+        ModelError
+            The loop of the guess is unstable.
+        """
+        count = excitation.size
+        omega, transform = self._transform(excitation, sample_time_s)
+        s = 1j * omega
+        loop = self.response(omega) * self.rate_feedback
+        if self.attitude_feedback_per_s > 0:
+            # Written so that nothing is divided by s, which is zero at rest.
+            below = s * (1 + loop) + loop * self.attitude_feedback_per_s
+            control, attitude = s / below, self.response(omega) / below
+            angle = np.fft.irfft(attitude * transform)[:count]
+        else:
+            control = 1 / (1 + loop)
+            angle = None
+        rate = np.fft.irfft(self.response(omega) * control * transform)[:count]
+        if angle is None:
+            angle = sample_time_s * (np.cumsum(rate) - 0.5 * rate)
+        return {
+            "input": np.fft.irfft(control * transform)[:count],
+            "rate": rate,
+            "attitude": angle,
+        }
+
+    def information(
+        self, control: NDArray[np.float64], sample_time_s: float
+    ) -> NDArray[np.float64]:
+        """Fisher information on gain, time constant and delay of one record, shape (3, 3)."""
+        omega, transform = self._transform(control, sample_time_s)
+        slopes = np.fft.irfft(self.sensitivities(omega) * transform, axis=1)[:, : control.size]
+        return np.asarray(slopes @ slopes.T / self.noise_rad_s**2)
+
+    def _transform(
+        self, signal: NDArray[np.float64], sample_time_s: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
+        silent = int(np.ceil((MEMORY * self.slowest_s() + self.delay_s) / sample_time_s))
+        total = next_fast_len(signal.size + silent, real=True)
+        total += total % 2
+        omega = np.asarray(2 * np.pi * np.fft.rfftfreq(total, sample_time_s), dtype=np.float64)
+        return omega, np.fft.rfft(signal, total)
+
+    def _poles(self) -> NDArray[np.complex128]:
+        """Closed-loop poles, the delay by a third-order Padé approximation."""
+        h = self.delay_s
+        over = np.array([-(h**3), 12 * h**2, -60 * h, 120.0])
+        under = np.array([h**3, 12 * h**2, 60 * h, 120.0])
+        lag = np.array([self.time_constant_s, 1.0])
+        if self.rate_feedback == 0:
+            return np.array([-1 / self.time_constant_s], dtype=np.complex128)
+        loop_gain = self.gain * self.rate_feedback
+        if self.attitude_feedback_per_s == 0:
+            total = np.polyadd(np.polymul(lag, under), loop_gain * over)
+        else:
+            command = np.array([1.0, self.attitude_feedback_per_s])
+            total = np.polyadd(
+                np.polymul([1.0, 0.0], np.polymul(lag, under)),
+                loop_gain * np.polymul(command, over),
+            )
+        return np.asarray(np.roots(total), dtype=np.complex128)

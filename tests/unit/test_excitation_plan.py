@@ -1,0 +1,296 @@
+"""Plans: verdicts that an expert would give, sizes that keep limits, files that autopilots read."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flightid import excitation
+from flightid.cli import design as design_command
+from flightid.cli.program import run
+from flightid.errors import ModelError, OptionError, UnknownNameError
+from flightid.excitation import Limits, ParameterFile, Plan, RateAxis
+from flightid.excitation.design import KINDS
+from flightid.plot.excitation import excitation_history, excitation_spectrum, plan_spectrum
+from tests.closeness import assert_close
+
+AXIS = RateAxis(
+    gain=40.0, time_constant_s=0.2, delay_s=0.01, rate_feedback=0.1, attitude_feedback_per_s=4.0
+)
+TEMPLATE = {
+    "magnitude": 0.15, "start_hz": 0.05, "stop_hz": 5.0, "record_s": 130.0, "fade_in_s": 5.0,
+    "fade_out_s": 5.0,
+}  # fmt: skip
+
+
+def _findings(plan: Plan, code: str) -> list[str]:
+    return [str(finding) for finding in plan.findings if finding.code == code]
+
+
+def test_template_of_the_methodic_configurator_is_seen_through() -> None:
+    chirp = excitation.ardupilot_chirp(**TEMPLATE)
+    plan = excitation.assess(chirp, AXIS, n_records=1)
+    (dwell,) = _findings(plan, "chirp-dwell")
+    assert "40 s of 130 s dwell at 0.05 Hz" in dwell
+    assert "Methodic Configurator" in dwell
+    assert "sweep takes 90 s, 31.5 s of it above 1 Hz" in dwell
+    assert "3.87 Hz of 5 Hz" in _findings(plan, "chirp-fade-out")[0]
+    assert "50 s without any excitation" in _findings(plan, "chirp-silent-end")[0]
+    assert not _findings(plan, "chirp-fade-in")
+    assert not plan.is_go
+    assert "[red] no window holds two cycles" in _findings(plan, "design-windows")[0]
+
+
+def test_default_of_copter_fades_in_beyond_its_dwell() -> None:
+    chirp = excitation.ardupilot_chirp(
+        magnitude=0.1, start_hz=0.5, stop_hz=40.0, record_s=70.0, fade_in_s=15.0, fade_out_s=2.0
+    )
+    plan = excitation.assess(chirp, AXIS)
+    assert "up to 1.04 Hz" in _findings(plan, "chirp-fade-in")[0]
+    assert not _findings(plan, "chirp-dwell")
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS))
+def test_every_kind_keeps_the_limits_by_default(kind: str) -> None:
+    limits = Limits(control=0.5, control_rate_per_s=60.0, attitude_rad=0.3)
+    plan = excitation.plan(kind, AXIS, band_rad_s=(2.0, 30.0), limits=limits)
+    axis = plan.axes[0]
+    shares = [
+        axis.peak_control / limits.control,
+        axis.peak_control_rate / 60.0,
+        axis.peak_rate_rad_s / limits.rate_rad_s,
+        axis.peak_attitude_rad / limits.attitude_rad,
+    ]
+    assert 0.79 < max(shares) <= 0.8 * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("kind", ["sweep", "ardupilot_chirp", "multisine", "noise", "prbs"])
+def test_a_sensible_request_is_a_go(kind: str) -> None:
+    plan = excitation.plan(kind, AXIS, band_rad_s=(1.0, 30.0))
+    assert plan.is_go, plan.summary()
+    assert len(plan.windows_s) == 5
+    assert "go" in repr(plan)
+    assert "Windows [s]" in str(plan.summary())
+    json.dumps(plan.to_dict(), allow_nan=False)
+
+
+@settings(max_examples=15, deadline=None)
+@given(amplitude=st.floats(0.001, 0.5), factor=st.floats(1.1, 4.0))
+def test_predictions_are_proportional_and_bounds_inverse(amplitude: float, factor: float) -> None:
+    small, large = (
+        excitation.plan(
+            "noise", AXIS, band_rad_s=(2.0, 20.0), amplitude=size, sample_rate_hz=100.0
+        ).axes[0]
+        for size in (amplitude, amplitude * factor)
+    )
+    assert_close(large.peak_attitude_rad, factor * small.peak_attitude_rad, rtol=1e-9, why="linear")
+    assert small.stderr is not None
+    assert large.stderr is not None
+    assert_close(np.array(small.stderr), factor * np.array(large.stderr), rtol=1e-9, why="linear")
+
+
+def test_too_much_amplitude_is_red_and_says_how_much_less() -> None:
+    plan = excitation.plan("sweep", AXIS, band_rad_s=(1.0, 30.0), amplitude=1.0)
+    (attitude,) = _findings(plan, "design-attitude")
+    assert attitude.startswith("[red]")
+    cut = float(attitude.split("reduce the amplitude by ")[1].split()[0])
+    again = excitation.plan("sweep", AXIS, band_rad_s=(1.0, 30.0), amplitude=1 - cut / 100)
+    assert _findings(again, "design-attitude")[0].startswith("[green]")
+
+
+def test_weak_slow_short_and_narrow_designs_are_told() -> None:
+    weak = excitation.plan("sweep", AXIS, band_rad_s=(1.0, 30.0), amplitude=1e-6)
+    assert _findings(weak, "design-coherence")[0].startswith("[red]")
+    assert _findings(weak, "design-bound")[0].startswith("[amber]")
+    slow = excitation.plan("sweep", AXIS, band_rad_s=(1.0, 60.0), sample_rate_hz=60.0)
+    assert _findings(slow, "design-sample-rate")[0].startswith("[red]")
+    short = excitation.plan("noise", AXIS, band_rad_s=(1.0, 30.0), duration_s=10.0)
+    assert _findings(short, "design-record-length")[0].startswith("[red]")
+    steps = excitation.plan("doublet", AXIS, band_rad_s=(2.0, 20.0))
+    assert _findings(steps, "design-transient")
+    narrow = excitation.assess(
+        excitation.noise(
+            band_rad_s=(1.0, 3.0), amplitude=0.1, duration_s=60.0, sample_rate_hz=200.0, seed=0
+        ),
+        AXIS,
+        band_rad_s=(1.0, 30.0),
+    )
+    assert _findings(narrow, "design-coverage")[0].startswith("[red]")
+
+
+def test_correlated_inputs_are_red_and_orthogonal_ones_green() -> None:
+    good = excitation.plan("multisine", AXIS, band_rad_s=(1.0, 30.0), names=("a", "b"))
+    assert _findings(good, "design-inputs-correlated")[0].startswith("[green]")
+    one = good.excitation.signals[0]
+    twin = excitation.Excitation(
+        np.vstack([one, one]), good.excitation.sample_time_s, ("a", "b"), "1", "copy", (1.0, 30.0)
+    )
+    bad = excitation.assess(twin, {"a": AXIS, "b": AXIS})
+    assert _findings(bad, "design-inputs-correlated")[0].startswith("[red]")
+
+
+def test_a_record_that_starts_off_trim_is_told() -> None:
+    time_s = np.arange(6000) / 200
+    cosine = excitation.Excitation(
+        0.1 * np.cos(5 * time_s)[None, :], 0.005, ("u",), "1", "tone", (2.0, 10.0)
+    )
+    assert (
+        "starts or ends at 0.1"
+        in _findings(excitation.assess(cosine, AXIS), "design-ends-out-of-trim")[0]
+    )
+
+
+def test_one_tone_cannot_tell_the_parameters_apart() -> None:
+    time_s = np.arange(8000) / 200
+    whole = 2 * math.pi * 8 / 40
+    tone = excitation.Excitation(
+        0 * time_s[None, :] + 0.1 * np.sin(whole * time_s), 0.005, ("u",), "1", "tone", (1.0, 2.0)
+    )
+    quick = RateAxis(gain=5.0, time_constant_s=1e-3)
+    plan = excitation.assess(tone, quick)
+    assert plan.axes[0].stderr is None or max(plan.axes[0].stderr) > 1e-3
+
+
+def test_plans_refuse() -> None:
+    with pytest.raises(OptionError, match="no such kind of design"):
+        excitation.plan("dance", AXIS, band_rad_s=(1.0, 30.0))
+    with pytest.raises(OptionError, match="this kind of design excites one input"):
+        excitation.plan("sweep", AXIS, band_rad_s=(1.0, 30.0), names=("a", "b"))
+    with pytest.raises(OptionError, match="very long record"):
+        excitation.plan("sweep", AXIS, band_rad_s=(0.01, 30.0))
+    made = excitation.doublet(amplitude=0.1, step_s=0.5, sample_rate_hz=50.0)
+    with pytest.raises(OptionError, match="an input has no guess"):
+        excitation.assess(made, {"v": AXIS})
+    with pytest.raises(OptionError, match="no record is flown"):
+        excitation.assess(made, AXIS, n_records=0)
+    with pytest.raises(ModelError, match="the guessed loop is unstable"):
+        excitation.assess(made, RateAxis(gain=40.0, time_constant_s=0.2, rate_feedback=-0.1))
+    with pytest.raises(ModelError, match="the guessed loop is unstable"):
+        RateAxis(gain=40.0, time_constant_s=0.2, delay_s=0.1, rate_feedback=0.5).slowest_s()
+    with pytest.raises(OptionError, match="absolute_gain must be positive"):
+        RateAxis(gain=0.0, time_constant_s=0.2)
+    with pytest.raises(OptionError, match="attitude_rad must be positive"):
+        Limits(attitude_rad=0.0)
+    with pytest.raises(OptionError, match="low must be positive"):
+        excitation.window_lengths((0.0, 1.0), 10.0, 1)
+
+
+def test_windows_follow_the_rules() -> None:
+    windows = excitation.window_lengths((1.0, 20.0), 90.0, 2)
+    assert_close(windows[0], 36.0, rtol=1e-12, why="a fifth of 180 s, less than half of 90 s")
+    assert_close(windows[-1], 20 * 2 * np.pi / 20, rtol=1e-12, why="twenty fastest cycles")
+    assert excitation.window_lengths((0.3, 20.0), 90.0, 2) == ()
+    assert excitation.window_lengths((1.0, 3.0), 60.0, 4) == (30.0,)
+
+
+def test_ardupilot_file_is_what_the_methodic_configurator_expects(tmp_path: Path) -> None:
+    chirp = excitation.ardupilot_chirp(**TEMPLATE, axis=11)
+    made = excitation.ardupilot_parameters(chirp, current={"LOG_BITMASK": 65534.0})
+    lines = made.write(tmp_path / "54_system_id_mixer_pitch.param").read_text().splitlines()
+    settings = dict(line.split(",") for line in lines if not line.startswith("#"))
+    assert settings == {
+        "ATC_RATE_FF_ENAB": "0", "ATC_RAT_PIT_I": "0", "LOG_BITMASK": "65535", "SID_AXIS": "11",
+        "SID_MAGNITUDE": "0.15", "SID_F_START_HZ": "0.05", "SID_F_STOP_HZ": "5",
+        "SID_T_FADE_IN": "5", "SID_T_FADE_OUT": "5", "SID_T_REC": "130",
+    }  # fmt: skip
+    assert all("#" not in line for line in lines if not line.startswith("#"))
+    before = dict.fromkeys(made.values, 3.0)
+    back = made.rollback(before)
+    assert back.values["ATC_RAT_PIT_I"] == 3
+    assert set(back.values) == set(made.values)
+    with pytest.raises(UnknownNameError, match="present values are needed"):
+        made.rollback({"SID_AXIS": 0.0})
+
+
+def test_axes_without_a_mixer_leave_the_rate_loop_alone() -> None:
+    chirp = excitation.ardupilot_chirp(**{**TEMPLATE, "magnitude": 5.0}, axis=1)
+    made = excitation.ardupilot_parameters(chirp)
+    assert not any(name.startswith("ATC") for name in made.values)
+    assert "ATTITUDE_FAST" in made.notes[-1]
+
+
+def test_px4_file_says_what_px4_cannot_do(tmp_path: Path) -> None:
+    copter = excitation.px4_parameters(vehicle="multicopter", amplitude=1.5)
+    text = copter.write(tmp_path / "quad.params").read_text()
+    assert "1\t1\tSDLOG_PROFILE\t25\t6" in text
+    assert "1\t1\tMC_AT_SYSID_AMP\t1.5\t9" in text
+    assert "companion computer" in text
+    plane = excitation.px4_parameters(
+        vehicle="fixed_wing", start_hz=0.5, stop_hz=10.0, duration_s=30.0
+    )
+    assert plane.values["FW_AT_SYSID_TYPE"] == 2
+    assert plane.values["FW_AT_SYSID_F1"] == 10.0
+
+
+def test_exports_refuse(tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match="ArduPilot can fly its own chirp only"):
+        excitation.ardupilot_parameters(
+            excitation.doublet(amplitude=0.1, step_s=0.5, sample_rate_hz=50.0)
+        )
+    with pytest.raises(OptionError, match="SID_T_FADE_OUT leaves the autopilot's range"):
+        excitation.ardupilot_parameters(
+            excitation.ardupilot_chirp(**{**TEMPLATE, "fade_out_s": 6.0})
+        )
+    with pytest.raises(OptionError, match="cannot inject a sweep"):
+        excitation.px4_parameters(vehicle="multicopter", stop_hz=10.0)
+    with pytest.raises(OptionError, match="MC_AT_SYSID_AMP leaves"):
+        excitation.px4_parameters(vehicle="multicopter", amplitude=9.0)
+    with pytest.raises(OptionError, match="vehicle is not known"):
+        excitation.px4_parameters(vehicle="boat")  # type: ignore[arg-type]
+    with pytest.raises(OptionError, match="parameters have another suffix"):
+        ParameterFile("px4", {"A": 1}).write(tmp_path / "a.param")
+    assert not list(tmp_path.iterdir())
+
+
+def test_csv_reads_back_to_twelve_digits(tmp_path: Path) -> None:
+    made = excitation.ardupilot_chirp(**{**TEMPLATE, "magnitude": 5.0}, axis=7, sample_rate_hz=50.0)
+    path = excitation.write_csv(made, tmp_path / "chirp.csv")
+    assert path.read_text().splitlines()[0] == "time_s,excitation [deg/s]"
+    read = np.loadtxt(path, delimiter=",", skiprows=1)
+    assert_close(read[:, 0], made.time_s, atol=1e-9, why="twelve digits")
+    assert_close(read[:, 1], made.signals[0], atol=1e-10, why="twelve digits")
+
+
+def test_pictures_show_every_input() -> None:
+    plan = excitation.plan("multisine", AXIS, band_rad_s=(2.0, 20.0), names=("a", "b"))
+    assert [trace.name for trace in excitation_history(plan.excitation).data] == ["a", "b"]
+    assert len(excitation_spectrum(plan.excitation).data) == 2
+    made = plan_spectrum(plan)
+    assert len(made.data) == 6
+    assert made.layout.xaxis.type == "log"
+
+
+COMMAND = [
+    "design", "ardupilot_chirp", "--band", "1", "30", "--gain", "40", "--time-constant", "0.2",
+    "--rate-feedback", "0.1", "--attitude-feedback", "4", "--axis", "11",
+]  # fmt: skip
+
+
+def test_command_designs_and_exports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = [tmp_path / name for name in ("a.csv", "a.param", "a.html")]
+    options = [
+        *("--csv", str(files[0])), *("--param", str(files[1])), *("--html", str(files[2])),
+    ]  # fmt: skip
+    assert run([*COMMAND, *options, "--json"]) == 0
+    shown = capsys.readouterr()
+    assert json.loads(shown.out)["go"] is True
+    assert shown.err.count("Wrote") == 3
+    assert "SID_AXIS,11" in files[1].read_text()
+    assert "Go or no-go" in files[2].read_text()
+
+
+def test_command_leaves_with_one_for_no_go(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([*COMMAND, "--amplitude", "3"]) == 1
+    assert "[red]" in capsys.readouterr().out
+    assert run(["design", "sweep", *COMMAND[2:-2], "--param", "x.param"]) == 2
+    assert "--param needs" in capsys.readouterr().err
+
+
+def test_command_offers_every_kind() -> None:
+    assert set(design_command.KINDS) == set(KINDS)
