@@ -84,6 +84,7 @@ def _multipliers(path: Path) -> dict[tuple[str, str], float]:
         for field, code, key in zip(layout.columns, layout.format, row.MultIds, strict=False):
             if code not in "cCeEL":
                 found[layout.name, field] = table.get(key, 1.0)
+    reader.close()
     return found
 
 
