@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from pathlib import Path
 
+from flightid.conventions import Role
 from flightid.errors import MissingColumnError
 from flightid.findings import Finding
+from flightid.logs.channel_map import ChannelMap
 from flightid.logs.log_table import LogTable
+from flightid.logs.self_check import InjectionCheck, check_injection
+from flightid.logs.sid_runs import SidRun, locate
 from flightid.logs.source import ByteRange, Event, Gap, LogSource, MessageInfo, ParameterChange
+from flightid.logs.to_record import make_record
+from flightid.record import Record
+from flightid.record.timebase import GapPolicy
 from flightid.table import Column, Table
 
 SUGGESTIONS = 12
@@ -142,6 +150,79 @@ class Log:
                 "the log holds no such message", found=name, needed=self._near(name)
             )
         return LogTable(self._source, self.messages[name], instance)
+
+    @cached_property
+    def sid_runs(self) -> tuple[SidRun, ...]:
+        """Runs of ArduPilot's system-identification mode, in order; empty in other logs."""
+        return locate(self)
+
+    def check_injection(self, run: SidRun) -> InjectionCheck:
+        """Prove where, with what sign and how late the logged chirp of a run reached the mixer."""
+        return check_injection(self, run)
+
+    def record(
+        self,
+        channels: ChannelMap | str | Path | None = None,
+        *,
+        names: Iterable[str] | None = None,
+        span: tuple[float, float] | None = None,
+        sid_run: SidRun | int | None = None,
+        sample_rate_hz: float | None = None,
+        roles: Mapping[str, Role | str] | None = None,
+        gaps: GapPolicy | str = GapPolicy.ERROR,
+        max_gap_s: float | None = None,
+        name: str | None = None,
+    ) -> Record:
+        """Make a record: mapped channels in SI units on one uniform time base.
+
+        Parameters
+        ----------
+        channels : ChannelMap, str or path, optional
+            Channel map, a shipped one by name or a TOML file; default: by kind and vehicle.
+        names : iterable of str, optional
+            Channels wanted; each must be there. Default: all of the map that the log holds.
+        span : (float, float), optional
+            First and last instant on the autopilot's clock, s; default: all, or the chirp of
+            `sid_run`.
+        sid_run : SidRun or int, optional
+            Run of `sid_runs`, or its number: adds the injected signal as the channel
+            ``"excitation"``, shifted to when it acted where `check_injection` proves the delay.
+        sample_rate_hz : float, optional
+            Samples per second; default: the rate of the slowest channel that the map marks as
+            deciding (commands and rates), so that no content is invented.
+        roles : mapping of str to Role, optional
+            Roles that differ from the map's.
+        gaps, max_gap_s : GapPolicy and float, optional
+            What to do where a channel has no samples for long; see `to_uniform`.
+        name : str, optional
+            Name of the record; default: the file's.
+
+        Returns
+        -------
+        Record
+            Its history tells source and method of each channel and what was left out.
+
+        Raises
+        ------
+        DataError
+            No map fits, or a gap or disordered stamps in the span.
+        MissingColumnError
+            A named channel is not in the log.
+        OptionError
+            There is no such run.
+        """
+        return make_record(
+            self,
+            channels,
+            names,
+            span,
+            sid_run,
+            sample_rate_hz,
+            roles,
+            gaps,
+            max_gap_s,
+            name,
+        )
 
     def summary(self) -> Table:
         """Table of the message types with rows, instances, rate and span."""

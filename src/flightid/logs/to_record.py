@@ -1,0 +1,205 @@
+"""From a log to a record: mapped channels on one time base, with the injected signal of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from flightid.conventions import Role
+from flightid.errors import DataError, MissingColumnError, OptionError
+from flightid.logs.channel_map import (
+    ChannelMap,
+    ChannelSource,
+    MappedChannel,
+    channel_map,
+    default_map,
+)
+from flightid.logs.extraction import Extracted, extract, find
+from flightid.logs.self_check import InjectionCheck, check_injection, chirp_clock, paired_rows
+from flightid.logs.sid_runs import SidRun
+from flightid.record import Channel, Record, Step
+from flightid.record.timebase import GapPolicy, to_uniform
+from flightid.table import Cell
+from flightid.units import convert
+
+if TYPE_CHECKING:
+    from flightid.logs.log import Log
+
+EXCITATION = "excitation"
+EDGE_STEPS = 3.0
+"""Steps of its own by which a channel may begin late or end early and still cover a span."""
+SI = {"deg": "rad", "deg/s": "rad/s"}
+
+
+def make_record(
+    log: Log,
+    channels: ChannelMap | str | Path | None,
+    names: Iterable[str] | None,
+    span_s: tuple[float, float] | None,
+    sid_run: SidRun | int | None,
+    sample_rate_hz: float | None,
+    roles: Mapping[str, Role | str] | None,
+    gaps: GapPolicy | str,
+    max_gap_s: float | None,
+    name: str | None,
+) -> Record:
+    """See `Log.record`."""
+    chosen = _chosen(log, channels, names).with_roles(roles or {})
+    run = _run(log, sid_run)
+    if run is not None and span_s is None:
+        span_s = run.chirp_span_s
+    found, left_out = _found(log, chosen, span_s, required=names is not None)
+    check = None
+    if run is not None:
+        check = check_injection(log, run)
+        found.append(_excitation(log, run, check))
+    reference = None if sample_rate_hz is not None else _reference(found)
+    base = to_uniform(
+        {item.channel.name: (item.time_s, item.values) for item in found},
+        sample_time_s=None if sample_rate_hz is None else 1.0 / sample_rate_hz,
+        reference=reference,
+        span_s=span_s,
+        gaps=gaps,
+        max_gap_s=max_gap_s,
+    )
+    span = base.only
+    record = Record.from_arrays(
+        span.time_s,
+        **{  # type: ignore[arg-type]
+            group: {
+                i.channel.name: span.samples[i.channel.name]
+                for i in found
+                if i.channel.role == role
+            }
+            for group, role in (
+                ("inputs", Role.INPUT),
+                ("outputs", Role.OUTPUT),
+                ("excitations", Role.EXCITATION),
+                ("others", Role.OTHER),
+            )
+        },
+        units={item.channel.name: item.channel.unit for item in found},
+        name=name or log.path.stem,
+    )
+    labels = [
+        Channel(i.channel.name, i.channel.unit, i.channel.role, i.note)
+        for role in Role
+        for i in found
+        if i.channel.role == role
+    ]
+    options: dict[str, Cell] = {"log": log.path.name, "map": chosen.title, **base.options}
+    options |= {"left_out": ", ".join(left_out) or None}
+    if check is not None:
+        options |= {"sid_run": repr(run), "injection": str(check.findings[0])}
+    return record.replace(channels=labels, step=Step("Log.record", options))
+
+
+def _chosen(
+    log: Log, channels: ChannelMap | str | Path | None, names: Iterable[str] | None
+) -> ChannelMap:
+    if channels is None:
+        chosen = default_map(log.kind, log.vehicle)
+    elif isinstance(channels, ChannelMap):
+        chosen = channels
+    else:
+        chosen = channel_map(channels)
+    return chosen if names is None else chosen.select(names)
+
+
+def _run(log: Log, sid_run: SidRun | int | None) -> SidRun | None:
+    if sid_run is None or isinstance(sid_run, SidRun):
+        return sid_run
+    if not 0 <= sid_run < len(log.sid_runs):
+        raise OptionError(
+            "there is no such system-identification run",
+            found=sid_run,
+            needed=f"0 to {len(log.sid_runs) - 1}" if log.sid_runs else "a log with SIDS and SIDD",
+        )
+    return log.sid_runs[sid_run]
+
+
+def _found(
+    log: Log, chosen: ChannelMap, span_s: tuple[float, float] | None, *, required: bool
+) -> tuple[list[Extracted], list[str]]:
+    """Channels that the log holds; the others by name with the reason, unless they are required.
+
+    A channel that does not decide on the sample time may not cut the span either: it is left out
+    where it does not cover what the deciding ones cover.
+    """
+    found, left_out = [], []
+    for channel in chosen.channels:
+        if find(log, channel) is None and not required:
+            left_out.append(f"{channel.name} (not logged)")
+            continue
+        item = extract(log, channel, span_s)
+        if item.time_s.size < 2:
+            if required:
+                raise DataError(
+                    f"channel {channel.name!r} has no samples in the span",
+                    found=f"{span_s}",
+                    needed=f"a span of the message {item.source.message}",
+                )
+            left_out.append(f"{channel.name} (no samples in the span)")
+            continue
+        found.append(item)
+    if not required:
+        begin, end = _core_span(found)
+        for item in [i for i in found if not i.channel.sets_rate]:
+            slack = EDGE_STEPS * item.interval_s
+            if item.time_s[0] > begin + slack or item.time_s[-1] < end - slack:
+                left_out.append(f"{item.channel.name} (does not cover the span)")
+                found.remove(item)
+    roles = {item.channel.role for item in found}
+    if not {Role.INPUT, Role.OUTPUT} <= roles and not required:
+        raise MissingColumnError(
+            "the log does not hold an input and an output of its channel map",
+            found=", ".join(left_out) + " left out",
+            needed="at least one of each",
+            action="name another map, or read columns with Log.table",
+        )
+    return found, left_out
+
+
+def _core_span(found: list[Extracted]) -> tuple[float, float]:
+    core = [item for item in found if item.channel.sets_rate] or found
+    if not core:
+        return 0.0, 0.0
+    return max(float(i.time_s[0]) for i in core), min(float(i.time_s[-1]) for i in core)
+
+
+def _reference(found: list[Extracted]) -> str:
+    """The slowest channel among those that decide on the sample time."""
+    core = [item for item in found if item.channel.sets_rate] or found
+    return max(core, key=lambda item: item.interval_s).channel.name
+
+
+def _excitation(log: Log, run: SidRun, check: InjectionCheck) -> Extracted:
+    """The injected signal at the instants when it acted, as far as that is proven.
+
+    The mode logs the chirp at the end of the loop before the one that uses it. Where the self-check
+    proves the delay, the chirp is shifted by it onto the stamps of RATE, which are those of the
+    gyroscope; otherwise it keeps the stamps with which it was written.
+    """
+    stamp_s, clock_s, signal = chirp_clock(log, run)
+    note = "as logged; its delay to the mixer is not proven"
+    if check.is_proven and check.injected is not None:
+        rates = log.table("RATE").time_s
+        rows, of_chirp = paired_rows(rates, stamp_s)
+        at_s = clock_s[of_chirp] - check.injected.lag_s
+        inside = at_s >= clock_s[0]
+        stamp_s = rates[rows][inside]
+        signal = check.sign * CubicSpline(clock_s, signal)(at_s[inside])
+        note = f"shifted by {check.injected.lag_loops:.2g} loops to when the mixer got it (proven)"
+    unit = SI.get(run.unit, run.unit)
+    channel = MappedChannel(EXCITATION, unit, Role.EXCITATION, False, False, ())
+    source = ChannelSource("SIDD", ("Targ",), note=note)
+    return Extracted(channel, source, stamp_s, _in_unit(signal, run.unit, unit))
+
+
+def _in_unit(signal: NDArray[np.float64], source: str, target: str) -> NDArray[np.float64]:
+    return signal if source == target else convert(signal, source, target)
