@@ -29,6 +29,8 @@ pub struct SidRun {
     pub record_s: f32,
     /// SID_T_FADE_OUT, s.
     pub fade_out_s: f32,
+    /// Time at which the pilot leaves the mode, s; infinity: it ends by itself.
+    pub leave_s: f64,
 }
 
 /// What the mode adds, and what SIDD logs of it.
@@ -97,7 +99,7 @@ impl SystemIdMode {
         }
         self.waveform_time += self.dt;
         let length = DELAY_S + run.fade_in_s + chirp.hold_s() + run.record_s + run.fade_out_s;
-        if self.waveform_time > length {
+        if self.waveform_time > length || time_s >= run.leave_s {
             self.next += 1;
             self.waveform_time = 0.0;
             return Injection::default();
@@ -214,6 +216,7 @@ mod tests {
             fade_in_s: 1.0,
             record_s: 10.0,
             fade_out_s: 1.0,
+            leave_s: f64::INFINITY,
         };
         let dt = 0.0025;
         let mut mode = SystemIdMode::new(&[run], dt).unwrap();
@@ -223,6 +226,9 @@ mod tests {
         let largest = log.iter().map(|i| i.actuator[1]).fold(0.0, f32::max);
         assert!((largest - 0.2).abs() < 1e-3);
         assert!(log[6300..].iter().all(|i| i.axis == 0));
+        let mut left = SystemIdMode::new(&[SidRun { leave_s: 3.0, ..run }], dt).unwrap();
+        let axes: Vec<u8> = (0..1400).map(|k| left.update(f64::from(k) * 0.0025).axis).collect();
+        assert!(axes[1199] == 11 && axes[1200..].iter().all(|&axis| axis == 0));
         assert!(SystemIdMode::new(&[SidRun { axis: 14, ..run }], dt).is_err());
         assert!(SystemIdMode::new(&[SidRun { record_s: 1.0, ..run }], dt).is_err());
     }

@@ -127,6 +127,7 @@ fn fly_quadrotor<'py>(
                     fade_in_s,
                     record_s,
                     fade_out_s,
+                    leave_s,
                 }
             ))
         })

@@ -1,8 +1,10 @@
 """Simulation: models driven by records, and a simulated quadrotor with its autopilot."""
 
+from flightid.simulation.ardupilot_log import write_ardupilot_log
 from flightid.simulation.autopilot import Autopilot, PilotDoublet, RateGains, SidRun
 from flightid.simulation.flight import Flight, fly
 from flightid.simulation.quadrotor import QuadrotorParameters, Sensors, Turbulence
+from flightid.simulation.scenario import fly_scenario
 from flightid.simulation.simulate import LinearModel, LinearSystem, simulate
 from flightid.simulation.truth import RateTruth, rate_truth
 
@@ -19,6 +21,8 @@ __all__ = [
     "SidRun",
     "Turbulence",
     "fly",
+    "fly_scenario",
     "rate_truth",
     "simulate",
+    "write_ardupilot_log",
 ]

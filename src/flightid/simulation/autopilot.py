@@ -154,6 +154,9 @@ class SidRun:
         SID_F_START_HZ and SID_F_STOP_HZ, Hz.
     fade_in_s, record_s, fade_out_s : float
         SID_T_FADE_IN, SID_T_REC and SID_T_FADE_OUT, s.
+    leave_after_s : float or None
+        Time after the start at which the pilot leaves the mode, s; None: it ends by itself, after
+        a silent tail as long as both fades and the dwell.
 
     Example
     -------
@@ -169,6 +172,7 @@ class SidRun:
     fade_in_s: float = 5.0
     record_s: float = 130.0
     fade_out_s: float = 5.0
+    leave_after_s: float | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.axis <= 13:
@@ -177,12 +181,19 @@ class SidRun:
     @property
     def duration_s(self) -> float:
         """Time in the mode: a second's wait, the chirp and the silent tail, s."""
-        return 1.0 + self.fade_in_s + 2.0 / self.start_hz + self.record_s + self.fade_out_s
+        by_itself = 1.0 + self.fade_in_s + 2.0 / self.start_hz + self.record_s + self.fade_out_s
+        return by_itself if self.leave_after_s is None else min(self.leave_after_s, by_itself)
 
     @property
     def end_s(self) -> float:
         """End of the mode, s."""
         return self.start_s + self.duration_s
+
+    def to_native(self) -> dict[str, Any]:
+        """Fields by name, as the native half reads them."""
+        fields = asdict(self)
+        left = fields.pop("leave_after_s") is not None
+        return fields | {"leave_s": self.end_s if left else math.inf}
 
     def parameters(self) -> dict[str, float]:
         """The SID_ parameters."""

@@ -272,7 +272,7 @@ def fly(
         asdict(errors),
         asdict(air),
         _pilot(moves, n_loops, loop.loop_rate_hz),
-        [asdict(run) for run in activations],
+        [run.to_native() for run in activations],
         log_every,
         seed,
     )
