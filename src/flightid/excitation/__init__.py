@@ -5,6 +5,7 @@
 Excitation('doublet', 1 input, 350 samples, 50 Hz, 7 s, relative peak factor 1.87)
 """
 
+from flightid.excitation.assess import assess, window_lengths
 from flightid.excitation.design import plan
 from flightid.excitation.excitation import Excitation
 from flightid.excitation.export import (
@@ -22,7 +23,7 @@ from flightid.excitation.multistep import (
     multistep_energy,
 )
 from flightid.excitation.noise import noise, uniform_noise
-from flightid.excitation.plan import AxisForecast, Limits, Plan, assess, window_lengths
+from flightid.excitation.plan import AxisForecast, Limits, Plan
 from flightid.excitation.prbs import held_density, prbs
 from flightid.excitation.spectrum import Spectrum
 from flightid.excitation.sweep import ardupilot_chirp, sweep

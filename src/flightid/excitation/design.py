@@ -7,11 +7,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from flightid.errors import OptionError
+from flightid.excitation.assess import assess
 from flightid.excitation.excitation import Excitation
 from flightid.excitation.multisine import multisine
 from flightid.excitation.multistep import doublet, modified_3211, multistep
 from flightid.excitation.noise import noise
-from flightid.excitation.plan import Limits, Plan, assess
+from flightid.excitation.plan import Limits, Plan
 from flightid.excitation.prbs import HALF_POWER, HIGHEST_ORDER, LOWEST_ORDER, prbs
 from flightid.excitation.sweep import ardupilot_chirp, sweep
 from flightid.excitation.vehicle import RateAxis
