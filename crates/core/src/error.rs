@@ -39,4 +39,24 @@ pub enum CoreError {
         /// The matrix.
         what: &'static str,
     },
+    /// A formula that is outside the grammar or too large.
+    #[error("at character {position}: {problem}")]
+    Expression {
+        /// Byte position in the text.
+        position: usize,
+        /// What was found and needed.
+        problem: String,
+    },
+    /// A name in a formula that nothing defines.
+    #[error("{name:?} is not defined here")]
+    UnknownName {
+        /// The name.
+        name: String,
+    },
+    /// Definitions that need one another.
+    #[error("definitions form a circle: {names}")]
+    Circular {
+        /// The chain of names.
+        names: String,
+    },
 }

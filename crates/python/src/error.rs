@@ -26,6 +26,9 @@ pub fn from_core(error: CoreError) -> PyErr {
         CoreError::Range { .. } => raise("OptionError", message),
         CoreError::NotFinite { .. } => raise("DataError", message),
         CoreError::Singular { .. } => raise("SingularError", message),
+        CoreError::Expression { .. } => raise("ModelError", message),
+        CoreError::UnknownName { .. } => raise("ModelError", message),
+        CoreError::Circular { .. } => raise("ModelError", message),
     }
 }
 

@@ -8,8 +8,12 @@ use pyo3::prelude::*;
 pub mod chirp;
 pub mod dataflash;
 pub mod error;
+pub mod expression;
+pub mod interrupt;
+pub mod least_squares;
 pub mod linear_simulation;
 pub mod quadrotor;
+pub mod transfer;
 pub mod ulog;
 
 /// version() -> str
@@ -29,5 +33,8 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     dataflash::register(module)?;
     ulog::register(module)?;
     quadrotor::register(module)?;
+    expression::register(module)?;
+    least_squares::register(module)?;
+    transfer::register(module)?;
     Ok(())
 }

@@ -1,0 +1,380 @@
+//! A whitelisted grammar for formulas in model files: numbers, names, `+ - * / ^`, parentheses and a
+//! fixed list of functions. Nothing is ever evaluated as code; length, depth and size are bounded,
+//! so a file from a stranger can neither run, hang nor exhaust anything.
+//!
+//! ```text
+//! sum     = product {("+" | "-") product}
+//! product = unary {("*" | "/") unary}
+//! unary   = ("-" | "+") unary | power
+//! power   = atom [("^" | "**") unary]          right-associative, binds tighter than a leading minus
+//! atom    = number | name | function "(" sum {"," sum} ")" | "(" sum ")"
+//! ```
+//! A name is a letter or underscore, then letters, digits, underscores, then primes (`p'` is a state
+//! derivative). `pi` is the number.
+
+use crate::error::CoreError;
+
+/// Longest text accepted, in bytes.
+pub const MAXIMUM_LENGTH: usize = 10_000;
+/// Most nodes in one expression.
+pub const MAXIMUM_NODES: usize = 4_096;
+/// Deepest nesting of parentheses, signs and powers.
+pub const MAXIMUM_DEPTH: usize = 64;
+
+/// Functions of one argument.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum Unary {
+    Negate,
+    Sin,
+    Cos,
+    Tan,
+    Asin,
+    Acos,
+    Atan,
+    Sinh,
+    Cosh,
+    Tanh,
+    Exp,
+    Log,
+    Sqrt,
+    Abs,
+    Sign,
+}
+
+/// Functions of two arguments.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[allow(missing_docs)]
+pub enum Binary {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Power,
+    Atan2,
+    Minimum,
+    Maximum,
+}
+
+/// One node; children are indices of earlier nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Node {
+    /// A number.
+    Number(f64),
+    /// A name to be bound when the tape is built.
+    Name(String),
+    /// A function of one node.
+    Unary(Unary, usize),
+    /// A function of two nodes.
+    Binary(Binary, usize, usize),
+}
+
+/// A parsed expression: nodes with children before parents, and the root.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expression {
+    /// Nodes, children before parents.
+    pub nodes: Vec<Node>,
+    /// Index of the node whose value is the expression's.
+    pub root: usize,
+}
+
+impl Expression {
+    /// Parse a text.
+    ///
+    /// # Errors
+    /// `CoreError::Expression` with the byte position of the fault.
+    pub fn parse(text: &str) -> Result<Self, CoreError> {
+        if text.len() > MAXIMUM_LENGTH {
+            return fault(MAXIMUM_LENGTH, format!("longer than {MAXIMUM_LENGTH} bytes"));
+        }
+        let mut parser = Parser { text: text.as_bytes(), position: 0, depth: 0, nodes: Vec::new() };
+        let root = parser.sum()?;
+        parser.skip_space();
+        if parser.position < text.len() {
+            return parser.unexpected("an operator or the end");
+        }
+        Ok(Self { nodes: parser.nodes, root })
+    }
+
+    /// Names that occur, in order of first occurrence.
+    pub fn names(&self) -> Vec<&str> {
+        let mut found: Vec<&str> = Vec::new();
+        for node in &self.nodes {
+            if let Node::Name(name) = node
+                && !found.contains(&name.as_str())
+            {
+                found.push(name);
+            }
+        }
+        found
+    }
+}
+
+fn fault<T>(position: usize, problem: String) -> Result<T, CoreError> {
+    Err(CoreError::Expression { position, problem })
+}
+
+struct Parser<'a> {
+    text: &'a [u8],
+    position: usize,
+    depth: usize,
+    nodes: Vec<Node>,
+}
+
+impl Parser<'_> {
+    fn skip_space(&mut self) {
+        while self.text.get(self.position).is_some_and(u8::is_ascii_whitespace) {
+            self.position += 1;
+        }
+    }
+
+    fn peek(&mut self) -> Option<u8> {
+        self.skip_space();
+        self.text.get(self.position).copied()
+    }
+
+    fn take(&mut self, wanted: u8) -> bool {
+        let found = self.peek() == Some(wanted);
+        self.position += usize::from(found);
+        found
+    }
+
+    fn unexpected<T>(&mut self, needed: &str) -> Result<T, CoreError> {
+        let rest = self.text.get(self.position..).unwrap_or_default();
+        let found = String::from_utf8_lossy(&rest[..rest.len().min(12)]).into_owned();
+        let found = if found.is_empty() { "the end".to_string() } else { format!("{found:?}") };
+        fault(self.position, format!("found {found}, needed {needed}"))
+    }
+
+    fn push(&mut self, node: Node) -> Result<usize, CoreError> {
+        if self.nodes.len() >= MAXIMUM_NODES {
+            return fault(self.position, format!("more than {MAXIMUM_NODES} terms"));
+        }
+        self.nodes.push(node);
+        Ok(self.nodes.len() - 1)
+    }
+
+    fn sum(&mut self) -> Result<usize, CoreError> {
+        self.depth += 1;
+        if self.depth > MAXIMUM_DEPTH {
+            return fault(self.position, format!("nested deeper than {MAXIMUM_DEPTH}"));
+        }
+        let mut left = self.product()?;
+        loop {
+            let operation = match self.peek() {
+                Some(b'+') => Binary::Add,
+                Some(b'-') => Binary::Subtract,
+                _ => break,
+            };
+            self.position += 1;
+            let right = self.product()?;
+            left = self.push(Node::Binary(operation, left, right))?;
+        }
+        self.depth -= 1;
+        Ok(left)
+    }
+
+    fn product(&mut self) -> Result<usize, CoreError> {
+        let mut left = self.unary()?;
+        loop {
+            let operation = match self.peek() {
+                Some(b'*') => Binary::Multiply,
+                Some(b'/') => Binary::Divide,
+                _ => return Ok(left),
+            };
+            self.position += 1;
+            let right = self.unary()?;
+            left = self.push(Node::Binary(operation, left, right))?;
+        }
+    }
+
+    fn unary(&mut self) -> Result<usize, CoreError> {
+        self.depth += 1;
+        if self.depth > MAXIMUM_DEPTH {
+            return fault(self.position, format!("nested deeper than {MAXIMUM_DEPTH}"));
+        }
+        let node = if self.take(b'-') {
+            let child = self.unary()?;
+            self.push(Node::Unary(Unary::Negate, child))?
+        } else if self.take(b'+') {
+            self.unary()?
+        } else {
+            self.power()?
+        };
+        self.depth -= 1;
+        Ok(node)
+    }
+
+    fn power(&mut self) -> Result<usize, CoreError> {
+        let base = self.atom()?;
+        let rest = {
+            self.skip_space();
+            self.text.get(self.position..).unwrap_or_default()
+        };
+        let width = match rest {
+            [b'^', ..] => 1,
+            [b'*', b'*', ..] => 2,
+            _ => return Ok(base),
+        };
+        self.position += width;
+        let exponent = self.unary()?;
+        self.push(Node::Binary(Binary::Power, base, exponent))
+    }
+
+    fn atom(&mut self) -> Result<usize, CoreError> {
+        match self.peek() {
+            Some(b'(') => {
+                self.position += 1;
+                let inner = self.sum()?;
+                self.close()?;
+                Ok(inner)
+            }
+            Some(first) if first.is_ascii_digit() || first == b'.' => self.number(),
+            Some(first) if first.is_ascii_alphabetic() || first == b'_' => self.name(),
+            _ => self.unexpected("a number, a name or '('"),
+        }
+    }
+
+    fn close(&mut self) -> Result<(), CoreError> {
+        if self.take(b')') { Ok(()) } else { self.unexpected("')'") }
+    }
+
+    fn while_matches(&mut self, test: impl Fn(u8) -> bool) {
+        while self.text.get(self.position).is_some_and(|&byte| test(byte)) {
+            self.position += 1;
+        }
+    }
+
+    fn number(&mut self) -> Result<usize, CoreError> {
+        let start = self.position;
+        self.while_matches(|byte| byte.is_ascii_digit() || byte == b'.');
+        if matches!(self.text.get(self.position), Some(b'e' | b'E')) {
+            let mark = self.position;
+            self.position += 1;
+            if matches!(self.text.get(self.position), Some(b'+' | b'-')) {
+                self.position += 1;
+            }
+            let digits = self.position;
+            self.while_matches(|byte| byte.is_ascii_digit());
+            if digits == self.position {
+                self.position = mark;
+            }
+        }
+        let text = String::from_utf8_lossy(&self.text[start..self.position]);
+        match text.parse::<f64>() {
+            Ok(value) if value.is_finite() => self.push(Node::Number(value)),
+            _ => fault(start, format!("{text:?} is not a finite number")),
+        }
+    }
+
+    fn name(&mut self) -> Result<usize, CoreError> {
+        let start = self.position;
+        self.while_matches(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+        self.while_matches(|byte| byte == b'\'');
+        let name = String::from_utf8_lossy(&self.text[start..self.position]).into_owned();
+        if self.peek() == Some(b'(') {
+            return self.call(start, &name);
+        }
+        if name == "pi" {
+            return self.push(Node::Number(std::f64::consts::PI));
+        }
+        self.push(Node::Name(name))
+    }
+
+    fn call(&mut self, start: usize, name: &str) -> Result<usize, CoreError> {
+        self.position += 1;
+        let mut arguments = vec![self.sum()?];
+        while self.take(b',') {
+            arguments.push(self.sum()?);
+        }
+        self.close()?;
+        match (unary(name), binary(name), arguments.as_slice()) {
+            (Some(function), _, &[only]) => self.push(Node::Unary(function, only)),
+            (_, Some(function), &[first, second]) => {
+                self.push(Node::Binary(function, first, second))
+            }
+            (None, None, _) => fault(start, format!("{name:?} is not a function known here")),
+            (.., given) => {
+                fault(start, format!("{name} does not take {} argument(s)", given.len()))
+            }
+        }
+    }
+}
+
+fn unary(name: &str) -> Option<Unary> {
+    Some(match name {
+        "sin" => Unary::Sin,
+        "cos" => Unary::Cos,
+        "tan" => Unary::Tan,
+        "asin" => Unary::Asin,
+        "acos" => Unary::Acos,
+        "atan" => Unary::Atan,
+        "sinh" => Unary::Sinh,
+        "cosh" => Unary::Cosh,
+        "tanh" => Unary::Tanh,
+        "exp" => Unary::Exp,
+        "log" => Unary::Log,
+        "sqrt" => Unary::Sqrt,
+        "abs" => Unary::Abs,
+        "sign" => Unary::Sign,
+        _ => return None,
+    })
+}
+
+fn binary(name: &str) -> Option<Binary> {
+    Some(match name {
+        "atan2" => Binary::Atan2,
+        "min" => Binary::Minimum,
+        "max" => Binary::Maximum,
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn problem(text: &str) -> (usize, String) {
+        match Expression::parse(text) {
+            Err(CoreError::Expression { position, problem }) => (position, problem),
+            other => panic!("{text:?} gave {other:?}"),
+        }
+    }
+
+    #[test]
+    fn faults_name_their_place() {
+        assert_eq!(problem("a + "), (4, "found the end, needed a number, a name or '('".into()));
+        assert_eq!(problem("2*foo(x)").0, 2);
+        assert!(problem("sin(x, y)").1.contains("does not take 2"));
+        assert!(problem("1.2.3").1.contains("not a finite number"));
+        assert!(problem("1e999").1.contains("not a finite number"));
+        assert!(problem("(a").1.contains("needed ')'"));
+        assert!(problem("a b").1.contains("needed an operator"));
+        assert!(problem("__import__('os')").1.contains("needed"));
+        assert!(problem("ü").1.contains("needed a number"));
+    }
+
+    #[test]
+    fn hostile_sizes_are_refused() {
+        assert!(problem(&"(".repeat(5_000)).1.contains("deeper"));
+        assert!(problem(&"-".repeat(5_000)).1.contains("deeper"));
+        assert!(problem(&("2^".repeat(4_000) + "2")).1.contains("deeper"));
+        assert!(problem(&("a+".repeat(4_000) + "a")).1.contains("more than"));
+        assert!(problem(&"a".repeat(20_000)).1.contains("longer"));
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_parses_or_fails_in_order(text in "\\PC{0,200}") {
+            if let Ok(expression) = Expression::parse(&text) {
+                prop_assert!(expression.root < expression.nodes.len());
+            }
+        }
+
+        #[test]
+        fn any_formula_text_parses_or_fails_in_order(text in "[-+*/^(),.0-9a-z' ]{0,120}") {
+            let _ = Expression::parse(&text);
+        }
+    }
+}

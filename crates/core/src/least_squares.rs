@@ -1,0 +1,113 @@
+//! A least-squares problem with bounds, as a fit states it and as a solver answers it.
+
+use crate::error::CoreError;
+
+/// A sum of squares: the residuals and their exact Jacobian.
+pub trait Problem {
+    /// Number of variables.
+    fn n_parameters(&self) -> usize;
+    /// Number of residuals.
+    fn n_residuals(&self) -> usize;
+    /// Residuals at `x`. An error at a trial point shortens the step.
+    ///
+    /// # Errors
+    /// Where the residuals have no value at `x`.
+    fn residuals(&mut self, x: &[f64], residuals: &mut [f64]) -> Result<(), CoreError>;
+    /// Jacobian at `x`, (n_residuals × n_parameters), row-major.
+    ///
+    /// # Errors
+    /// Where the derivatives have no value at `x`.
+    fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) -> Result<(), CoreError>;
+}
+
+/// When to stop.
+#[derive(Debug, Clone, Copy)]
+pub struct Options {
+    /// Most accepted or rejected steps.
+    pub maximum_iterations: usize,
+    /// Largest cosine between residuals and a free column of the Jacobian at a minimum.
+    pub gradient_tolerance: f64,
+    /// Smallest relative step.
+    pub step_tolerance: f64,
+    /// Smallest relative reduction of the sum of squares.
+    pub cost_tolerance: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            maximum_iterations: 200,
+            gradient_tolerance: 1e-10,
+            step_tolerance: 1e-12,
+            cost_tolerance: 1e-15,
+        }
+    }
+}
+
+/// Why the iteration ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Termination {
+    /// The residuals are orthogonal to every free direction.
+    Gradient,
+    /// The relative step fell below its tolerance.
+    Step,
+    /// The relative reduction of the cost fell below its tolerance.
+    Cost,
+    /// The residuals vanish.
+    Zero,
+    /// Every variable is held by its bounds.
+    Bounds,
+    /// The most iterations were used.
+    Iterations,
+    /// No step lowers the cost although the gradient is not zero.
+    Stalled,
+    /// The caller asked to stop.
+    Interrupted,
+}
+
+impl Termination {
+    /// Whether the end point is a minimum to the tolerances.
+    pub fn is_converged(self) -> bool {
+        !matches!(self, Self::Iterations | Self::Stalled | Self::Interrupted)
+    }
+
+    /// Stable name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gradient => "gradient",
+            Self::Step => "step",
+            Self::Cost => "cost",
+            Self::Zero => "zero",
+            Self::Bounds => "bounds",
+            Self::Iterations => "iterations",
+            Self::Stalled => "stalled",
+            Self::Interrupted => "interrupted",
+        }
+    }
+}
+
+/// Where the iteration ended.
+#[derive(Debug, Clone)]
+pub struct Minimum {
+    /// Variables.
+    pub x: Vec<f64>,
+    /// Sum of squared residuals.
+    pub cost: f64,
+    /// Residuals at `x`.
+    pub residuals: Vec<f64>,
+    /// Jacobian at `x`, row-major.
+    pub jacobian: Vec<f64>,
+    /// Steps tried.
+    pub iterations: usize,
+    /// Why it ended.
+    pub termination: Termination,
+}
+
+/// State that the callback sees after each step.
+#[derive(Debug, Clone, Copy)]
+pub struct Progress {
+    /// Steps tried.
+    pub iteration: usize,
+    /// Sum of squares now.
+    pub cost: f64,
+}

@@ -1,0 +1,316 @@
+//! Expressions flattened to a tape: one pass over an array of operations gives the values, on plain
+//! numbers or on dual numbers. Common parts are computed once and constants are folded.
+
+use std::collections::{BTreeMap, HashMap};
+
+use crate::dual::{Dual, Scalar};
+use crate::error::CoreError;
+use crate::expression::{Binary, Expression, Node, Unary};
+
+/// Longest chain of definitions that refer to one another.
+pub const MAXIMUM_CHAIN: usize = 100;
+/// Most operations on one tape.
+pub const MAXIMUM_OPERATIONS: usize = 200_000;
+const LANES: usize = 4;
+
+#[derive(Debug, Clone, Copy)]
+enum Operation {
+    Constant(f64),
+    Input(usize),
+    Unary(Unary, usize),
+    Binary(Binary, usize, usize),
+}
+
+#[derive(PartialEq, Eq, Hash)]
+enum Key {
+    Constant(u64),
+    Input(usize),
+    Unary(Unary, usize),
+    Binary(Binary, usize, usize),
+}
+
+/// Several expressions of the same inputs, ready to be evaluated many times.
+#[derive(Debug, Clone)]
+pub struct Tape {
+    operations: Vec<Operation>,
+    outputs: Vec<usize>,
+    n_inputs: usize,
+}
+
+/// Registers that are reused from call to call.
+#[derive(Debug, Clone, Default)]
+pub struct Registers {
+    plain: Vec<f64>,
+    dual: Vec<Dual<f64, LANES>>,
+    inputs: Vec<Dual<f64, LANES>>,
+}
+
+impl Tape {
+    /// Flatten expressions; each name is an input, or stands for a definition.
+    ///
+    /// # Errors
+    /// `UnknownName` and `Circular` for names and definitions; `Expression` where the tape would be
+    /// too long.
+    pub fn compile(
+        expressions: &[Expression],
+        inputs: &[String],
+        definitions: &BTreeMap<String, Expression>,
+    ) -> Result<Self, CoreError> {
+        let places = inputs.iter().enumerate().map(|(i, name)| (name.as_str(), i)).collect();
+        let mut builder = Builder {
+            places,
+            definitions,
+            done: HashMap::new(),
+            open: Vec::new(),
+            operations: Vec::new(),
+            seen: HashMap::new(),
+        };
+        let outputs =
+            expressions.iter().map(|each| builder.expression(each)).collect::<Result<_, _>>()?;
+        Ok(Self { operations: builder.operations, outputs, n_inputs: inputs.len() })
+    }
+
+    /// Number of expressions.
+    pub fn n_outputs(&self) -> usize {
+        self.outputs.len()
+    }
+
+    /// Number of inputs.
+    pub fn n_inputs(&self) -> usize {
+        self.n_inputs
+    }
+
+    /// Evaluate on any scalar; `registers` is scratch.
+    pub fn run<T: Scalar>(&self, inputs: &[T], registers: &mut Vec<T>, outputs: &mut [T]) {
+        registers.clear();
+        for operation in &self.operations {
+            let value = match *operation {
+                Operation::Constant(number) => T::constant(number),
+                Operation::Input(place) => inputs[place],
+                Operation::Unary(function, a) => apply_unary(function, registers[a]),
+                Operation::Binary(function, a, b) => {
+                    apply_binary(function, registers[a], registers[b])
+                }
+            };
+            registers.push(value);
+        }
+        for (output, &place) in outputs.iter_mut().zip(&self.outputs) {
+            *output = registers[place];
+        }
+    }
+
+    /// Values of the expressions.
+    ///
+    /// # Errors
+    /// `Shape` for a wrong number of inputs or outputs, `NotFinite` where a value has no meaning.
+    pub fn evaluate(
+        &self,
+        inputs: &[f64],
+        registers: &mut Registers,
+        values: &mut [f64],
+    ) -> Result<(), CoreError> {
+        self.check(inputs, values.len())?;
+        self.run(inputs, &mut registers.plain, values);
+        finite("the value of an expression", values)
+    }
+
+    /// Values, and the exact Jacobian (n_outputs × n_directions, row-major) with respect to the
+    /// inputs named by index in `directions`.
+    ///
+    /// # Errors
+    /// As `evaluate`; also `NotFinite` where a derivative has no meaning.
+    pub fn jacobian(
+        &self,
+        inputs: &[f64],
+        directions: &[usize],
+        registers: &mut Registers,
+        values: &mut [f64],
+        jacobian: &mut [f64],
+    ) -> Result<(), CoreError> {
+        self.check(inputs, values.len())?;
+        let n = directions.len();
+        let needed = self.n_outputs() * n;
+        if jacobian.len() != needed {
+            return Err(CoreError::Shape { what: "Jacobian", found: jacobian.len(), needed });
+        }
+        if n == 0 {
+            return self.evaluate(inputs, registers, values);
+        }
+        let mut outputs = vec![Dual::<f64, LANES>::constant(0.0); self.n_outputs()];
+        for start in (0..n).step_by(LANES) {
+            let lanes = &directions[start..n.min(start + LANES)];
+            registers.inputs.clear();
+            registers.inputs.extend(inputs.iter().map(|&value| Dual::constant(value)));
+            for (lane, &direction) in lanes.iter().enumerate() {
+                registers.inputs[direction] = Dual::variable(inputs[direction], lane);
+            }
+            self.run(&registers.inputs, &mut registers.dual, &mut outputs);
+            for (row, output) in outputs.iter().enumerate() {
+                values[row] = output.value;
+                let place = row * n + start;
+                jacobian[place..place + lanes.len()]
+                    .copy_from_slice(&output.gradient[..lanes.len()]);
+            }
+        }
+        finite("the value of an expression", values)?;
+        finite("the derivative of an expression", jacobian)
+    }
+
+    fn check(&self, inputs: &[f64], n_values: usize) -> Result<(), CoreError> {
+        if inputs.len() != self.n_inputs {
+            let (found, needed) = (inputs.len(), self.n_inputs);
+            return Err(CoreError::Shape { what: "inputs of the expressions", found, needed });
+        }
+        if n_values != self.n_outputs() {
+            let needed = self.n_outputs();
+            return Err(CoreError::Shape {
+                what: "values of the expressions",
+                found: n_values,
+                needed,
+            });
+        }
+        finite("the inputs of the expressions", inputs)
+    }
+}
+
+fn finite(what: &'static str, values: &[f64]) -> Result<(), CoreError> {
+    match values.iter().position(|value| !value.is_finite()) {
+        Some(index) => Err(CoreError::NotFinite { what, index }),
+        None => Ok(()),
+    }
+}
+
+fn apply_unary<T: Scalar>(function: Unary, a: T) -> T {
+    match function {
+        Unary::Negate => -a,
+        Unary::Sin => a.sin(),
+        Unary::Cos => a.cos(),
+        Unary::Tan => a.tan(),
+        Unary::Asin => a.asin(),
+        Unary::Acos => a.acos(),
+        Unary::Atan => a.atan(),
+        Unary::Sinh => a.sinh(),
+        Unary::Cosh => a.cosh(),
+        Unary::Tanh => a.tanh(),
+        Unary::Exp => a.exp(),
+        Unary::Log => a.ln(),
+        Unary::Sqrt => a.sqrt(),
+        Unary::Abs => a.abs(),
+        Unary::Sign => a.sign(),
+    }
+}
+
+fn apply_binary<T: Scalar>(function: Binary, a: T, b: T) -> T {
+    match function {
+        Binary::Add => a + b,
+        Binary::Subtract => a - b,
+        Binary::Multiply => a * b,
+        Binary::Divide => a / b,
+        Binary::Power => a.power(b),
+        Binary::Atan2 => a.atan2(b),
+        Binary::Minimum => a.minimum(b),
+        Binary::Maximum => a.maximum(b),
+    }
+}
+
+struct Builder<'a> {
+    places: HashMap<&'a str, usize>,
+    definitions: &'a BTreeMap<String, Expression>,
+    done: HashMap<String, usize>,
+    open: Vec<String>,
+    operations: Vec<Operation>,
+    seen: HashMap<Key, usize>,
+}
+
+impl Builder<'_> {
+    fn expression(&mut self, expression: &Expression) -> Result<usize, CoreError> {
+        let mut wanted = vec![false; expression.nodes.len()];
+        wanted[expression.root] = true;
+        for index in (0..=expression.root).rev() {
+            match expression.nodes[index] {
+                Node::Unary(_, a) if wanted[index] => wanted[a] = true,
+                Node::Binary(_, a, b) if wanted[index] => (wanted[a], wanted[b]) = (true, true),
+                _ => {}
+            }
+        }
+        let mut registers = vec![0; expression.nodes.len()];
+        for (index, node) in expression.nodes.iter().enumerate() {
+            if !wanted[index] {
+                continue;
+            }
+            registers[index] = match node {
+                Node::Number(value) => self.constant(*value)?,
+                Node::Name(name) => self.name(name)?,
+                Node::Unary(function, a) => self.unary(*function, registers[*a])?,
+                Node::Binary(function, a, b) => {
+                    self.binary(*function, registers[*a], registers[*b])?
+                }
+            };
+        }
+        Ok(registers[expression.root])
+    }
+
+    fn name(&mut self, name: &str) -> Result<usize, CoreError> {
+        if let Some(&place) = self.places.get(name) {
+            return self.push(Key::Input(place), Operation::Input(place));
+        }
+        if let Some(&register) = self.done.get(name) {
+            return Ok(register);
+        }
+        let definitions = self.definitions;
+        let Some(definition) = definitions.get(name) else {
+            return Err(CoreError::UnknownName { name: name.to_string() });
+        };
+        if self.open.iter().any(|each| each == name) || self.open.len() >= MAXIMUM_CHAIN {
+            return Err(CoreError::Circular { names: self.open.join(" → ") + " → " + name });
+        }
+        self.open.push(name.to_string());
+        let register = self.expression(definition)?;
+        self.open.pop();
+        self.done.insert(name.to_string(), register);
+        Ok(register)
+    }
+
+    fn value(&self, register: usize) -> Option<f64> {
+        match self.operations[register] {
+            Operation::Constant(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    fn constant(&mut self, value: f64) -> Result<usize, CoreError> {
+        self.push(Key::Constant(value.to_bits()), Operation::Constant(value))
+    }
+
+    fn unary(&mut self, function: Unary, a: usize) -> Result<usize, CoreError> {
+        match self.value(a) {
+            Some(value) => self.constant(apply_unary(function, value)),
+            None => self.push(Key::Unary(function, a), Operation::Unary(function, a)),
+        }
+    }
+
+    fn binary(&mut self, function: Binary, a: usize, b: usize) -> Result<usize, CoreError> {
+        match (self.value(a), self.value(b)) {
+            (Some(left), Some(right)) => self.constant(apply_binary(function, left, right)),
+            _ => self.push(Key::Binary(function, a, b), Operation::Binary(function, a, b)),
+        }
+    }
+
+    fn push(&mut self, key: Key, operation: Operation) -> Result<usize, CoreError> {
+        if let Some(&register) = self.seen.get(&key) {
+            return Ok(register);
+        }
+        let register = self.operations.len();
+        if register >= MAXIMUM_OPERATIONS {
+            let problem = format!("more than {MAXIMUM_OPERATIONS} operations in one model");
+            return Err(CoreError::Expression { position: 0, problem });
+        }
+        self.operations.push(operation);
+        self.seen.insert(key, register);
+        Ok(register)
+    }
+}
+
+#[cfg(test)]
+#[path = "tests/tape.rs"]
+mod tests;

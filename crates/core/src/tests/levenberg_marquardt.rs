@@ -1,0 +1,69 @@
+use super::*;
+
+struct Rosenbrock;
+
+impl Problem for Rosenbrock {
+    fn n_parameters(&self) -> usize {
+        2
+    }
+    fn n_residuals(&self) -> usize {
+        2
+    }
+    fn residuals(&mut self, x: &[f64], r: &mut [f64]) -> Result<(), CoreError> {
+        r.copy_from_slice(&[10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]]);
+        Ok(())
+    }
+    fn jacobian(&mut self, x: &[f64], j: &mut [f64]) -> Result<(), CoreError> {
+        j.copy_from_slice(&[-20.0 * x[0], 10.0, -1.0, 0.0]);
+        Ok(())
+    }
+}
+
+fn solve(lower: [f64; 2], upper: [f64; 2]) -> Minimum {
+    let go = &mut |_: &Progress| true;
+    minimise(&mut Rosenbrock, &[-1.2, 1.0], &lower, &upper, &Options::default(), go).unwrap()
+}
+
+const OPEN: [f64; 2] = [f64::INFINITY; 2];
+
+#[test]
+fn rosenbrock_free() {
+    let found = solve([f64::NEG_INFINITY; 2], OPEN);
+    assert!((found.x[0] - 1.0).abs() < 1e-12 && (found.x[1] - 1.0).abs() < 1e-12);
+    assert!(found.termination.is_converged() && found.iterations < 60);
+}
+
+#[test]
+fn rosenbrock_at_a_bound() {
+    // With x ≤ 0.5 the minimum is (0.5, 0.25), cost 0.25.
+    let found = solve([-2.0, -2.0], [0.5, 2.0]);
+    assert!((found.x[0] - 0.5).abs() < 1e-15 && (found.x[1] - 0.25).abs() < 1e-10);
+    // With y ≥ 1.5 as lower bound: the stationary point of the remaining cubic.
+    let found = solve([-2.0, 1.5], [2.0, 2.0]);
+    let x = found.x[0];
+    assert_eq!(found.x[1], 1.5);
+    assert!((-400.0 * x * (1.5 - x * x) - 2.0 * (1.0 - x)).abs() < 1e-6);
+}
+
+#[test]
+fn everything_fixed_and_interruption() {
+    let found = solve([-1.2, 1.0], [-1.2, 1.0]);
+    assert_eq!(found.termination, Termination::Bounds);
+    let stop = &mut |_: &Progress| false;
+    let low = [f64::NEG_INFINITY; 2];
+    let found =
+        minimise(&mut Rosenbrock, &[-1.2, 1.0], &low, &OPEN, &Options::default(), stop).unwrap();
+    assert_eq!((found.termination, found.iterations), (Termination::Interrupted, 1));
+}
+
+#[test]
+fn bad_bounds_and_starts_are_refused() {
+    let go = &mut |_: &Progress| true;
+    let options = Options::default();
+    let crossed = minimise(&mut Rosenbrock, &[0.0; 2], &[1.0, 0.0], &[0.0; 2], &options, go);
+    assert!(matches!(crossed, Err(CoreError::Range { .. })));
+    let short = minimise(&mut Rosenbrock, &[0.0], &[0.0], &[0.0], &options, go);
+    assert!(matches!(short, Err(CoreError::Shape { .. })));
+    let nan = minimise(&mut Rosenbrock, &[f64::NAN, 0.0], &[-1.0; 2], &[1.0; 2], &options, go);
+    assert!(matches!(nan, Err(CoreError::NotFinite { .. })));
+}

@@ -1,0 +1,94 @@
+//! Face of `flightid_core::expression` and `tape`. (Python side: models/expression.py)
+
+use std::collections::BTreeMap;
+
+use flightid_core::expression::Expression;
+use flightid_core::tape::{Registers, Tape as CoreTape};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
+use pyo3::prelude::*;
+
+use crate::error::from_core;
+
+/// expression_names(text: str) -> list[str]
+///
+/// Names that occur in a formula, in order of first occurrence.
+#[pyfunction]
+fn expression_names(text: &str) -> PyResult<Vec<String>> {
+    let expression = Expression::parse(text).map_err(from_core)?;
+    Ok(expression.names().into_iter().map(String::from).collect())
+}
+
+/// __init__(self, expressions: Sequence[str], names: Sequence[str], definitions: dict[str, str]) -> None
+///
+/// Formulas of the same names, compiled once.
+#[pyclass(frozen, module = "flightid._native")]
+struct Tape {
+    tape: CoreTape,
+}
+
+#[pymethods]
+impl Tape {
+    #[new]
+    fn new(
+        expressions: Vec<String>,
+        names: Vec<String>,
+        definitions: BTreeMap<String, String>,
+    ) -> PyResult<Self> {
+        let parse = |text: &String| Expression::parse(text).map_err(from_core);
+        let expressions = expressions.iter().map(parse).collect::<PyResult<Vec<_>>>()?;
+        let definitions = definitions
+            .iter()
+            .map(|(name, text)| Ok((name.clone(), parse(text)?)))
+            .collect::<PyResult<_>>()?;
+        let tape = CoreTape::compile(&expressions, &names, &definitions).map_err(from_core)?;
+        Ok(Self { tape })
+    }
+
+    /// evaluate(self, values: NDArray[np.float64]) -> NDArray[np.float64]
+    ///
+    /// Value of each formula.
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let mut result = vec![0.0; self.tape.n_outputs()];
+        self.tape
+            .evaluate(values.as_slice()?, &mut Registers::default(), &mut result)
+            .map_err(from_core)?;
+        Ok(result.into_pyarray(py))
+    }
+
+    /// jacobian(self, values: NDArray[np.float64], directions: Sequence[int]) -> NDArray[np.float64]
+    ///
+    /// Exact derivatives, shape (n_expressions, n_directions).
+    fn jacobian<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'_, f64>,
+        directions: Vec<usize>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let values = values.as_slice()?;
+        let (n, m) = (self.tape.n_outputs(), directions.len());
+        if let Some(&found) = directions.iter().find(|&&index| index >= values.len()) {
+            let needed = values.len();
+            let what = "index of a direction";
+            return Err(from_core(flightid_core::CoreError::Shape { what, found, needed }));
+        }
+        let (mut result, mut jacobian) = (vec![0.0; n], vec![0.0; n * m]);
+        let registers = &mut Registers::default();
+        self.tape
+            .jacobian(values, &directions, registers, &mut result, &mut jacobian)
+            .map_err(from_core)?;
+        jacobian.into_pyarray(py).reshape([n, m])
+    }
+}
+
+/// Add this file's names to the module.
+///
+/// # Errors
+/// Never in practice; PyO3's own.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(expression_names, module)?)?;
+    module.add_class::<Tape>()
+}
