@@ -167,3 +167,24 @@ def require_match(found: str, needed: str, *, subject: str) -> None:
             needed=canonical(needed),
             action="convert at the edge with Record.to_units, or declare the model in that unit",
         )
+
+
+def exponents(unit: str) -> dict[str, float]:
+    """Powers of the base names that a unit is written in; the radian counts as a plain number.
+
+    Returns
+    -------
+    dict of str to float
+
+    Raises
+    ------
+    UnitError
+        The unit is not known.
+
+    Example
+    -------
+    >>> exponents("ft/s^2"), exponents("rad/s")
+    ({'foot': 1.0, 'second': -2.0}, {'second': -1.0})
+    """
+    items = _registry().Quantity(1.0, _parse(unit)).unit_items()
+    return {str(name): float(str(power)) for name, power in items if name != "radian"}

@@ -1,0 +1,152 @@
+"""Models from files: bounded in size, read as data, never run."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+
+from flightid.errors import FileFormatError, OptionError, UnknownNameError
+from flightid.models.description import model_from_description
+from flightid.models.transfer import TransferFunctionModel
+
+MAXIMUM_BYTES = 1 << 20
+_LIBRARY_NAME = re.compile(r"[a-z0-9_]+")
+_DEFAULT_AXIS = "roll"
+
+
+def library_names() -> list[str]:
+    """Names of the models that come with flightid.
+
+    Returns
+    -------
+    list of str
+
+    Raises
+    ------
+    Nothing.
+
+    Reference
+    ---------
+    Each file names its source.
+
+    Example
+    -------
+    >>> "rate_first_order" in library_names()
+    True
+    """
+    folder = files("flightid.models") / "library"
+    return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
+
+
+def load_model(source: str | Path, *, axis: str | None = None) -> TransferFunctionModel:
+    """Load a model from a TOML file, or one of the library by its name.
+
+    Parameters
+    ----------
+    source : str or Path
+        Path of a ``.toml`` file, or a name such as ``"rate_first_order"``; the axis may follow the
+        name, as in ``"rate_first_order_pitch"``.
+    axis : str, optional
+        ``"roll"`` (default), ``"pitch"`` or ``"yaw"``, for a library model written for any axis.
+
+    Returns
+    -------
+    TransferFunctionModel
+
+    Raises
+    ------
+    UnknownNameError
+        There is no such library model.
+    OptionError
+        The model is not written for that axis.
+    FileFormatError
+        The file is too large, not UTF-8 or not TOML.
+    ModelError
+        The model contradicts itself.
+
+    Example
+    -------
+    >>> model = load_model("rate_first_order", axis="pitch")
+    >>> print(model)
+    q/tau_theta = Mttheta / (s - Mq) * exp(-(tau) s)
+    """
+    name = str(source)
+    if isinstance(source, Path) or name.endswith(".toml"):
+        return _build(_parse(_read(Path(source)), name), axis, name)
+    if not _LIBRARY_NAME.fullmatch(name):
+        raise UnknownNameError(
+            "there is no such library model",
+            found=repr(name),
+            needed=f"a .toml file, or one of {', '.join(library_names())}",
+        )
+    stem, _, tail = name.rpartition("_")
+    if name not in library_names() and stem in library_names():
+        name, axis = stem, axis or tail
+    if name not in library_names():
+        raise UnknownNameError(
+            "there is no such library model",
+            found=repr(name),
+            needed=f"a .toml file, or one of {', '.join(library_names())}",
+        )
+    text = (files("flightid.models") / "library" / f"{name}.toml").read_text(encoding="utf-8")
+    return _build(_parse(text, name), axis, name)
+
+
+def _read(path: Path) -> str:
+    with path.open("rb") as file:
+        content = file.read(MAXIMUM_BYTES + 1)
+    if len(content) > MAXIMUM_BYTES:
+        raise FileFormatError(
+            "a model file is larger than a model can be",
+            found=f"{path} with more than {MAXIMUM_BYTES} bytes",
+            needed="a TOML file below 1 MiB",
+        )
+    try:
+        return content.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise FileFormatError(
+            "a model file is not text", found=f"{path}: {error}", needed="TOML in UTF-8"
+        ) from error
+
+
+def _parse(text: str, name: str) -> dict[str, object]:
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise FileFormatError(
+            "a model file is not TOML", found=f"{name}: {error}", needed="TOML"
+        ) from error
+
+
+def _build(content: dict[str, object], axis: str | None, name: str) -> TransferFunctionModel:
+    axes = content.pop("axes", None)
+    if not isinstance(axes, dict):
+        if axis is not None:
+            raise OptionError(
+                f"model {name} is written for one vehicle, not for an axis", found=axis
+            )
+        return model_from_description(content)
+    chosen = axis or _DEFAULT_AXIS
+    words = axes.get(chosen)
+    if not isinstance(words, dict):
+        raise OptionError(
+            f"model {name} is not written for that axis",
+            found=repr(chosen),
+            needed=f"one of {', '.join(axes)}",
+        )
+    filled = _fill(content, {f"<{key}>": str(value) for key, value in words.items()})
+    return model_from_description(filled if isinstance(filled, dict) else content)
+
+
+def _fill(item: object, words: dict[str, str]) -> object:
+    """Replace each <word> of a template by the axis's own, in keys and texts."""
+    if isinstance(item, dict):
+        return {_fill(key, words): _fill(value, words) for key, value in item.items()}
+    if isinstance(item, list):
+        return [_fill(value, words) for value in item]
+    if isinstance(item, str):
+        for word, text in words.items():
+            item = item.replace(word, text)
+    return item

@@ -1,0 +1,316 @@
+"""Parameters of a model: value, unit, bounds, free or fixed, tie to others, note."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid import _native
+from flightid.errors import ModelError, UnknownNameError
+from flightid.models.formula import RESERVED, formula_names, require_unit
+from flightid.table import Column, Table
+from flightid.units import canonical
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One named number of a model.
+
+    Attributes
+    ----------
+    name : str
+        Name as in formulas: letters, digits, underscores.
+    value : float or None
+        Value, or start of a fit, in `unit`; None where a tie gives it.
+    unit : str
+        Unit; `"1"` for a plain number.
+    minimum, maximum : float
+        Bounds of a fit, in `unit`; infinite where open.
+    free : bool
+        Whether a fit may change it.
+    tie : str or None
+        Formula of other parameters that gives the value.
+    note : str
+        What it means, and where the value comes from.
+
+    Example
+    -------
+    >>> Parameter("Lp", -5.0, "1/s", minimum=-60.0, maximum=0.0, note="roll damping")
+    Parameter(Lp = -5 1/s, free in [-60, 0])
+    """
+
+    name: str
+    value: float | None = None
+    unit: str = "1"
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    free: bool = True
+    tie: str | None = None
+    note: str = ""
+
+    def __post_init__(self) -> None:
+        if not _NAME.fullmatch(self.name) or self.name in RESERVED:
+            raise ModelError(
+                "name of a parameter cannot stand in a formula",
+                found=repr(self.name),
+                needed="letters, digits and underscores, not a function, 'pi' or 's'",
+            )
+        object.__setattr__(self, "unit", canonical(self.unit))
+        if self.tie is not None:
+            object.__setattr__(self, "free", False)
+            return
+        self._check_numbers()
+
+    def _check_numbers(self) -> None:
+        if self.value is None or not math.isfinite(self.value):
+            raise ModelError(
+                f"parameter {self.name} has no value",
+                found=self.value,
+                needed="a finite number, or a tie",
+            )
+        if math.isnan(self.minimum) or math.isnan(self.maximum) or self.minimum > self.maximum:
+            raise ModelError(
+                f"bounds of parameter {self.name} contradict each other",
+                found=f"min {self.minimum:g}, max {self.maximum:g}",
+                needed="min at most max",
+            )
+        if not self.minimum <= self.value <= self.maximum:
+            raise ModelError(
+                f"value of parameter {self.name} lies outside its bounds",
+                found=f"{self.value:g}",
+                needed=f"between {self.minimum:g} and {self.maximum:g} {self.unit}",
+                action="start inside the bounds, or widen them",
+            )
+
+    @property
+    def status(self) -> str:
+        """``"free"``, ``"fixed"`` or ``"tied"``."""
+        if self.tie is not None:
+            return "tied"
+        return "free" if self.free else "fixed"
+
+    def __repr__(self) -> str:
+        """Name, value, unit and what a fit may do, on one line."""
+        shown = "?" if self.value is None else f"{self.value:.6g}"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        limits = f" in [{self.minimum:g}, {self.maximum:g}]" if self.free else ""
+        tie = f" = {self.tie}" if self.tie else ""
+        return f"Parameter({self.name} = {shown}{unit}, {self.status}{tie}{limits})"
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values; an open bound is None."""
+        return {
+            "value": self.value,
+            "unit": self.unit,
+            "min": self.minimum if math.isfinite(self.minimum) else None,
+            "max": self.maximum if math.isfinite(self.maximum) else None,
+            "status": self.status,
+            "tie": self.tie,
+            "note": self.note,
+        }
+
+
+class Parameters(Mapping[str, Parameter]):
+    """Named parameters, checked against each other: ties known, not circular, right in their units.
+
+    Parameters
+    ----------
+    parameters : iterable of Parameter
+        In the order in which results list them.
+
+    Raises
+    ------
+    ModelError
+        A name given twice; a tie that is unknown, circular or wrong in its unit.
+
+    Example
+    -------
+    >>> both = Parameters([Parameter("Nr", -4.0, "1/s"), Parameter("K", unit="1/s", tie="-2*Nr")])
+    >>> both["K"].value
+    8.0
+    """
+
+    __slots__ = ("_items",)
+
+    def __init__(self, parameters: Iterable[Parameter]) -> None:
+        self._items: dict[str, Parameter] = {}
+        for parameter in parameters:
+            if parameter.name in self._items:
+                raise ModelError(f"parameter {parameter.name} is given twice")
+            self._items[parameter.name] = parameter
+        self._check_ties()
+        values = self.tape(self.names).evaluate(self.independent_values())
+        for name, value in zip(self.names, values, strict=True):
+            self._items[name] = replace(self._items[name], value=float(value))
+
+    def _check_ties(self) -> None:
+        units = self.units
+        for parameter in self.tied:
+            tie = parameter.tie or ""
+            for name in formula_names(tie):
+                if name not in self._items:
+                    raise ModelError(
+                        f"tie of parameter {parameter.name} names an unknown parameter",
+                        found=repr(name),
+                        needed=f"one of {', '.join(self._items)}",
+                    )
+            require_unit(tie, parameter.unit, units, subject=f"tie of parameter {parameter.name}")
+
+    def __getitem__(self, name: str) -> Parameter:
+        try:
+            return self._items[name]
+        except KeyError:
+            raise UnknownNameError(
+                "there is no such parameter",
+                found=repr(name),
+                needed=f"one of {', '.join(self._items)}",
+            ) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __repr__(self) -> str:
+        """Counts on one line."""
+        free = sum(parameter.free for parameter in self.values())
+        return f"Parameters({len(self)}: {free} free, {', '.join(self)})"
+
+    @property
+    def names(self) -> list[str]:
+        """All names, in order."""
+        return list(self._items)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit by name."""
+        return {name: parameter.unit for name, parameter in self._items.items()}
+
+    @property
+    def independent(self) -> list[Parameter]:
+        """Parameters without a tie: the inputs of every formula."""
+        return [parameter for parameter in self.values() if parameter.tie is None]
+
+    @property
+    def free(self) -> list[Parameter]:
+        """Parameters that a fit may change."""
+        return [parameter for parameter in self.values() if parameter.free]
+
+    @property
+    def tied(self) -> list[Parameter]:
+        """Parameters given by a tie."""
+        return [parameter for parameter in self.values() if parameter.tie is not None]
+
+    @property
+    def free_indices(self) -> list[int]:
+        """Places of the free parameters among the independent ones."""
+        return [i for i, parameter in enumerate(self.independent) if parameter.free]
+
+    @property
+    def definitions(self) -> dict[str, str]:
+        """Formula by name, of the tied parameters."""
+        return {parameter.name: parameter.tie or "" for parameter in self.tied}
+
+    def independent_values(self, values: Mapping[str, float] | None = None) -> NDArray[np.float64]:
+        """Values of the independent parameters, some of them replaced.
+
+        Parameters
+        ----------
+        values : mapping of str to float, optional
+            Values by name, in the parameters' units.
+
+        Returns
+        -------
+        ndarray, shape (n_independent,)
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such parameter.
+        ModelError
+            A tied parameter was given a value.
+        """
+        given = dict(values or {})
+        for name in given:
+            if self[name].tie is not None:
+                raise ModelError(
+                    f"parameter {name} is tied and cannot be given a value",
+                    found=f"{name} = {self[name].tie}",
+                    action="give values to the parameters in its tie",
+                )
+        return np.array([float(given.get(p.name, p.value or 0.0)) for p in self.independent])
+
+    def tape(self, formulas: Iterable[str]) -> _native.Tape:
+        """Formulas of these parameters, compiled for the independent ones.
+
+        Returns
+        -------
+        Tape
+
+        Raises
+        ------
+        ModelError
+            A formula is outside the grammar, names what is unknown, or ties form a circle.
+        """
+        names = [parameter.name for parameter in self.independent]
+        return _native.Tape(list(formulas), names, self.definitions)
+
+    def with_values(self, values: Mapping[str, float]) -> Parameters:
+        """Copy with other values of some independent parameters.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such parameter.
+        ModelError
+            A parameter is tied, or a value lies outside its bounds.
+        """
+        self.independent_values(values)
+        return Parameters(
+            replace(p, value=float(values[p.name])) if p.name in values else p
+            for p in self.values()
+        )
+
+    def with_parameter(self, parameter: Parameter) -> Parameters:
+        """Copy with one parameter replaced by another of the same name.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no parameter of that name.
+        """
+        _ = self[parameter.name]
+        return Parameters(parameter if p.name == parameter.name else p for p in self.values())
+
+    def summary(self) -> Table:
+        """Table of all parameters.
+
+        Returns
+        -------
+        Table
+        """
+        columns = tuple(
+            Column(heading)
+            for heading in ("parameter", "value", "unit", "min", "max", "status", "tie", "note")
+        )
+        rows = []
+        for p in self.values():
+            low = p.minimum if math.isfinite(p.minimum) else None
+            high = p.maximum if math.isfinite(p.maximum) else None
+            rows.append((p.name, p.value, p.unit, low, high, p.status, p.tie, p.note))
+        return Table("Parameters", columns, tuple(rows))
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values by name."""
+        return {name: parameter.to_dict() for name, parameter in self._items.items()}
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()
