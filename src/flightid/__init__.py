@@ -15,7 +15,17 @@ if TYPE_CHECKING:
     from flightid import excitation
     from flightid.errors import FlightidError
     from flightid.findings import Finding
+    from flightid.identification import Fit, FittedParameter, FittedResponse, LocalMinimum
+    from flightid.identification.identify import identify
     from flightid.logs import Log, LogTable, read_log
+    from flightid.models import (
+        Parameter,
+        Parameters,
+        TransferFunction,
+        TransferFunctionModel,
+        library_names,
+        load_model,
+    )
     from flightid.record import Channel, Record, read_records, write_records
     from flightid.responses import FrequencyResponse, PairResponse, estimate_response
     from flightid.simulation.simulate import LinearSystem, simulate
@@ -25,16 +35,27 @@ if TYPE_CHECKING:
 _HOMES = {
     "Channel": "flightid.record",
     "Finding": "flightid.findings",
+    "Fit": "flightid.identification",
+    "FittedParameter": "flightid.identification",
+    "FittedResponse": "flightid.identification",
     "FlightidError": "flightid.errors",
     "FrequencyResponse": "flightid.responses",
     "LinearSystem": "flightid.simulation.simulate",
+    "LocalMinimum": "flightid.identification",
     "Log": "flightid.logs",
     "LogTable": "flightid.logs",
     "PairResponse": "flightid.responses",
+    "Parameter": "flightid.models",
+    "Parameters": "flightid.models",
     "Record": "flightid.record",
     "Table": "flightid.table",
+    "TransferFunction": "flightid.models",
+    "TransferFunctionModel": "flightid.models",
     "estimate_response": "flightid.responses",
     "excitation": "flightid.excitation",
+    "identify": "flightid.identification.identify",
+    "library_names": "flightid.models",
+    "load_model": "flightid.models",
     "read_log": "flightid.logs",
     "read_records": "flightid.record",
     "simulate": "flightid.simulation.simulate",
@@ -44,17 +65,28 @@ _HOMES = {
 __all__ = [
     "Channel",
     "Finding",
+    "Fit",
+    "FittedParameter",
+    "FittedResponse",
     "FlightidError",
     "FrequencyResponse",
     "LinearSystem",
+    "LocalMinimum",
     "Log",
     "LogTable",
     "PairResponse",
+    "Parameter",
+    "Parameters",
     "Record",
     "Table",
+    "TransferFunction",
+    "TransferFunctionModel",
     "__version__",
     "estimate_response",
     "excitation",
+    "identify",
+    "library_names",
+    "load_model",
     "read_log",
     "read_records",
     "simulate",

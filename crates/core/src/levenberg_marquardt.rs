@@ -297,12 +297,12 @@ impl<'a> Search<'a> {
             work[place * m + n + place] = self.damping.sqrt() * scale;
         }
         let rhs = &mut work[f * m..];
-        for row in 0..n {
+        for (row, entry) in rhs.iter_mut().enumerate().take(n) {
             let moved: f64 = (0..n)
                 .filter(|j| !free.contains(j))
                 .map(|j| self.triangle[j * n + row] * self.delta[j])
                 .sum();
-            rhs[row] = -(self.projected[row] + moved);
+            *entry = -(self.projected[row] + moved);
         }
         triangularise(&mut work, m, f);
         let mut step = vec![0.0; f];

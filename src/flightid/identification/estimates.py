@@ -1,0 +1,176 @@
+"""From the end of a search to estimates with errors, bounds and correlations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import FitError
+from flightid.identification.error_model import UNKNOWN, ErrorModel
+from flightid.identification.fit import FittedParameter
+from flightid.identification.multistart import End
+from flightid.identification.selection import SelectedResponse
+from flightid.inference import correlation as correlation_of
+from flightid.inference import cramer_rao, insensitivity, interval95, null_combination, propagate
+from flightid.inference.cramer_rao import inverse_hessian
+from flightid.models import Parameter, TransferFunctionModel
+
+Array = NDArray[np.float64]
+_DECIBEL = 20.0 / np.log(10.0)
+_DEGREE = 180.0 / np.pi
+_AT_BOUND = 1e-9
+_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What is known of the estimates.
+
+    Attributes
+    ----------
+    parameters : mapping of str to FittedParameter
+    names : tuple of str
+        Order of `covariance` and `correlation`.
+    covariance : ndarray or None
+    correlation : ndarray
+    source : str
+        Where the intervals come from.
+    """
+
+    parameters: Mapping[str, FittedParameter]
+    names: tuple[str, ...]
+    covariance: Array | None
+    correlation: Array
+    source: str
+
+
+def statistics(
+    fitted: TransferFunctionModel,
+    selected: Sequence[SelectedResponse],
+    errors: ErrorModel,
+    end: End,
+    *,
+    sensitivity: Array | None,
+) -> Statistics:
+    """Standard errors, bounds and correlations at the end of a search.
+
+    Raises
+    ------
+    FitError
+        The data do not see a parameter, or a combination of parameters.
+    """
+    free = fitted.parameters.free
+    inner = np.array([not _is_at_bound(parameter) for parameter in free], dtype=bool)
+    names = tuple(p.name for p, keep in zip(free, inner, strict=True) if keep)
+    jacobian = end.jacobian[:, inner]
+    _require_identifiable(names, jacobian)
+    covariance = None
+    if sensitivity is not None and names:
+        covariance = propagate(jacobian, sensitivity, errors.covariance)
+    weighted = coherence_jacobian(fitted, selected)[:, inner]
+    correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
+    parameters = _parameters(fitted, names, covariance, weighted)
+    return Statistics(parameters, names, covariance, correlation, errors.source)
+
+
+def _is_at_bound(parameter: Parameter) -> bool:
+    value = parameter.value or 0.0
+    margin = _AT_BOUND * max(abs(value), 1e-300)
+    return value - parameter.minimum <= margin or parameter.maximum - value <= margin
+
+
+def _require_identifiable(names: tuple[str, ...], jacobian: Array) -> None:
+    if not names:
+        return
+    share = null_combination(jacobian)
+    if share is None:
+        return
+    guilty = [name for name, part in zip(names, share, strict=True) if part > _SHARE]
+    raise FitError(
+        "the data cannot tell these parameters apart"
+        if len(guilty) > 1
+        else "the data do not see a parameter",
+        found=", ".join(guilty),
+        needed="a different effect of each on the responses in the band",
+        action="fix or tie one of them, or widen the band",
+    )
+
+
+def coherence_jacobian(
+    fitted: TransferFunctionModel, selected: Sequence[SelectedResponse]
+) -> Array:
+    """Derivatives of the weighted dB and degree residuals with respect to the free parameters."""
+    values = fitted.parameters.independent_values()
+    free = fitted.parameters.free_indices
+    rows = []
+    for place, each in enumerate(selected):
+        slope = fitted.native.log_gradient(values, free, each.omega_rad_s)[place]
+        both = np.empty((2 * len(slope), len(free)))
+        both[0::2] = _DECIBEL * np.sqrt(each.weight_db)[:, None] * slope.real
+        both[1::2] = _DEGREE * np.sqrt(each.weight_deg)[:, None] * slope.imag
+        rows.append(both)
+    return np.vstack(rows)
+
+
+def _parameters(
+    fitted: TransferFunctionModel, names: tuple[str, ...], covariance: Array | None, weighted: Array
+) -> dict[str, FittedParameter]:
+    bounds = dict(zip(names, cramer_rao(weighted), strict=True)) if names else {}
+    slack = dict(zip(names, insensitivity(weighted), strict=True)) if names else {}
+    errors = _standard_errors(fitted, names, covariance)
+    result = {}
+    for name, parameter in fitted.parameters.items():
+        value = float(parameter.value or 0.0)
+        at_bound = parameter.free and name not in names
+        stderr = errors.get(name)
+        result[name] = FittedParameter(
+            name,
+            parameter.unit,
+            value,
+            "at bound" if at_bound else parameter.status,
+            stderr,
+            None if stderr is None else interval95(value, stderr),
+            _percent(bounds.get(name), value),
+            _percent(slack.get(name), value),
+            _reason(parameter, at_bound=at_bound, known=covariance is not None, value=value),
+        )
+    return result
+
+
+def _percent(size: float | None, value: float) -> float | None:
+    return None if size is None or value == 0.0 else float(100.0 * size / abs(value))
+
+
+def _reason(parameter: Parameter, *, at_bound: bool, known: bool, value: float) -> str:
+    if at_bound:
+        return "at bound: the data would move it further"
+    if parameter.status == "fixed":
+        return "fixed"
+    if not known:
+        return f"errors of the response: {UNKNOWN} known"
+    if parameter.status == "tied":
+        return "tied: bounds belong to the parameters in its tie"
+    return "" if value != 0.0 else "percent of zero has no meaning"
+
+
+def _standard_errors(
+    fitted: TransferFunctionModel, names: tuple[str, ...], covariance: Array | None
+) -> dict[str, float]:
+    """Of the estimated parameters and, through their ties, of the tied ones."""
+    if covariance is None:
+        return {}
+    parameters = fitted.parameters
+    result = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
+    if parameters.tied:
+        independent = [parameter.name for parameter in parameters.independent]
+        directions = [independent.index(name) for name in names]
+        tape = parameters.tape([parameter.name for parameter in parameters.tied])
+        slope = tape.jacobian(parameters.independent_values(), directions)
+        variance = np.einsum("ij,jk,ik->i", slope, covariance, slope)
+        for parameter, each in zip(parameters.tied, variance, strict=True):
+            if each > 0.0:
+                result[parameter.name] = float(np.sqrt(each))
+    return result

@@ -1,0 +1,290 @@
+"""The fit: a model with estimates, how well each is known, and where it all comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.findings import Finding
+from flightid.models import TransferFunctionModel
+from flightid.responses import PairResponse
+from flightid.table import Cell, Column, Table
+
+SCHEMA = "flightid.fit/1"
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """One parameter after a fit.
+
+    Attributes
+    ----------
+    name, unit : str
+    value : float
+        Estimate, in `unit`.
+    status : str
+        ``"free"``, ``"at bound"``, ``"fixed"`` or ``"tied"``.
+    stderr : float or None
+        Standard error over repeated flights, in `unit`; None where `reason` says why.
+    interval95 : tuple of float or None
+        95 % interval, in `unit`.
+    cramer_rao_percent, insensitivity_percent : float or None
+        In the convention of CIFER, percent of the value; no confidence interval.
+    reason : str
+        Why a number is missing; empty where none is.
+
+    Example
+    -------
+    >>> FittedParameter("Lp", "1/s", -5.0, "free", 0.1, (-5.2, -4.8), 3.0, 1.5)
+    FittedParameter(Lp = -5 ± 0.2 1/s, free)
+    """
+
+    name: str
+    unit: str
+    value: float
+    status: str
+    stderr: float | None = None
+    interval95: tuple[float, float] | None = None
+    cramer_rao_percent: float | None = None
+    insensitivity_percent: float | None = None
+    reason: str = ""
+
+    def __repr__(self) -> str:
+        """Value with half its 95 % interval on one line."""
+        half = ""
+        if self.interval95 is not None:
+            half = f" ± {(self.interval95[1] - self.interval95[0]) / 2:.2g}"
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"FittedParameter({self.name} = {self.value:.5g}{half}{unit}, {self.status})"
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "value": self.value,
+            "unit": self.unit,
+            "status": self.status,
+            "stderr": self.stderr,
+            "interval95": None if self.interval95 is None else list(self.interval95),
+            "cramer_rao_percent": self.cramer_rao_percent,
+            "insensitivity_percent": self.insensitivity_percent,
+            "reason": self.reason,
+        }
+
+
+@dataclass(frozen=True)
+class FittedResponse:
+    """One measured response with the model beside it.
+
+    Attributes
+    ----------
+    name : str
+        ``"output/input"``.
+    cost : float
+        J of this response; guide: at most 100, and 150 to 200 for a single off-axis one.
+    measured : PairResponse
+        The whole measured response.
+    omega_rad_s : ndarray, shape (n,)
+        Frequencies that were fitted, rad/s.
+    model : ndarray of complex, shape (n_f,)
+        The fitted model at every measured frequency.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> omega = [1.0, 2.0, 4.0, 8.0]
+    >>> model = fid.load_model("rate_integrator")
+    >>> data = fid.FrequencyResponse.from_values(omega, model.frequency_response(omega),
+    ...     inputs=["tau_phi"], outputs=["p"], units={"p": "rad/s"})
+    >>> fid.identify(model, data).responses[0].name
+    'p/tau_phi'
+    """
+
+    name: str
+    cost: float
+    measured: PairResponse
+    omega_rad_s: NDArray[np.float64]
+    model: NDArray[np.complex128]
+
+    @property
+    def band_rad_s(self) -> tuple[float, float]:
+        """Lowest and highest fitted frequency, rad/s."""
+        return float(self.omega_rad_s[0]), float(self.omega_rad_s[-1])
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values without the curves."""
+        low, high = self.band_rad_s
+        return {
+            "cost": self.cost,
+            "band_rad_s": [low, high],
+            "n_frequencies": len(self.omega_rad_s),
+        }
+
+
+@dataclass(frozen=True)
+class LocalMinimum:
+    """A minimum that one or more starts found.
+
+    Attributes
+    ----------
+    objective : float
+        What was minimised, there.
+    count : int
+        Number of starts that ended there.
+    values : mapping of str to float
+        Free parameters there.
+    termination : str
+        Why the iteration ended.
+
+    Example
+    -------
+    >>> LocalMinimum(12.5, 3, {"K": 2.0}, "cost").count
+    3
+    """
+
+    objective: float
+    count: int
+    values: Mapping[str, float]
+    termination: str
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Fit:
+    """Result of `flightid.identify`.
+
+    Attributes
+    ----------
+    model : TransferFunctionModel
+        The model with the estimates as values.
+    parameters : mapping of str to FittedParameter
+        All parameters, in the model's order.
+    cost, average_cost : float
+        Σ J_l and its average over the responses; guide: average at most 100, below 50 nearly
+        indistinguishable.
+    costs : mapping of str to float
+        J_l by response.
+    names : tuple of str
+        Parameters of `covariance` and `correlation`: free and not at a bound.
+    covariance : ndarray, shape (n, n), or None
+        Of the estimates over repeated flights; None where the errors of the data are not known.
+    correlation : ndarray, shape (n, n)
+        Of the inverse Hessian of the cost; guide: at most 0.98 in size.
+    responses : tuple of FittedResponse
+    minima : tuple of LocalMinimum
+        What the starts found, best first.
+    objective : float
+        What was minimised: equal to `cost` for ``cost="coherence"``.
+    termination : str
+        Why the iteration ended.
+    iterations : int
+    intervals_from : str
+        ``"response covariance"``, ``"random error"`` (approximate) or ``"nothing"``.
+    findings : tuple of Finding
+    provenance : mapping
+        Hash of the data, options, version of flightid, seed.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> omega = [1.0, 2.0, 4.0, 8.0]
+    >>> model = fid.load_model("rate_integrator").with_fixed(tau=0.02)
+    >>> data = fid.FrequencyResponse.from_values(omega, 2 * model.frequency_response(omega),
+    ...     inputs=["tau_phi"], outputs=["p"], units={"p": "rad/s"})
+    >>> fit = fid.identify(model, data)
+    >>> fit
+    Fit('Roll rate, integrator', 1 free of 2 parameters, 1 response, average cost 0.00)
+    >>> round(fit.parameters["Ltphi"].value, 6)
+    200.0
+    """
+
+    model: TransferFunctionModel
+    parameters: Mapping[str, FittedParameter]
+    cost: float
+    average_cost: float
+    costs: Mapping[str, float]
+    names: tuple[str, ...]
+    covariance: NDArray[np.float64] | None
+    correlation: NDArray[np.float64]
+    responses: tuple[FittedResponse, ...]
+    minima: tuple[LocalMinimum, ...]
+    objective: float
+    termination: str
+    iterations: int
+    intervals_from: str
+    findings: tuple[Finding, ...] = ()
+    provenance: Mapping[str, object] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """Size and average cost on one line."""
+        free = sum(p.status in ("free", "at bound") for p in self.parameters.values())
+        n = len(self.responses)
+        return (
+            f"Fit({self.model.name!r}, {free} free of {len(self.parameters)} parameters, "
+            f"{n} response{'' if n == 1 else 's'}, average cost {self.average_cost:.2f})"
+        )
+
+    def summary(self) -> Table:
+        """Table of the parameters, with costs and findings below.
+
+        Returns
+        -------
+        Table
+        """
+        columns = (
+            Column("parameter"),
+            Column("value", digits=5),
+            Column("unit"),
+            Column("95 % low"),
+            Column("95 % high"),
+            Column("Cramér–Rao", "%", 3),
+            Column("insensitivity", "%", 3),
+            Column("status"),
+        )
+        rows: list[tuple[Cell, ...]] = []
+        for p in self.parameters.values():
+            low, high = p.interval95 if p.interval95 is not None else (None, None)
+            bounds = (p.cramer_rao_percent, p.insensitivity_percent)
+            rows.append((p.name, p.value, p.unit, low, high, *bounds, p.status))
+        costs = ", ".join(f"{name} {cost:.1f}" for name, cost in self.costs.items())
+        notes = (
+            *map(str, self.model.responses),
+            f"Average cost {self.average_cost:.1f} (guide: at most 100); {costs}.",
+            f"Intervals from: {self.intervals_from}.",
+            *map(str, self.findings),
+        )
+        return Table(f"Fit of {self.model.name}", columns, tuple(rows), notes)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key."""
+        return {
+            "schema": SCHEMA,
+            "model": self.model.to_dict(),
+            "parameters": {name: p.to_dict() for name, p in self.parameters.items()},
+            "cost": self.cost,
+            "average_cost": self.average_cost,
+            "costs": dict(self.costs),
+            "names": list(self.names),
+            "covariance": None if self.covariance is None else self.covariance.tolist(),
+            "correlation": self.correlation.tolist(),
+            "responses": {each.name: each.to_dict() for each in self.responses},
+            "minima": [
+                {
+                    "objective": each.objective,
+                    "count": each.count,
+                    "values": dict(each.values),
+                    "termination": each.termination,
+                }
+                for each in self.minima
+            ],
+            "objective": self.objective,
+            "termination": self.termination,
+            "iterations": self.iterations,
+            "intervals_from": self.intervals_from,
+            "findings": [finding.to_dict() for finding in self.findings],
+            "provenance": dict(self.provenance),
+        }
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()

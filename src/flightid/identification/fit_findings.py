@@ -1,0 +1,155 @@
+"""Verdicts on a fit against the published guides, each with what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.identification.error_model import APPROXIMATE, UNKNOWN
+from flightid.identification.fit import FittedParameter
+from flightid.identification.multistart import CONVERGED, End
+
+CRAMER_RAO_GUIDE_PERCENT = 20.0
+INSENSITIVITY_GUIDE_PERCENT = 10.0
+CORRELATION_GUIDE = 0.98
+AVERAGE_COST_GUIDE = 100.0
+EXCELLENT_COST = 50.0
+SINGLE_COST_GUIDE = 150.0
+SINGLE_COST_LIMIT = 200.0
+"""Tischler & Remple, 2nd ed., §12.2.5, §12.3.4 and §13.7."""
+
+_NEAR_COST = 1.1
+
+
+def judge_cost(costs: Mapping[str, float], average: float) -> list[Finding]:
+    """Verdicts on the costs: the average, and each response that stands out."""
+    if average <= EXCELLENT_COST:
+        found = [
+            Finding("cost", Light.GREEN, f"average cost {average:.1f}, nearly indistinguishable")
+        ]
+    elif average <= AVERAGE_COST_GUIDE:
+        found = [
+            Finding("cost", Light.GREEN, f"average cost {average:.1f}, within the guide of 100")
+        ]
+    else:
+        found = [
+            Finding(
+                "cost",
+                Light.RED,
+                f"average cost {average:.0f} is above the guide of 100",
+                "add missing dynamics, narrow the band, or look for a wrong sign or unit",
+            )
+        ]
+    for name, cost in costs.items():
+        if len(costs) > 1 and cost > SINGLE_COST_GUIDE:
+            light = Light.RED if cost > SINGLE_COST_LIMIT else Light.AMBER
+            action = "narrow its band to where it is coherent, or leave it out"
+            found.append(Finding("cost-response", light, f"{name}: cost {cost:.0f}", action))
+    return found
+
+
+def judge_parameters(parameters: Mapping[str, FittedParameter]) -> list[Finding]:
+    """Verdicts on each parameter: at a bound, insensitive, badly bounded."""
+    found = []
+    for p in parameters.values():
+        if p.status == "at bound":
+            found.append(
+                Finding(
+                    "at-bound",
+                    Light.AMBER,
+                    f"{p.name} ended at its bound {p.value:.4g} {p.unit}",
+                    "widen the bound if physics allows, else fix the parameter there",
+                )
+            )
+        insensitive, bounded = p.insensitivity_percent, p.cramer_rao_percent
+        if insensitive is not None and insensitive > INSENSITIVITY_GUIDE_PERCENT:
+            found.append(
+                Finding(
+                    "insensitive",
+                    Light.AMBER,
+                    f"{p.name}: insensitivity {insensitive:.0f} % is above the guide of 10 %",
+                    "fix it or drop it from the model: the data hardly see it",
+                )
+            )
+        elif bounded is not None and bounded > CRAMER_RAO_GUIDE_PERCENT:
+            found.append(
+                Finding(
+                    "cramer-rao",
+                    Light.AMBER,
+                    f"{p.name}: Cramér–Rao bound {bounded:.0f} % is above the guide of 20 %",
+                    "it is correlated with others: fix or tie one of them, or widen the band",
+                )
+            )
+    return found
+
+
+def judge_correlation(names: Sequence[str], correlation: NDArray[np.float64]) -> list[Finding]:
+    """One verdict for each pair that the data can hardly tell apart."""
+    pairs = np.argwhere(np.triu(np.abs(correlation) > CORRELATION_GUIDE, k=1)).tolist()
+    return [
+        Finding(
+            "correlated",
+            Light.AMBER,
+            f"{names[i]} and {names[j]} are correlated by {correlation[i, j]:+.3f}, "
+            "above the guide of 0.98",
+            "fix or tie one of them, or widen the band",
+        )
+        for i, j in pairs
+    ]
+
+
+def judge_search(groups: Sequence[Sequence[End]]) -> list[Finding]:
+    """Verdicts on the iteration and on the minima that the starts found."""
+    best = groups[0][0]
+    found = []
+    if best.termination not in CONVERGED:
+        found.append(
+            Finding(
+                "not-converged",
+                Light.RED,
+                f"the iteration ended by {best.termination!r} after {best.iterations} steps",
+                "raise maximum_iterations, use more starts, or simplify the model",
+            )
+        )
+    rivals = [
+        group
+        for group in groups[1:]
+        if group[0].is_converged and group[0].cost <= _NEAR_COST * best.cost
+    ]
+    if rivals:
+        found.append(
+            Finding(
+                "several-minima",
+                Light.AMBER,
+                f"{len(rivals)} other minima lie within 10 % of the best cost",
+                "narrow the bounds by physics, or fix a parameter",
+            )
+        )
+    return found
+
+
+def judge_intervals(source: str) -> list[Finding]:
+    """Verdict on where the 95 % intervals come from."""
+    if source == UNKNOWN:
+        return [
+            Finding(
+                "intervals-missing",
+                Light.UNKNOWN,
+                "the errors of the response are not known, so there are no 95 % intervals",
+                "estimate the response from records with covariance=True",
+            )
+        ]
+    if source == APPROXIMATE:
+        return [
+            Finding(
+                "intervals-approximate",
+                Light.AMBER,
+                "95 % intervals rest on the random error alone and are approximate",
+                "estimate the response with covariance=True",
+            )
+        ]
+    return []

@@ -1,0 +1,263 @@
+"""Fit of a model to frequency responses (native side: `frequency_fit.rs`).
+
+Cost of one response: (20/n) Σ W_γ [W_g (Δ dB)² + W_p (Δ phase in degrees)²], phase wrapped.
+Or, with ``cost="likelihood"``, the whitened complex error.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import FitError, OptionError
+from flightid.findings import Finding
+from flightid.identification.error_model import (
+    ErrorModel,
+    coherence_sensitivity,
+    error_model,
+    whitening,
+)
+from flightid.identification.estimates import Statistics, statistics
+from flightid.identification.fit import Fit, FittedResponse, LocalMinimum
+from flightid.identification.fit_findings import (
+    judge_correlation,
+    judge_cost,
+    judge_intervals,
+    judge_parameters,
+    judge_search,
+)
+from flightid.identification.multistart import End, cluster, collect, draw_starts
+from flightid.identification.selection import Bands, SelectedResponse, select_points
+from flightid.identification.setup_checks import check_setup
+from flightid.models import TransferFunctionModel
+from flightid.responses import FrequencyResponse
+from flightid.units import require_match
+from flightid.version import VERSION
+
+Array = NDArray[np.float64]
+COSTS = ("coherence", "likelihood")
+_DECIBEL = 20.0 / np.log(10.0)
+_DEGREE = 180.0 / np.pi
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of a frequency-domain fit; see `flightid.identify`."""
+
+    starts: int
+    seed: int
+    omega_rad_s: Bands
+    n_omega: int
+    minimum_coherence: float | None
+    weight_gain: float
+    weight_phase: float
+    cost: str
+    maximum_iterations: int
+
+    def check(self) -> None:
+        """Refuse options without a meaning.
+
+        Raises
+        ------
+        OptionError
+            The cost is not known, or no iteration is allowed.
+        """
+        if self.cost not in COSTS:
+            raise OptionError("cost is not known", found=repr(self.cost), needed=" or ".join(COSTS))
+        if self.maximum_iterations < 1:
+            raise OptionError(
+                "maximum_iterations is too small", found=self.maximum_iterations, needed="1 or more"
+            )
+
+
+def fit_responses(model: TransferFunctionModel, data: FrequencyResponse, options: Options) -> Fit:
+    """Fit a model to measured responses; see `flightid.identify`."""
+    options.check()
+    _check_model(model, data)
+    selected = select_points(
+        data,
+        model.response_names,
+        bands=options.omega_rad_s,
+        n_omega=options.n_omega,
+        minimum_coherence=options.minimum_coherence,
+        weight_gain=options.weight_gain,
+        weight_phase=options.weight_phase,
+    )
+    setup = _check_start(model, selected)
+    errors = error_model(data, selected)
+    ends = _minimise(model, selected, errors, options)
+    groups = cluster(ends)
+    best = ends[0]
+    values = dict(zip((p.name for p in model.parameters.free), map(float, best.x), strict=True))
+    fitted = model.with_values(values)
+    responses = _compare(fitted, selected)
+    found = statistics(
+        fitted, selected, errors, best, sensitivity=_sensitivity(fitted, selected, errors, options)
+    )
+    return _assemble(fitted, options, data, groups, responses, found, setup)
+
+
+def _check_model(model: TransferFunctionModel, data: FrequencyResponse) -> None:
+    if not model.parameters.free:
+        raise FitError(
+            "the model has no free parameter",
+            needed="at least one",
+            action="free a parameter with model.with_free(name)",
+        )
+    for response in model.responses:
+        data.pair(response.output, response.input)
+    for name in (*model.inputs, *model.outputs):
+        require_match(data.units[name], model.units[name], subject=f"channel {name}")
+
+
+def _model_at(model: TransferFunctionModel, omega: Array, place: int) -> NDArray[np.complex128]:
+    values = model.parameters.independent_values()
+    return np.asarray(model.native.response(values, np.ascontiguousarray(omega))[place])
+
+
+def _check_start(
+    model: TransferFunctionModel, selected: Sequence[SelectedResponse]
+) -> list[Finding]:
+    found: list[Finding] = []
+    for place, each in enumerate(selected):
+        start = _model_at(model, each.omega_rad_s, place)
+        if np.all(np.isfinite(start)) and np.all(np.abs(start) > 0.0):
+            found += check_setup(each.name, each.omega_rad_s, each.response, start)
+    return found
+
+
+def _minimise(
+    model: TransferFunctionModel,
+    selected: Sequence[SelectedResponse],
+    errors: ErrorModel,
+    options: Options,
+) -> list[End]:
+    free = model.parameters.free
+    measured = [
+        (each.omega_rad_s, each.response, np.sqrt(each.weight_db), np.sqrt(each.weight_deg))
+        for each in selected
+    ]
+    return collect(
+        model.native.fit(
+            model.parameters.independent_values(),
+            model.parameters.free_indices,
+            measured,
+            whitening(errors) if options.cost == "likelihood" else [],
+            draw_starts(free, options.starts, options.seed),
+            np.array([parameter.minimum for parameter in free]),
+            np.array([parameter.maximum for parameter in free]),
+            options.maximum_iterations,
+        )
+    )
+
+
+def _sensitivity(
+    fitted: TransferFunctionModel,
+    selected: Sequence[SelectedResponse],
+    errors: ErrorModel,
+    options: Options,
+) -> Array | None:
+    """Derivatives of the minimised residuals with respect to the measured points."""
+    if not errors.runs:
+        return None
+    if options.cost == "likelihood":
+        from scipy.linalg import block_diag  # noqa: PLC0415
+
+        return np.asarray(-block_diag(*(matrix for *_, matrix in whitening(errors))))
+    curves = [_model_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
+    return coherence_sensitivity(selected, curves, errors)
+
+
+def _compare(
+    fitted: TransferFunctionModel, selected: Sequence[SelectedResponse]
+) -> tuple[FittedResponse, ...]:
+    result = []
+    for place, each in enumerate(selected):
+        curve = _model_at(fitted, each.measured.omega_rad_s, place)
+        ratio = curve[each.places] / each.response
+        cost = float(
+            np.sum(
+                each.weight_db * (_DECIBEL * np.log(np.abs(ratio))) ** 2
+                + each.weight_deg * (_DEGREE * np.angle(ratio)) ** 2
+            )
+        )
+        result.append(FittedResponse(each.name, cost, each.measured, each.omega_rad_s, curve))
+    return tuple(result)
+
+
+def _assemble(
+    fitted: TransferFunctionModel,
+    options: Options,
+    data: FrequencyResponse,
+    groups: Sequence[Sequence[End]],
+    responses: tuple[FittedResponse, ...],
+    found: Statistics,
+    setup: list[Finding],
+) -> Fit:
+    best = groups[0][0]
+    costs = {each.name: each.cost for each in responses}
+    total = sum(costs.values())
+    free = [parameter.name for parameter in fitted.parameters.free]
+    findings = (
+        *setup,
+        *judge_search(groups),
+        *judge_cost(costs, total / len(costs)),
+        *judge_parameters(found.parameters),
+        *judge_correlation(found.names, found.correlation),
+        *judge_intervals(found.source),
+    )
+    minima = tuple(
+        LocalMinimum(
+            group[0].cost,
+            len(group),
+            dict(zip(free, map(float, group[0].x), strict=True)),
+            group[0].termination,
+        )
+        for group in groups
+    )
+    return Fit(
+        model=fitted,
+        parameters=found.parameters,
+        cost=total,
+        average_cost=total / len(costs),
+        costs=costs,
+        names=found.names,
+        covariance=found.covariance,
+        correlation=found.correlation,
+        responses=responses,
+        minima=minima,
+        objective=best.cost,
+        termination=best.termination,
+        iterations=best.iterations,
+        intervals_from=found.source,
+        findings=findings,
+        provenance=_provenance(data, options),
+    )
+
+
+def _provenance(data: FrequencyResponse, options: Options) -> dict[str, object]:
+    digest = hashlib.sha256()
+    for array in (data.omega_rad_s, data.response, data.coherence, data.random_error):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    bands = options.omega_rad_s
+    return {
+        "method": "frequency domain",
+        "flightid": VERSION,
+        "data_sha256": digest.hexdigest(),
+        "data_history": [str(step) for step in data.history],
+        "options": {
+            "starts": options.starts,
+            "seed": options.seed,
+            "omega_rad_s": dict(bands) if isinstance(bands, dict) else bands,
+            "n_omega": options.n_omega,
+            "minimum_coherence": options.minimum_coherence,
+            "weight_gain": options.weight_gain,
+            "weight_phase": options.weight_phase,
+            "cost": options.cost,
+            "maximum_iterations": options.maximum_iterations,
+        },
+    }

@@ -1,0 +1,125 @@
+"""The verb: a model and data to a fit, by the kinds of both."""
+
+from __future__ import annotations
+
+from flightid.errors import FitError
+from flightid.identification.fit import Fit
+from flightid.identification.frequency_domain import Options, fit_responses
+from flightid.identification.selection import Bands
+from flightid.models import TransferFunctionModel
+from flightid.responses import FrequencyResponse
+
+# Kind of model, kind of data -> the fit; a new kind adds its line.
+_FITS = {(TransferFunctionModel, FrequencyResponse): fit_responses}
+
+
+def identify(
+    model: TransferFunctionModel,
+    data: FrequencyResponse,
+    *,
+    starts: int = 1,
+    seed: int = 0,
+    omega_rad_s: Bands = None,
+    n_omega: int = 20,
+    minimum_coherence: float | None = 0.6,
+    weight_gain: float = 1.0,
+    weight_phase: float = 0.01745,
+    cost: str = "coherence",
+    maximum_iterations: int = 200,
+) -> Fit:
+    """Fit the free parameters of a model to data.
+
+    Each response is fitted at `n_omega` of its measured frequencies, log-spaced over its band. The
+    cost of one response is (20/n) Σ W_γ [W_g (Δ dB)² + W_p (Δ degrees)²] with
+    W_γ = [1.58 (1 − exp(−γ²))]².
+
+    Parameters
+    ----------
+    model : TransferFunctionModel
+        Structure, start values and bounds; every response in it is fitted.
+    data : FrequencyResponse
+        Measured responses with the model's channels, in the model's units.
+    starts : int
+        Number of starts: the model's own values, then a Latin hypercube inside the bounds.
+    seed : int
+        Seed of the hypercube.
+    omega_rad_s : tuple of float, or mapping of str to tuple, optional
+        Band (low, high), rad/s, of all responses or by name ``"output/input"``; default: for each
+        response its widest band with `minimum_coherence`.
+    n_omega : int
+        Frequencies of each response.
+    minimum_coherence : float or None
+        Points with less coherence γ² are left out; None takes all.
+    weight_gain, weight_phase : float
+        Weights W_g of a squared dB and W_p of a squared degree.
+    cost : str
+        ``"coherence"``: the cost above. ``"likelihood"``: generalised least squares on the complex
+        response with the covariance of its errors; smaller intervals, less tolerant of a model
+        that is too simple.
+    maximum_iterations : int
+        Most steps of each start.
+
+    Returns
+    -------
+    Fit
+        Estimates with 95 % intervals that carry the errors of the response through the fit,
+        Cramér–Rao bounds and insensitivities, costs, correlations, findings.
+
+    Raises
+    ------
+    FitError
+        No free parameter; parameters that the data cannot tell apart; a fit that diverged from
+        every start; a likelihood without known errors.
+    DataError
+        A response without enough coherent points in its band.
+    UnitError
+        Data and model disagree on the unit of a channel.
+    UnknownNameError
+        A channel of the model is not in the data.
+    OptionError
+        An option outside its range.
+
+    Assumes
+    -------
+    A response without bias. Biased when a loop was closed during the flight and the response was
+    not estimated with the excitation as instrument; errors of different outputs are taken as
+    independent.
+
+    Reference
+    ---------
+    Tischler & Remple, *Aircraft and Rotorcraft System Identification*, 2nd ed., eqs. 11.4, 11.5,
+    12.24 to 12.28; intervals: Pintelon & Schoukens, *System Identification*, 2nd ed., §9.7.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> import flightid as fid
+    >>> truth = fid.load_model("rate_first_order").with_values({"Lp": -6.0, "Ltphi": 180.0})
+    >>> omega = np.geomspace(1.0, 50.0, 100)
+    >>> data = fid.FrequencyResponse.from_values(
+    ...     omega, truth.frequency_response(omega), inputs=["tau_phi"], outputs=["p"],
+    ...     units={"p": "rad/s"}, random_error=np.full(100, 0.02))
+    >>> fit = fid.identify(fid.load_model("rate_first_order"), data)
+    >>> round(fit.parameters["Lp"].value, 6), round(fit.parameters["Ltphi"].value, 6)
+    (-6.0, 180.0)
+    """
+    options = Options(
+        starts=starts,
+        seed=seed,
+        omega_rad_s=omega_rad_s,
+        n_omega=n_omega,
+        minimum_coherence=minimum_coherence,
+        weight_gain=weight_gain,
+        weight_phase=weight_phase,
+        cost=cost,
+        maximum_iterations=maximum_iterations,
+    )
+    fit = _FITS.get((type(model), type(data)))
+    if fit is None:
+        raise FitError(
+            "there is no fit for this model and these data",
+            found=f"{type(model).__name__} and {type(data).__name__}",
+            needed="TransferFunctionModel and FrequencyResponse",
+            action="estimate a response with flightid.estimate_response",
+        )
+    return fit(model, data, options)

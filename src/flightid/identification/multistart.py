@@ -1,0 +1,132 @@
+"""Several starts inside the bounds, and the minima that they find."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from flightid.errors import FitError, OptionError
+from flightid.models import Parameter
+
+Array = NDArray[np.float64]
+NativeEnd = tuple[Array, float, Array, Array, int, str]
+
+CONVERGED = frozenset({"gradient", "step", "cost", "zero", "bounds"})
+_SAME_COST = 1e-6
+_SAME_VALUE = 1e-3
+_DECADES = 1.0
+_OPEN_FACTOR = 10.0
+
+
+@dataclass(frozen=True)
+class End:
+    """Where one start ended: values, cost, residuals, Jacobian, iterations, why."""
+
+    x: Array
+    cost: float
+    residuals: Array
+    jacobian: Array
+    iterations: int
+    termination: str
+
+    @property
+    def is_converged(self) -> bool:
+        """Whether it is a minimum to the tolerances."""
+        return self.termination in CONVERGED
+
+
+def draw_starts(free: Sequence[Parameter], starts: int, seed: int) -> Array:
+    """Start values: the model's own first, the others by a Latin hypercube inside the bounds.
+
+    A range of one sign over more than a decade is drawn in its logarithm. Where a bound is open the
+    range ends at ten times the value.
+
+    Parameters
+    ----------
+    free : sequence of Parameter
+        Parameters to be fitted.
+    starts : int
+        Number of starts.
+    seed : int
+        Seed of the generator.
+
+    Returns
+    -------
+    ndarray, shape (starts, n_free)
+
+    Raises
+    ------
+    OptionError
+        Fewer than one start.
+
+    Reference
+    ---------
+    McKay, Beckman & Conover (1979), *Technometrics* 21.
+
+    Example
+    -------
+    >>> draw_starts([Parameter("T", 0.1, "s", minimum=0.01, maximum=1.0)], 3, seed=0).shape
+    (3, 1)
+    """
+    if starts < 1:
+        raise OptionError("starts is too small", found=starts, needed="at least 1")
+    own = np.array([[parameter.value or 0.0 for parameter in free]])
+    if starts == 1 or not free:
+        return own
+    shares = qmc.LatinHypercube(d=len(free), rng=np.random.default_rng(seed)).random(starts - 1)
+    columns = [_spread(parameter, shares[:, k]) for k, parameter in enumerate(free)]
+    return np.ascontiguousarray(np.vstack([own, np.column_stack(columns)]))
+
+
+def _spread(parameter: Parameter, share: Array) -> Array:
+    value = parameter.value or 0.0
+    reach = _OPEN_FACTOR * abs(value) or 1.0
+    low = parameter.minimum if np.isfinite(parameter.minimum) else min(value, 0.0) - reach
+    high = parameter.maximum if np.isfinite(parameter.maximum) else max(value, 0.0) + reach
+    if low > 0.0 and np.log10(high / low) > _DECADES:
+        return np.asarray(low * (high / low) ** share)
+    return np.asarray(low + (high - low) * share)
+
+
+def collect(outcomes: Sequence[NativeEnd | str]) -> list[End]:
+    """Ends of the starts that ended, best first.
+
+    Raises
+    ------
+    FitError
+        No start led anywhere.
+    """
+    ends = [End(*outcome) for outcome in outcomes if not isinstance(outcome, str)]
+    ends = [end for end in ends if np.isfinite(end.cost)]
+    if not ends:
+        reasons = sorted({outcome for outcome in outcomes if isinstance(outcome, str)})
+        raise FitError(
+            "the fit diverged from every start",
+            found="; ".join(reasons),
+            needed="a model with a finite response at its start values",
+            action="check start values and bounds, or the structure of the model",
+        )
+    return sorted(ends, key=lambda end: end.cost)
+
+
+def cluster(ends: Sequence[End]) -> list[list[End]]:
+    """Group ends that are the same minimum, best group first."""
+    groups: list[list[End]] = []
+    for end in ends:
+        for group in groups:
+            if _same(group[0], end):
+                group.append(end)
+                break
+        else:
+            groups.append([end])
+    return groups
+
+
+def _same(first: End, second: End) -> bool:
+    scale = np.maximum(np.abs(first.x), np.abs(second.x))
+    near = np.all(np.abs(first.x - second.x) <= _SAME_VALUE * np.maximum(scale, 1e-12))
+    return bool(near) and second.cost - first.cost <= _SAME_COST * (1.0 + first.cost)

@@ -1,0 +1,189 @@
+"""Which points of a measured response a fit uses, and with what weight."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.responses import FrequencyResponse, PairResponse
+from flightid.responses.bands import nearest
+
+Band = tuple[float, float]
+Bands = Band | Mapping[str, Band] | None
+
+COST_POINTS = 20.0
+"""The cost is scaled as if 20 frequencies were fitted, whatever their number."""
+MINIMUM_POINTS = 3
+_EDGE = 1e-9
+
+
+def coherence_weight(coherence: ArrayLike) -> NDArray[np.float64]:
+    """Weight of a point by its coherence, W_γ = [1.58 (1 − exp(−γ²))]².
+
+    Parameters
+    ----------
+    coherence : array_like
+        Coherence γ², 0 to 1.
+
+    Returns
+    -------
+    ndarray
+        Same shape; 0.51 at γ² = 0.6, 1.0 at γ² = 1.
+
+    Reference
+    ---------
+    Tischler & Remple, *Aircraft and Rotorcraft System Identification*, 2nd ed., eq. 11.5. The
+    exponent is γ², not its square.
+
+    Example
+    -------
+    >>> coherence_weight([0.6, 1.0]).round(5)
+    array([0.50819, 0.9975 ])
+    """
+    return np.asarray((1.58 * (1.0 - np.exp(-np.asarray(coherence, dtype=np.float64)))) ** 2)
+
+
+@dataclass(frozen=True)
+class SelectedResponse:
+    """Points of one measured response that a fit uses.
+
+    Attributes
+    ----------
+    name : str
+        ``"output/input"``.
+    measured : PairResponse
+        The whole measured response.
+    places : ndarray of int, shape (n,)
+        Its frequencies that are fitted.
+    weight_db, weight_deg : ndarray, shape (n,)
+        Weights of squared decibels and degrees, the factor 20/n included.
+    """
+
+    name: str
+    measured: PairResponse
+    places: NDArray[np.intp]
+    weight_db: NDArray[np.float64]
+    weight_deg: NDArray[np.float64]
+
+    @property
+    def omega_rad_s(self) -> NDArray[np.float64]:
+        """Frequencies that are fitted, rad/s."""
+        return np.ascontiguousarray(self.measured.omega_rad_s[self.places])
+
+    @property
+    def response(self) -> NDArray[np.complex128]:
+        """Measured values there."""
+        return np.ascontiguousarray(self.measured.response[self.places])
+
+    @property
+    def band_rad_s(self) -> Band:
+        """Lowest and highest fitted frequency, rad/s."""
+        omega = self.omega_rad_s
+        return float(omega[0]), float(omega[-1])
+
+
+def select_points(
+    data: FrequencyResponse,
+    names: tuple[str, ...],
+    *,
+    bands: Bands,
+    n_omega: int,
+    minimum_coherence: float | None,
+    weight_gain: float,
+    weight_phase: float,
+) -> list[SelectedResponse]:
+    """Choose the fitted points of each response: log-spaced, on the measured grid, coherent.
+
+    Raises
+    ------
+    UnknownNameError
+        A band is given for a response that is not in the model.
+    DataError
+        Too few points of a response lie in its band with enough coherence.
+    OptionError
+        An option outside its range.
+    """
+    _check_options(n_omega, minimum_coherence, weight_gain, weight_phase)
+    if isinstance(bands, Mapping):
+        stray = set(bands) - set(names)
+        if stray:
+            raise UnknownNameError(
+                "a band is given for a response that the model does not have",
+                found=", ".join(sorted(stray)),
+                needed=", ".join(names),
+            )
+    chosen = []
+    for name in names:
+        output, _, source = name.partition("/")
+        pair = data.pair(output, source)
+        band = bands.get(name) if isinstance(bands, Mapping) else bands
+        places = _places(pair, name, band, n_omega, minimum_coherence)
+        weight = COST_POINTS / len(places) * coherence_weight(pair.coherence[places])
+        chosen.append(
+            SelectedResponse(name, pair, places, weight_gain * weight, weight_phase * weight)
+        )
+    return chosen
+
+
+def _check_options(
+    n_omega: int, minimum_coherence: float | None, weight_gain: float, weight_phase: float
+) -> None:
+    if n_omega < MINIMUM_POINTS:
+        raise OptionError(
+            "n_omega is too small", found=n_omega, needed=f"at least {MINIMUM_POINTS}"
+        )
+    if minimum_coherence is not None and not 0.0 <= minimum_coherence <= 1.0:
+        raise OptionError(
+            "minimum_coherence has no meaning", found=minimum_coherence, needed="0 to 1, or None"
+        )
+    for name, value in (("weight_gain", weight_gain), ("weight_phase", weight_phase)):
+        if not (np.isfinite(value) and value >= 0.0):
+            raise OptionError(f"{name} has no meaning", found=value, needed="a number from 0 up")
+    if weight_gain == 0.0 and weight_phase == 0.0:
+        raise OptionError("both weights are zero", needed="weight_gain or weight_phase above 0")
+
+
+def _places(
+    pair: PairResponse,
+    name: str,
+    band: Band | None,
+    n_omega: int,
+    minimum_coherence: float | None,
+) -> NDArray[np.intp]:
+    grid = pair.omega_rad_s
+    if band is None:
+        found = pair.usable_band(0.0 if minimum_coherence is None else minimum_coherence)
+        if found is None:
+            raise DataError(
+                f"response {name} has no band to fit",
+                found=f"coherence of at most {pair.coherence.max():.2f}",
+                needed=f"neighbouring frequencies with at least {minimum_coherence}",
+                action="give omega_rad_s and a lower minimum_coherence, or leave the response out",
+            )
+        band = found
+    low, high = band
+    if not (np.isfinite(low) and np.isfinite(high) and 0.0 < low < high):
+        raise OptionError(
+            f"band of response {name} has no meaning",
+            found=f"{low:g} to {high:g} rad/s",
+            needed="0 < low < high",
+        )
+    inside = (grid >= low * (1.0 - _EDGE)) & (grid <= high * (1.0 + _EDGE))
+    if minimum_coherence is not None:
+        inside &= pair.coherence >= minimum_coherence
+    inside &= np.abs(pair.response) > 0.0
+    usable = np.flatnonzero(inside)
+    if len(usable) < MINIMUM_POINTS:
+        raise DataError(
+            f"response {name} has too few points to fit",
+            found=f"{len(usable)} between {low:.4g} and {high:.4g} rad/s"
+            + ("" if minimum_coherence is None else f" with coherence ≥ {minimum_coherence:g}"),
+            needed=f"at least {MINIMUM_POINTS}",
+            action="widen omega_rad_s, lower minimum_coherence, or leave the response out",
+        )
+    wanted = np.geomspace(grid[usable[0]], grid[usable[-1]], n_omega)
+    return np.asarray(usable[np.unique(nearest(grid[usable], wanted))])

@@ -1,0 +1,79 @@
+"""Insensitivity of the cost to single parameters, and combinations that the data cannot see."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import SingularError
+
+Array = NDArray[np.float64]
+
+
+def insensitivity(jacobian: Array) -> Array:
+    """Insensitivity 1/√ℋ_ii: the change of one parameter alone that raises the cost by one half.
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (n_residuals, n_parameters)
+        Derivatives of the weighted residuals, whose squares add up to the cost.
+
+    Returns
+    -------
+    ndarray, shape (n_parameters,)
+        In the units of the parameters.
+
+    Raises
+    ------
+    SingularError
+        A parameter has no influence on the residuals.
+
+    Reference
+    ---------
+    Tischler & Remple, 2nd ed., eq. 12.28; guide: at most 10 % of the value.
+
+    Example
+    -------
+    >>> insensitivity(np.array([[3.0], [4.0]]))
+    array([0.14142136])
+    """
+    size = np.linalg.norm(jacobian, axis=0)
+    if np.any(size == 0.0):
+        raise SingularError("a parameter has no influence on the residuals")
+    return np.asarray(1.0 / (np.sqrt(2.0) * size))
+
+
+def null_combination(jacobian: Array, *, tolerance: float = 1e-9) -> Array | None:
+    """Combination of parameters that leaves the residuals as they are, where there is one.
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (n_residuals, n_parameters)
+        Derivatives of the residuals.
+    tolerance : float
+        Smallest singular value, relative to the largest, of columns scaled to equal length.
+
+    Returns
+    -------
+    ndarray, shape (n_parameters,), or None
+        Share of each parameter, scaled by its influence, largest 1; None where all combinations
+        are seen.
+
+    Reference
+    ---------
+    Golub & Van Loan, *Matrix Computations*, 4th ed., §5.4.
+
+    Example
+    -------
+    >>> null_combination(np.array([[1.0, 2.0], [2.0, 4.0]]))
+    array([1., 1.])
+    """
+    size = np.linalg.norm(jacobian, axis=0)
+    if np.any(size == 0.0):
+        return np.asarray((size == 0.0).astype(np.float64))
+    n = len(size)
+    _, values, right = np.linalg.svd(jacobian / size, full_matrices=True)
+    if len(values) == n and values[-1] > tolerance * values[0]:
+        return None
+    share = np.abs(right[-1])
+    return np.asarray(share / share.max())
