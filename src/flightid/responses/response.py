@@ -224,10 +224,8 @@ class FrequencyResponse:
                 needed="a response estimated with covariance=True",
             )
         chosen = nearest(self.omega_rad_s, np.atleast_1d(np.asarray(omega_rad_s, dtype=float)))
-        every = np.arange(len(self.inputs))
-        return np.array(
-            [self.errors.covariance(k, every, chosen) for k in range(len(self.outputs))]
-        )
+        outputs, inputs = np.arange(len(self.outputs)), np.arange(len(self.inputs))
+        return self.errors.covariance(outputs, inputs, chosen)
 
     def pair(self, output: str, input: str) -> PairResponse:
         """Response of one output to one input.

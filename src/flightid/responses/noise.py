@@ -1,0 +1,112 @@
+"""Noise spectrum of the outputs: what the inputs do not explain, without leakage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError
+from flightid.responses.local_fit import Bins, bins_needed, fit_locally
+from flightid.responses.samples import Samples
+
+
+@dataclass(frozen=True)
+class NoiseSpectrum:
+    """One-sided noise spectra of the outputs on a grid of their own.
+
+    Attributes
+    ----------
+    omega_rad_s : ndarray, shape (n,)
+    density : ndarray, shape (n_out, n)
+        unit² per Hz, positive.
+    """
+
+    omega_rad_s: NDArray[np.float64]
+    density: NDArray[np.float64]
+
+    def at(self, omega_rad_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Density between the grid's frequencies, log-linear; held beyond its ends."""
+        logs = np.log(np.maximum(self.density, np.finfo(float).tiny))
+        return np.exp([np.interp(omega_rad_s, self.omega_rad_s, row) for row in logs])
+
+
+def estimate_noise(
+    samples: Samples, omega: NDArray[np.float64], response: NDArray[np.complex128]
+) -> NoiseSpectrum:
+    """Noise spectra from local polynomial fits on neighbouring groups of bins.
+
+    With excitations, outputs and inputs are both fitted on them and the noise of ``y − H u`` is
+    formed from their joint residual: fitting y on u would absorb what the loop feeds back.
+
+    Parameters
+    ----------
+    samples : Samples
+    omega : ndarray, shape (n_f,)
+        Frequencies of `response`, rad/s.
+    response : ndarray of complex, shape (n_out, n_in, n_f)
+        Needed with excitations only.
+
+    Returns
+    -------
+    NoiseSpectrum
+
+    Raises
+    ------
+    DataError
+        The records hold too few samples.
+
+    Notes
+    -----
+    What remains of leakage is the part of third degree over a group of bins; a mode whose bandwidth
+    is below a few bins of the record still raises the estimate there. Noise is taken to be
+    stationary over all records.
+    """
+    joint = bool(samples.excitations)
+    order = ("excitations", "inputs", "outputs") if joint else ("inputs", "outputs")
+    rows = np.concatenate([np.arange(len(samples.records[0]))[samples.rows(k)] for k in order])
+    n_regressors = len(samples.excitations if joint else samples.inputs)
+    records = [Bins.of(record[rows], samples.sample_time_s) for record in samples.records]
+    count = bins_needed(n_regressors, len(records))
+    size = min(len(bins.omega) for bins in records)
+    if size < count:
+        raise DataError(
+            "the records are too short for a noise spectrum",
+            found=f"{size} Fourier bins",
+            needed=f"{count}",
+            action="use longer records, or covariance=False",
+        )
+    longest = max(records, key=lambda bins: len(bins.omega))
+    edges = longest.omega[:: max(count, len(longest.omega) * count // max(size, 1))]
+    centres, densities = [], []
+    for low, high in zip(edges, [*edges[1:], np.inf], strict=True):
+        places = [
+            slice(*np.searchsorted(bins.omega, [low * (1 - 1e-12), high * (1 - 1e-12)]))
+            for bins in records
+        ]
+        if sum(place.stop - place.start for place in places) < 0.9 * count * len(records):
+            continue
+        inside = longest.omega[places[records.index(longest)]]
+        centre = float(0.5 * (inside[0] + inside[-1]))
+        residual = fit_locally(records, places, centre, n_regressors).residual
+        densities.append(_of_outputs(residual, joint, centre, omega, response))
+        centres.append(centre)
+    return NoiseSpectrum(np.array(centres), np.array(densities).T)
+
+
+def _of_outputs(
+    residual: NDArray[np.complex128],
+    joint: bool,
+    centre: float,
+    omega: NDArray[np.float64],
+    response: NDArray[np.complex128],
+) -> NDArray[np.float64]:
+    if not joint:
+        return np.real(np.diag(residual))
+    n_out = response.shape[0]
+    nearest = int(np.argmin(np.abs(omega - centre)))
+    combine = np.concatenate([-response[:, :, nearest], np.eye(n_out)], axis=1)
+    # residual has its conjugate on the first index.
+    density = np.real(np.einsum("oa,ab,ob->o", combine.conj(), residual, combine))
+    return np.asarray(np.maximum(density, 0.0))
