@@ -62,7 +62,8 @@ impl Mixer {
         let high = rpy.iter().copied().fold(f64::MIN, f64::max);
         let scale = if high - low > 1.0 { 1.0 / (high - low) } else { 1.0 };
         rpy = rpy.map(|v| v * scale);
-        let throttle_given = throttle.clamp(-low * scale, 1.0 - high * scale);
+        // Rounding may put the lower bound above the upper one, which `clamp` would not take.
+        let throttle_given = throttle.min(1.0 - high * scale).max(-low * scale);
         let thrust = rpy.map(|v| (throttle_given + v).clamp(0.0, 1.0));
         Mixed { pwm_us: thrust.map(|t| self.pwm_of(t)), limited: scale < 1.0 || yaw_given != yaw }
     }

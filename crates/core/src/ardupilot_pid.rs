@@ -30,6 +30,15 @@ pub struct PidGains {
     pub fltd: f32,
 }
 
+impl PidGains {
+    /// Every number is finite, and bounds and filters are not negative.
+    pub fn is_sound(&self) -> bool {
+        let bounds = [self.imax, self.pdmx, self.fltt, self.flte, self.fltd];
+        let gains = [self.p, self.i, self.d, self.ff, self.d_ff];
+        bounds.iter().all(|v| v.is_finite() && *v >= 0.0) && gains.iter().all(|v| v.is_finite())
+    }
+}
+
 /// What the controller computed in one loop, as PIDR, PIDP and PIDY log it.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PidTerms {

@@ -125,22 +125,25 @@ struct Acted {
 }
 
 impl Loop<'_> {
-    fn act(&mut self, x: &State, gyro: [f64; 3]) -> Acted {
+    fn act(&mut self, x: &State, gyro: [f64; 3], k: usize) -> Result<Acted, CoreError> {
         let last = self.last_gyro.replace(gyro).unwrap_or(gyro);
         let filtered: [f64; 3] = std::array::from_fn(|i| self.filters[i].apply(gyro[i]));
         let terms: [PidTerms; 3] = std::array::from_fn(|i| {
             let target = self.rate_target[i] + self.injection.rate[i];
             self.pids[i].update(target, filtered[i] as f32, self.limited)
         });
-        let output = std::array::from_fn(|i| {
+        let output: [f64; 3] = std::array::from_fn(|i| {
             f64::from(terms[i].feedback() + self.injection.actuator[i] + terms[i].feedforward())
         });
+        if !(output.iter().all(|v| v.is_finite()) && x.iter().all(|v| v.is_finite())) {
+            return Err(CoreError::NotFinite { what: "simulated flight", index: k });
+        }
         let throttle = self.throttle(x) + self.injection.throttle;
         let mixed = self.autopilot.mixer.mix(output, throttle);
         self.limited = mixed.limited;
         let gyro_mean = std::array::from_fn(|i| 0.5 * (gyro[i] + last[i]));
         let applied = self.injection.target;
-        Acted { gyro, gyro_mean, filtered, terms, output, throttle, mixed, applied }
+        Ok(Acted { gyro, gyro_mean, filtered, terms, output, throttle, mixed, applied })
     }
 
     fn throttle(&self, x: &State) -> f64 {
@@ -226,6 +229,14 @@ fn check(vehicle: &Quadrotor, autopilot: &Autopilot, plan: &Plan<'_>) -> Result<
         let found = vehicle.motor_delay_s;
         return Err(CoreError::Range { what: "motor delay", found, needed: "0 to 1 s" });
     }
+    if let Some(gains) = autopilot.rate.iter().find(|gains| !gains.is_sound()) {
+        let needed = "finite gains, with bounds and filters of 0 or more";
+        return Err(CoreError::Range {
+            what: "rate controller",
+            found: f64::from(gains.p),
+            needed,
+        });
+    }
     if plan.log_every == 0 {
         return Err(CoreError::Range { what: "log divider", found: 0.0, needed: "1 or more" });
     }
@@ -301,7 +312,7 @@ fn run(
         let noise = random.normal3(sensors.gyro_noise_rad_s);
         let omega = rates(&x);
         let gyro = std::array::from_fn(|i| omega[i] + sensors.gyro_bias_rad_s[i] + noise[i]);
-        let acted = state.act(&x, gyro);
+        let acted = state.act(&x, gyro, k)?;
         let pilot = std::array::from_fn(|i| plan.pilot[i * n_loops + k]);
         state.plan(&x, pilot, time_s);
         if k % plan.log_every == 0 {
@@ -318,9 +329,6 @@ fn run(
         vehicle.step(&mut x, after, &gust, dt - delay.rest_s);
         wind.advance(&mut random);
         turn.advance(&mut random);
-        if !x[10].is_finite() {
-            return Err(CoreError::NotFinite { what: "simulated flight", index: k });
-        }
     }
     Ok(rows)
 }

@@ -108,7 +108,7 @@ def fly_scenario(
     Example
     -------
     >>> fly_scenario("advised", seed=3, turbulence={"rate_rad_s": 0.1})
-    Flight(361.6 s at 400 Hz, 3 sweeps, 3 doublets, seed 3)
+    Flight(353.6 s at 400 Hz, 3 sweeps, 3 doublets, seed 3)
     """
     if scenario not in SCENARIOS:
         raise OptionError("scenario is not known", found=scenario, needed=f"one of {SCENARIOS}")
