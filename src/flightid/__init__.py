@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from flightid.findings import Finding
     from flightid.identification import Fit, FittedParameter, FittedResponse, LocalMinimum
     from flightid.identification.identify import identify
+    from flightid.inspection import Inspection, inspect_log
     from flightid.logs import Log, LogTable, read_log
     from flightid.models import (
         Parameter,
@@ -40,6 +41,7 @@ _HOMES = {
     "FittedResponse": "flightid.identification",
     "FlightidError": "flightid.errors",
     "FrequencyResponse": "flightid.responses",
+    "Inspection": "flightid.inspection",
     "LinearSystem": "flightid.simulation.simulate",
     "LocalMinimum": "flightid.identification",
     "Log": "flightid.logs",
@@ -54,6 +56,7 @@ _HOMES = {
     "estimate_response": "flightid.responses",
     "excitation": "flightid.excitation",
     "identify": "flightid.identification.identify",
+    "inspect_log": "flightid.inspection",
     "library_names": "flightid.models",
     "load_model": "flightid.models",
     "read_log": "flightid.logs",
@@ -70,6 +73,7 @@ __all__ = [
     "FittedResponse",
     "FlightidError",
     "FrequencyResponse",
+    "Inspection",
     "LinearSystem",
     "LocalMinimum",
     "Log",
@@ -85,6 +89,7 @@ __all__ = [
     "estimate_response",
     "excitation",
     "identify",
+    "inspect_log",
     "library_names",
     "load_model",
     "read_log",

@@ -26,6 +26,7 @@ ORDER = [
     "logs",
     "conditioning",
     "responses",
+    "inspection",
     "models",
     "identification",
     "inference",

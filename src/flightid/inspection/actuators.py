@@ -1,0 +1,94 @@
+"""Commands to motors and servos with the limits between which they move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.logs import Log, LogTable
+
+MOTOR_FUNCTIONS = range(33, 41)
+"""SERVOn_FUNCTION of ArduPilot's motors 1 to 8."""
+
+
+@dataclass(frozen=True, eq=False)
+class Actuators:
+    """Motor commands as logged.
+
+    Attributes
+    ----------
+    message : str
+        Where they were logged.
+    names : tuple of str
+        Field of each motor.
+    time_s : ndarray, shape (n,)
+        Stamps, s.
+    values : ndarray, shape (n_motors, n)
+        Commands, in the unit of the limits.
+    low, high : float
+        Limits between which the mixer may move them in flight.
+    """
+
+    message: str
+    names: tuple[str, ...]
+    time_s: NDArray[np.float64]
+    values: NDArray[np.float64]
+    low: float
+    high: float
+
+    @property
+    def ran(self) -> bool:
+        """Whether any motor was ever commanded above the lower limit of flight."""
+        return bool(np.any(self.values > self.low + 0.01 * (self.high - self.low)))
+
+
+def find_actuators(log: Log) -> Actuators | None:
+    """Motor commands of a log, or None where it holds none that can be told apart."""
+    return _ardupilot(log) if log.kind == "ardupilot" else _px4(log)
+
+
+def _ardupilot(log: Log) -> Actuators | None:
+    if "RCOU" not in log:
+        return None
+    parameters = log.parameters
+    table = log.table("RCOU")
+    motors = [
+        f"C{number}"
+        for number in range(1, 15)
+        if parameters.get(f"SERVO{number}_FUNCTION") in MOTOR_FUNCTIONS and f"C{number}" in table
+    ]
+    if not motors:
+        return None
+    least = parameters.get("MOT_PWM_MIN", 1000.0)
+    span = parameters.get("MOT_PWM_MAX", 2000.0) - least
+    return _made(
+        table,
+        motors,
+        least + span * parameters.get("MOT_SPIN_MIN", 0.15),
+        least + span * parameters.get("MOT_SPIN_MAX", 0.95),
+    )
+
+
+def _px4(log: Log) -> Actuators | None:
+    if "actuator_motors" in log:
+        table = log.table("actuator_motors", log.messages["actuator_motors"].instances[0])
+        used = [f"control[{i}]" for i in range(12) if f"control[{i}]" in table]
+        used = [name for name in used if np.any(np.isfinite(table[name]))]
+        return _made(table, used, 0.0, 1.0) if used else None
+    if "actuator_outputs" not in log:
+        return None
+    table = log.table("actuator_outputs", log.messages["actuator_outputs"].instances[0])
+    used = [f"output[{i}]" for i in range(8) if f"output[{i}]" in table]
+    used = [name for name in used if np.any(table[name] > 0)]
+    low, high = (log.parameters.get(f"PWM_{end}", default) for end, default in _PWM.items())
+    return _made(table, used, low, high) if used else None
+
+
+_PWM = {"MIN": 1000.0, "MAX": 2000.0}
+
+
+def _made(table: LogTable, names: list[str], low: float, high: float) -> Actuators:
+    values = np.nan_to_num(np.array([table[name] for name in names]), nan=low)
+    return Actuators(table.name, tuple(names), table.time_s, values, low, high)

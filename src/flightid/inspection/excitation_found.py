@@ -1,0 +1,186 @@
+"""What moved the vehicle: injected sweeps, autotune, sweeps and steps of set-points, a pilot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.inspection.signals import Signal, Span, find, inside
+from flightid.inspection.sources import AXES, SET_POINTS
+from flightid.inspection.thresholds import RESTING_RATE
+from flightid.logs import Log
+
+SID_AXES = {
+    1: "roll angle", 2: "pitch angle", 3: "yaw rate", 4: "roll recovery", 5: "pitch recovery",
+    6: "yaw recovery", 7: "roll rate", 8: "pitch rate", 9: "yaw rate", 10: "roll mixer",
+    11: "pitch mixer", 12: "yaw mixer", 13: "thrust mixer",
+}  # fmt: skip
+"""SID_AXIS of ArduPilot."""
+MIXER_AXES = {10: "roll", 11: "pitch", 12: "yaw"}
+PX4_AUTOTUNE = {2: "roll", 4: "pitch", 6: "yaw"}
+"""State of autotune_attitude_control_status while an axis is excited."""
+START_DELAY_S = 1.0
+"""ArduCopter waits so long between entering the mode and the start of its chirp."""
+SWEEP_RATIO, SWEEP_CYCLES, SWEEP_ORDER = 3.0, 8, 0.9
+
+
+@dataclass(frozen=True)
+class FoundExcitation:
+    """A stretch of a log in which something excited an axis.
+
+    Attributes
+    ----------
+    kind : str
+        ``"sid"``, ``"autotune"``, ``"sweep"``, ``"steps"``, ``"pilot"``; ``"hand"`` on the ground.
+    axis : str
+        ``"roll"``, ``"pitch"``, ``"yaw"``, or another injection point in words.
+    start_s, stop_s : float
+        Span, s.
+    detail : str
+        Settings or measures with units.
+    """
+
+    kind: str
+    axis: str
+    start_s: float
+    stop_s: float
+    detail: str
+
+    @property
+    def is_injected(self) -> bool:
+        """Whether the autopilot made it, so that it is independent of what the sensors read."""
+        return self.kind in ("sid", "autotune")
+
+
+def excitations(log: Log, spans: tuple[Span, ...]) -> tuple[FoundExcitation, ...]:
+    """Everything that excited the vehicle, injected runs first.
+
+    Looks in the spans in the air; without any, in the whole log.
+    """
+    found = [*_system_identification(log), *_autotune(log)]
+    flying = bool(spans)
+    spans = spans or ((log.first_s or 0.0, log.last_s or 0.0),)
+    for axis, name in SET_POINTS.items():
+        set_point, rate = find(log, name), find(log, AXES[axis][1])
+        for span in spans:
+            if any(e.is_injected and _overlap(span, e) for e in found):
+                continue
+            manoeuvre = _shape(set_point, axis, span) or _motion(rate, axis, span, flying)
+            found += [manoeuvre] if manoeuvre is not None else []
+    return tuple(found)
+
+
+def _overlap(span: Span, excitation: FoundExcitation) -> bool:
+    return excitation.start_s < span[1] and excitation.stop_s > span[0]
+
+
+def _system_identification(log: Log) -> list[FoundExcitation]:
+    """Runs of ArduPilot's system identification mode, from their start records."""
+    if "SIDS" not in log or "SIDD" not in log:
+        return []
+    starts, data = log.table("SIDS"), log.table("SIDD")
+    ends = [*starts.time_s[1:], np.inf]
+    found = []
+    for row, (start, end) in enumerate(zip(starts.time_s, ends, strict=True)):
+        number = int(starts["Ax"][row])
+        delay = START_DELAY_S if log.vehicle == "copter" else 0.0
+        during = data.time_s[(data.time_s >= start) & (data.time_s < end)]
+        if during.size < 2:
+            continue
+        stop = min(float(during[-1]), start + delay + float(starts["TR"][row]))
+        found.append(
+            FoundExcitation(
+                "sid",
+                MIXER_AXES.get(number, SID_AXES.get(number, f"axis {number}")),
+                float(start),
+                stop,
+                f"SID_AXIS {number}, magnitude {starts['Mag'][row]:.3g}, "
+                f"{starts['FSt'][row]:.3g} to {starts['FSp'][row]:.3g} Hz",
+            )
+        )
+    return found
+
+
+def _autotune(log: Log) -> list[FoundExcitation]:
+    name = "autotune_attitude_control_status"
+    if name in log and "state" in log.messages[name].fields:
+        table = log.table(name, log.messages[name].instances[0])
+        found = []
+        for state, axis in PX4_AUTOTUNE.items():
+            stamps = table.time_s[table["state"] == state]
+            if stamps.size > 1:
+                found.append(
+                    FoundExcitation(
+                        "autotune", axis, float(stamps[0]), float(stamps[-1]), "PX4 autotune"
+                    )
+                )
+        return found
+    if "ATUN" in log:
+        stamps = log.table("ATUN").time_s
+        start, stop = float(stamps.min()), float(stamps.max())
+        return [FoundExcitation("autotune", "roll, pitch or yaw", start, stop, "twitches")]
+    return []
+
+
+def _shape(signal: Signal | None, axis: str, span: Span) -> FoundExcitation | None:
+    """Sweep or steps in a set-point."""
+    if signal is None:
+        return None
+    mask = inside(signal.time_s, [span])
+    stamps, values = signal.time_s[mask], signal.values[mask]
+    if stamps.size < 20 or np.std(values) < RESTING_RATE.value:
+        return None
+    centred = values - np.median(values)
+    sweep = _sweep(stamps, centred)
+    if sweep is not None:
+        return FoundExcitation(
+            "sweep", axis, span[0], span[1], f"set-point from {sweep[0]:.2g} to {sweep[1]:.2g} Hz"
+        )
+    steps = _steps(stamps, centred)
+    if steps >= 2:
+        return FoundExcitation("steps", axis, span[0], span[1], f"{steps} steps of the set-point")
+    return None
+
+
+def _sweep(stamps: NDArray[np.float64], values: NDArray[np.float64]) -> tuple[float, float] | None:
+    """First and last frequency, Hz, where the half periods shrink (or grow) steadily."""
+    level = 0.3 * float(np.percentile(np.abs(values), 90))
+    state = np.where(values > level, 1, np.where(values < -level, -1, 0))
+    known = np.flatnonzero(state)
+    turns = known[1:][np.diff(state[known]) != 0]
+    if turns.size < 2 * SWEEP_CYCLES:
+        return None
+    frequency = 0.5 / np.diff(stamps[turns])
+    order = np.corrcoef(np.arange(frequency.size), np.argsort(np.argsort(frequency)))[0, 1]
+    tail = max(1, frequency.size // 8)
+    first, last = float(np.median(frequency[:tail])), float(np.median(frequency[-tail:]))
+    if abs(order) < SWEEP_ORDER or max(first, last) < SWEEP_RATIO * min(first, last):
+        return None
+    return first, last
+
+
+def _steps(stamps: NDArray[np.float64], values: NDArray[np.float64]) -> int:
+    """Number of jumps within 0.1 s to a level that is then held for 0.3 s."""
+    grid = np.arange(stamps[0], stamps[-1], 0.02)
+    if grid.size < 40:
+        return 0
+    level = np.interp(grid, stamps, values)
+    height = float(np.ptp(np.percentile(level, [2, 98])))
+    jump = np.abs(level[5:] - level[:-5]) > 0.4 * height
+    ahead = np.lib.stride_tricks.sliding_window_view(level[5:], 15)
+    flat = np.ptp(ahead, axis=1) < 0.1 * height
+    landed = jump[: flat.size] & flat
+    return int(np.count_nonzero(np.diff(landed.astype(np.int8)) == 1))
+
+
+def _motion(rate: Signal | None, axis: str, span: Span, flying: bool) -> FoundExcitation | None:
+    if rate is None:
+        return None
+    values = rate.within([span])
+    spread = float(np.std(values)) if values.size else 0.0
+    if spread < RESTING_RATE.value:
+        return None
+    kind, how = ("pilot", "plain flying") if flying else ("hand", "moved on the ground")
+    return FoundExcitation(kind, axis, span[0], span[1], f"body rate {spread:.2g} rad/s rms, {how}")

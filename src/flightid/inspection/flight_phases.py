@@ -1,0 +1,161 @@
+"""When the vehicle flew: airborne spans, and what must be rejected after a tip-over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.inspection.actuators import Actuators
+from flightid.inspection.signals import Signal, Span, find
+from flightid.inspection.thresholds import (
+    AIRBORNE_SHARE,
+    AIRBORNE_SPEED,
+    AIRBORNE_THRUST,
+    LYING_RATE,
+    LYING_TILT,
+    SHORTEST_SEGMENT,
+    TIPPING_TILT,
+)
+from flightid.logs import Log
+
+EV_LAND_COMPLETE, EV_NOT_LANDED = 18, 28
+"""Ids of ArduPilot's EV message."""
+FALL_S = 5.0
+"""A fall begins at most this long after the throttle went down, s."""
+
+
+@dataclass(frozen=True)
+class FlightPhases:
+    """Where in a log the vehicle flew.
+
+    Attributes
+    ----------
+    airborne : tuple of (float, float)
+        Spans in the air, s, on the autopilot's clock; a fall is not part of them.
+    motors_ran : bool or None
+        Whether any motor was ever commanded above its lower limit; None where none is logged.
+    tipped_s : float or None
+        When the vehicle began to fall over; None where it did not.
+    evidence : str
+        What the spans rest on.
+    """
+
+    airborne: tuple[Span, ...]
+    motors_ran: bool | None
+    tipped_s: float | None
+    evidence: str
+
+    @property
+    def airborne_s(self) -> float:
+        """Time in the air, s."""
+        return sum(stop - start for start, stop in self.airborne)
+
+
+def flight_phases(log: Log, actuators: Actuators | None) -> FlightPhases:
+    """Find the airborne spans of a log from throttle (or speed), landing detector and attitude."""
+    ran = None if actuators is None else actuators.ran
+    plane = log.vehicle == "plane"
+    carrying = find(log, "speed" if plane else "thrust")
+    if carrying is None or ran is False:
+        reason = "motor outputs" if ran is False else "neither throttle nor speed is logged"
+        return FlightPhases((), ran, None, reason)
+    limit = AIRBORNE_SPEED.value if plane else _carrying_throttle(carrying.values)
+    spans = _spans(carrying.time_s, carrying.values > limit)
+    evidence = f"{carrying.source.label} above {limit:.3g} {carrying.unit}".rstrip(" 1")
+    flying = _landing_detector(log)
+    if flying is not None:
+        spans = _common(spans, _spans(*flying))
+        evidence += ", landing detector"
+    tipped = _tip_over(log, carrying, limit)
+    if tipped is not None and not any(start < tipped < stop + FALL_S for start, stop in spans):
+        # Moved by hand after landing.
+        tipped = None
+    if tipped is not None:
+        spans = _common(spans, [(-np.inf, tipped)])
+        evidence += ", attitude"
+    kept = tuple(span for span in spans if span[1] - span[0] >= SHORTEST_SEGMENT.value)
+    return FlightPhases(kept, ran, tipped, evidence)
+
+
+def _carrying_throttle(throttle: NDArray[np.float64]) -> float:
+    used = throttle[throttle > AIRBORNE_THRUST.value]
+    if used.size == 0:
+        return AIRBORNE_THRUST.value
+    return max(AIRBORNE_THRUST.value, AIRBORNE_SHARE.value * float(np.median(used)))
+
+
+def _spans(time_s: NDArray[np.float64], mask: NDArray[np.bool_]) -> list[Span]:
+    """Spans of true samples; interruptions shorter than the shortest segment count as true."""
+    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
+    starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
+    spans: list[Span] = []
+    for start, stop in zip(time_s[starts], time_s[stops], strict=True):
+        if spans and start - spans[-1][1] < 0.5 * SHORTEST_SEGMENT.value:
+            spans[-1] = (spans[-1][0], float(stop))
+        else:
+            spans.append((float(start), float(stop)))
+    return spans
+
+
+def _common(first: list[Span], second: list[Span]) -> list[Span]:
+    both = [(max(a[0], b[0]), min(a[1], b[1])) for a in first for b in second]
+    return [span for span in both if span[1] > span[0]]
+
+
+def _landing_detector(log: Log) -> tuple[NDArray[np.float64], NDArray[np.bool_]] | None:
+    """Stamps and whether the autopilot held itself for flying; None where it does not log it."""
+    if log.kind == "px4":
+        name = "vehicle_land_detected"
+        if name not in log or "landed" not in log.messages[name].fields:
+            return None
+        table = log.table(name, log.messages[name].instances[0])
+        return _held(log, table.time_s, table["landed"] == 0)
+    if "EV" not in log:
+        return None
+    table = log.table("EV")
+    told = np.isin(table["Id"], [EV_LAND_COMPLETE, EV_NOT_LANDED])
+    if not np.any(table["Id"] == EV_NOT_LANDED):
+        return None
+    return _held(log, table.time_s[told], table["Id"][told] == EV_NOT_LANDED)
+
+
+def _held(
+    log: Log, time_s: NDArray[np.float64], flying: NDArray[np.bool_]
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """States that last until the next one, on a grid of 0.1 s; before the first, its opposite."""
+    first, last = log.first_s or 0.0, log.last_s or 0.0
+    grid = np.linspace(first, last, min(max(2, int((last - first) / 0.1)), 1_000_000))
+    index = np.searchsorted(time_s, grid, side="right") - 1
+    return grid, np.where(index >= 0, flying[np.maximum(index, 0)], ~flying[0])
+
+
+def tilt(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Stamps, s, and angle of the z axis from the vertical, rad; None where not logged."""
+    if log.kind == "px4":
+        if "vehicle_attitude" not in log or "q[1]" not in log.messages["vehicle_attitude"].fields:
+            return None
+        table = log.table("vehicle_attitude", log.messages["vehicle_attitude"].instances[0])
+        cosine = 1.0 - 2.0 * (table["q[1]"] ** 2 + table["q[2]"] ** 2)
+        return table.time_s, np.arccos(np.clip(cosine, -1.0, 1.0))
+    phi, theta = find(log, "phi"), find(log, "theta")
+    if phi is None or theta is None or phi.values.shape != theta.values.shape:
+        return None
+    return phi.time_s, np.arccos(np.clip(np.cos(phi.values) * np.cos(theta.values), -1.0, 1.0))
+
+
+def _tip_over(log: Log, carrying: Signal, limit: float) -> float | None:
+    """When the vehicle began to fall, if at the end it lies still and tilted without thrust."""
+    found = tilt(log)
+    if found is None or log.vehicle == "plane":
+        return None
+    time_s, angle = found
+    speed = np.abs(np.gradient(angle, time_s)) if time_s.size > 2 else np.zeros_like(angle)
+    idle = np.interp(time_s, carrying.time_s, carrying.values) < limit
+    lying = (angle > LYING_TILT.value) & (speed < LYING_RATE.value) & idle
+    rest = [span for span in _spans(time_s, lying) if span[1] - span[0] > 1.0]
+    if not rest:
+        return None
+    upright = np.flatnonzero((time_s < rest[0][0]) & (angle < TIPPING_TILT.value))
+    return float(time_s[upright[-1]]) if upright.size else float(time_s[0])

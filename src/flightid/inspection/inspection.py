@@ -1,0 +1,244 @@
+"""The noun of the stage: what a log holds and whether it can support identification."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from textwrap import fill
+
+from flightid.conventions import Light
+from flightid.findings import Finding, worst
+from flightid.inspection.excitation_found import FoundExcitation
+from flightid.inspection.flight_phases import FlightPhases
+from flightid.inspection.rates import StreamRate
+from flightid.inspection.saturation import Saturation
+from flightid.inspection.skew import Skew
+from flightid.inspection.usable_band import AxisBand
+from flightid.table import Column, Table
+
+WIDTH = 100
+WORDS = {
+    Light.GREEN: "can support identification",
+    Light.AMBER: "can support identification with reservations",
+    Light.RED: "cannot support identification",
+    Light.UNKNOWN: "could not be judged",
+}
+
+
+@dataclass(frozen=True, repr=False)
+class Inspection:
+    """What a log holds, and whether it can support identification.
+
+    Attributes
+    ----------
+    name, kind, firmware : str
+        File name, ``"ardupilot"`` or ``"px4"``, firmware as logged.
+    vehicle : str or None
+        Kind of vehicle.
+    duration_s : float
+        First to last stamp, s.
+    rates : tuple of StreamRate
+        Rate, jitter and gaps of every message, fastest first.
+    phases : FlightPhases
+        Airborne spans.
+    excitations : tuple of FoundExcitation
+        What excited the vehicle.
+    saturations : tuple of Saturation
+        What was at a limit in the air, most first.
+    skews : tuple of Skew
+        Streams that show the same motion at different times.
+    bands : tuple of AxisBand
+        What each axis supports.
+    findings : tuple of Finding
+        Verdicts with what to do.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> inspection = fid.inspect_log("flight.bin")                   # doctest: +SKIP
+    >>> inspection.usable_band_rad_s["roll"]                         # doctest: +SKIP
+    (3.1, 62.8)
+    """
+
+    name: str
+    kind: str
+    firmware: str
+    vehicle: str | None
+    duration_s: float
+    rates: tuple[StreamRate, ...]
+    phases: FlightPhases
+    excitations: tuple[FoundExcitation, ...]
+    saturations: tuple[Saturation, ...]
+    skews: tuple[Skew, ...]
+    bands: tuple[AxisBand, ...]
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def verdict(self) -> Light:
+        """Worst light of all findings."""
+        return worst(self.findings)
+
+    @property
+    def usable_band_rad_s(self) -> dict[str, tuple[float, float] | None]:
+        """Usable band by axis, rad/s; None where there is none."""
+        return {band.axis: band.band_rad_s for band in self.bands}
+
+    @property
+    def messages_used(self) -> tuple[str, ...]:
+        """Messages from which commands and rates would be taken."""
+        labels = [label for band in self.bands for label in (band.input, band.output) if label]
+        return tuple(dict.fromkeys(label.split(".")[0] for label in labels))
+
+    def with_findings(self, findings: tuple[Finding, ...]) -> Inspection:
+        """Copy with other findings."""
+        return replace(self, findings=findings)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Verdicts, axes, rates, excitation, saturation and skew, those that have rows."""
+        made = (
+            self.summary(),
+            self._axes(),
+            self._excitations(),
+            self._saturations(),
+            self._skews(),
+            self._rates(),
+        )
+        return tuple(table for table in made if table.rows)
+
+    def summary(self) -> Table:
+        """Table of the verdicts, the worst first."""
+        rows = tuple((str(f.light), f.code, f.message, f.action or None) for f in self.findings)
+        columns = (Column("light"), Column("code"), Column("found"), Column("do"))
+        return Table(f"{self.name}: {WORDS[self.verdict]}", columns, rows)
+
+    def to_text(self) -> str:
+        """Verdict, sentences and tables for a terminal."""
+        head = f"{self.name}: {self.firmware or self.kind}, {self.duration_s:.1f} s"
+        said = [f"{head}\nThis log {WORDS[self.verdict]}."]
+        for finding in self.findings:
+            text = f"{finding.light}: {finding.message}"
+            said.append(fill(text, WIDTH, subsequent_indent="    "))
+            if finding.action:
+                advice = f"  do: {finding.action}"
+                said.append(fill(advice, WIDTH, initial_indent="  ", subsequent_indent="        "))
+        return "\n\n".join(["\n".join(said), *(t.to_text() for t in self.tables()[1:])])
+
+    def _axes(self) -> Table:
+        columns = (
+            Column("axis"),
+            Column("command"),
+            Column("body rate"),
+            Column("logged", "Hz"),
+            Column("lowest", "rad/s"),
+            Column("highest", "rad/s"),
+            Column("coherence"),
+            Column("reason"),
+        )
+        rows = tuple(
+            (
+                band.axis,
+                band.input or None,
+                band.output or None,
+                band.rate_hz or None,
+                band.band_rad_s[0] if band.band_rad_s else None,
+                band.band_rad_s[1] if band.band_rad_s else None,
+                band.coherence,
+                band.reason or None,
+            )
+            for band in self.bands
+        )
+        return Table("Usable band by axis", columns, rows)
+
+    def _excitations(self) -> Table:
+        columns = (
+            Column("kind"),
+            Column("axis"),
+            Column("start", "s"),
+            Column("stop", "s"),
+            Column("detail"),
+        )
+        rows = tuple((e.kind, e.axis, e.start_s, e.stop_s, e.detail) for e in self.excitations)
+        return Table("Excitation found", columns, rows)
+
+    def _saturations(self) -> Table:
+        columns = (Column("what"), Column("limit"), Column("share", "%", 3))
+        rows = tuple((s.what, s.limit, 100.0 * s.share) for s in self.saturations)
+        return Table("At a limit in the air", columns, rows)
+
+    def _skews(self) -> Table:
+        columns = (
+            Column("motion"),
+            Column("first"),
+            Column("second"),
+            Column("second is later by", "ms", 3),
+            Column("correlation", "", 3),
+        )
+        rows = tuple(
+            (s.quantity, s.first, s.second, 1e3 * s.lag_s, s.correlation) for s in self.skews
+        )
+        return Table("Clock skew between streams", columns, rows)
+
+    def _rates(self) -> Table:
+        columns = (
+            Column("message"),
+            Column("rows"),
+            Column("rate", "Hz"),
+            Column("mean rate", "Hz"),
+            Column("jitter", "%", 2),
+            Column("gaps"),
+            Column("longest gap", "s", 3),
+            Column("stamps out of order"),
+        )
+        rows = tuple(
+            (
+                r.label,
+                r.rows,
+                r.rate_hz,
+                r.mean_hz,
+                100.0 * r.jitter,
+                r.n_gaps,
+                r.longest_gap_s or None,
+                r.n_disordered,
+            )
+            for r in self.rates
+        )
+        return Table("Rates", columns, rows)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values.
+
+        Returns
+        -------
+        dict
+            Key ``schema`` and one for each attribute, ``verdict`` and ``usable_band_rad_s``.
+        """
+        return {
+            "schema": "flightid.inspection/1",
+            "name": self.name,
+            "kind": self.kind,
+            "firmware": self.firmware,
+            "vehicle": self.vehicle,
+            "duration_s": self.duration_s,
+            "verdict": str(self.verdict),
+            "usable_band_rad_s": {
+                axis: None if band is None else list(band)
+                for axis, band in self.usable_band_rad_s.items()
+            },
+            "airborne_s": self.phases.airborne_s,
+            "phases": asdict(self.phases),
+            "rates": [asdict(rate) for rate in self.rates],
+            "excitations": [asdict(excitation) for excitation in self.excitations],
+            "saturations": [asdict(saturation) for saturation in self.saturations],
+            "skews": [asdict(skew) for skew in self.skews],
+            "bands": [asdict(band) for band in self.bands],
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def __repr__(self) -> str:
+        """Log, duration, time in the air and verdict on one line."""
+        return (
+            f"Inspection({self.name!r}, {self.duration_s:.4g} s, "
+            f"{self.phases.airborne_s:.4g} s airborne, {self.verdict})"
+        )
+
+    def _repr_html_(self) -> str:
+        return "".join(table._repr_html_() for table in self.tables())

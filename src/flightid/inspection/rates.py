@@ -1,0 +1,93 @@
+"""How regularly each message was logged: rate, jitter, gaps, stamps out of order."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.inspection.thresholds import GAP_FACTOR
+from flightid.logs import Log
+
+FEWEST_ROWS = 10
+"""Messages with fewer stamped rows have no rate worth a line."""
+
+
+@dataclass(frozen=True)
+class StreamRate:
+    """Regularity of one instance of one message.
+
+    Attributes
+    ----------
+    message : str
+        Message or topic.
+    instance : int or None
+        Instance.
+    rows : int
+        Stamped rows.
+    rate_hz : float
+        From the median interval.
+    mean_hz : float
+        Rows over the span: lower where rows are missing.
+    jitter : float
+        Half the spread between the 5th and the 95th percentile of the intervals, in medians.
+    n_gaps : int
+        Intervals above 2.5 medians.
+    longest_gap_s : float
+        Longest of them, s; 0 without.
+    n_disordered : int
+        Stamps that repeat or go back.
+    """
+
+    message: str
+    instance: int | None
+    rows: int
+    rate_hz: float
+    mean_hz: float
+    jitter: float
+    n_gaps: int
+    longest_gap_s: float
+    n_disordered: int
+
+    @property
+    def label(self) -> str:
+        """Message with its instance."""
+        return self.message if self.instance is None else f"{self.message}[{self.instance}]"
+
+
+def stream_rates(log: Log) -> tuple[StreamRate, ...]:
+    """Regularity of every message with enough stamped rows, fastest first."""
+    found = []
+    for info in log.messages.values():
+        if info.rate_hz is None or info.first_s is None:
+            continue
+        for instance in info.instances or (None,):
+            stamps = log.table(info.name, instance).time_s
+            rate = _of(info.name, instance, stamps)
+            if rate is not None:
+                found.append(rate)
+    return tuple(sorted(found, key=lambda rate: -rate.rate_hz))
+
+
+def _of(message: str, instance: int | None, stamps: NDArray[np.float64]) -> StreamRate | None:
+    if stamps.size < FEWEST_ROWS:
+        return None
+    intervals = np.diff(stamps)
+    forward = intervals[intervals > 0]
+    if forward.size < FEWEST_ROWS - 1:
+        return None
+    middle = float(np.median(forward))
+    gaps = forward[forward > GAP_FACTOR.value * middle]
+    low, high = np.percentile(forward, [5, 95])
+    return StreamRate(
+        message,
+        instance,
+        int(stamps.size),
+        1.0 / middle,
+        (stamps.size - 1) / float(np.ptp(stamps)),
+        float(high - low) / (2.0 * middle),
+        int(gaps.size),
+        float(gaps.max()) if gaps.size else 0.0,
+        int(np.count_nonzero(intervals <= 0)),
+    )

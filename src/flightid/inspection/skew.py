@@ -1,0 +1,91 @@
+"""Clock skew: the same motion in two streams, and how late one shows it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.inspection.signals import Signal, Span, inside, places
+from flightid.inspection.sources import AXES
+from flightid.inspection.thresholds import SKEW_CORRELATION
+from flightid.logs import Log
+
+LONGEST_LAG_S = 0.3
+STEPS = 241
+"""Lags tried on each side."""
+
+
+@dataclass(frozen=True)
+class Skew:
+    """How late one stream shows the same motion as another.
+
+    Attributes
+    ----------
+    quantity : str
+        Canonical name of the motion.
+    first, second : str
+        Where it was logged.
+    lag_s : float
+        Positive where the second is later, s.
+    correlation : float
+        Of the two at that lag.
+    resolution_s : float
+        A tenth of the slower interval: lags below it mean nothing, s.
+    """
+
+    quantity: str
+    first: str
+    second: str
+    lag_s: float
+    correlation: float
+    resolution_s: float
+
+
+def stream_skews(log: Log, spans: tuple[Span, ...]) -> tuple[Skew, ...]:
+    """Skew between every two streams that hold the same body rate, where they agree on it.
+
+    The streams are filtered differently, and a filter's delay is part of the lag.
+    """
+    found = [
+        _skew(rate, streams[0], second, spans)
+        for _, rate in AXES.values()
+        if (streams := places(log, rate))
+        for second in streams[1:]
+    ]
+    return tuple(skew for skew in found if skew is not None)
+
+
+def _skew(quantity: str, first: Signal, second: Signal, spans: tuple[Span, ...]) -> Skew | None:
+    slow, fast = sorted((first, second), key=lambda signal: signal.rate_hz)
+    mask = inside(slow.time_s, spans)
+    stamps, values = slow.time_s[mask], slow.values[mask]
+    if stamps.size < 50 or np.std(values) == 0:
+        return None
+    lags = np.linspace(-LONGEST_LAG_S, LONGEST_LAG_S, 2 * STEPS - 1)
+    correlations = np.array(
+        [_correlation(values, np.interp(stamps + lag, fast.time_s, fast.values)) for lag in lags]
+    )
+    best = int(np.argmax(correlations))
+    if not 0 < best < lags.size - 1 or correlations[best] < SKEW_CORRELATION.value:
+        return None
+    left, middle, right = correlations[best - 1 : best + 2]
+    curvature = left - 2.0 * middle + right
+    fraction = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
+    # The fast stream read `lag` later matches the slow one: the fast one is later by `lag`.
+    lag = float(lags[best] + fraction * (lags[1] - lags[0]))
+    later = lag if fast is second else -lag
+    return Skew(
+        quantity,
+        first.source.label,
+        second.source.label,
+        later,
+        float(middle),
+        0.1 / slow.rate_hz,
+    )
+
+
+def _correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    spread = float(np.std(a) * np.std(b))
+    return float(np.mean((a - a.mean()) * (b - b.mean()))) / spread if spread > 0 else 0.0

@@ -1,0 +1,183 @@
+"""The band of each axis in which a model can be supported: coherence, windows, logging rate."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import FlightidError
+from flightid.inspection.excitation_found import FoundExcitation
+from flightid.inspection.signals import Span, find, records
+from flightid.inspection.sources import AXES
+from flightid.inspection.thresholds import (
+    CYCLES_IN_WINDOW,
+    INDEPENDENT_WINDOWS,
+    MINIMUM_COHERENCE,
+    SAMPLES_PER_CYCLE,
+    SAMPLES_PER_CYCLE_LEAST,
+)
+from flightid.logs import Log
+from flightid.record import Record
+from flightid.responses import FrequencyResponse, estimate_response
+from flightid.responses.bands import usable_band
+
+
+@dataclass(frozen=True)
+class AxisBand:
+    """What one axis can support.
+
+    Attributes
+    ----------
+    axis : str
+        ``"roll"``, ``"pitch"`` or ``"yaw"``.
+    input, output : str
+        Where they were logged; empty where they were not.
+    rate_hz : float
+        Rate of the slower of the two, Hz; 0 where one is missing.
+    band_rad_s : tuple of float, or None
+        Widest band in which the partial coherence reaches 0.6 with at least five independent
+        windows and ten samples a cycle, rad/s.
+    coherence : float or None
+        Mean partial coherence in the band; the largest anywhere where there is no band.
+    reason : str
+        Why there is no band; empty where there is one.
+    """
+
+    axis: str
+    input: str
+    output: str
+    rate_hz: float
+    band_rad_s: tuple[float, float] | None
+    coherence: float | None
+    reason: str = ""
+
+    @property
+    def highest_hz(self) -> float:
+        """Highest frequency that the logging rate supports with ten samples a cycle, Hz."""
+        return self.rate_hz / SAMPLES_PER_CYCLE.value
+
+    @property
+    def span(self) -> float:
+        """Highest over lowest frequency of the band; 0 without one."""
+        return self.band_rad_s[1] / self.band_rad_s[0] if self.band_rad_s else 0.0
+
+
+def lowest_hz(airborne_s: float) -> float:
+    """Lowest frequency of which five independent windows hold two cycles each, Hz."""
+    if airborne_s <= 0:
+        return math.inf
+    return INDEPENDENT_WINDOWS.value * CYCLES_IN_WINDOW.value / airborne_s
+
+
+def axis_bands(
+    log: Log, spans: tuple[Span, ...], excited: tuple[FoundExcitation, ...]
+) -> tuple[AxisBand, ...]:
+    """Usable band of each axis, with all mixer commands as inputs.
+
+    An axis with injected runs is judged by them alone: windows without excitation are no evidence.
+    """
+    inputs = {axis: find(log, names[0]) for axis, names in AXES.items()}
+    outputs = {axis: find(log, names[1]) for axis, names in AXES.items()}
+    present = tuple(axis for axis in AXES if inputs[axis] is not None and outputs[axis] is not None)
+    known: dict[tuple[Span, ...], tuple[FrequencyResponse | None, str]] = {}
+    found = []
+    for axis, (tau, rate) in AXES.items():
+        command, motion = inputs[axis], outputs[axis]
+        if command is None or motion is None:
+            absent = [name for name, s in ((tau, command), (rate, motion)) if s is None]
+            missing = f"{' and '.join(absent)} not logged"
+            found.append(AxisBand(axis, "", "", 0.0, None, None, missing))
+            continue
+        own = tuple((e.start_s, e.stop_s) for e in excited if e.is_injected and e.axis == axis)
+        chosen = own or spans
+        if chosen not in known:
+            known[chosen] = _response(log, present, chosen)
+        response, why = known[chosen]
+        slowest = min(command.rate_hz, motion.rate_hz)
+        labels = (command.source.label, motion.source.label)
+        band, coherence = None, None
+        if response is not None and tau in response.inputs:
+            band, coherence, why = _band(response, rate, tau, slowest)
+        elif response is not None:
+            why = f"{labels[0]} did not move"
+        found.append(AxisBand(axis, *labels, slowest, band, coherence, why))
+    return tuple(found)
+
+
+def _response(
+    log: Log, axes: tuple[str, ...], spans: tuple[Span, ...]
+) -> tuple[FrequencyResponse | None, str]:
+    """Estimate all axes at once; None with the reason where that is not possible."""
+    if not spans or not axes:
+        return None, "nothing was flown" if axes else "no axis has command and rate logged"
+    kept = _records(log, axes, spans)
+    inputs = [tau for tau in (AXES[axis][0] for axis in axes) if _moves(kept, tau)]
+    if not inputs:
+        return None, "no command moved" if kept else "no span holds command and rate together"
+    # Conditioning on each other input costs one independent window.
+    windows = INDEPENDENT_WINDOWS.value + len(inputs) - 1
+    total = sum(record.duration_s for record in kept)
+    window = min(total / windows, *(record.duration_s for record in kept))
+    low = CYCLES_IN_WINDOW.value * 2.0 * math.pi / window
+    high = 2.0 * math.pi * kept[0].sample_rate_hz / SAMPLES_PER_CYCLE_LEAST.value
+    if high < 1.2 * low:
+        return None, (
+            f"the windows reach down to {low / (2 * math.pi):.2g} Hz, the sampling up to "
+            f"{high / (2 * math.pi):.2g} Hz: no band is left"
+        )
+    try:
+        return estimate_response(
+            kept,
+            inputs=inputs,
+            outputs=[AXES[axis][1] for axis in axes],
+            omega_rad_s=(low, high, 60),
+            window_s=[window, window / 2] if high > 4 * low else [window],
+        ), ""
+    except FlightidError as error:
+        return None, error.problem
+
+
+def _records(log: Log, axes: tuple[str, ...], spans: tuple[Span, ...]) -> list[Record]:
+    """Records of the spans, without scraps that would shorten the windows of all."""
+    wanted = [find(log, name) for axis in axes for name in AXES[axis]]
+    signals = [signal for signal in wanted if signal is not None]
+    made = records(signals, {AXES[axis][0] for axis in axes}, spans)
+    longest = max((record.duration_s for record in made), default=0.0)
+    return [record for record in made if record.duration_s >= 0.2 * longest]
+
+
+def _moves(made: list[Record], name: str) -> bool:
+    return any(float(np.ptp(record[name])) > 0 for record in made)
+
+
+def _band(
+    response: FrequencyResponse, output: str, tau: str, rate_hz: float
+) -> tuple[tuple[float, float] | None, float | None, str]:
+    row, column = response.outputs.index(output), response.inputs.index(tau)
+    omega = response.omega_rad_s
+    coherence = _trusted(response, row, column)
+    fast_enough = omega <= 2.0 * math.pi * rate_hz / SAMPLES_PER_CYCLE.value
+    if not np.any(fast_enough):
+        return (
+            None,
+            None,
+            (
+                f"logged at {rate_hz:.3g} Hz: ten samples a cycle end below the lowest frequency "
+                "of which the flight holds enough cycles"
+            ),
+        )
+    band = usable_band(omega[fast_enough], coherence[fast_enough], MINIMUM_COHERENCE.value)
+    largest = float(coherence[fast_enough].max())
+    if band is None:
+        return None, largest, f"partial coherence stays below 0.6 (largest {largest:.2f})"
+    within = (omega >= band[0]) & (omega <= band[1])
+    return band, float(np.mean(coherence[within])), ""
+
+
+def _trusted(response: FrequencyResponse, row: int, column: int) -> NDArray[np.float64]:
+    """Partial coherence, zero where fewer than five independent windows stand behind it."""
+    enough = response.n_independent[row, column] >= INDEPENDENT_WINDOWS.value - 0.5
+    return np.where(enough, response.coherence[row, column], 0.0)

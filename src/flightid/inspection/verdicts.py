@@ -1,0 +1,275 @@
+"""From what was measured to verdicts with sentences: each bad case has its own code."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.inspection import advice
+from flightid.inspection.thresholds import (
+    BAND_GOOD,
+    BAND_LEAST,
+    JITTER,
+    RATE_GOOD,
+    RATE_LEAST,
+    SATURATED_SHARE,
+    SKEW,
+)
+from flightid.inspection.usable_band import AxisBand, lowest_hz
+from flightid.logs import Log
+
+if TYPE_CHECKING:
+    from flightid.inspection.inspection import Inspection
+
+
+def judge(log: Log, found: Inspection) -> tuple[Finding, ...]:
+    """All verdicts on a log, the worst first."""
+    findings = [*log.findings, *_flight(log, found)]
+    if found.phases.airborne:
+        findings += [*_length(found), *_bands(log, found), *_loop(log, found)]
+    findings += [*_logging(log, found), *_excitation(log, found)]
+    return _ranked([*findings, *_quality(found)])
+
+
+_RANK = {Light.RED: 0, Light.AMBER: 1, Light.UNKNOWN: 2, Light.GREEN: 3}
+
+
+def _ranked(findings: list[Finding]) -> tuple[Finding, ...]:
+    """Worst first; an advice that several verdicts share is given once."""
+    given: set[str] = set()
+    ranked = []
+    for finding in sorted(findings, key=lambda finding: _RANK[finding.light]):
+        repeated = finding.action in given
+        given.add(finding.action)
+        ranked.append(replace(finding, action="") if repeated else finding)
+    return tuple(ranked)
+
+
+def _flight(log: Log, found: Inspection) -> list[Finding]:
+    phases = found.phases
+    if not phases.airborne:
+        return [_on_the_ground(log, found)]
+    findings = [
+        Finding(
+            "airborne",
+            Light.GREEN,
+            f"airborne for {phases.airborne_s:.1f} s in {len(phases.airborne)} spans "
+            f"({phases.evidence})",
+        )
+    ]
+    if phases.tipped_s is not None:
+        findings.append(
+            Finding(
+                "tipped-over",
+                Light.AMBER,
+                f"the vehicle falls over at {phases.tipped_s:.1f} s and stays tilted: everything "
+                "after that is left out",
+                "look for the cause of the fall before flying a manoeuvre",
+            )
+        )
+    return findings
+
+
+def _on_the_ground(log: Log, found: Inspection) -> Finding:
+    if found.phases.motors_ran is False and found.excitations:
+        return Finding(
+            "motors-off",
+            Light.RED,
+            "the body rates move but the motors never ran: their outputs stayed at or below the "
+            "lower limit for the whole log. What commands and rates share here is the controller "
+            "answering to a vehicle that is moved by hand, the inverse of the controller and not "
+            "the vehicle",
+            "arm, fly, and hand in a log of the flight",
+        )
+    return Finding(
+        "not-airborne",
+        Light.RED,
+        f"never airborne ({found.phases.evidence}): there is no flight to identify",
+        advice.excitation(log),
+    )
+
+
+def _length(found: Inspection) -> list[Finding]:
+    needed = advice.shortest_flight_s()
+    airborne = found.phases.airborne_s
+    if airborne >= needed:
+        return []
+    return [
+        Finding(
+            "too-short",
+            Light.RED,
+            f"{airborne:.1f} s in the air: five independent windows of two cycles reach down to "
+            f"{lowest_hz(airborne):.2g} Hz only",
+            advice.record_length(),
+        )
+    ]
+
+
+def _logging(log: Log, found: Inspection) -> list[Finding]:
+    logged = [band for band in found.bands if band.rate_hz > 0]
+    if not logged:
+        return [
+            Finding(
+                "no-command-logged",
+                Light.RED,
+                "no axis has both its mixer command and its body rate in the log",
+                advice.logging(log),
+            )
+        ]
+    slowest = min(logged, key=lambda band: band.rate_hz)
+    rate, what = slowest.rate_hz, f"{slowest.input} and {slowest.output}"
+    reach = f"{rate / 10:.2g} Hz at ten samples a cycle ({rate / 5:.2g} Hz at the very most)"
+    if rate < RATE_LEAST.value:
+        return [
+            Finding(
+                "rate-too-low",
+                Light.RED,
+                f"{what} are logged at {rate:.3g} Hz: no model above {reach}",
+                advice.logging(log),
+            )
+        ]
+    if rate < RATE_GOOD.value:
+        return [
+            Finding(
+                "rate-limited",
+                Light.AMBER,
+                f"{what} are logged at {rate:.3g} Hz: the model ends at {reach}",
+                advice.logging(log),
+            )
+        ]
+    return [Finding("rate-good", Light.GREEN, f"{what} are logged at {rate:.4g} Hz: up to {reach}")]
+
+
+def _excitation(log: Log, found: Inspection) -> list[Finding]:
+    if not found.excitations:
+        return [
+            Finding(
+                "nothing-excited",
+                Light.RED,
+                "no axis moves more than it does in a steady hover: nothing was excited",
+                advice.excitation(log),
+            )
+        ]
+    if not found.phases.airborne:
+        return []
+    made = [e for e in found.excitations if e.kind != "pilot"]
+    if made:
+        text = "; ".join(f"{e.kind} on {e.axis} ({e.detail})" for e in made[:6])
+        return [Finding("excitation-found", Light.GREEN, f"excitation found: {text}")]
+    axes = ", ".join(dict.fromkeys(e.axis for e in found.excitations))
+    return [
+        Finding(
+            "pilot-only",
+            Light.AMBER,
+            f"plain flying is the only excitation ({axes}): it holds little power above 1 Hz and "
+            "moves several axes at once",
+            advice.excitation(log),
+        )
+    ]
+
+
+def _bands(log: Log, found: Inspection) -> list[Finding]:
+    findings = [_band(log, band) for band in found.bands if band.rate_hz > 0]
+    if all(finding.code != "band" for finding in findings):
+        best = max((band.coherence or 0.0 for band in found.bands), default=0.0)
+        findings.append(
+            Finding(
+                "no-usable-band",
+                Light.RED,
+                "no axis has a band that supports a model: half a decade with coherence of at "
+                f"least 0.6 is needed (largest coherence found {best:.2f})",
+                advice.excitation(log),
+            )
+        )
+    return findings
+
+
+def _band(log: Log, band: AxisBand) -> Finding:
+    if band.band_rad_s is None:
+        return Finding(
+            f"no-band-{band.axis}",
+            Light.AMBER,
+            f"{band.axis}: no usable band: {band.reason}",
+            advice.excitation(log),
+        )
+    low, high = (omega / (2.0 * math.pi) for omega in band.band_rad_s)
+    text = (
+        f"{band.axis}: usable from {low:.2g} to {high:.2g} Hz ({band.band_rad_s[0]:.3g} to "
+        f"{band.band_rad_s[1]:.3g} rad/s), mean coherence {band.coherence or 0.0:.2f}"
+    )
+    if band.span < BAND_LEAST.value:
+        return Finding(
+            f"narrow-band-{band.axis}",
+            Light.AMBER,
+            f"{text}: too narrow for more than a gain",
+            advice.excitation(log),
+        )
+    light = Light.GREEN if band.span >= BAND_GOOD.value else Light.AMBER
+    return Finding("band", light, text, "" if light is Light.GREEN else advice.excitation(log))
+
+
+def _loop(log: Log, found: Inspection) -> list[Finding]:
+    if any(e.is_injected for e in found.excitations):
+        return []
+    return [
+        Finding(
+            "closed-loop",
+            Light.AMBER,
+            "the loops are closed and no injected signal is logged: a direct estimate from command "
+            "to rate is biased towards the inverse of the controller wherever coherence is low",
+            advice.excitation(log),
+        )
+    ]
+
+
+def _quality(found: Inspection) -> list[Finding]:
+    findings = []
+    worst = next(iter(found.saturations), None)
+    if worst is not None and worst.share > SATURATED_SHARE.value:
+        findings.append(
+            Finding(
+                "saturated",
+                Light.AMBER,
+                f"{worst.what} is at its {worst.limit} for {100 * worst.share:.0f} % of the flight",
+                "lower the amplitude, trim the centre of gravity, or change the hover throttle",
+            )
+        )
+    for message in found.messages_used:
+        for rate in found.rates:
+            if rate.message != message:
+                continue
+            if rate.n_gaps:
+                findings.append(
+                    Finding(
+                        "gaps",
+                        Light.AMBER,
+                        f"{rate.label} has {rate.n_gaps} gap{'s' * (rate.n_gaps > 1)}, the longest "
+                        f"{rate.longest_gap_s:.3g} s (median interval "
+                        f"{1e3 / rate.rate_hz:.3g} ms)",
+                        "use a faster card, or log less; records are cut at gaps",
+                    )
+                )
+            if rate.jitter > JITTER.value:
+                findings.append(
+                    Finding(
+                        "jitter",
+                        Light.AMBER,
+                        f"{rate.label} is logged with {100 * rate.jitter:.0f} % jitter",
+                        "records are resampled by their stamps; log at the full rate instead",
+                    )
+                )
+    findings += [
+        Finding(
+            "skew",
+            Light.AMBER,
+            f"{skew.second} shows the same motion {1e3 * skew.lag_s:.1f} ms later than "
+            f"{skew.first}: clock skew, or the delay of a filter",
+            "take command and rate from the same message",
+        )
+        for skew in found.skews
+        if abs(skew.lag_s) > max(SKEW.value, skew.resolution_s)
+    ]
+    return findings

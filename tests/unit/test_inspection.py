@@ -1,0 +1,162 @@
+"""Inspection: a good log is green, and every shortcoming is found under its own code."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import flightid as fid
+from flightid.cli.inspect import command
+from flightid.conventions import Light
+from flightid.inspection import advice
+from flightid.inspection.inspection import Inspection
+from flightid.logs import Log
+from flightid.logs.ulog import UlogSource
+from tests.sweep_log import SweepFlight
+from tests.ulog_builder import UlogBuilder
+
+
+def codes(inspection: Inspection, light: Light) -> set[str]:
+    return {finding.code for finding in inspection.findings if finding.light is light}
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Inspection:
+    path = SweepFlight().write(tmp_path_factory.mktemp("good"))
+    return fid.inspect_log(path)
+
+
+def test_a_flight_with_sweeps_is_green(good: Inspection) -> None:
+    assert good.verdict is Light.GREEN, [str(finding) for finding in good.findings]
+    assert codes(good, Light.GREEN) == {"airborne", "rate-good", "excitation-found", "band"}
+    assert good.phases.airborne_s == pytest.approx(135.0, abs=0.1)
+    for axis in ("roll", "pitch", "yaw"):
+        band = good.usable_band_rad_s[axis]
+        assert band is not None
+        assert band[0] < 2 * np.pi * 0.5
+        assert band[1] > 2 * np.pi * 8.0
+
+
+def test_injected_runs_are_located_with_their_settings(good: Inspection) -> None:
+    assert [(e.kind, e.axis) for e in good.excitations] == [
+        ("sid", "roll"),
+        ("sid", "pitch"),
+        ("sid", "yaw"),
+    ]
+    second = good.excitations[1]
+    assert (second.start_s, second.stop_s) == pytest.approx((60.0, 105.0), abs=0.02)
+    assert "0.2 to 12 Hz" in second.detail
+
+
+def test_result_is_plain_values_text_and_tables(good: Inspection) -> None:
+    values = json.loads(json.dumps(good.to_dict(), allow_nan=False))
+    assert values["schema"] == "flightid.inspection/1"
+    assert values["verdict"] == "green"
+    assert set(values["usable_band_rad_s"]) == {"roll", "pitch", "yaw"}
+    assert repr(good) == "Inspection('sweeps.bin', 145 s, 135 s airborne, green)"
+    text = good.to_text()
+    assert "can support identification" in text
+    assert max(map(len, text.split("\n\n")[0].splitlines())) <= 100
+    assert [table.title for table in good.tables()][1:3] == [
+        "Usable band by axis",
+        "Excitation found",
+    ]
+    assert "<table>" in good._repr_html_()
+
+
+BAD_CASES = [
+    ("rate-too-low", Light.RED, SweepFlight(rate_hz=10.0)),
+    ("rate-limited", Light.AMBER, SweepFlight(rate_hz=50.0)),
+    ("too-short", Light.RED, SweepFlight(sweep_s=6.0)),
+    ("nothing-excited", Light.RED, SweepFlight(amplitude=0.0, injected=False)),
+    ("no-usable-band", Light.RED, SweepFlight(amplitude=0.001, noise=0.5, injected=False)),
+    ("not-airborne", Light.RED, SweepFlight(airborne=False, motor_us=1000.0)),
+    ("tipped-over", Light.AMBER, SweepFlight(tips_over=True)),
+    ("saturated", Light.AMBER, SweepFlight(motor_us=1950.0)),
+    ("closed-loop", Light.AMBER, SweepFlight(injected=False)),
+    ("skew", Light.AMBER, SweepFlight(imu_late_s=0.02)),
+]
+
+
+@pytest.mark.parametrize(("code", "light", "flight"), BAD_CASES, ids=[c for c, _, _ in BAD_CASES])
+def test_each_shortcoming_has_its_code(
+    code: str, light: Light, flight: SweepFlight, tmp_path: Path
+) -> None:
+    inspection = fid.inspect_log(flight.write(tmp_path))
+    assert code in codes(inspection, light), [str(finding) for finding in inspection.findings]
+    assert inspection.verdict is not Light.GREEN
+
+
+def test_a_fall_ends_the_flight(tmp_path: Path) -> None:
+    inspection = fid.inspect_log(SweepFlight(tips_over=True, sweep_s=20.0).write(tmp_path))
+    assert inspection.phases.tipped_s == pytest.approx(75.3, abs=0.2)
+    assert inspection.phases.airborne[-1][1] <= 75.4
+
+
+def test_skew_is_measured(tmp_path: Path) -> None:
+    inspection = fid.inspect_log(SweepFlight(imu_late_s=0.02, sweep_s=20.0).write(tmp_path))
+    lags = {skew.quantity: skew.lag_s for skew in inspection.skews}
+    assert lags["p"] == pytest.approx(0.02, abs=0.002)
+
+
+def test_logging_advice_names_the_missing_bits(tmp_path: Path) -> None:
+    flight = SweepFlight(rate_hz=10.0, log_bitmask=float(1 << 10 | 1 << 12))
+    inspection = fid.inspect_log(flight.write(tmp_path))
+    action = next(f.action for f in inspection.findings if f.code == "rate-too-low")
+    assert action == "set LOG_BITMASK 267267 (now 5120; bits 0, 1, 18 are missing)"
+
+
+def test_record_length_rule() -> None:
+    # Five windows of two cycles at 0.3 Hz.
+    assert advice.shortest_flight_s() == pytest.approx(10 / 0.3)
+    assert advice.record_length(0.1).startswith("fly at least 100 s")
+
+
+def px4(tmp_path: Path, output: float, thrust: float) -> Inspection:
+    """A PX4 log in which the vehicle moves, with motors at `output`."""
+    built = UlogBuilder()
+    built.format("vehicle_angular_velocity:uint64_t timestamp;float[3] xyz;")
+    built.format("vehicle_torque_setpoint:uint64_t timestamp;float[3] xyz;")
+    built.format("vehicle_thrust_setpoint:uint64_t timestamp;float[3] xyz;")
+    built.format("actuator_motors:uint64_t timestamp;float[4] control;")
+    for number, name in enumerate(
+        ["vehicle_angular_velocity", "vehicle_torque_setpoint", "vehicle_thrust_setpoint"]
+    ):
+        built.announce(name, number)
+    built.announce("actuator_motors", 3)
+    rng = np.random.default_rng(0)
+    rates = np.cumsum(rng.standard_normal((8000, 3)), axis=0) * 0.02
+    rates -= rates.mean(axis=0)
+    for index, rate in enumerate(rates):
+        stamp = 1_000_000 + 10_000 * index
+        built.sample(0, "Q3f", stamp, *rate)
+        built.sample(1, "Q3f", stamp, *(-0.1 * rate))
+        built.sample(2, "Q3f", stamp, 0.0, 0.0, -thrust)
+        built.sample(3, "Q4f", stamp, output, output, output, float("nan"))
+    path = tmp_path / "px4.ulg"
+    path.write_bytes(bytes(built))
+    return fid.inspect_log(Log(path, UlogSource(path)))
+
+
+def test_motors_that_never_ran_are_told_apart_from_a_flight(tmp_path: Path) -> None:
+    bench = px4(tmp_path, output=0.0, thrust=0.0)
+    assert "motors-off" in codes(bench, Light.RED)
+    assert {e.kind for e in bench.excitations} == {"hand"}
+    flight = px4(tmp_path, output=0.4, thrust=0.4)
+    assert "motors-off" not in codes(flight, Light.RED)
+    assert {"closed-loop", "pilot-only"} <= codes(flight, Light.AMBER)
+    action = next(f.action for f in bench.findings if f.code == "motors-off")
+    assert action == "arm, fly, and hand in a log of the flight"
+
+
+def test_command_line_prints_text_or_json_and_leaves_with_the_verdict(tmp_path: Path) -> None:
+    path = SweepFlight(airborne=False, sweep_s=5.0, motor_us=1000.0).write(tmp_path)
+    text = CliRunner().invoke(command, [str(path)])
+    assert text.exit_code == 1
+    assert "cannot support identification" in text.output
+    document = CliRunner().invoke(command, [str(path), "--json"])
+    assert json.loads(document.output)["verdict"] == "red"
