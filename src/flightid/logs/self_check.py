@@ -33,6 +33,8 @@ PROOF_GAIN = 0.02
 """Departure of the gain from 1 that a proof allows; larger ones come from limits in the mixer."""
 QUIET = 0.02
 """Residual, as a fraction of the chirp's deviation, below which an axis counts as not injected."""
+EARLY = 0.2
+"""Part of a loop by which a row may be stamped before the RATE row of its loop."""
 LOOPS = (-2.0, 4.0)
 """Delays that are searched, in loops."""
 
@@ -125,8 +127,8 @@ def check_injection(log: Log, run: SidRun) -> InjectionCheck:
     -------
     InjectionCheck
 
-    Assumes that RATE, PIDR, PIDP, PIDY and SIDD are written in the same loop (one logging call of
-    the firmware), so rows belong together when their stamps are nearest.
+    Assumes that RATE, PIDR, PIDP, PIDY and SIDD are written in the same loop, as one logging call
+    of the firmware does.
     """
     loop_time_s = loop_time(log)
     checked = [_check_axis(log, run, axis, loop_time_s) for axis in COMMANDS]
@@ -153,18 +155,19 @@ def loop_time(log: Log) -> float:
 
 
 def paired_rows(
-    time_s: NDArray[np.float64], other_s: NDArray[np.float64]
+    time_s: NDArray[np.float64], other_s: NDArray[np.float64], loop_time_s: float
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows of two messages written in the same loop: nearest stamps within half a step."""
-    if time_s.size < 2 or other_s.size < 2:
-        empty = np.empty(0, np.intp)
-        return empty, empty
-    right = np.clip(np.searchsorted(other_s, time_s), 1, other_s.size - 1)
-    left_is_nearer = time_s - other_s[right - 1] <= other_s[right] - time_s
-    nearest = np.where(left_is_nearer, right - 1, right)
-    limit = 0.5 * min(float(np.median(np.diff(time_s))), float(np.median(np.diff(other_s))))
-    kept = np.flatnonzero(np.abs(other_s[nearest] - time_s) <= limit)
-    return kept, nearest[kept]
+    """Rows of two messages written in the same loop.
+
+    RATE carries the stamp of the gyroscope, at the start of the loop; others carry that of their
+    writing, later in the loop (or some microseconds before RATE in firmware that stamps RATE so
+    too). The nearest stamp would be that of the wrong loop once writing takes half a loop.
+    """
+    next_one = np.searchsorted(other_s, time_s - EARLY * loop_time_s)
+    inside = next_one < other_s.size
+    next_one = np.minimum(next_one, other_s.size - 1)
+    inside &= other_s[next_one] < time_s + (1.0 - EARLY) * loop_time_s
+    return np.flatnonzero(inside), next_one[inside]
 
 
 def chirp_clock(log: Log, run: SidRun) -> tuple[NDArray[np.float64], ...]:
@@ -177,11 +180,11 @@ def chirp_clock(log: Log, run: SidRun) -> tuple[NDArray[np.float64], ...]:
 
 
 def _check_axis(log: Log, run: SidRun, axis: Axis, loop_time_s: float) -> AxisCheck | None:
-    residual = mixer_residual(log, axis)
+    residual = mixer_residual(log, axis, loop_time_s)
     if residual is None:
         return None
     stamp_s, clock_s, signal = chirp_clock(log, run)
-    rows, of_chirp = paired_rows(residual[0], stamp_s)
+    rows, of_chirp = paired_rows(residual[0], stamp_s, loop_time_s)
     begin, end = run.delay_s, run.delay_s + run.record_s
     inside = (clock_s[of_chirp] > begin) & (clock_s[of_chirp] < end)
     left, at_s = residual[1][rows][inside], clock_s[of_chirp][inside]
@@ -196,7 +199,9 @@ def _check_axis(log: Log, run: SidRun, axis: Axis, loop_time_s: float) -> AxisCh
     return AxisCheck(axis, rms, correlation, gain, lag_s, lag_s / loop_time_s)
 
 
-def mixer_residual(log: Log, axis: Axis) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+def mixer_residual(
+    log: Log, axis: Axis, loop_time_s: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Command to the mixer minus the controller's terms, with the stamps of RATE, s."""
     command, controller = COMMANDS[axis]
     if "RATE" not in log or controller not in log:
@@ -205,7 +210,7 @@ def mixer_residual(log: Log, axis: Axis) -> tuple[NDArray[np.float64], NDArray[n
     names = [name for name in TERMS if name in terms]
     if command not in rates or len(names) < len(TERMS) - 1:
         return None
-    rows, others = paired_rows(rates.time_s, terms.time_s)
+    rows, others = paired_rows(rates.time_s, terms.time_s, loop_time_s)
     total = np.sum([terms[name][others] for name in names], axis=0)
     return rates.time_s[rows], rates[command][rows] - total
 

@@ -63,7 +63,7 @@ def make_record(
         {item.channel.name: (item.time_s, item.values) for item in found},
         sample_time_s=None if sample_rate_hz is None else 1.0 / sample_rate_hz,
         reference=reference,
-        span_s=span_s,
+        span_s=_snapped(found, reference, span_s),
         gaps=gaps,
         max_gap_s=max_gap_s,
     )
@@ -178,6 +178,27 @@ def _reference(found: list[Extracted]) -> str:
     return max(core, key=lambda item: item.interval_s).channel.name
 
 
+def _snapped(
+    found: list[Extracted], reference: str | None, span_s: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """Span that begins on a stamp of the reference, so that it is copied, not interpolated.
+
+    A span that the channels miss by more than their own steps is left as it is, to be refused.
+    """
+    if reference is None:
+        return span_s
+    begin = max(float(item.time_s[0]) for item in found)
+    end = min(float(item.time_s[-1]) for item in found)
+    if span_s is not None:
+        slack = EDGE_STEPS * max(item.interval_s for item in found)
+        if begin > span_s[0] + slack or end < span_s[1] - slack:
+            return span_s
+        begin, end = max(begin, span_s[0]), min(end, span_s[1])
+    stamps = next(item.time_s for item in found if item.channel.name == reference)
+    after = stamps[stamps >= begin]
+    return (float(after[0]), end) if after.size and after[0] < end else span_s
+
+
 def _excitation(log: Log, run: SidRun, check: InjectionCheck) -> Extracted:
     """The injected signal at the instants when it acted, as far as that is proven.
 
@@ -189,7 +210,7 @@ def _excitation(log: Log, run: SidRun, check: InjectionCheck) -> Extracted:
     note = "as logged; its delay to the mixer is not proven"
     if check.is_proven and check.injected is not None:
         rates = log.table("RATE").time_s
-        rows, of_chirp = paired_rows(rates, stamp_s)
+        rows, of_chirp = paired_rows(rates, stamp_s, check.loop_time_s)
         at_s = clock_s[of_chirp] - check.injected.lag_s
         inside = at_s >= clock_s[0]
         stamp_s = rates[rows][inside]
