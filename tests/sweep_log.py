@@ -39,7 +39,7 @@ class SweepFlight:
         writer.message(int(stamps[0]), "ArduCopter V4.6.0 (test)")
         for name, value in self._parameters().items():
             writer.parameter(name, value)
-        columns: dict[str, object] = {"AOut": np.where(flying, 0.4, 0.0)}
+        columns: dict[str, object] = {}
         for letter, command, rate in zip(LETTERS, commands, rates, strict=True):
             columns |= {f"{letter}Out": command, letter: np.degrees(rate), f"{letter}Des": 0.0}
         writer.add("RATE", stamps, columns)
@@ -89,6 +89,7 @@ class SweepFlight:
             fall = time_s[-1] - 5.0
             roll = np.clip((time_s - fall) * 60.0, 0.0, 70.0)
         writer.add("ATT", stamps[every], {"Roll": roll[every]})
+        writer.add("CTUN", stamps[every], {"ThO": np.where(flying, 0.4, 0.0)[every]})
         outputs = np.where(flying, self.motor_us, 1000.0)[every]
         writer.add("RCOU", stamps[every], {f"C{i}": outputs for i in (1, 2, 3, 4)})
 
@@ -103,7 +104,7 @@ class SweepFlight:
             start = 5.0 + axis * self.sweep_s
             during = (time_s >= start) & (time_s < start + self.sweep_s)
             settings = {"Ax": 10 + axis, "Mag": self.amplitude, "FSt": 0.2}
-            settings |= {"FSp": 0.06 * self.rate_hz, "TR": self.sweep_s - 1.0}
+            settings |= {"FSp": 0.06 * self.rate_hz, "TC": 10.0, "TR": self.sweep_s - 1.0}
             writer.add("SIDS", stamps[during][:1], settings)
             local = {"Time": time_s[during] - start, "Targ": commands[axis][during]}
             writer.add("SIDD", stamps[during], local)

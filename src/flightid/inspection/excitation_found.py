@@ -7,22 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.inspection.axes import axes_of
 from flightid.inspection.signals import Signal, Span, find, inside
-from flightid.inspection.sources import AXES, SET_POINTS
 from flightid.inspection.thresholds import RESTING_RATE
-from flightid.logs import Log
+from flightid.logs import Log, SidRun
 
-SID_AXES = {
-    1: "roll angle", 2: "pitch angle", 3: "yaw rate", 4: "roll recovery", 5: "pitch recovery",
-    6: "yaw recovery", 7: "roll rate", 8: "pitch rate", 9: "yaw rate", 10: "roll mixer",
-    11: "pitch mixer", 12: "yaw mixer", 13: "thrust mixer",
-}  # fmt: skip
-"""SID_AXIS of ArduPilot."""
-MIXER_AXES = {10: "roll", 11: "pitch", 12: "yaw"}
 PX4_AUTOTUNE = {2: "roll", 4: "pitch", 6: "yaw"}
 """State of autotune_attitude_control_status while an axis is excited."""
-START_DELAY_S = 1.0
-"""ArduCopter waits so long between entering the mode and the start of its chirp."""
 SWEEP_RATIO, SWEEP_CYCLES, SWEEP_ORDER = 3.0, 8, 0.9
 
 
@@ -59,11 +50,11 @@ def excitations(log: Log, spans: tuple[Span, ...]) -> tuple[FoundExcitation, ...
 
     Looks in the spans in the air; without any, in the whole log.
     """
-    found = [*_system_identification(log), *_autotune(log)]
+    found = [*map(_injected, log.sid_runs), *_autotune(log)]
     flying = bool(spans)
     spans = spans or ((log.first_s or 0.0, log.last_s or 0.0),)
-    for axis, name in SET_POINTS.items():
-        set_point, rate = find(log, name), find(log, AXES[axis][1])
+    for axis, names in axes_of(log.vehicle).items():
+        set_point, rate = find(log, names.set_point), find(log, names.rate)
         for span in spans:
             if any(e.is_injected and _overlap(span, e) for e in found):
                 continue
@@ -76,31 +67,18 @@ def _overlap(span: Span, excitation: FoundExcitation) -> bool:
     return excitation.start_s < span[1] and excitation.stop_s > span[0]
 
 
-def _system_identification(log: Log) -> list[FoundExcitation]:
-    """Runs of ArduPilot's system identification mode, from their start records."""
-    if "SIDS" not in log or "SIDD" not in log:
-        return []
-    starts, data = log.table("SIDS"), log.table("SIDD")
-    ends = [*starts.time_s[1:], np.inf]
-    found = []
-    for row, (start, end) in enumerate(zip(starts.time_s, ends, strict=True)):
-        number = int(starts["Ax"][row])
-        delay = START_DELAY_S if log.vehicle == "copter" else 0.0
-        during = data.time_s[(data.time_s >= start) & (data.time_s < end)]
-        if during.size < 2:
-            continue
-        stop = min(float(during[-1]), start + delay + float(starts["TR"][row]))
-        found.append(
-            FoundExcitation(
-                "sid",
-                MIXER_AXES.get(number, SID_AXES.get(number, f"axis {number}")),
-                float(start),
-                stop,
-                f"SID_AXIS {number}, magnitude {starts['Mag'][row]:.3g}, "
-                f"{starts['FSt'][row]:.3g} to {starts['FSp'][row]:.3g} Hz",
-            )
-        )
-    return found
+def _injected(run: SidRun) -> FoundExcitation:
+    """A run of ArduPilot's system identification mode."""
+    axis = str(run.body_axis) if run.body_axis is not None else run.point
+    unit = "" if run.unit == "1" else f" {run.unit}"
+    return FoundExcitation(
+        "sid",
+        axis,
+        *run.chirp_span_s,
+        f"{run.point}, SID_AXIS {run.axis}, amplitude {run.magnitude:.3g}{unit}, "
+        f"{run.f_start_hz:.3g} to {run.f_stop_hz:.3g} Hz"
+        + ("" if run.is_complete else ", broken off"),
+    )
 
 
 def _autotune(log: Log) -> list[FoundExcitation]:

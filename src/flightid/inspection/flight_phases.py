@@ -57,13 +57,13 @@ def flight_phases(log: Log, actuators: Actuators | None) -> FlightPhases:
     """Find the airborne spans of a log from throttle (or speed), landing detector and attitude."""
     ran = None if actuators is None else actuators.ran
     plane = log.vehicle == "plane"
-    carrying = find(log, "speed" if plane else "thrust")
+    carrying = find(log, "airspeed" if plane else "thrust")
     if carrying is None or ran is False:
         reason = "motor outputs" if ran is False else "neither throttle nor speed is logged"
         return FlightPhases((), ran, None, reason)
     limit = AIRBORNE_SPEED.value if plane else _carrying_throttle(carrying.values)
     spans = _spans(carrying.time_s, carrying.values > limit)
-    evidence = f"{carrying.source.label} above {limit:.3g} {carrying.unit}".rstrip(" 1")
+    evidence = f"{carrying.label} above {limit:.3g} {carrying.unit}".rstrip(" 1")
     flying = _landing_detector(log)
     if flying is not None:
         spans = _common(spans, _spans(*flying))

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightid.inspection.actuators import Actuators
+from flightid.inspection.axes import axes_of
 from flightid.inspection.signals import Span, find, inside
-from flightid.inspection.sources import AXES
 from flightid.inspection.thresholds import GYRO_RANGE
 from flightid.logs import Log
 
@@ -68,23 +68,23 @@ def _motors(actuators: Actuators | None, spans: tuple[Span, ...]) -> list[Satura
 
 def _commands(log: Log, spans: tuple[Span, ...]) -> list[Saturation]:
     found = []
-    for tau, _ in AXES.values():
-        signal = find(log, tau)
+    for axis in axes_of(log.vehicle).values():
+        signal = find(log, axis.command)
         values = signal.within(spans) if signal is not None else np.empty(0)
-        if signal is not None and values.size:
+        if signal is not None and signal.unit == "1" and values.size:
             share = float(np.mean(np.abs(values) >= 1.0 - EDGE))
-            found.append(Saturation(signal.source.label, "mixer limit 1", share))
+            found.append(Saturation(signal.label, "mixer limit 1", share))
     return found
 
 
 def _gyroscopes(log: Log, spans: tuple[Span, ...]) -> list[Saturation]:
     found = []
-    for _, rate in AXES.values():
-        signal = find(log, rate)
+    for axis in axes_of(log.vehicle).values():
+        signal = find(log, axis.rate)
         values = signal.within(spans) if signal is not None else np.empty(0)
         if signal is not None and values.size:
             share = float(np.mean(np.abs(values) >= GYRO_RANGE.value))
-            found.append(Saturation(signal.source.label, "gyroscope range 2000 deg/s", share))
+            found.append(Saturation(signal.label, "gyroscope range 2000 deg/s", share))
     if "VIBE" in log and "Clip" in log.messages["VIBE"].fields:
         table = log.table("VIBE", (log.messages["VIBE"].instances or (None,))[0])
         mask = inside(table.time_s, spans)

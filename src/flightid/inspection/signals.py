@@ -1,27 +1,28 @@
-"""Signals of a log with their own stamps, in SI units, and records made from them."""
+"""Signals of a log with their own stamps, and records made from them."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError
-from flightid.inspection.sources import BY_KIND, Source
+from flightid.errors import DataError, MissingColumnError, UnknownNameError
 from flightid.logs import Log
+from flightid.logs.channel_map import ChannelMap, channel_map, default_map
+from flightid.logs.extraction import extract
 from flightid.record import Record
 from flightid.record.timebase import to_uniform
-from flightid.units import conversion_factor
 
 Span = tuple[float, float]
-SI = {"deg/s": "rad/s", "deg": "rad"}
+FALLBACK = {"ardupilot": "arducopter", "px4": "px4_multicopter"}
+"""Map for a log that does not tell its vehicle."""
 
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """One quantity as logged, in SI units.
+    """One channel as logged.
 
     Attributes
     ----------
@@ -30,22 +31,21 @@ class Signal:
     time_s, values : ndarray, shape (n,)
         Stamps (increasing, s) and values.
     unit : str
-        SI unit.
-    source : Source
-        Where it came from.
+        Unit of the channel map (SI).
+    label : str
+        Where it came from, in the log's own names.
     """
 
     name: str
     time_s: NDArray[np.float64]
     values: NDArray[np.float64]
     unit: str
-    source: Source
+    label: str
 
     @property
     def rate_hz(self) -> float:
-        """Samples per second from the median interval; 0 below two samples."""
-        steps = np.diff(self.time_s)
-        return float(1.0 / np.median(steps)) if steps.size else 0.0
+        """Samples per second from the median interval."""
+        return float(1.0 / np.median(np.diff(self.time_s)))
 
     def within(self, spans: Iterable[Span]) -> NDArray[np.float64]:
         """Values at stamps inside any of the spans."""
@@ -60,43 +60,43 @@ def inside(time_s: NDArray[np.float64], spans: Iterable[Span]) -> NDArray[np.boo
     return mask
 
 
+def _map(log: Log) -> ChannelMap:
+    try:
+        return default_map(log.kind, log.vehicle)
+    except DataError:
+        return channel_map(FALLBACK[log.kind])
+
+
 def find(log: Log, name: str) -> Signal | None:
-    """Take the best place of a signal that the log holds, or None.
+    """Take the best place of a channel that the log holds, or None.
 
     Stamps that repeat or go back are left out; `rates` counts them.
     """
-    for source in BY_KIND[log.kind].get(name, ()):
-        signal = read(log, name, source)
-        if signal is not None:
-            return signal
-    return None
+    return next(iter(places(log, name, most=1)), None)
 
 
-def places(log: Log, name: str) -> list[Signal]:
-    """Every place of a signal that the log holds, best first."""
-    found = (read(log, name, source) for source in BY_KIND[log.kind].get(name, ()))
-    return [signal for signal in found if signal is not None]
-
-
-def read(log: Log, name: str, source: Source) -> Signal | None:
-    """Read one place of a signal; None where the log does not hold it or it does not run."""
-    if source.message not in log or log.messages[source.message].rate_hz is None:
-        return None
-    info = log.messages[source.message]
-    fields = [field for field in source.fields if field in info.fields]
-    if not fields or fields[0] != source.fields[0]:
-        return None
-    table = log.table(source.message, info.instances[0] if info.instances else None)
-    declared = table.unit(fields[0])
-    unit = source.unit if declared == "1" else declared
-    target = SI.get(unit, unit)
-    scale = source.sign * conversion_factor(unit, target)
-    values = scale * np.sum([table[field] for field in fields], axis=0)
-    later = np.concatenate([[True], table.time_s[1:] > np.maximum.accumulate(table.time_s)[:-1]])
-    good = later & np.isfinite(values)
-    if np.count_nonzero(good) < 2:
-        return None
-    return Signal(name, table.time_s[good], values[good], target, source)
+def places(log: Log, name: str, most: int | None = None) -> list[Signal]:
+    """Places of a channel that the log holds, best first."""
+    try:
+        channel = _map(log)[name]
+    except UnknownNameError:
+        return []
+    found: list[Signal] = []
+    for source in channel.sources:
+        info = log.messages.get(source.message)
+        if info is None or info.rate_hz is None or len(found) == most:
+            continue
+        try:
+            samples = extract(log, replace(channel, sources=(source,)))
+        except MissingColumnError:
+            continue
+        earlier = np.maximum.accumulate(samples.time_s)
+        later = np.concatenate([[True], samples.time_s[1:] > earlier[:-1]])
+        good = later & np.isfinite(samples.values)
+        if np.count_nonzero(good) >= 2:
+            stamps, values = samples.time_s[good], samples.values[good]
+            found.append(Signal(name, stamps, values, channel.unit, str(source)))
+    return found
 
 
 def records(signals: list[Signal], inputs: set[str], spans: Iterable[Span]) -> list[Record]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.inspection.axes import axes_of
 from flightid.inspection.signals import Signal, Span, inside, places
-from flightid.inspection.sources import AXES
 from flightid.inspection.thresholds import SKEW_CORRELATION
 from flightid.logs import Log
 
@@ -49,9 +49,9 @@ def stream_skews(log: Log, spans: tuple[Span, ...]) -> tuple[Skew, ...]:
     The streams are filtered differently, and a filter's delay is part of the lag.
     """
     found = [
-        _skew(rate, streams[0], second, spans)
-        for _, rate in AXES.values()
-        if (streams := places(log, rate))
+        _skew(axis.rate, streams[0], second, spans)
+        for axis in axes_of(log.vehicle).values()
+        if (streams := places(log, axis.rate))
         for second in streams[1:]
     ]
     return tuple(skew for skew in found if skew is not None)
@@ -78,8 +78,8 @@ def _skew(quantity: str, first: Signal, second: Signal, spans: tuple[Span, ...])
     later = lag if fast is second else -lag
     return Skew(
         quantity,
-        first.source.label,
-        second.source.label,
+        first.label,
+        second.label,
         later,
         float(middle),
         0.1 / slow.rate_hz,

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FlightidError
+from flightid.inspection.axes import AxisChannels, axes_of
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.signals import Span, find, records
-from flightid.inspection.sources import AXES
 from flightid.inspection.thresholds import (
     CYCLES_IN_WINDOW,
     INDEPENDENT_WINDOWS,
@@ -79,12 +79,13 @@ def axis_bands(
 
     An axis with injected runs is judged by them alone: windows without excitation are no evidence.
     """
-    inputs = {axis: find(log, names[0]) for axis, names in AXES.items()}
-    outputs = {axis: find(log, names[1]) for axis, names in AXES.items()}
-    present = tuple(axis for axis in AXES if inputs[axis] is not None and outputs[axis] is not None)
+    axes = axes_of(log.vehicle)
+    inputs = {axis: find(log, names.command) for axis, names in axes.items()}
+    outputs = {axis: find(log, names.rate) for axis, names in axes.items()}
+    present = [axes[axis] for axis in axes if inputs[axis] and outputs[axis]]
     known: dict[tuple[Span, ...], tuple[FrequencyResponse | None, str]] = {}
     found = []
-    for axis, (tau, rate) in AXES.items():
+    for axis, (tau, rate, _) in axes.items():
         command, motion = inputs[axis], outputs[axis]
         if command is None or motion is None:
             absent = [name for name, s in ((tau, command), (rate, motion)) if s is None]
@@ -97,7 +98,7 @@ def axis_bands(
             known[chosen] = _response(log, present, chosen)
         response, why = known[chosen]
         slowest = min(command.rate_hz, motion.rate_hz)
-        labels = (command.source.label, motion.source.label)
+        labels = (command.label, motion.label)
         band, coherence = None, None
         if response is not None and tau in response.inputs:
             band, coherence, why = _band(response, rate, tau, slowest)
@@ -108,13 +109,13 @@ def axis_bands(
 
 
 def _response(
-    log: Log, axes: tuple[str, ...], spans: tuple[Span, ...]
+    log: Log, axes: list[AxisChannels], spans: tuple[Span, ...]
 ) -> tuple[FrequencyResponse | None, str]:
     """Estimate all axes at once; None with the reason where that is not possible."""
     if not spans or not axes:
         return None, "nothing was flown" if axes else "no axis has command and rate logged"
     kept = _records(log, axes, spans)
-    inputs = [tau for tau in (AXES[axis][0] for axis in axes) if _moves(kept, tau)]
+    inputs = [axis.command for axis in axes if _moves(kept, axis.command)]
     if not inputs:
         return None, "no command moved" if kept else "no span holds command and rate together"
     # Conditioning on each other input costs one independent window.
@@ -132,7 +133,7 @@ def _response(
         return estimate_response(
             kept,
             inputs=inputs,
-            outputs=[AXES[axis][1] for axis in axes],
+            outputs=[axis.rate for axis in axes],
             omega_rad_s=(low, high, 60),
             window_s=[window, window / 2] if high > 4 * low else [window],
         ), ""
@@ -140,11 +141,11 @@ def _response(
         return None, error.problem
 
 
-def _records(log: Log, axes: tuple[str, ...], spans: tuple[Span, ...]) -> list[Record]:
+def _records(log: Log, axes: list[AxisChannels], spans: tuple[Span, ...]) -> list[Record]:
     """Records of the spans, without scraps that would shorten the windows of all."""
-    wanted = [find(log, name) for axis in axes for name in AXES[axis]]
+    wanted = [find(log, name) for axis in axes for name in (axis.command, axis.rate)]
     signals = [signal for signal in wanted if signal is not None]
-    made = records(signals, {AXES[axis][0] for axis in axes}, spans)
+    made = records(signals, {axis.command for axis in axes}, spans)
     longest = max((record.duration_s for record in made), default=0.0)
     return [record for record in made if record.duration_s >= 0.2 * longest]
 
