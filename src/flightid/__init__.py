@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from flightid.version import VERSION as __version__
 
 if TYPE_CHECKING:
-    from flightid import excitation
+    from flightid import conditioning, excitation
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.identification import Fit, FittedParameter, FittedResponse, LocalMinimum
@@ -53,6 +53,7 @@ _HOMES = {
     "Table": "flightid.table",
     "TransferFunction": "flightid.models",
     "TransferFunctionModel": "flightid.models",
+    "conditioning": "flightid.conditioning",
     "estimate_response": "flightid.responses",
     "excitation": "flightid.excitation",
     "identify": "flightid.identification.identify",
@@ -86,6 +87,7 @@ __all__ = [
     "TransferFunction",
     "TransferFunctionModel",
     "__version__",
+    "conditioning",
     "estimate_response",
     "excitation",
     "identify",

@@ -15,6 +15,7 @@ pub mod expression;
 pub mod frequency_fit;
 pub mod gyro_filter;
 pub mod householder;
+pub mod kinematics;
 pub mod least_squares;
 pub mod levenberg_marquardt;
 pub mod linear_simulation;

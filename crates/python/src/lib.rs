@@ -10,6 +10,7 @@ pub mod dataflash;
 pub mod error;
 pub mod expression;
 pub mod interrupt;
+pub mod kinematics;
 pub mod least_squares;
 pub mod linear_simulation;
 pub mod quadrotor;
@@ -29,6 +30,7 @@ fn version() -> &'static str {
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(version, module)?)?;
     chirp::register(module)?;
+    kinematics::register(module)?;
     linear_simulation::register(module)?;
     dataflash::register(module)?;
     ulog::register(module)?;

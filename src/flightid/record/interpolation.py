@@ -30,6 +30,11 @@ class Interpolation(StrEnum):
     stamps). `CUBIC`: spline. `LINEAR`: straight lines, which lose amplitude near the source's
     Nyquist frequency. `PREVIOUS`: the last value holds; for modes and other discrete values, and
     the only choice that is never low-passed.
+
+    Example
+    -------
+    >>> Interpolation("previous")
+    <Interpolation.PREVIOUS: 'previous'>
     """
 
     BAND_LIMITED = "band-limited"

@@ -22,6 +22,11 @@ class StampPolicy(StrEnum):
     `ERROR` refuses; `DROP` keeps the first sample of a stamp and drops each sample that is not
     later than all before it; `SORT` puts samples in the order of their stamps first (for writers
     that store late messages out of order), then drops repeated stamps.
+
+    Example
+    -------
+    >>> [policy.value for policy in StampPolicy]
+    ['error', 'drop', 'sort']
     """
 
     ERROR = "error"

@@ -24,6 +24,11 @@ class GapPolicy(StrEnum):
     A gap is a spacing above 2.5 median spacings of the channel (or above `max_gap_s`, for `ERROR`
     and `SPLIT`). `ERROR` refuses; `SPLIT` returns one span on each side; `INTERPOLATE` bridges
     gaps up to `max_gap_s` with straight lines and refuses longer ones.
+
+    Example
+    -------
+    >>> [policy.value for policy in GapPolicy]
+    ['error', 'split', 'interpolate']
     """
 
     ERROR = "error"
@@ -85,7 +90,7 @@ def to_uniform(
 
     Reference
     ---------
-    Klein & Morelli, Aircraft System Identification, section 9.4 (sampling and anti-aliasing);
+    Klein & Morelli, Aircraft System Identification, chapter 9 (sampling and anti-aliasing);
     Oppenheim & Schafer, Discrete-Time Signal Processing (3rd ed.), section 4.6.
 
     Example

@@ -1,0 +1,58 @@
+"""Another sample time for a record that is already uniform."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from flightid.record import Interpolation, Record, Step, to_uniform
+
+
+def resample(
+    record: Record,
+    sample_time_s: float,
+    *,
+    interpolation: Interpolation | str | Mapping[str, Interpolation | str] = "band-limited",
+) -> Record:
+    """Bring a record to another sample time, anti-aliased where it becomes coarser.
+
+    Parameters
+    ----------
+    record : Record
+        Data.
+    sample_time_s : float
+        New sample time, s.
+    interpolation : Interpolation or mapping of str to Interpolation
+        How samples arise between stamps, for all channels or by name (others: band-limited).
+
+    Returns
+    -------
+    Record
+        Copy; starts at the same instant.
+
+    Raises
+    ------
+    OptionError
+        `sample_time_s` is not positive.
+    DataError
+        The record is too short.
+    UnknownNameError
+        A key of `interpolation` is no channel.
+
+    Reference
+    ---------
+    Oppenheim & Schafer, Discrete-Time Signal Processing (3rd ed.), section 4.6.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> time_s = np.arange(400) / 400
+    >>> resample(Record.from_arrays(time_s, outputs={"p": np.sin(time_s)}), 0.01)
+    Record('record', 100 samples, 100 Hz, 1 s, inputs [], outputs [p])
+    """
+    base = to_uniform(
+        {name: (record.time_s, record[name]) for name in record.channels},
+        sample_time_s=sample_time_s,
+        interpolation=interpolation,
+    )
+    step = Step("conditioning.resample", base.options)
+    return record.replace(base.only.samples, time_s=base.only.time_s, step=step)
