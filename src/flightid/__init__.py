@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from flightid.version import VERSION as __version__
 
 if TYPE_CHECKING:
-    from flightid import conditioning, excitation
+    from flightid import conditioning, excitation, validation
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.identification import Fit, FittedParameter, FittedResponse, LocalMinimum
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from flightid.responses import FrequencyResponse, PairResponse, estimate_response
     from flightid.simulation.simulate import LinearSystem, simulate
     from flightid.table import Table
+    from flightid.validation import Verification
+    from flightid.validation.verify import verify
 
 # Name -> the module that holds it (a public module is its own home).
 _HOMES = {
@@ -54,6 +56,7 @@ _HOMES = {
     "TransferFunction": "flightid.models",
     "TransferFunctionModel": "flightid.models",
     "conditioning": "flightid.conditioning",
+    "Verification": "flightid.validation",
     "estimate_response": "flightid.responses",
     "excitation": "flightid.excitation",
     "identify": "flightid.identification.identify",
@@ -63,6 +66,8 @@ _HOMES = {
     "read_log": "flightid.logs",
     "read_records": "flightid.record",
     "simulate": "flightid.simulation.simulate",
+    "validation": "flightid.validation",
+    "verify": "flightid.validation.verify",
     "write_records": "flightid.record",
 }
 
@@ -86,6 +91,7 @@ __all__ = [
     "Table",
     "TransferFunction",
     "TransferFunctionModel",
+    "Verification",
     "__version__",
     "conditioning",
     "estimate_response",
@@ -97,6 +103,8 @@ __all__ = [
     "read_log",
     "read_records",
     "simulate",
+    "validation",
+    "verify",
     "write_records",
 ]
 
