@@ -172,13 +172,23 @@ impl Ulog {
                     self.accept(bytes, at, found.kind, found.stop);
                     at = found.stop;
                 }
-                Worth::Doubtful(reason) if carries_on(bytes, found.stop, self) => {
-                    self.skip(at, found.stop, reason);
+                Worth::Doubtful(reason) if self.frames(bytes, at, found.stop) => {
+                    if matches!(found.kind, b'C' | b'L') {
+                        self.accept(bytes, at, found.kind, found.stop);
+                    } else {
+                        self.skip(at, found.stop, reason);
+                    }
                     at = found.stop;
                 }
                 worth => at = self.resume(bytes, at, worth, at_end),
             }
         }
+    }
+
+    /// Tell whether a doubtful record can at least be stepped over: records go on behind it, and
+    /// none starts inside it, as they would if its length were damaged.
+    fn frames(&self, bytes: &[u8], at: usize, stop: usize) -> bool {
+        carries_on(bytes, stop, self) && next_record(&bytes[..stop], at + 1, self) == stop
     }
 
     /// Go on behind damage at `at`; returns the place of the next record.

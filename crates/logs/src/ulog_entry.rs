@@ -119,14 +119,15 @@ impl Line {
     }
 }
 
-/// Tell whether a payload could be a logged line; `strict` also asks for printable text.
-pub fn is_line(payload: &[u8], tagged: bool, strict: bool) -> bool {
+/// Tell whether a payload could be a logged line of printable text. A search after damage looks at
+/// the `first` bytes of the text only, so that it stays linear in the file.
+pub fn is_line(payload: &[u8], tagged: bool, first: usize) -> bool {
     let head = if tagged { 11 } else { 9 };
     let level = payload.first().copied().unwrap_or(u8::MAX);
     let known = level.is_ascii_digit() && level < b'8' || level < 8;
-    payload.get(head..).is_some_and(|line| {
-        known && (!strict || line.iter().take(64).all(|&byte| is_printable(byte)))
-    })
+    payload
+        .get(head..)
+        .is_some_and(|line| known && line.iter().take(first).all(|&byte| is_printable(byte)))
 }
 
 fn is_printable(byte: u8) -> bool {
@@ -168,11 +169,11 @@ mod tests {
         let mut payload = vec![b'6'];
         payload.extend(7_u64.to_le_bytes());
         payload.extend(b"armed");
-        assert!(is_line(&payload, false, true));
+        assert!(is_line(&payload, false, 64));
         let line = Line::read(&payload, false).expect("a line");
         assert_eq!((line.stamp_us, line.text.as_str()), (7, "armed"));
-        assert!(!is_line(&payload[..8], false, false));
+        assert!(!is_line(&payload[..8], false, 64));
         payload.push(0);
-        assert!(is_line(&payload, false, false) && !is_line(&payload, false, true));
+        assert!(is_line(&payload, false, 5) && !is_line(&payload, false, 6));
     }
 }

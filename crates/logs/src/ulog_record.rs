@@ -10,6 +10,9 @@ pub const HEAD: usize = 3;
 /// Records that may follow each other without one that can be vouched for.
 const DOUBTFUL_CHAIN: usize = 32;
 
+/// Bytes of a line of text that a search looks at.
+const LINE_START: usize = 64;
+
 /// Why bytes were not read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Reason {
@@ -124,8 +127,9 @@ fn judge_payload(kind: u8, payload: &[u8], known: &impl Known, strict: bool) -> 
         b'P' => valid(is_parameter(payload)),
         b'M' => valid(payload.get(1..).is_some_and(is_entry)),
         b'Q' => valid(payload.get(1..).is_some_and(is_parameter)),
-        b'L' => valid(is_line(payload, false, strict)),
-        b'C' => valid(is_line(payload, true, strict)),
+        b'L' | b'C' => {
+            valid(is_line(payload, kind == b'C', if strict { LINE_START } else { usize::MAX }))
+        }
         b'O' => valid(payload.len() == 2),
         b'R' => match payload {
             &[low, high] => valid(known.sizes(u16::from_le_bytes([low, high])).is_some()),
