@@ -82,7 +82,7 @@ def _known(data: FrequencyResponse, group: Sequence[SelectedResponse]) -> Array:
     union = np.unique(np.concatenate([each.places for each in group]))
     inputs = np.array([data.inputs.index(each.measured.input) for each in group])
     output = data.outputs.index(group[0].measured.output)
-    full = data.errors.covariance(output, inputs, union)
+    full = data.errors.covariance(np.array([output]), inputs, union)[0]
     places = [k * len(union) + np.searchsorted(union, each.places) for k, each in enumerate(group)]
     real = np.concatenate(places)
     keep = np.concatenate([real, real + len(group) * len(union)])
