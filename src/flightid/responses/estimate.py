@@ -12,6 +12,7 @@ from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.record.history import Step
+from flightid.responses.feedback import feedback_findings
 from flightid.responses.local_polynomial import estimate_local_polynomial
 from flightid.responses.planning import plan_frequencies, plan_windows
 from flightid.responses.response import FrequencyResponse
@@ -121,12 +122,17 @@ def estimate_response(
     options: dict[str, Cell] = {"method": method, "detrend": detrend}
     if method == "local_polynomial":
         step = Step("estimate_response", options, VERSION)
-        return estimate_local_polynomial(samples, omega, step, covariance=covariance)
+        response = estimate_local_polynomial(samples, omega, step, covariance=covariance)
+        loops = feedback_findings(samples, float(omega[-1]))
+        return replace(response, findings=(*response.findings, *loops))
     plans = plan_windows(window_s, samples, float(omega[-1]), shifts_of(overlap))
     lengths = ", ".join(f"{plan.length * samples.sample_time_s:.6g}" for plan in plans)
     step = Step("estimate_response", options | {"window_s": lengths, "overlap": overlap}, VERSION)
     estimate = estimate_windowed(samples, omega, plans, detrend)
     response = windowed_response(estimate, method, step)
+    if method == "composite":
+        loops = feedback_findings(samples, float(omega[-1]))
+        response = replace(response, findings=(*response.findings, *loops))
     if not covariance:
         return response
     try:

@@ -92,7 +92,7 @@ class FrequencyResponse:
 
     def __post_init__(self) -> None:
         sizes = {"o": len(self.outputs), "i": len(self.inputs), "f": len(self.omega_rad_s)}
-        for name, axes in _AXES.items():
+        for name, axes in AXES.items():
             value = getattr(self, name)
             if value is None:
                 continue
@@ -280,7 +280,7 @@ class FrequencyResponse:
         axes = {"o": np.array(rows), "i": np.array(columns), "f": chosen}
         changes = {
             name: getattr(self, name)[np.ix_(*(axes[axis] for axis in letters))]
-            for name, letters in _AXES.items()
+            for name, letters in AXES.items()
             if getattr(self, name) is not None
         }
         errors = None if self.errors is None else Selected(self.errors, *axes.values())
@@ -333,7 +333,7 @@ class FrequencyResponse:
             "findings": [finding.to_dict() for finding in self.findings],
             "history": [str(step) for step in self.history],
         }
-        for name in _AXES:
+        for name in AXES:
             array = getattr(self, name)
             if array is not None and np.iscomplexobj(array):
                 values[name] = {"real": array.real.tolist(), "imaginary": array.imag.tolist()}
@@ -362,7 +362,7 @@ class FrequencyResponse:
         return names.index(name)
 
 
-_AXES = {
+AXES = {
     "omega_rad_s": "f",
     "response": "oif",
     "coherence": "oif",

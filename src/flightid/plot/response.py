@@ -1,0 +1,60 @@
+"""A measured frequency response: gain and phase with their error bands, and coherence."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import plotly.graph_objects as go
+
+from flightid.plot import look
+from flightid.plot.frequency_response import Curve, bode
+from flightid.responses import FrequencyResponse
+
+
+def response_figure(
+    response: FrequencyResponse,
+    pairs: Iterable[tuple[str, str]] | None = None,
+    *,
+    minimum_coherence: float = 0.6,
+) -> go.Figure:
+    """Draw measured responses over frequency, with 95 % bands of the random error.
+
+    Parameters
+    ----------
+    response : FrequencyResponse
+        What was measured.
+    pairs : iterable of (output, input), optional
+        Responses to draw; default: of each output, the one to the input with most coherence.
+    minimum_coherence : float
+        Guideline drawn in the coherence plot.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    chosen = list(pairs) if pairs is not None else leading_pairs(response)
+    drawn = [response.pair(output, name) for output, name in chosen]
+    curves = [
+        Curve(
+            f"{pair.output} / {pair.input}",
+            pair.omega_rad_s,
+            pair.response,
+            look.MEASURED if len(drawn) == 1 else look.SERIES[index % len(look.SERIES)],
+            look.DASHES[index % len(look.DASHES)],
+            pair.coherence,
+            pair.random_error,
+        )
+        for index, pair in enumerate(drawn)
+    ]
+    units = {pair.unit for pair in drawn}
+    unit = units.pop() if len(units) == 1 else ""
+    return bode(curves, unit=unit, minimum_coherence=minimum_coherence)
+
+
+def leading_pairs(response: FrequencyResponse) -> list[tuple[str, str]]:
+    """For each output, the input to which it is most coherent on average."""
+    best = response.coherence.mean(axis=2).argmax(axis=1)
+    return [
+        (output, response.inputs[column])
+        for output, column in zip(response.outputs, best, strict=True)
+    ]
