@@ -169,6 +169,7 @@ def require_match(found: str, needed: str, *, subject: str) -> None:
         )
 
 
+@cache
 def exponents(unit: str) -> dict[str, float]:
     """Powers of the base names that a unit is written in; the radian counts as a plain number.
 

@@ -5,8 +5,6 @@
 //! 11.4 and 12.24), with weights that the caller prepares; and the whitened complex error
 //! (generalised least squares, which is maximum likelihood for Gaussian errors of known covariance).
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use num_complex::Complex64;
 use rayon::prelude::*;
 
@@ -243,17 +241,18 @@ impl<M: ResponseModel> Problem for FrequencyFit<'_, M> {
     }
 }
 
-/// Minimise from several starts, in parallel; the answers keep the order of the starts.
+/// Minimise from several starts, in parallel, until `stop` says true; the answers keep the order of
+/// the starts. One start runs on the calling thread.
 pub fn minimise_from<P: Problem + Clone + Sync>(
     problem: &P,
     starts: &[Vec<f64>],
     lower: &[f64],
     upper: &[f64],
     options: &Options,
-    stop: &AtomicBool,
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Result<Minimum, CoreError>> {
     let one = |start: &Vec<f64>| {
-        let proceed = &mut |_: &_| !stop.load(Ordering::Relaxed);
+        let proceed = &mut |_: &_| !stop();
         minimise(&mut problem.clone(), start, lower, upper, options, proceed)
     };
     match starts {

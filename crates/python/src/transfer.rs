@@ -153,8 +153,13 @@ impl TransferFunctions {
         let starts: Vec<_> = starts.as_slice()?.chunks_exact(width).map(<[f64]>::to_vec).collect();
         let (lower, upper) = (lower.as_slice()?, upper.as_slice()?);
         let options = Options { maximum_iterations, ..Options::default() };
-        let found =
-            interrupt::run(py, |stop| minimise_from(&fit, &starts, lower, upper, &options, stop))?;
+        let work =
+            |stop: interrupt::Stop<'_>| minimise_from(&fit, &starts, lower, upper, &options, stop);
+        let found = if starts.len() == 1 {
+            interrupt::run_here(py, work)?
+        } else {
+            interrupt::run_beside(py, work)?
+        };
         found.into_iter().map(|each| outcome(py, each)).collect()
     }
 }

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, solve_triangular
+from scipy.linalg import block_diag
 
 from flightid.errors import FitError
 from flightid.identification.selection import SelectedResponse
@@ -138,7 +138,7 @@ def whitening(model: ErrorModel) -> list[tuple[int, int, Array]]:
                 needed="a covariance of full rank",
                 action="lower n_omega, or use cost='coherence'",
             ) from error
-        matrix = solve_triangular(lower, np.diag(1.0 / deviation), lower=True)
+        matrix = np.linalg.solve(lower, np.diag(1.0 / deviation))
         result.append((run.first, run.count, np.ascontiguousarray(matrix)))
     return result
 

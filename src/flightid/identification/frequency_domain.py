@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import FitError, OptionError
+from flightid.errors import DataError, FitError, OptionError
 from flightid.findings import Finding
 from flightid.identification.error_model import (
     ErrorModel,
@@ -124,7 +124,10 @@ def _check_start(
 ) -> list[Finding]:
     found: list[Finding] = []
     for place, each in enumerate(selected):
-        start = _model_at(model, each.omega_rad_s, place)
+        try:
+            start = _model_at(model, each.omega_rad_s, place)
+        except DataError:
+            continue  # no value at the start: the search will say so if no start has one
         if np.all(np.isfinite(start)) and np.all(np.abs(start) > 0.0):
             found += check_setup(each.name, each.omega_rad_s, each.response, start)
     return found

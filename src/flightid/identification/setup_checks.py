@@ -60,7 +60,9 @@ def check_setup(
         return []
     phase_deg = float(np.degrees(np.angle(direction)))
     decibel = 20.0 * np.log10(np.abs(ratio))
-    slope = float(np.polyfit(np.log10(omega_rad_s), decibel, 1)[0])
+    decades = np.log10(omega_rad_s / omega_rad_s[0])
+    decades -= decades.mean()
+    slope = float(decades @ decibel / (decades @ decades))
     if abs(abs(phase_deg) - 180.0) < _PHASE_TOLERANCE_DEG and abs(slope) < _SLOPE_TOLERANCE:
         return [
             Finding(

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 from scipy.stats import norm, t
 
 from flightid.errors import OptionError, SingularError
@@ -63,7 +62,7 @@ def propagate(jacobian: Array, sensitivity: Array, covariance: Array) -> Array:
     diagonal = np.abs(np.diag(triangle))
     if np.any(diagonal <= 1e-14 * diagonal.max(initial=0.0)):
         raise SingularError("the Hessian of the cost is singular to working precision")
-    gain = solve_triangular(triangle, q.T @ sensitivity) / scale[:, None]
+    gain = np.linalg.solve(triangle, q.T @ sensitivity) / scale[:, None]
     result = gain @ covariance @ gain.T
     return np.asarray(0.5 * (result + result.T))
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from flightid.errors import SingularError
 
@@ -59,7 +58,7 @@ def inverse_hessian(jacobian: Array) -> Array:
     diagonal = np.abs(np.diag(triangle))
     if len(jacobian) < len(scale) or np.any(diagonal <= 1e-14 * diagonal.max(initial=0.0)):
         raise SingularError("the Hessian of the cost is singular to working precision")
-    root = solve_triangular(triangle, np.eye(len(scale))) / scale[:, None]
+    root = np.linalg.solve(triangle, np.eye(len(scale))) / scale[:, None]
     return np.asarray(0.5 * root @ root.T)
 
 

@@ -132,6 +132,9 @@ class TransferFunctionModel:
             raise ModelError("a response is given twice", found=", ".join(names))
         known = {**self.parameters.units, "s": "1/s"}
         for response in self.responses:
+            # Each text alone first, so that a fault is placed in what was written.
+            for text in (response.gain, *response.numerator, *response.denominator):
+                formula_names(text)
             for text, with_s in ((response.formula, True), (response.delay, False)):
                 for name in formula_names(text):
                     if name not in known or (name == "s" and not with_s):
