@@ -14,6 +14,7 @@ from flightid.inference import (
     insensitivity,
     propagate,
 )
+from flightid.responses.uncertainty import Known
 from tests.closeness import assert_close
 
 TRUTH = {
@@ -26,16 +27,9 @@ TRUTH = {
 OMEGA = np.geomspace(0.5, 60.0, 120)
 
 
-class KnownErrors:
+def known_errors(matrix: np.ndarray) -> Known:
     """Errors with a given covariance of the stacked real and imaginary parts."""
-
-    def __init__(self, matrix: np.ndarray) -> None:
-        self.matrix = matrix
-
-    def covariance(self, output: int, inputs: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
-        half = len(self.matrix) // 2
-        keep = np.concatenate([frequencies, half + frequencies])
-        return self.matrix[np.ix_(keep, keep)]
+    return Known(matrix[None], len(matrix) // 2)
 
 
 def measured(
@@ -44,7 +38,7 @@ def measured(
     *,
     change: np.ndarray | float = 0.0,
     coherence: float = 1.0,
-    errors: KnownErrors | None = None,
+    errors: Known | None = None,
     random_error: float = 0.0,
 ) -> fid.FrequencyResponse:
     values = model.frequency_response(omega) + change
@@ -176,7 +170,7 @@ def _coverage(cost: str, flights: int, sigma: float) -> tuple[float, np.ndarray]
     for _ in range(flights):
         noise = root @ generator.standard_normal(len(matrix))
         change = noise[: len(OMEGA)] + 1j * noise[len(OMEGA) :]
-        data = measured(truth, change=change, errors=KnownErrors(matrix), coherence=0.9)
+        data = measured(truth, change=change, errors=known_errors(matrix), coherence=0.9)
         fit = fid.identify(truth, data, cost=cost)
         assert fit.intervals_from == "response covariance"
         for key, value in TRUTH[name].items():
@@ -208,7 +202,7 @@ def test_intervals_are_calibrated(cost: str, sigma: float) -> None:
 def test_likelihood_is_the_sharper_estimate() -> None:
     name = "rate_motor_lag"
     truth = fid.load_model(name).with_values(TRUTH[name])
-    data = measured(truth, errors=KnownErrors(_correlated_errors(truth, 0.03)))
+    data = measured(truth, errors=known_errors(_correlated_errors(truth, 0.03)))
     coherence, likelihood = (
         fid.identify(truth, data, cost=cost) for cost in ("coherence", "likelihood")
     )
