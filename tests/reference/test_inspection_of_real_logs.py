@@ -36,7 +36,7 @@ def test_px4_2016_was_moved_by_hand(shared_data: Path) -> None:
     # 69 s with body rates up to 2.7 rad/s, but thrust 0, every output at PWM_DISARMED (900 us).
     inspection = fid.inspect_log(shared_data / "logs" / "px4_quad_2016.ulg")
     assert red(inspection) == {"motors-off"}
-    assert inspection.duration_s == pytest.approx(69.0, abs=0.1)
+    assert inspection.duration_s == pytest.approx(69.0, abs=0.2)
     assert {e.kind for e in inspection.excitations} == {"hand"}
     limited = next(f for f in inspection.findings if f.code == "rate-limited")
     assert "SDLOG_PROFILE 25" in limited.action

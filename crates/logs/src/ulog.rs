@@ -123,7 +123,6 @@ impl Ulog {
             version: *version,
             start_us: little_endian(stamp),
             last_us: little_endian(stamp),
-            by_id: vec![NO_TABLE; 1 << 16],
             ..Self::default()
         };
         let mut start = log.read_flags(bytes)?;
@@ -254,7 +253,8 @@ impl Ulog {
         let Some((id, sample)) = payload.split_first_chunk::<2>() else {
             return;
         };
-        let index = self.by_id[usize::from(u16::from_le_bytes(*id))];
+        let index = self.by_id.get(usize::from(u16::from_le_bytes(*id))).copied();
+        let index = index.unwrap_or(NO_TABLE);
         let Some(table) = self.tables.get_mut(index as usize) else {
             return;
         };
@@ -290,7 +290,11 @@ impl Ulog {
             self.tables.push(Table { name: name.into(), instance, offsets: Vec::new(), shape });
             (self.tables.len() - 1) as u32
         });
-        self.by_id[usize::from(u16::from_le_bytes([low, high]))] = index;
+        let id = usize::from(u16::from_le_bytes([low, high]));
+        if self.by_id.len() <= id {
+            self.by_id.resize(id + 1, NO_TABLE);
+        }
+        self.by_id[id] = index;
         true
     }
 }

@@ -11,6 +11,7 @@ from flightid.logs import Log, LogTable
 
 MOTOR_FUNCTIONS = range(33, 41)
 """SERVOn_FUNCTION of ArduPilot's motors 1 to 8."""
+FEWEST_SAMPLES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +41,12 @@ class Actuators:
 
     @property
     def ran(self) -> bool:
-        """Whether any motor was ever commanded above the lower limit of flight."""
-        return bool(np.any(self.values > self.low + 0.01 * (self.high - self.low)))
+        """Whether any motor was commanded above the lower limit of flight, a few samples at least.
+
+        A single sample may be damage.
+        """
+        above = self.values > self.low + 0.01 * (self.high - self.low)
+        return bool(np.any(np.count_nonzero(above, axis=1) >= FEWEST_SAMPLES))
 
 
 def find_actuators(log: Log) -> Actuators | None:

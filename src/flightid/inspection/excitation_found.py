@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.inspection.axes import axes_of
 from flightid.inspection.signals import Signal, Span, find, inside
+from flightid.inspection.stamps import log_span
 from flightid.inspection.thresholds import RESTING_RATE
 from flightid.logs import Log, SidRun
 
@@ -52,7 +53,7 @@ def excitations(log: Log, spans: tuple[Span, ...]) -> tuple[FoundExcitation, ...
     """
     found = [*map(_injected, log.sid_runs), *_autotune(log)]
     flying = bool(spans)
-    spans = spans or ((log.first_s or 0.0, log.last_s or 0.0),)
+    spans = spans or (log_span(log),)
     for axis, names in axes_of(log.vehicle).items():
         set_point, rate = find(log, names.set_point), find(log, names.rate)
         for span in spans:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.inspection.actuators import Actuators
 from flightid.inspection.signals import Signal, Span, find
+from flightid.inspection.stamps import believable, log_span
 from flightid.inspection.thresholds import (
     AIRBORNE_SHARE,
     AIRBORNE_SPEED,
@@ -111,21 +112,23 @@ def _landing_detector(log: Log) -> tuple[NDArray[np.float64], NDArray[np.bool_]]
         if name not in log or "landed" not in log.messages[name].fields:
             return None
         table = log.table(name, log.messages[name].instances[0])
-        return _held(log, table.time_s, table["landed"] == 0)
+        good = believable(table.time_s)
+        return _held(log, table.time_s[good], table["landed"][good] == 0)
     if "EV" not in log:
         return None
     table = log.table("EV")
-    told = np.isin(table["Id"], [EV_LAND_COMPLETE, EV_NOT_LANDED])
-    if not np.any(table["Id"] == EV_NOT_LANDED):
-        return None
-    return _held(log, table.time_s[told], table["Id"][told] == EV_NOT_LANDED)
+    told = np.isin(table["Id"], [EV_LAND_COMPLETE, EV_NOT_LANDED]) & believable(table.time_s)
+    took_off = table["Id"][told] == EV_NOT_LANDED
+    return _held(log, table.time_s[told], took_off) if np.any(took_off) else None
 
 
 def _held(
     log: Log, time_s: NDArray[np.float64], flying: NDArray[np.bool_]
-) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]] | None:
     """States that last until the next one, on a grid of 0.1 s; before the first, its opposite."""
-    first, last = log.first_s or 0.0, log.last_s or 0.0
+    if time_s.size == 0:
+        return None
+    first, last = log_span(log)
     grid = np.linspace(first, last, min(max(2, int((last - first) / 0.1)), 1_000_000))
     index = np.searchsorted(time_s, grid, side="right") - 1
     return grid, np.where(index >= 0, flying[np.maximum(index, 0)], ~flying[0])
@@ -138,11 +141,13 @@ def tilt(log: Log) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
             return None
         table = log.table("vehicle_attitude", log.messages["vehicle_attitude"].instances[0])
         cosine = 1.0 - 2.0 * (table["q[1]"] ** 2 + table["q[2]"] ** 2)
-        return table.time_s, np.arccos(np.clip(cosine, -1.0, 1.0))
+        good = believable(table.time_s) & np.isfinite(cosine)
+        return table.time_s[good], np.arccos(np.clip(cosine[good], -1.0, 1.0))
     phi, theta = find(log, "phi"), find(log, "theta")
-    if phi is None or theta is None or phi.values.shape != theta.values.shape:
+    if phi is None or theta is None:
         return None
-    return phi.time_s, np.arccos(np.clip(np.cos(phi.values) * np.cos(theta.values), -1.0, 1.0))
+    pitch = np.interp(phi.time_s, theta.time_s, theta.values)
+    return phi.time_s, np.arccos(np.clip(np.cos(phi.values) * np.cos(pitch), -1.0, 1.0))
 
 
 def _tip_over(log: Log, carrying: Signal, limit: float) -> float | None:

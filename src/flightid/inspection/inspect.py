@@ -11,6 +11,7 @@ from flightid.inspection.inspection import Inspection
 from flightid.inspection.rates import stream_rates
 from flightid.inspection.saturation import saturations
 from flightid.inspection.skew import stream_skews
+from flightid.inspection.stamps import log_span
 from flightid.inspection.usable_band import axis_bands
 from flightid.inspection.verdicts import judge
 from flightid.logs import Log, read_log
@@ -54,6 +55,7 @@ def inspect_log(log: Log | str | Path) -> Inspection:
     """
     opened = log if isinstance(log, Log) else read_log(log)
     actuators = find_actuators(opened)
+    start_s, stop_s = log_span(opened)
     phases = flight_phases(opened, actuators)
     excited = excitations(opened, phases.airborne)
     found = Inspection(
@@ -61,7 +63,7 @@ def inspect_log(log: Log | str | Path) -> Inspection:
         kind=opened.kind,
         firmware=opened.firmware,
         vehicle=opened.vehicle,
-        duration_s=opened.duration_s,
+        duration_s=stop_s - start_s,
         rates=stream_rates(opened),
         phases=phases,
         excitations=excited,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.inspection.stamps import believable
 from flightid.inspection.thresholds import GAP_FACTOR
 from flightid.logs import Log
 
@@ -37,7 +38,7 @@ class StreamRate:
     longest_gap_s : float
         Longest of them, s; 0 without.
     n_disordered : int
-        Stamps that repeat or go back.
+        Stamps that repeat, go back, or lie far from all others.
     """
 
     message: str
@@ -73,8 +74,8 @@ def stream_rates(log: Log) -> tuple[StreamRate, ...]:
 def _of(message: str, instance: int | None, stamps: NDArray[np.float64]) -> StreamRate | None:
     if stamps.size < FEWEST_ROWS:
         return None
-    intervals = np.diff(stamps)
-    forward = intervals[intervals > 0]
+    good = stamps[believable(stamps)]
+    forward = np.diff(good)
     if forward.size < FEWEST_ROWS - 1:
         return None
     middle = float(np.median(forward))
@@ -85,9 +86,9 @@ def _of(message: str, instance: int | None, stamps: NDArray[np.float64]) -> Stre
         instance,
         int(stamps.size),
         1.0 / middle,
-        (stamps.size - 1) / float(np.ptp(stamps)),
+        (good.size - 1) / float(np.ptp(good)),
         float(high - low) / (2.0 * middle),
         int(gaps.size),
         float(gaps.max()) if gaps.size else 0.0,
-        int(np.count_nonzero(intervals <= 0)),
+        int(stamps.size - good.size),
     )

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, MissingColumnError, UnknownNameError
+from flightid.errors import DataError, MissingColumnError, UnitError, UnknownNameError
+from flightid.inspection.stamps import believable
 from flightid.logs import Log
 from flightid.logs.channel_map import ChannelMap, channel_map, default_map
 from flightid.logs.extraction import extract
@@ -70,7 +71,7 @@ def _map(log: Log) -> ChannelMap:
 def find(log: Log, name: str) -> Signal | None:
     """Take the best place of a channel that the log holds, or None.
 
-    Stamps that repeat or go back are left out; `rates` counts them.
+    Stamps that cannot be believed are left out; `rates` counts them.
     """
     return next(iter(places(log, name, most=1)), None)
 
@@ -88,11 +89,9 @@ def places(log: Log, name: str, most: int | None = None) -> list[Signal]:
             continue
         try:
             samples = extract(log, replace(channel, sources=(source,)))
-        except MissingColumnError:
+        except (MissingColumnError, UnitError):
             continue
-        earlier = np.maximum.accumulate(samples.time_s)
-        later = np.concatenate([[True], samples.time_s[1:] > earlier[:-1]])
-        good = later & np.isfinite(samples.values)
+        good = believable(samples.time_s) & np.isfinite(samples.values)
         if np.count_nonzero(good) >= 2:
             stamps, values = samples.time_s[good], samples.values[good]
             found.append(Signal(name, stamps, values, channel.unit, str(source)))
