@@ -52,6 +52,11 @@ impl Table {
         self.offsets.is_empty()
     }
 
+    /// Bytes of a row, header included.
+    pub fn row_size(&self) -> usize {
+        self.layout.size
+    }
+
     /// Fields in the file's order.
     pub fn fields(&self) -> &[Field] {
         &self.layout.fields

@@ -5,6 +5,7 @@
 //!
 //! - in step (the message before ended here): another known header, or the end of the file, follows
 //!   directly; or, where something else follows, the next proven message does not begin inside it;
+//! - anywhere: it is a `FMT` whose claimed size is the sum of its fields;
 //! - after garbage: another known header, or the end, follows directly; or its stamp lies within
 //!   `NEAR_US` of the last one read (a chance of 1e-11 for random bytes).
 //!
@@ -123,7 +124,7 @@ impl<'a> Scanner<'a> {
                 continue;
             };
             let stop = at + self.known(type_id).size;
-            if self.goes_on_at(stop) {
+            if self.goes_on_at(stop) || self.defines_soundly(at, type_id) {
                 self.accept(at, stop, type_id);
                 at = stop;
                 continue;
@@ -187,7 +188,20 @@ impl<'a> Scanner<'a> {
         if at + known.size > self.bytes.len() {
             return false;
         }
-        self.goes_on_at(at + known.size) || self.is_near_in_time(at, known)
+        self.goes_on_at(at + known.size)
+            || self.is_near_in_time(at, known)
+            || self.defines_soundly(at, type_id)
+    }
+
+    /// Whether a `FMT` message agrees with itself: the size that it claims is the sum of its fields.
+    /// What follows cannot be asked, since it may be of the type that is defined here.
+    fn defines_soundly(&self, at: usize, type_id: u8) -> bool {
+        type_id == FMT_TYPE
+            && self
+                .bytes
+                .get(at..at + FMT_SIZE)
+                .and_then(definition)
+                .is_some_and(|definition| definition.layout.is_some())
     }
 
     fn is_near_in_time(&self, at: usize, known: Known) -> bool {
