@@ -6,6 +6,7 @@ WHEELS := dist
 STAMP  := $(VENV)/.installed
 RUST   := $(shell find crates -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml
 JOBS   ?= auto
+FUZZ_RUNS ?= 1000000
 
 .PHONY: demo test test-slow fuzz bench lint format stubs develop wheel docs clean help
 
@@ -55,6 +56,11 @@ test-slow: wheel  ## Monte Carlo calibration of every printed interval, and the 
 
 bench: wheel  ## speed against peers, same data, one run
 	$(BIN)/python -m benchmarks
+
+fuzz:  ## throw damaged logs at the readers (needs a nightly toolchain and cargo-fuzz)
+	cd fuzz && for target in dataflash ulog; do \
+	  mkdir -p corpus/$$target seeds/$$target && cargo +nightly fuzz run -s none $$target \
+	    corpus/$$target seeds/$$target -- -runs=$(FUZZ_RUNS) -max_len=4096 || exit 1; done
 
 clean:
 	rm -rf $(VENV) $(WHEELS) target demo-output
