@@ -285,6 +285,16 @@ def test_command_designs_and_exports(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "Go or no-go" in files[2].read_text()
 
 
+def test_command_writes_what_px4_can_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "wing.params"
+    base = ["design", "sweep", *COMMAND[2:-2], "--params", str(file)]
+    assert run(base) == 0
+    assert "FW_AT" not in file.read_text()
+    assert run([*base, "--fixed-wing"]) == 0
+    assert "FW_AT_SYSID_F1\t4.77464829\t9" in file.read_text()
+    assert "Wrote" in capsys.readouterr().err
+
+
 def test_command_leaves_with_one_for_no_go(capsys: pytest.CaptureFixture[str]) -> None:
     assert run([*COMMAND, "--amplitude", "3"]) == 1
     assert "[red]" in capsys.readouterr().out

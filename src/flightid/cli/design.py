@@ -47,6 +47,8 @@ FILE = click.Path(dir_okay=False, path_type=Path)
 @click.option("--seed", type=int, default=0, show_default=True)
 @click.option("--csv", "csv_file", type=FILE, help="Write the samples to this file.")
 @click.option("--param", type=FILE, help="Write ArduPilot parameters (kind ardupilot_chirp).")
+@click.option("--params", type=FILE, help="Write PX4 parameters: logging, and what it can inject.")
+@click.option("--fixed-wing", is_flag=True, help="With --params: a fixed wing sweeps the band.")
 @click.option("--axis", type=click.IntRange(1, 19), default=10, show_default=True, help="SID_AXIS.")
 @click.option("--html", type=FILE, help="Write a page with pictures to this file.")
 @json_option
@@ -72,6 +74,8 @@ def command(
     seed: int,
     csv_file: Path | None,
     param: Path | None,
+    params: Path | None,
+    fixed_wing: bool,
     axis: int,
     html: Path | None,
     as_json: bool,
@@ -116,9 +120,28 @@ def command(
     if param is not None:
         made = excitation.ardupilot_parameters(plan.excitation)
         note(f"Wrote {made.write(param)}")
+    if params is not None:
+        note(f"Wrote {_write_px4(plan, params, fixed_wing)}")
     if html is not None:
         note(f"Wrote {_write_page(plan, html)}")
     leave_by_verdict(plan.findings)
+
+
+def _write_px4(plan: Plan, path: Path, fixed_wing: bool) -> Path:
+    from math import tau
+
+    from flightid.excitation import px4_parameters
+
+    if not fixed_wing:
+        return px4_parameters(vehicle="multicopter").write(path)
+    low, high = plan.band_rad_s
+    made = px4_parameters(
+        vehicle="fixed_wing",
+        start_hz=low / tau,
+        stop_hz=high / tau,
+        duration_s=plan.excitation.duration_s,
+    )
+    return made.write(path)
 
 
 def _write_page(plan: Plan, path: Path) -> Path:

@@ -1,0 +1,104 @@
+"""``flightid verify``: how a model predicts records that it has not seen."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from flightid.cli.output import emit, json_option, leave_by_verdict, note
+
+if TYPE_CHECKING:
+    from flightid.validation import Verification
+
+
+@click.command()
+@click.argument("model")
+@click.argument(
+    "records",
+    nargs=-1,
+    required=True,
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+)
+@click.option("--axis", type=click.Choice(["roll", "pitch", "yaw"]), help="For library models.")
+@click.option("--value", "values", multiple=True, metavar="NAME=NUMBER", help="Parameter value.")
+@click.option("--output", "outputs", multiple=True, help="Output to compare; default: all.")
+@click.option("--initial", type=click.Choice(["trim", "fit"]), default="trim", show_default=True)
+@click.option("--hold", type=click.Choice(["first", "zero"]), default="first", show_default=True)
+@click.option("--free-bias/--no-free-bias", default=True, help="Solve for state biases.")
+@click.option("--free-reference/--no-free-reference", default=True, help="Solve for offsets.")
+@click.option(
+    "--html",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write a page with pictures to this file.",
+)
+@json_option
+def command(
+    model: str,
+    records: tuple[Path, ...],
+    axis: str | None,
+    values: tuple[str, ...],
+    outputs: tuple[str, ...],
+    initial: str,
+    hold: str,
+    free_bias: bool,
+    free_reference: bool,
+    html: Path | None,
+    as_json: bool,
+) -> None:
+    """Predict RECORDS with MODEL, a .toml file or the name of a library model.
+
+    The records (CSV, Parquet, .mat, netCDF) hold the model's channels by name. The exit code is 1
+    where a prediction misses its guide.
+    """
+    from flightid import load_model, read_records, verify
+
+    chosen = load_model(model, axis=axis)
+    if values:
+        chosen = chosen.with_values(dict(map(_number, values)))
+    compared = outputs or chosen.outputs
+    flown = [
+        record
+        for path in records
+        for record in read_records(path, inputs=chosen.inputs, outputs=compared)
+    ]
+    result = verify(
+        chosen,
+        flown,
+        free_bias=free_bias,
+        free_reference=free_reference,
+        initial="fit" if initial == "fit" else "trim",
+        outputs=compared,
+        hold="zero" if hold == "zero" else "first",
+    )
+    emit(result, as_json=as_json)
+    if html is not None:
+        note(f"Wrote {_write_page(result, str(chosen), html)}")
+    leave_by_verdict(result.findings)
+
+
+def _number(text: str) -> tuple[str, float]:
+    name, _, number = text.partition("=")
+    try:
+        return name, float(number)
+    except ValueError:
+        raise click.BadParameter(f"{text!r} is not NAME=NUMBER", param_hint="--value") from None
+
+
+def _write_page(result: Verification, model: str, path: Path) -> Path:
+    from flightid.files import write_atomically
+    from flightid.plot.verification import prediction, residuals
+    from flightid.report.blocks import result_blocks
+    from flightid.report.content import Document, Section
+    from flightid.report.figures import figure_block
+    from flightid.report.html import to_html
+
+    sections = [Section("Verdicts", result_blocks(result))]
+    for item in result.predictions:
+        pictures = (
+            figure_block(prediction(item), "Measured, and predicted from the input alone."),
+            figure_block(residuals(item), "Measured minus predicted."),
+        )
+        sections.append(Section(item.measured.name, pictures))
+    return write_atomically(path, to_html(Document("Verification", model, tuple(sections))))
