@@ -75,7 +75,8 @@ def test_the_pilot_holds_free_flight() -> None:
 
 
 def test_gusts_and_noise_have_the_size_that_was_asked_for() -> None:
-    flight = fly(duration_s=60.0, sensors=Sensors(gyro_noise_rad_s=0.02), seed=8)
+    air, sensors = Turbulence(rate_rad_s=0.25), Sensors(gyro_noise_rad_s=0.02)
+    flight = fly(duration_s=60.0, sensors=sensors, turbulence=air, seed=8)
     noise = flight["gyro_x"] - flight["p"]
     assert noise.std() == pytest.approx(0.02, rel=0.03)
     assert noise.mean() == pytest.approx(0.002, abs=5e-4)

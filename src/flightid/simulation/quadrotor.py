@@ -157,6 +157,8 @@ class Sensors:
 class Turbulence:
     """Gusts as Gauss–Markov velocity and rotation of the air (Dryden's longitudinal form).
 
+    The defaults are a hall, with the rotors' own stirred air; outdoors take ten times as much.
+
     Attributes
     ----------
     velocity_m_s : float
@@ -175,7 +177,7 @@ class Turbulence:
     0.0
     """
 
-    velocity_m_s: float = 0.3
+    velocity_m_s: float = 0.1
     velocity_time_s: float = 1.5
-    rate_rad_s: float = 0.25
+    rate_rad_s: float = 0.03
     rate_time_s: float = 0.3

@@ -20,7 +20,8 @@ def advised_runs() -> tuple[SidRun, ...]:
     """Mixer sweeps of roll, pitch and yaw as we advise: 0.1–12 Hz, so that motors show themselves.
 
     The published settings end at 5 Hz, fade out from 3.9 Hz, and spend 40 of 130 s at 0.05 Hz where
-    the attitude loop undoes them. The pilot leaves the mode when the chirp is over.
+    the attitude loop undoes them. The pilot leaves the mode twenty seconds after the chirp: windows
+    then cover its end as they cover its middle.
 
     Example
     -------
@@ -28,18 +29,18 @@ def advised_runs() -> tuple[SidRun, ...]:
     [10, 11, 12]
     """
     runs = []
-    for number, (axis, magnitude) in enumerate(((10, 0.10), (11, 0.10), (12, 0.12))):
+    for number, (axis, magnitude) in enumerate(((10, 0.15), (11, 0.15), (12, 0.15))):
         runs.append(
             SidRun(
                 axis=axis,
-                start_s=5.0 + 110.0 * number,
+                start_s=5.0 + 130.0 * number,
                 magnitude=magnitude,
                 start_hz=0.1,
                 stop_hz=12.0,
                 fade_in_s=5.0,
                 record_s=100.0,
                 fade_out_s=1.0,
-                leave_after_s=103.0,
+                leave_after_s=125.0,
             )
         )
     return tuple(runs)
@@ -108,7 +109,7 @@ def fly_scenario(
     Example
     -------
     >>> fly_scenario("advised", seed=3, turbulence={"rate_rad_s": 0.1})
-    Flight(353.6 s at 400 Hz, 3 sweeps, 3 doublets, seed 3)
+    Flight(415.6 s at 400 Hz, 3 sweeps, 3 doublets, seed 3)
     """
     if scenario not in SCENARIOS:
         raise OptionError("scenario is not known", found=scenario, needed=f"one of {SCENARIOS}")
