@@ -1,13 +1,16 @@
-"""Estimates with their intervals, side by side on one scale."""
+"""Fits: the model beside the measured response, and estimates with their intervals."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import plotly.graph_objects as go
 
+from flightid.errors import UnknownNameError
+from flightid.identification import Fit, FittedResponse
 from flightid.plot import look
+from flightid.plot.frequency_response import Curve, bode
 
 ROW_PX = 34
 FRAME_PX = 130
@@ -89,3 +92,70 @@ def parameter_intervals(estimates: Sequence[Estimate], *, name: str = "estimate"
     made.update_xaxes(title_text=f"departure from the {reference} [%]")
     made.update_layout(hovermode="closest")
     return made
+
+
+def fit_figure(fit: Fit, name: str | None = None) -> go.Figure:
+    """Bode plot of one measured response, its 95 % band, and the model where it was fitted.
+
+    Parameters
+    ----------
+    fit : Fit
+        Result of `flightid.identify`.
+    name : str, optional
+        ``"output/input"``; default: the first response.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+
+    Raises
+    ------
+    UnknownNameError
+        The fit has no such response.
+    """
+    for each in fit.responses:
+        if name in (None, each.name):
+            return _response_figure(each)
+    raise UnknownNameError(
+        "the fit has no such response",
+        found=repr(name),
+        needed=", ".join(each.name for each in fit.responses),
+    )
+
+
+def _response_figure(each: FittedResponse) -> go.Figure:
+    measured = each.measured
+    low, high = each.band_rad_s
+    inside = (measured.omega_rad_s >= low) & (measured.omega_rad_s <= high)
+    curves = [
+        Curve(
+            "measured",
+            measured.omega_rad_s,
+            measured.response,
+            coherence=measured.coherence,
+            random_error=measured.random_error,
+        ),
+        Curve("model", measured.omega_rad_s[inside], each.model[inside], look.MODEL),
+    ]
+    return bode(curves, unit=measured.unit)
+
+
+def estimates_of(fit: Fit, truth: Mapping[str, float] | None = None) -> list[Estimate]:
+    """The fit's parameters that have an interval, for `parameter_intervals`.
+
+    Parameters
+    ----------
+    fit : Fit
+        Result of `flightid.identify`.
+    truth : mapping of str to float, optional
+        True values by name, where known.
+
+    Returns
+    -------
+    list of Estimate
+    """
+    return [
+        Estimate(p.name, p.value, *p.interval95, (truth or {}).get(p.name))
+        for p in fit.parameters.values()
+        if p.interval95 is not None and p.value != 0.0
+    ]

@@ -1,0 +1,87 @@
+"""``flightid identify``: a model from a log or a record, with its intervals."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from flightid.cli.output import emit, json_option, leave_by_verdict, note
+
+if TYPE_CHECKING:
+    from flightid.models import TransferFunctionModel
+    from flightid.record import Record
+
+LOGS = {".bin", ".ulg", ".log"}
+
+
+@click.command()
+@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--model", "model_name", required=True, help="Library name or .toml file.")
+@click.option("--axis", type=click.Choice(["roll", "pitch", "yaw"]), help="Of a library model.")
+@click.option("--span", nargs=2, type=float, help="First and last instant in a log, s.")
+@click.option("--run", "sid_run", type=click.IntRange(0), help="Number of the sweep in a log.")
+@click.option("--band", nargs=2, type=float, help="Lowest and highest frequency, rad/s.")
+@click.option(
+    "--method",
+    type=click.Choice(["composite", "instrument", "local_polynomial"]),
+    default="composite",
+    show_default=True,
+    help="How the response is estimated; with a loop closed: instrument.",
+)
+@click.option("--starts", type=click.IntRange(1), default=1, show_default=True)
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@json_option
+def command(
+    file: Path,
+    model_name: str,
+    axis: str | None,
+    span: tuple[float, float] | None,
+    sid_run: int | None,
+    band: tuple[float, float] | None,
+    method: str,
+    starts: int,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Identify a model from FILE, a log or a file of records.
+
+    The exit code is 1 where a verdict is red.
+    """
+    import flightid
+    from flightid.progress import progress
+
+    model = flightid.load_model(model_name, axis=axis)
+    with progress(3, "Identifying") as advance:
+        records = _records(file, model, span, sid_run)
+        advance()
+        response = flightid.estimate_response(
+            records,
+            inputs=model.inputs,
+            outputs=model.outputs,
+            omega_rad_s=None if band is None else (*band, 100),
+            method=method,
+        )
+        advance()
+        fit = flightid.identify(model, response, starts=starts, seed=seed)
+        advance()
+    note(repr(fit))
+    emit(fit, as_json=as_json)
+    leave_by_verdict(fit.findings)
+
+
+def _records(
+    file: Path,
+    model: TransferFunctionModel,
+    span: tuple[float, float] | None,
+    sid_run: int | None,
+) -> list[Record]:
+    import flightid
+
+    names = [*model.inputs, *model.outputs]
+    if file.suffix.lower() in LOGS:
+        return [flightid.read_log(file).record(names=names, span=span, sid_run=sid_run)]
+    if span is not None or sid_run is not None:
+        raise click.UsageError("--span and --run belong to logs")
+    return flightid.read_records(file, inputs=model.inputs, outputs=model.outputs)
