@@ -96,7 +96,7 @@ def test_a_model_file_lies_beside_the_study(tmp_path: Path) -> None:
         ('[log]\npath = "flight.bin"', "[[log]]", "log does not fit: found [{}]; needed a table"),
         ("[fit]", "[fit", "the study file is no TOML"),
         ("seed = 7", "seed = 7\nwindows_s = []", "[fit]: there is no key 'windows_s'"),
-        ('compare = ["composite"]', "windows_s = []", "needed a list of numbers"),
+        ('compare = ["composite"]', "windows_s = []", "needed a list of one or more numbers"),
     ],
 )
 def test_each_fault_is_named(tmp_path: Path, old: str, new: str, said: str) -> None:

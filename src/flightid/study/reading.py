@@ -89,13 +89,20 @@ class TableReader:
         found = self._take(key, default, fits, "a list of different texts")
         return (found,) if isinstance(found, str) else tuple(found)
 
-    def numbers(self, key: str, default: Iterable[float] = REQUIRED) -> tuple[float, ...]:
-        """Several finite numbers."""
+    def numbers(
+        self, key: str, default: Iterable[float] = REQUIRED, *, length: int | None = None
+    ) -> tuple[float, ...]:
+        """Several finite numbers, of a given count or at least one."""
 
         def fits(value: object) -> bool:
-            return isinstance(value, list) and bool(value) and all(map(_is_number, value))
+            return (
+                isinstance(value, list)
+                and (len(value) == length if length else bool(value))
+                and all(map(_is_number, value))
+            )
 
-        return tuple(map(float, self._take(key, default, fits, "a list of numbers")))
+        needed = f"a list of {length or 'one or more'} numbers"
+        return tuple(map(float, self._take(key, default, fits, needed)))
 
     def interval(self, key: str) -> tuple[float, float]:
         """Two finite numbers, the first below the second."""
@@ -119,17 +126,22 @@ class TableReader:
         """A table below; empty where it is absent."""
         return TableReader(self.values(key), f"[{key}]")
 
-    def tables(self, key: str) -> list[TableReader]:
-        """A list of tables below; empty where it is absent."""
+    def rows(self, key: str) -> list[tuple[str, dict[str, Any]]]:
+        """A list of tables below, each with its place in words; empty where it is absent."""
 
         def fits(value: object) -> bool:
             return isinstance(value, list) and all(isinstance(item, dict) for item in value)
 
         found = self._take(key, [], fits, f"tables headed [[{key}]]")
-        return [
-            TableReader(item, f"[[{key}]] number {number}")
-            for number, item in enumerate(found, start=1)
-        ]
+        return [(f"[[{key}]] number {number}", item) for number, item in enumerate(found, start=1)]
+
+    def tables(self, key: str) -> list[TableReader]:
+        """Readers of a list of tables below; empty where it is absent."""
+        return [TableReader(item, where) for where, item in self.rows(key)]
+
+    def know(self, key: str) -> None:
+        """Count a key as one that has a meaning here, though it is absent."""
+        self._known.append(key)
 
     def finish(self) -> None:
         """Refuse keys that nobody asked for.
