@@ -1,4 +1,4 @@
-"""A small log of a mixer sweep with the loop order of ArduCopter, for tests of what is read from it."""
+"""A small log of a mixer sweep with the loop order of ArduCopter, for tests of its reading."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def write_sweep(
     magnitude: float = 0.15,
     firmware: str = "ArduCopter V4.7.0 (sweep)",
 ) -> Path:
-    """Write a log in which `injected` holds the chirp of `lag_loops` before, on top of the terms."""
+    """Write a log in which `injected` holds the chirp `lag_loops` late, on top of the terms."""
     rng = np.random.default_rng(3)
     writer = DataflashWriter()
     writer.message(0, firmware)

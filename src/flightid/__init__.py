@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from flightid.record import Channel, Record, read_records, write_records
     from flightid.responses import FrequencyResponse, PairResponse, estimate_response
     from flightid.simulation.simulate import LinearSystem, simulate
+    from flightid.study import Study, run_study
     from flightid.table import Table
     from flightid.validation import Verification
     from flightid.validation.verify import verify
@@ -52,6 +53,7 @@ _HOMES = {
     "Parameter": "flightid.models",
     "Parameters": "flightid.models",
     "Record": "flightid.record",
+    "Study": "flightid.study",
     "Table": "flightid.table",
     "TransferFunction": "flightid.models",
     "TransferFunctionModel": "flightid.models",
@@ -65,6 +67,7 @@ _HOMES = {
     "load_model": "flightid.models",
     "read_log": "flightid.logs",
     "read_records": "flightid.record",
+    "run_study": "flightid.study",
     "simulate": "flightid.simulation.simulate",
     "validation": "flightid.validation",
     "verify": "flightid.validation.verify",
@@ -88,6 +91,7 @@ __all__ = [
     "Parameter",
     "Parameters",
     "Record",
+    "Study",
     "Table",
     "TransferFunction",
     "TransferFunctionModel",
@@ -102,6 +106,7 @@ __all__ = [
     "load_model",
     "read_log",
     "read_records",
+    "run_study",
     "simulate",
     "validation",
     "verify",

@@ -46,10 +46,13 @@ class Lights:
         One light each.
     title : str
         What was judged.
+    repeats : bool
+        They sum up verdicts that stand elsewhere in the report, and are not counted again.
     """
 
     findings: tuple[Finding, ...]
     title: str = ""
+    repeats: bool = False
 
 
 @dataclass(frozen=True)
@@ -168,11 +171,11 @@ class Document:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Every verdict, in order."""
+        """Every verdict, in order, those that only repeat others left out."""
         return tuple(
             finding
             for block in self.walk()
-            if isinstance(block, Lights)
+            if isinstance(block, Lights) and not block.repeats
             for finding in block.findings
         )
 

@@ -60,10 +60,11 @@ def _block(block: Block) -> dict[str, Any]:
     match block:
         case Paragraph(text):
             return {"kind": "paragraph", "text": text}
-        case Lights(findings, title):
+        case Lights(findings, title, repeats):
             return {
                 "kind": "lights",
                 "title": title,
+                "repeats": repeats,
                 "findings": [finding.to_dict() for finding in findings],
             }
         case TableBlock(table, folded):
@@ -129,7 +130,8 @@ def _read_block(values: Mapping[str, Any]) -> Block:
         case "paragraph":
             return Paragraph(str(values["text"]))
         case "lights":
-            return Lights(_each(values["findings"], _read_finding), str(values["title"]))
+            findings = _each(values["findings"], _read_finding)
+            return Lights(findings, str(values["title"]), bool(values["repeats"]))
         case "table":
             return TableBlock(_read_table(values), bool(values["folded"]))
         case "key_values":

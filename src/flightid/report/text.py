@@ -16,7 +16,7 @@ from flightid.report.content import (
     Section,
     TableBlock,
 )
-from flightid.table import Column
+from flightid.table import Column, Table
 
 WIDTH = 100
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
@@ -69,7 +69,8 @@ def _block(block: Block) -> list[str]:
         case Lights():
             return _lights(block)
         case TableBlock(table):
-            return table.to_text().split("\n")
+            bare = Table(table.title, table.columns, table.rows).to_text().split("\n")
+            return [*bare, *(line for note in table.notes for line in textwrap.wrap(note, WIDTH))]
         case KeyValues():
             return _key_values(block)
         case Figure(caption=caption):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from typing import Any, TypeVar, cast
@@ -10,6 +11,7 @@ from typing import Any, TypeVar, cast
 from flightid.errors import StudyError
 
 Value = TypeVar("Value")
+TOP = "top level"
 REQUIRED: Any = object()
 """Default of a key that must be given."""
 
@@ -124,7 +126,7 @@ class TableReader:
 
     def table(self, key: str) -> TableReader:
         """A table below; empty where it is absent."""
-        return TableReader(self.values(key), f"[{key}]")
+        return TableReader(self.values(key), f"[{self._below(key)}]")
 
     def rows(self, key: str) -> list[tuple[str, dict[str, Any]]]:
         """A list of tables below, each with its place in words; empty where it is absent."""
@@ -133,7 +135,8 @@ class TableReader:
             return isinstance(value, list) and all(isinstance(item, dict) for item in value)
 
         found = self._take(key, [], fits, f"tables headed [[{key}]]")
-        return [(f"[[{key}]] number {number}", item) for number, item in enumerate(found, start=1)]
+        path = self._below(key)
+        return [(f"[[{path}]] number {number}", item) for number, item in enumerate(found, start=1)]
 
     def tables(self, key: str) -> list[TableReader]:
         """Readers of a list of tables below; empty where it is absent."""
@@ -142,6 +145,9 @@ class TableReader:
     def know(self, key: str) -> None:
         """Count a key as one that has a meaning here, though it is absent."""
         self._known.append(key)
+
+    def _below(self, key: str) -> str:
+        return key if self._where == TOP else f"{re.sub(r'[][]', '', self._where)}.{key}"
 
     def finish(self) -> None:
         """Refuse keys that nobody asked for.

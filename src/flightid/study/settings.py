@@ -10,14 +10,14 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, cast
 
 from flightid.errors import StudyError
-from flightid.study.reading import TableReader
+from flightid.study.flight import FlightPlan, read_flight
+from flightid.study.reading import TOP, TableReader
 
 MAXIMUM_BYTES = 1 << 20
 METHODS = ("composite", "local_polynomial", "instrument")
-SIMULATORS = ("quadrotor",)
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,16 @@ class ModelSettings:
     band_rad_s: tuple[float, float]
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
+    @property
+    def segments(self) -> tuple[str, ...]:
+        """Every segment that the model uses."""
+        return (*self.identify, *self.verify)
+
+    @property
+    def template_path(self) -> Path | None:
+        """Path of the model file; None for a library model."""
+        return Path(self.template) if self.template.endswith(".toml") else None
+
 
 @dataclass(frozen=True)
 class ResponseSettings:
@@ -106,12 +116,10 @@ class Settings:
         Words for the report.
     log : Path or None
         Log to read.
-    simulator : str or None
-        Or: the simulator that flies and writes the log.
-    flight : mapping
-        Its settings, checked by the simulator.
-    channels : mapping of str to str
-        Sources of channels that differ from the autopilot's channel map.
+    flight : FlightPlan or None
+        Or: the flight that is simulated, whose log is then read.
+    channel_map : str or None
+        Name of a shipped channel map, or path of one (*.toml); None: by autopilot and vehicle.
     sample_rate_hz : float or None
         Rate of the records; None: the slowest needed channel's.
     segments : tuple of Segment
@@ -122,21 +130,23 @@ class Settings:
         How to estimate responses.
     starts, seed : int
         Starts of each fit, and the seed they are drawn with.
+    initial : {"trim", "fit"}
+        Whether a prediction starts at rest or from a state that is solved for.
     """
 
     title: str
     aircraft: str
     notes: str
     log: Path | None
-    simulator: str | None
-    flight: Mapping[str, Any]
-    channels: Mapping[str, str]
+    flight: FlightPlan | None
+    channel_map: str | None
     sample_rate_hz: float | None
     segments: tuple[Segment, ...]
     models: tuple[ModelSettings, ...]
     response: ResponseSettings
     starts: int
     seed: int
+    initial: Literal["trim", "fit"]
 
     def segment(self, name: str) -> Segment:
         """Segment of this name."""
@@ -161,13 +171,15 @@ def read_settings(path: Path) -> Settings:
         The file is no TOML, a key is unknown or missing, a value does not fit, or a model refers
         to a segment that is not there; the message names the place.
     """
-    root = TableReader(_parsed(path), "top level")
+    root = TableReader(_parsed(path), TOP)
     title = root.table("study")
     words = (title.text("title"), title.text("aircraft", ""), title.text("notes", ""))
     title.finish()
-    log, simulator, flight = _source(root, path.parent)
+    log, flight = _source(root, path.parent)
     channels = root.table("channels")
-    sources = channels.values("sources")
+    mapped = channels.maybe(channels.text, "map")
+    if mapped is not None and mapped.endswith(".toml"):
+        mapped = str(path.parent / mapped)
     rate = channels.maybe(channels.positive, "sample_rate_hz")
     channels.finish()
     segments = tuple(_segment(reader) for reader in root.tables("segment"))
@@ -175,11 +187,14 @@ def read_settings(path: Path) -> Settings:
     fit = root.table("fit")
     starts, seed = fit.integer("starts", 1, minimum=1), fit.integer("seed", 0)
     fit.finish()
+    check = root.table("verify")
+    initial = cast(Literal["trim", "fit"], check.choice("initial", ("trim", "fit"), "trim"))
+    check.finish()
     models = tuple(_model(reader, path.parent) for reader in root.tables("model"))
     root.finish()
     _require_references(segments, models)
     return Settings(
-        *words, log, simulator, flight, sources, rate, segments, models, response, starts, seed
+        *words, log, flight, mapped, rate, segments, models, response, starts, seed, initial
     )
 
 
@@ -194,7 +209,7 @@ def _parsed(path: Path) -> dict[str, Any]:
         raise StudyError("the study file is no TOML", found=str(error) or "deep nesting") from error
 
 
-def _source(root: TableReader, folder: Path) -> tuple[Path | None, str | None, Mapping[str, Any]]:
+def _source(root: TableReader, folder: Path) -> tuple[Path | None, FlightPlan | None]:
     log, flight = root.table("log"), root.table("flight")
     if ("log" in root) == ("flight" in root):
         raise StudyError(
@@ -205,11 +220,8 @@ def _source(root: TableReader, folder: Path) -> tuple[Path | None, str | None, M
     if "log" in root:
         path = folder / log.text("path")
         log.finish()
-        return path, None, {}
-    simulator = flight.choice("simulate", SIMULATORS)
-    settings = flight.values("settings")
-    flight.finish()
-    return None, simulator, settings
+        return path, None
+    return None, read_flight(flight)
 
 
 def _segment(reader: TableReader) -> Segment:

@@ -1,0 +1,183 @@
+"""What a study has to say, as a content tree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flightid.findings import Finding, worst
+from flightid.plot.fit import Estimate, parameter_intervals
+from flightid.report.blocks import provenance
+from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
+from flightid.report.figures import figure_block
+from flightid.study.model_section import model_section
+from flightid.study.truth import recovered
+from flightid.table import Cell, Column, Table
+from flightid.version import VERSION
+
+if TYPE_CHECKING:
+    from flightid.identification import FittedParameter
+    from flightid.study.stages import Identified
+    from flightid.study.study import Study
+
+
+def study_document(study: Study) -> Document:
+    """Say what a study found.
+
+    Parameters
+    ----------
+    study : Study
+        Results of all stages.
+
+    Returns
+    -------
+    Document
+    """
+    settings = study.settings
+    models = (model_section(item, study.truth) for item in study.identified)
+    return Document(
+        settings.title,
+        settings.aircraft,
+        (
+            Section("Result", tuple(_result(study))),
+            *models,
+            Section("The log", tuple(_log_blocks(study))),
+            Section("Provenance", provenance(study.files, _options(study))),
+        ),
+        f"Made by flightid {VERSION} from {', '.join(study.files)}.",
+    )
+
+
+def parameter_table(study: Study) -> Table:
+    """All parameters with their intervals, and with the truth where it is known.
+
+    Parameters
+    ----------
+    study : Study
+        Results of all stages.
+
+    Returns
+    -------
+    Table
+    """
+    columns = [
+        Column("model"),
+        Column("parameter"),
+        Column("value", digits=5),
+        Column("unit"),
+        Column("95 % low"),
+        Column("95 % high"),
+    ]
+    if study.truth is not None:
+        columns += [Column("truth", digits=5), Column("inside")]
+    rows: list[tuple[Cell, ...]] = []
+    for item, parameter, true_value in _parameters(study):
+        low, high = parameter.interval95 or (None, None)
+        row: list[Cell] = [item.settings.name, parameter.name, parameter.value, parameter.unit]
+        row += [low, high]
+        if study.truth is not None:
+            row += [true_value, _inside(parameter, true_value)]
+        rows.append(tuple(row))
+    notes = () if study.truth is None else ("Truth: what the simulated vehicle obeys at hover.",)
+    return Table("Parameters", tuple(columns), tuple(rows), notes)
+
+
+def _parameters(study: Study) -> Iterator[tuple[Identified, FittedParameter, float | None]]:
+    for item in study.identified:
+        truth = {} if study.truth is None else study.truth.parameters(item.fit.model)
+        for name, parameter in item.fit.parameters.items():
+            yield item, parameter, truth.get(name)
+
+
+def _inside(parameter: FittedParameter, true_value: float | None) -> bool | None:
+    if parameter.interval95 is None or true_value is None:
+        return None
+    return parameter.interval95[0] <= true_value <= parameter.interval95[1]
+
+
+def _result(study: Study) -> list[Block]:
+    notes = study.settings.notes
+    blocks: list[Block] = [Paragraph(notes)] if notes else []
+    blocks.append(Lights(tuple(map(_in_short, study.identified)), repeats=True))
+    inside = [_inside(parameter, true) for _, parameter, true in _parameters(study)]
+    judged = np.array([value for value in inside if value is not None], dtype=bool)
+    if judged.size:
+        blocks.append(Lights((recovered(judged),)))
+    blocks.append(TableBlock(parameter_table(study)))
+    return [*blocks, *_interval_figure(study)]
+
+
+def _in_short(item: Identified) -> Finding:
+    """One line about a model: its worst verdict, and the first finding that gave it."""
+    findings = item.findings
+    light = worst(findings)
+    reasons = [finding for finding in findings if finding.light is light]
+    name, fitted = item.settings.name, item.fit
+    first = f"{name}: average cost {fitted.average_cost:.1f}"
+    if not reasons or light is worst(()):
+        return Finding("model", light, f"{first}; every guideline is met.")
+    return Finding("model", light, f"{first}; {reasons[0].message}", reasons[0].action)
+
+
+def _log_blocks(study: Study) -> Iterator[Block]:
+    yield Lights(study.inspection.findings)
+    first, *others = study.inspection.tables()[1:]
+    yield TableBlock(first)
+    yield from (TableBlock(table, folded=True) for table in others)
+    yield TableBlock(_record_table(study), folded=True)
+
+
+def _record_table(study: Study) -> Table:
+    columns = (
+        Column("record"),
+        Column("from", "s", 6),
+        Column("to", "s", 6),
+        Column("rate", "Hz"),
+        Column("samples"),
+        Column("channels"),
+        Column("made by"),
+    )
+    rows = tuple(
+        (
+            name,
+            float(record.time_s[0]),
+            float(record.time_s[-1]),
+            record.sample_rate_hz,
+            record.n_samples,
+            ", ".join(record.channels),
+            "; ".join(map(str, record.history)),
+        )
+        for name, record in study.records.items()
+    )
+    return Table("Records cut from the log", columns, rows)
+
+
+def _interval_figure(study: Study) -> tuple[Figure, ...]:
+    estimates = [
+        Estimate(f"{parameter.name}, {item.settings.name}", parameter.value, low, high, true)
+        for item, parameter, true in _parameters(study)
+        if parameter.interval95 is not None
+        for low, high in [parameter.interval95]
+    ]
+    if not estimates:
+        return ()
+    reference = "estimate" if study.truth is None else "truth"
+    caption = f"Estimates with their 95 % intervals, in percent of the {reference}."
+    return (figure_block(parameter_intervals(estimates), caption),)
+
+
+def _options(study: Study) -> dict[str, Cell]:
+    settings, response = study.settings, study.settings.response
+    options: dict[str, Cell] = {
+        "estimator": response.method,
+        "frequencies in a model's band": response.n_frequencies,
+        "windows [s]": ", ".join(f"{value:g}" for value in response.windows_s) or "chosen",
+        "least coherence": response.minimum_coherence,
+        "starts of a fit": settings.starts,
+        "seed of the starts": settings.seed,
+    }
+    if settings.flight is not None and study.truth is not None:
+        options["seed of the flight"] = settings.flight.seed
+    return options

@@ -1,0 +1,123 @@
+"""The part of a study's report about one model: response, fit, rival estimates, verification."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flightid.plot import look
+from flightid.plot.frequency_response import Curve, bode
+from flightid.plot.record import Panel, Trace, time_histories
+from flightid.report.blocks import result_blocks
+from flightid.report.content import Block, Figure, Lights, Section, TableBlock
+from flightid.report.figures import figure_block
+from flightid.table import Cell, Column, Table
+
+if TYPE_CHECKING:
+    from flightid.identification import FittedParameter
+    from flightid.study.stages import Identified
+    from flightid.study.truth import Truth
+    from flightid.validation import Verification
+
+ESTIMATORS = {
+    "composite": "direct estimate",
+    "local_polynomial": "local polynomial estimate",
+    "instrument": "instrument estimate",
+}
+"""Estimators in words, as legends and tables name them."""
+
+
+def model_section(item: Identified, truth: Truth | None) -> Section:
+    """Say what was found of one model.
+
+    Parameters
+    ----------
+    item : Identified
+        Responses, fits and verifications.
+    truth : Truth or None
+        What should have been found, where the flight was simulated.
+
+    Returns
+    -------
+    Section
+    """
+    blocks: list[Block] = [
+        _bode_figure(item, truth),
+        *result_blocks(item.fit, title="Parameters"),
+    ]
+    if len(item.fits) > 1:
+        blocks.append(TableBlock(_comparison(item, truth)))
+    if item.response.findings:
+        blocks.append(Lights(item.response.findings, "Frequency response"))
+    parts = tuple(
+        Section(f"Prediction of “{name}”", tuple(_verification_blocks(verification)))
+        for name, verification in item.verifications.items()
+    )
+    return Section(item.settings.name, tuple(blocks), parts)
+
+
+def _bode_figure(item: Identified, truth: Truth | None) -> Figure:
+    output, source = item.fit.model.outputs[0], item.fit.model.inputs[0]
+    curves = []
+    for number, (method, response) in enumerate(item.responses.items()):
+        pair = response.pair(output, source)
+        curves.append(
+            Curve(
+                ESTIMATORS[method],
+                pair.omega_rad_s,
+                pair.response,
+                colour=look.MEASURED if number == 0 else look.SERIES[number],
+                dash="solid" if number == 0 else "dash",
+                coherence=pair.coherence,
+                random_error=pair.random_error if number == 0 else None,
+            )
+        )
+    omega = curves[0].omega_rad_s
+    fitted = item.fit.model.frequency_response(omega)[0, 0]
+    curves.append(Curve("model", omega, fitted, colour=look.MODEL))
+    if truth is not None:
+        exact = truth.response(item.fit.model, omega)
+        if exact is not None:
+            curves.append(Curve("truth", omega, exact, colour=look.TRUTH, dash="dot"))
+    shown = f"{output} to {source}: {curves[0].name} with its 95 % band of random error, and model"
+    return figure_block(bode(curves, unit=pair.unit), shown + ("; truth dotted." if truth else "."))
+
+
+def _comparison(item: Identified, truth: Truth | None) -> Table:
+    known = {} if truth is None else truth.parameters(item.fit.model)
+    columns = [Column("parameter"), Column("unit")]
+    columns += [Column(ESTIMATORS[method]) for method in item.fits]
+    columns += [Column("truth")] if known else []
+    rows: list[tuple[Cell, ...]] = []
+    for name, parameter in item.fit.parameters.items():
+        cells: list[Cell] = [name, parameter.unit]
+        cells += [_with_interval(other.parameters[name]) for other in item.fits.values()]
+        cells += [known[name]] if known else []
+        rows.append(tuple(cells))
+    return Table(
+        "The same model fitted to each estimate, with 95 % intervals", tuple(columns), tuple(rows)
+    )
+
+
+def _verification_blocks(verification: Verification) -> list[Block]:
+    record = verification.measured
+    panels = [
+        Panel(
+            look.axis_title(name, record.unit(name)),
+            (
+                Trace("measured", record.time_s, record[name]),
+                Trace("model", record.time_s, verification.predicted[name], look.MODEL, "dash"),
+            ),
+        )
+        for name in verification.outputs
+    ]
+    figure = figure_block(
+        time_histories(panels), "Measured response and the model's prediction from the input alone."
+    )
+    return [figure, *result_blocks(verification, title="Errors of the prediction")]
+
+
+def _with_interval(parameter: FittedParameter) -> str:
+    if parameter.interval95 is None:
+        return f"{parameter.value:.4g}"
+    low, high = parameter.interval95
+    return f"{parameter.value:.4g} ({low:.4g} … {high:.4g})"

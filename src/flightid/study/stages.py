@@ -1,0 +1,219 @@
+"""The stages of a study, one function each, from the log to the verified models."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+from flightid.conventions import Role
+from flightid.errors import StudyError
+from flightid.findings import Finding
+from flightid.identification import Fit, identify
+from flightid.logs import Log, SidRun
+from flightid.models import TransferFunctionModel, load_model
+from flightid.record import Record
+from flightid.responses import FrequencyResponse, estimate_response
+from flightid.study.settings import ModelSettings, Segment, Settings
+from flightid.validation import Verification, verify
+
+EXCITATION = "excitation"
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """One model to identify, loaded.
+
+    Attributes
+    ----------
+    settings : ModelSettings
+        What was asked.
+    model : TransferFunctionModel
+        Structure and start values, overrides applied.
+    """
+
+    settings: ModelSettings
+    model: TransferFunctionModel
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels that the model names."""
+        return (*self.model.inputs, *self.model.outputs)
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What a study made of one model.
+
+    Attributes
+    ----------
+    settings : ModelSettings
+        What was asked.
+    responses : mapping of str to FrequencyResponse
+        By estimator; the first is the one that counts.
+    fits : mapping of str to Fit
+        By estimator.
+    verifications : mapping of str to Verification
+        By segment, none of which the fit has seen.
+    """
+
+    settings: ModelSettings
+    responses: Mapping[str, FrequencyResponse]
+    fits: Mapping[str, Fit]
+    verifications: Mapping[str, Verification]
+
+    @property
+    def response(self) -> FrequencyResponse:
+        """The response that was fitted."""
+        return next(iter(self.responses.values()))
+
+    @property
+    def fit(self) -> Fit:
+        """The fit that counts."""
+        return next(iter(self.fits.values()))
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Verdicts on the response, the fit and each verification that count."""
+        checks = (finding for each in self.verifications.values() for finding in each.findings)
+        return (*self.response.findings, *self.fit.findings, *checks)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values of every result."""
+        return {
+            "name": self.settings.name,
+            "responses": {key: value.to_dict() for key, value in self.responses.items()},
+            "fits": {key: value.to_dict() for key, value in self.fits.items()},
+            "verifications": {key: value.to_dict() for key, value in self.verifications.items()},
+        }
+
+
+def load_task(settings: ModelSettings) -> Task:
+    """Load a model and apply the overrides of the study.
+
+    Raises
+    ------
+    StudyError
+        The model has more than one response.
+    UnknownNameError
+        There is no such library model, or no such parameter in it.
+    """
+    path = settings.template_path
+    model = load_model(settings.template if path is None else path, axis=settings.axis)
+    if len(model.responses) != 1:
+        raise StudyError(
+            f"model {settings.name!r} has several responses",
+            found=", ".join(model.response_names),
+            needed="one output to one input",
+        )
+    parameters = model.parameters
+    for name, given in settings.parameters.items():
+        parameters = parameters.with_parameter(replace(parameters[name], **given))
+    return Task(settings, replace(model, parameters=parameters))
+
+
+def cut_records(log: Log, settings: Settings, tasks: Iterable[Task]) -> dict[str, Record]:
+    """Take every segment that a model uses out of the log, with the channels its models need.
+
+    Parameters
+    ----------
+    log : Log
+        The flight.
+    settings : Settings
+        The study.
+    tasks : iterable of Task
+        The models.
+
+    Returns
+    -------
+    dict of str to Record
+        By segment name.
+
+    Raises
+    ------
+    StudyError
+        The log holds no such system-identification run.
+    """
+    records = {}
+    for segment in settings.segments:
+        users = [task for task in tasks if segment.name in task.settings.segments]
+        if users:
+            records[segment.name] = _cut(log, segment, settings, users)
+    return records
+
+
+def _cut(log: Log, segment: Segment, settings: Settings, users: list[Task]) -> Record:
+    roles = {name: Role.INPUT for task in users for name in task.model.inputs}
+    roles |= {name: Role.OUTPUT for task in users for name in task.model.outputs}
+    return log.record(
+        settings.channel_map,
+        names=list(roles),
+        span=segment.span_s,
+        sid_run=None if segment.sid_axis is None else sid_run(log, segment),
+        sample_rate_hz=settings.sample_rate_hz,
+        roles=roles,
+        name=segment.name,
+    )
+
+
+def sid_run(log: Log, segment: Segment) -> SidRun:
+    """System-identification run that a segment names.
+
+    Raises
+    ------
+    StudyError
+        The log holds no such run.
+    """
+    runs = [run for run in log.sid_runs if run.axis == segment.sid_axis]
+    if segment.run >= len(runs):
+        flown = ", ".join(str(run.axis) for run in log.sid_runs) or "none"
+        raise StudyError(
+            f"segment {segment.name!r}: the log holds no such system-identification run",
+            found=f"runs of SID_AXIS {flown}",
+            needed=f"run {segment.run} of SID_AXIS {segment.sid_axis}",
+        )
+    return runs[segment.run]
+
+
+def estimate(
+    task: Task, records: Mapping[str, Record], settings: Settings
+) -> dict[str, FrequencyResponse]:
+    """Frequency responses of one model's segments by each estimator, the one that counts first."""
+    chosen = settings.response
+    return {
+        method: estimate_response(
+            [records[name] for name in task.settings.identify],
+            inputs=task.model.inputs,
+            outputs=task.model.outputs,
+            excitation=EXCITATION if method == "instrument" else None,
+            omega_rad_s=(*task.settings.band_rad_s, chosen.n_frequencies),
+            window_s=list(chosen.windows_s) or "auto",
+            method=method,
+        )
+        for method in dict.fromkeys((chosen.method, *chosen.compare))
+    }
+
+
+def fit(
+    task: Task, responses: Mapping[str, FrequencyResponse], settings: Settings
+) -> dict[str, Fit]:
+    """Fit the model to the response of each estimator."""
+    return {
+        method: identify(
+            task.model,
+            response,
+            starts=settings.starts,
+            seed=settings.seed,
+            minimum_coherence=settings.response.minimum_coherence,
+        )
+        for method, response in responses.items()
+    }
+
+
+def check(
+    task: Task, fitted: Fit, records: Mapping[str, Record], settings: Settings
+) -> dict[str, Verification]:
+    """Predict each segment that the fit has not seen."""
+    return {
+        name: verify(fitted, records[name], initial=settings.initial, outputs=task.model.outputs)
+        for name in task.settings.verify
+    }

@@ -1,0 +1,102 @@
+"""The noun: what a study file made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from flightid.findings import Finding
+from flightid.inspection import Inspection
+from flightid.record import Record
+from flightid.report.content import Document
+from flightid.report.json import to_dict
+from flightid.study.document import parameter_table, study_document
+from flightid.study.output import SCHEMA
+from flightid.study.settings import Settings
+from flightid.study.stages import Identified
+from flightid.study.truth import Truth
+from flightid.table import Table
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """What a study file made.
+
+    Attributes
+    ----------
+    settings : Settings
+        The study file, checked.
+    output : Path
+        Folder with ``report.html``, ``report.txt`` and ``results.json``.
+    inspection : Inspection
+        What the log can support.
+    records : mapping of str to Record
+        By segment.
+    identified : tuple of Identified
+        Responses, fits and verifications, one for each model.
+    truth : Truth or None
+        What should have been found, where the flight was simulated.
+    files : mapping of str to str
+        SHA-256 of what was read, by file name.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> fid.run_study("study.toml")                                  # doctest: +SKIP
+    Study('Roll rate', 1 model, 3 green)
+    """
+
+    settings: Settings
+    output: Path
+    inspection: Inspection
+    records: Mapping[str, Record]
+    identified: tuple[Identified, ...]
+    truth: Truth | None = None
+    files: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def document(self) -> Document:
+        """The report as a content tree."""
+        return study_document(self)
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Every verdict of the report."""
+        return self.document.findings
+
+    def summary(self) -> Table:
+        """Table of all parameters with their intervals."""
+        return parameter_table(self)
+
+    def to_dict(self) -> dict[str, object]:
+        """Every result as plain values, the report's content tree among them.
+
+        Returns
+        -------
+        dict
+            Keys ``schema``, ``title``, ``files``, ``inspection``, ``models``, ``truth``,
+            ``findings``, ``report``.
+        """
+        return {
+            "schema": SCHEMA,
+            "title": self.settings.title,
+            "files": dict(self.files),
+            "inspection": self.inspection.to_dict(),
+            "models": [item.to_dict() for item in self.identified],
+            "truth": None if self.truth is None else self.truth.to_dict(),
+            "findings": [finding.to_dict() for finding in self.findings],
+            "report": to_dict(self.document),
+        }
+
+    def __repr__(self) -> str:
+        """Title, number of models and verdicts on one line."""
+        n = len(self.identified)
+        return (
+            f"Study({self.settings.title!r}, {n} model{'' if n == 1 else 's'}, "
+            f"{self.document.tally})"
+        )
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()

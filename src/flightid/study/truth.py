@@ -1,0 +1,113 @@
+"""What a study of a simulated flight should find, and whether it did."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binom
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.simulation import Flight, RateTruth
+from flightid.simulation.truth import AXES, RATES
+
+if TYPE_CHECKING:
+    from flightid.models import TransferFunctionModel
+
+NAMES = {
+    "damping_1_s": ("Lp", "Mq", "Nr"),
+    "gain_rad_s2": ("Ltphi", "Mttheta", "Ntpsi"),
+    "motor_lag_s": ("T_m",),
+    "lead_s": ("T_r",),
+}
+"""Names that model files give to the truth's fields."""
+SAME = 1e-9
+"""Relative difference up to which two transfer functions count as the same."""
+SURPRISING = 0.01
+"""A count of misses rarer than this under honest intervals is a failure, not bad luck."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Exact transfer functions of a simulated vehicle.
+
+    Attributes
+    ----------
+    rates : mapping of str to RateTruth
+        By body-rate channel.
+    """
+
+    rates: Mapping[str, RateTruth]
+
+    @classmethod
+    def of_flight(cls, flight: Flight) -> Truth:
+        """Truth of every rate axis of a simulated flight."""
+        return cls({rate: flight.truth(axis) for rate, axis in zip(RATES, AXES, strict=True)})
+
+    def response(
+        self, model: TransferFunctionModel, omega_rad_s: NDArray[np.float64]
+    ) -> NDArray[np.complex128] | None:
+        """Exact response of the model's output, shape (n_freqs,); None where it is no body rate."""
+        truth = self.rates.get(model.outputs[0])
+        return None if truth is None else truth.frequency_response(omega_rad_s)
+
+    def parameters(self, model: TransferFunctionModel) -> dict[str, float]:
+        """True value of each parameter of a model that can follow the true response exactly.
+
+        Parameters
+        ----------
+        model : TransferFunctionModel
+            Model with one response; its parameters carry the library's names.
+
+        Returns
+        -------
+        dict of str to float
+            Empty where the model has another structure: its parameters then have no true value.
+        """
+        truth = self.rates.get(model.outputs[0])
+        if truth is None:
+            return {}
+        values = {
+            name: float(getattr(truth, field)) for field, names in NAMES.items() for name in names
+        }
+        values["tau"] = truth.effective_delay_s()
+        if not set(model.parameters) <= set(values):
+            return {}
+        chosen = {name: values[name] for name in model.parameters}
+        omega = np.geomspace(0.1, 100.0, 9)
+        followed = model.frequency_response(omega, chosen)[0, 0]
+        return chosen if np.allclose(followed, truth.continuous(omega), rtol=SAME) else {}
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values by rate channel."""
+        return {rate: truth.to_dict() for rate, truth in self.rates.items()}
+
+
+def recovered(inside: NDArray[np.bool_]) -> Finding:
+    """Verdict on how many true values lie inside their 95 % intervals.
+
+    Parameters
+    ----------
+    inside : ndarray of bool, shape (n_parameters,)
+        One for each true value.
+
+    Returns
+    -------
+    Finding
+    """
+    missed = int(inside.size - inside.sum())
+    message = f"{inside.size - missed} of {inside.size} true values lie inside their 95 % intervals"
+    if missed == 0:
+        return Finding("truth-recovered", Light.GREEN, message + ".")
+    chance = float(binom.sf(missed - 1, inside.size, 0.05))
+    light = Light.AMBER if chance > SURPRISING else Light.RED
+    return Finding(
+        "truth-missed",
+        light,
+        f"{message}; honest intervals miss as many in {100 * chance:.2g} % of flights.",
+        "compare other seeds, and the model's structure with the simulated one",
+    )

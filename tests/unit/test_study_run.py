@@ -1,0 +1,180 @@
+"""A whole study on a short simulated flight: every stage, every face, every ending."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+import flightid as fid
+from flightid.cli.program import run
+from flightid.errors import StudyError
+from flightid.report.html import to_html
+from flightid.report.text import to_text
+from flightid.study import run as running
+
+STUDY = """
+[study]
+title = "Short flight <b>"
+[flight]
+simulate = "quadrotor"
+seed = 1
+log_every = 4
+[[flight.sweep]]
+axis = 10
+start_s = 2.0
+magnitude = 0.15
+start_hz = 0.4
+stop_hz = 8.0
+fade_in_s = 1.0
+record_s = 40.0
+fade_out_s = 1.0
+[[flight.doublet]]
+axis = "roll"
+start_s = 52.0
+amplitude = 0.3
+[[segment]]
+name = "sweep"
+sid_axis = 10
+[[segment]]
+name = "doublet"
+span_s = [61.0, 66.0]
+[response]
+method = "instrument"
+compare = ["composite"]
+[[model]]
+name = "Roll rate"
+template = "rate_motor_lag"
+axis = "roll"
+identify = "sweep"
+verify = "doublet"
+band_rad_s = [4.0, 40.0]
+parameters.T_m = { maximum = 0.15 }
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> fid.Study:
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "study.toml").write_text(STUDY)
+    return fid.run_study(folder / "study.toml")
+
+
+def test_output_is_whole(study: fid.Study) -> None:
+    names = sorted(item.name for item in study.output.iterdir())
+    assert names == ["flight.bin", "report.html", "report.txt", "results.json"]
+    assert study.output.name == "study-output"
+    assert list(study.output.parent.glob(".*")) == []
+
+
+def test_every_stage_left_its_result(study: fid.Study) -> None:
+    (item,) = study.identified
+    assert list(item.fits) == ["instrument", "composite"]
+    assert list(item.verifications) == ["doublet"]
+    assert study.truth is not None
+    assert set(study.truth.parameters(item.fit.model)) == {"Ltphi", "Lp", "T_m", "tau"}
+    assert set(study.records) == {"sweep", "doublet"}
+    assert re.fullmatch(r"Study\('Short flight <b>', 1 model, .*green.*\)", repr(study))
+
+
+def test_text_html_and_json_agree_on_the_numbers(study: fid.Study) -> None:
+    values = json.loads((study.output / "results.json").read_text())
+    text = (study.output / "report.txt").read_text()
+    page = (study.output / "report.html").read_text()
+    fitted = values["models"][0]["fits"]["instrument"]["parameters"]
+    for name, parameter in fitted.items():
+        shown = f"{parameter['value']:.5g}"
+        assert shown in text, name
+        assert f">{shown}<" in page, name
+    assert text == to_text(study.document)
+    assert page == to_html(study.document)
+    assert values["report"]["tally"] in text
+
+
+def test_provenance_names_every_file_by_its_hash(study: fid.Study) -> None:
+    text = (study.output / "report.txt").read_text()
+    assert set(study.files) == {"study.toml", "flight.bin"}
+    for digest in study.files.values():
+        assert digest in text
+
+
+def test_a_second_run_on_the_written_log_finds_the_same(
+    study: fid.Study, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = study.output.parent / "study.toml"
+    output = tmp_path / "again"
+    arguments = ["run", str(source), "--log", str(study.output / "flight.bin")]
+    code = run([*arguments, "--output", str(output), "--json"])
+    values = json.loads(capsys.readouterr().out)
+    first = study.to_dict()
+    assert code in {0, 1}
+    assert values["truth"] is None
+    assert values["models"] == json.loads(json.dumps(first["models"]))
+
+
+@pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt])
+def test_a_run_that_breaks_off_leaves_nothing(
+    study: fid.Study,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    failure: type[BaseException],
+) -> None:
+    def broken(*_: object) -> str:
+        raise failure
+
+    monkeypatch.setattr(running, "to_html", broken)
+    with pytest.raises(failure):
+        fid.run_study(
+            study.output.parent / "study.toml",
+            output=tmp_path / "out",
+            log=study.output / "flight.bin",
+        )
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("sid_axis = 10", "sid_axis = 11", "no such system-identification run: found runs of"),
+        ('template = "rate_motor_lag"', 'template = "rate_motor"', "no such library model"),
+        ("parameters.T_m", "parameters.T_x", "there is no such parameter"),
+    ],
+)
+def test_what_the_log_or_library_lacks_is_named(
+    study: fid.Study, tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    (tmp_path / "study.toml").write_text(STUDY.replace(old, new))
+    with pytest.raises(fid.FlightidError, match=said):
+        fid.run_study(tmp_path / "study.toml", log=study.output / "flight.bin")
+    assert [item.name for item in tmp_path.iterdir()] == ["study.toml"]
+
+
+def test_a_model_with_several_responses_is_refused(study: fid.Study, tmp_path: Path) -> None:
+    (tmp_path / "two.toml").write_text(
+        'kind = "transfer"\nname = "two"\nsource = "none"\n'
+        '[inputs]\ntau_phi = "1"\n[outputs]\np = "rad/s"\nq = "rad/s"\n'
+        '[parameters]\nK = { value = 1.0, unit = "rad/s^2" }\n'
+        '[responses."p/tau_phi"]\ngain = "K"\ndenominator = ["s"]\n'
+        '[responses."q/tau_phi"]\ngain = "K"\ndenominator = ["s"]\n'
+    )
+    text = STUDY.replace('"rate_motor_lag"\naxis = "roll"', '"two.toml"')
+    (tmp_path / "study.toml").write_text(text)
+    with pytest.raises(StudyError, match="has several responses"):
+        fid.run_study(tmp_path / "study.toml", log=study.output / "flight.bin")
+
+
+def test_a_log_that_is_not_there_is_named(tmp_path: Path) -> None:
+    text = re.sub(r"\[flight\].*?\[\[segment\]\]", "[[segment]]", STUDY, count=1, flags=re.DOTALL)
+    (tmp_path / "study.toml").write_text('[log]\npath = "lost.bin"\n' + text)
+    with pytest.raises(StudyError, match="the log of the study is not there"):
+        fid.run_study(tmp_path / "study.toml")
+
+
+def test_a_folder_of_other_content_is_refused_before_the_work(
+    study: fid.Study, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.txt").touch()
+    assert run(["run", str(study.output.parent / "study.toml"), "--output", str(tmp_path)]) == 2
+    assert "holds something else" in capsys.readouterr().err
