@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from pymavlink import DFReader
 
 import flightid as fid
 from flightid.logs import DataflashWriter
@@ -73,8 +74,6 @@ def _ours(path: Path) -> list[np.ndarray]:
 
 
 def _theirs(path: Path) -> list[np.ndarray]:
-    from pymavlink import DFReader
-
     reader = DFReader.DFReader_binary(str(path))
     rows: dict[str, list[list[float]]] = {name: [] for name in MESSAGES}
     while (message := reader.recv_match(type=list(MESSAGES))) is not None:

@@ -11,8 +11,10 @@ use crate::error::from_logs;
 
 /// Field as Python sees it: label, format character, unit, multiplier, numbers a row.
 type FieldRow = (String, char, String, f64, usize);
-/// Table as Python sees it: name, type, rows, instances, fields, first, last and usual step (s).
-type TableRow = (String, u8, usize, Vec<i64>, Vec<FieldRow>, Option<(f64, f64, Option<f64>)>);
+/// Table as Python sees it: name, type, rows, fields.
+type TableRow = (String, u8, usize, Vec<FieldRow>);
+/// Instances, and first stamp, last stamp and usual step, s.
+type Description = (Vec<i64>, Option<(f64, f64, Option<f64>)>);
 
 /// An indexed DataFlash log with its bytes.
 ///
@@ -59,16 +61,7 @@ impl DataflashFile {
             let (scale, width) = (field.scale.factor(), field.kind.width());
             (field.name.clone(), field.code, field.unit.clone(), scale, width)
         });
-        let instances = self.0.instances(table);
-        let stamps = self.0.describe(table, &instances);
-        (
-            table.name().to_owned(),
-            table.type_id(),
-            table.len(),
-            instances,
-            fields.collect(),
-            stamps.map(|stamps| (stamps.first_s, stamps.last_s, stamps.interval_s)),
-        )
+        (table.name().to_owned(), table.type_id(), table.len(), fields.collect())
     }
 }
 
@@ -78,12 +71,24 @@ fn missing(what: &'static str, place: usize) -> PyErr {
 
 #[pymethods]
 impl DataflashFile {
-    /// tables(self) -> list[tuple[str, int, int, list[int], list[tuple[str, str, str, float, int]], tuple[float, float, float | None] | None]]
+    /// tables(self) -> list[tuple[str, int, int, list[tuple[str, str, str, float, int]]]]
     ///
-    /// Every message type that is defined: name, type, rows, instances, fields (label, format
-    /// character, unit, multiplier, numbers a row), and first stamp, last stamp, median step in s.
-    fn tables(&self, py: Python<'_>) -> Vec<TableRow> {
-        py.detach(|| self.0.tables().iter().map(|table| self.row(table)).collect())
+    /// Every message type that is defined: name, type, rows and fields (label, format character,
+    /// unit, multiplier, numbers a row).
+    fn tables(&self) -> Vec<TableRow> {
+        self.0.tables().iter().map(|table| self.row(table)).collect()
+    }
+
+    /// describe(self, table: int) -> tuple[list[int], tuple[float, float, float | None] | None]
+    ///
+    /// Instances of a table, and its first stamp, last stamp and median step in s.
+    fn describe(&self, py: Python<'_>, table: usize) -> PyResult<Description> {
+        let table = self.table_at(table)?;
+        Ok(py.detach(|| {
+            let instances = self.0.instances(table);
+            let stamps = self.0.describe(table, &instances);
+            (instances, stamps.map(|found| (found.first_s, found.last_s, found.interval_s)))
+        }))
     }
 
     /// skipped(self) -> list[tuple[int, int, str]]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -47,8 +47,46 @@ class _Column(NamedTuple):
 
 class _Layout(NamedTuple):
     table: int
+    n_rows: int
     columns: dict[str, int]
-    widths: dict[str, int]
+    fields: list[_Column]
+
+
+class _Messages(Mapping[str, MessageInfo]):
+    """Message infos by name, each made when it is asked for: describing reads every row."""
+
+    def __init__(self, file: _native.DataflashFile, layouts: dict[str, _Layout]) -> None:
+        self._file = file
+        self._layouts = layouts
+        self._made: dict[str, MessageInfo] = {}
+
+    def __getitem__(self, name: str) -> MessageInfo:
+        if name not in self._made:
+            self._made[name] = self._describe(name, self._layouts[name])
+        return self._made[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._layouts
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._layouts)
+
+    def __len__(self) -> int:
+        return len(self._layouts)
+
+    def _describe(self, name: str, layout: _Layout) -> MessageInfo:
+        instances, stamps = self._file.describe(layout.table)
+        first_s, last_s, step_s = stamps or (None, None, None)
+        return MessageInfo(
+            name,
+            layout.n_rows,
+            tuple(instances),
+            {field.label: UNITS.get(field.unit, DIMENSIONLESS) for field in layout.fields},
+            tuple(field.label for field in layout.fields if field.width == 0),
+            None if step_s is None else 1.0 / step_s,
+            first_s,
+            last_s,
+        )
 
 
 def open_dataflash(path: Path) -> DataflashSource:
@@ -78,58 +116,25 @@ class DataflashSource:
     def __init__(self, file: _native.DataflashFile) -> None:
         self._file = file
         self._layouts: dict[str, _Layout] = {}
-        self._messages: dict[str, MessageInfo] = {}
-        self._unknown_units: set[str] = set()
         self._renamed: list[str] = []
-        for index, row in enumerate(file.tables()):
-            self._adopt(index, *row)
+        for index, (name, _, count, fields) in enumerate(file.tables()):
+            if count > 0:
+                self._adopt(index, name, count, [_Column(*field) for field in fields])
+        self._messages = _Messages(file, self._layouts)
 
-    def _adopt(
-        self,
-        index: int,
-        name: str,
-        _type: int,
-        count: int,
-        instances: list[int],
-        fields: list[tuple[str, str, str, float, int]],
-        stamps: tuple[float, float, float | None] | None,
-    ) -> None:
+    def _adopt(self, table: int, name: str, count: int, fields: list[_Column]) -> None:
         """Take in a table of the file; a second layout under one name becomes ``NAME~2``."""
-        if count == 0:
-            return
         label, copy = name, 1
         while label in self._layouts:
             copy += 1
             label = f"{name}~{copy}"
         if copy > 1:
             self._renamed.append(label)
-        columns = [_Column(*field) for field in fields]
-        first_s, last_s, step_s = stamps or (None, None, None)
-        self._layouts[label] = _Layout(
-            index,
-            {column.label: place for place, column in reversed(list(enumerate(columns)))},
-            {column.label: column.width for column in columns},
-        )
-        self._messages[label] = MessageInfo(
-            label,
-            count,
-            tuple(instances),
-            {column.label: self._unit(column) for column in columns},
-            tuple(column.label for column in columns if column.width == 0),
-            None if step_s is None else 1.0 / step_s,
-            first_s,
-            last_s,
-        )
-
-    def _unit(self, column: _Column) -> str:
-        unit = UNITS.get(column.unit)
-        if unit is None:
-            self._unknown_units.add(column.unit)
-            return DIMENSIONLESS
-        return unit
+        places = {field.label: place for place, field in reversed(list(enumerate(fields)))}
+        self._layouts[label] = _Layout(table, count, places, fields)
 
     @property
-    def messages(self) -> dict[str, MessageInfo]:
+    def messages(self) -> Mapping[str, MessageInfo]:
         """Message types that have rows, in order of definition."""
         return self._messages
 
@@ -141,7 +146,7 @@ class DataflashSource:
         """Scaled numbers; an int16[32] field has shape (n_rows, 32)."""
         layout = self._layouts[message]
         values = self._file.numbers(layout.table, layout.columns[field], instance)
-        width = layout.widths[field]
+        width = layout.fields[layout.columns[field]].width
         return values.reshape(-1, width) if width > 1 else values
 
     def texts(self, message: str, field: str, instance: int | None) -> list[str]:
@@ -272,8 +277,9 @@ class DataflashSource:
                 )
 
     def _doubts(self) -> Iterator[Finding]:
-        if self._unknown_units:
-            names = ", ".join(sorted(map(repr, self._unknown_units)))
+        units = {field.unit for layout in self._layouts.values() for field in layout.fields}
+        if unknown := units - set(UNITS):
+            names = ", ".join(sorted(map(repr, unknown)))
             yield Finding(
                 "unit-unknown",
                 Light.AMBER,

@@ -124,7 +124,7 @@ class Log:
 
     def __contains__(self, message: object) -> bool:
         """Tell whether the log holds rows of a message type."""
-        return message in self.messages
+        return message in self._source.messages
 
     def table(self, name: str, instance: int | None = None) -> LogTable:
         """Rows of a message type by column.
@@ -145,11 +145,12 @@ class Log:
         MissingColumnError
             The log holds no such message or instance.
         """
-        if name not in self.messages:
+        messages = self._source.messages
+        if name not in messages:
             raise MissingColumnError(
                 "the log holds no such message", found=name, needed=self._near(name)
             )
-        return LogTable(self._source, self.messages[name], instance)
+        return LogTable(self._source, messages[name], instance)
 
     @cached_property
     def sid_runs(self) -> tuple[SidRun, ...]:
