@@ -19,8 +19,11 @@ from scipy.fft import next_fast_len
 from flightid.responses.noise import NoiseSpectrum
 from flightid.responses.transform import FoldedBasis, WindowPlan, transform
 
-COLUMNS = 4096
+COLUMNS = 2048
 """Frequencies of the noise that are worked on at a time: bounds memory."""
+SIDE_LOBES = 40.0
+"""Bins of the shortest window beyond the highest frequency, past which noise does not reach the
+estimate: a Hann window's side lobes are down by 1e-9 in power there."""
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
@@ -73,14 +76,26 @@ class WindowedErrors:
         size = 2 * len(inputs) * len(frequencies)
         total = np.zeros((len(outputs), size, size))
         sensitivity = self.sensitivity[:, :, :, outputs][:, :, :, :, inputs][..., frequencies]
-        longest = max(share.plan.length for share in self.shares)
-        for record in self.instruments:
-            length = next_fast_len(record.shape[1] + longest // 2, real=True)
-            weights = [self._weights(record, k, inputs, frequencies) for k in self.shares]
-            bins = np.arange(length // 2 + 1)
+        for n_samples in sorted({record.shape[1] for record in self.instruments}):
+            weights = [
+                [self._weights(record, share, inputs, frequencies) for share in self.shares]
+                for record in self.instruments
+                if record.shape[1] == n_samples
+            ]
+            length, bins = self._noise_bins(n_samples, frequencies)
             for columns in np.array_split(bins, -(-len(bins) // COLUMNS)):
                 self._add(total, columns, length, weights, sensitivity, outputs, frequencies)
         return total
+
+    def _noise_bins(
+        self, n_samples: int, frequencies: NDArray[np.intp]
+    ) -> tuple[int, NDArray[np.intp]]:
+        """Length of the noise's Fourier transform, and its bins that reach the estimate."""
+        lengths = [share.plan.length for share in self.shares]
+        length = int(next_fast_len(n_samples + max(lengths) // 2, real=True))
+        highest = float(self.omega[frequencies].max()) + SIDE_LOBES * 2.0 * np.pi / min(lengths)
+        last = min(length // 2, int(highest * length / (2.0 * np.pi)) + 1)
+        return length, np.arange(last + 1)
 
     def _weights(
         self,
@@ -100,47 +115,68 @@ class WindowedErrors:
         total: Real,
         columns: NDArray[np.intp],
         length: int,
-        weights: Sequence[Complex],
+        records: Sequence[Sequence[Complex]],
         sensitivity: Real,
         outputs: NDArray[np.intp],
         frequencies: NDArray[np.intp],
     ) -> None:
+        """Add what some bins of the noise contribute, for all records of one length."""
         angle = 2.0 * np.pi * columns / length
         density = self.noise.at(angle / self.sample_time_s) / (2.0 * self.sample_time_s)
         twice = np.where((columns == 0) | (2 * columns == length), 1.0, 2.0) / length
-        parts = []
-        for share, weight in zip(self.shares, weights, strict=True):
-            ahead = _kernel(share.plan, weight, self.omega[frequencies], angle, self.detrend)
-            behind = _kernel(share.plan, weight, self.omega[frequencies], -angle, self.detrend)
-            mirrored = behind.conj()
-            parts.append(((ahead + mirrored) / 2.0, (ahead - mirrored) / 2.0j))
-        for place, output in enumerate(outputs):
-            rows = np.concatenate(
-                [
-                    sum(
-                        turn[part, 0, place][:, :, None] * real
-                        + turn[part, 1, place][:, :, None] * imaginary
-                        for turn, (real, imaginary) in zip(sensitivity, parts, strict=True)
-                    ).reshape(-1, len(columns))
-                    for part in (0, 1)
-                ]
+        level = np.sqrt(twice * density[outputs])
+        omega = self.omega[frequencies]
+        bases = [
+            tuple(
+                basis_transform(share.plan.length, omega, sign * angle, self.detrend)
+                for sign in (1.0, -1.0)
             )
-            rows *= np.sqrt(twice * density[output])
-            flat = np.concatenate([rows.real, rows.imag], axis=1)
-            total[place] += flat @ flat.T
+            for share in self.shares
+        ]
+        for weights in records:
+            parts = []
+            for share, weight, (above, below) in zip(self.shares, weights, bases, strict=True):
+                ahead = _places(share.plan, weight, angle) * above
+                mirrored = (_places(share.plan, weight, -angle) * below).conj()
+                parts.append(((ahead + mirrored) / 2.0, (ahead - mirrored) / 2.0j))
+            _add_gram(total, parts, sensitivity, level)
 
 
-def _kernel(plan: WindowPlan, weight: Complex, omega: Real, angle: Real, detrend: str) -> Complex:
-    """Fourier transform of g, shape (n_in, n_f, n_angles).
+def _add_gram(
+    total: Real, parts: Sequence[tuple[Complex, Complex]], sensitivity: Real, level: Real
+) -> None:
+    """Add the Gram matrix of the weighted kernels of each output.
 
-    Windows are copies of one basis function at their own places, so the transform is that of the
-    places times that of the function.
+    Parameters
+    ----------
+    total : ndarray, shape (n_out, rows, rows)
+        Added to.
+    parts : sequence of (ndarray, ndarray), each shape (n_in, n_f, n_bins)
+        Kernels of real and imaginary part, for each window length.
+    sensitivity : ndarray, shape (n_windows, 2, 2, n_out, n_in, n_f)
+    level : ndarray, shape (n_out, n_bins)
+        Root of the noise power at each bin.
+    """
+    n_bins = level.shape[1]
+    for place in range(len(total)):
+        rows = np.zeros((2, *parts[0][0].shape), dtype=np.complex128)
+        for turn, kernels in zip(sensitivity, parts, strict=True):
+            for part, other in np.ndindex(2, 2):
+                weight = turn[part, other, place]
+                if np.any(weight):
+                    rows[part] += weight[:, :, None] * kernels[other]
+        rows *= level[place]
+        flat = rows.reshape(-1, n_bins).view(np.float64)
+        total[place] += flat @ flat.T
+
+
+def _places(plan: WindowPlan, weight: Complex, angle: Real) -> Complex:
+    """Fourier transform of the windows' weights at their places, shape (n_in, n_f, n_angles).
+
+    Windows are copies of one basis function, so the transform of g is this times the function's.
     """
     middles = plan.length // 2 + plan.hop * np.arange(weight.shape[2])
-    return np.asarray(
-        (weight @ np.exp(-1j * np.multiply.outer(middles, angle)))
-        * basis_transform(plan.length, omega, angle, detrend)
-    )
+    return np.asarray(weight @ np.exp(-1j * np.multiply.outer(middles, angle)))
 
 
 def basis_transform(length: int, omega: Real, angle: Real, detrend: str) -> Complex:

@@ -21,6 +21,7 @@ SMALLEST_PROBABILITY = 1e-6
 SAMPLES_A_CYCLE = 8.0
 """Samples kept in a cycle of the highest frequency of interest."""
 MAXIMUM_SAMPLES = 20000
+"""Of all records together."""
 
 
 def feedback_findings(samples: Samples, omega_max: float) -> list[Finding]:
@@ -45,17 +46,19 @@ def feedback_findings(samples: Samples, omega_max: float) -> list[Finding]:
     *Econometrica* 37 (1969); Ljung, *System Identification*, 2nd ed., section 13.4.
     """
     step = max(1, int(2.0 * np.pi / (SAMPLES_A_CYCLE * omega_max * samples.sample_time_s)))
-    records = [record[:, ::step][:, :MAXIMUM_SAMPLES] for record in samples.records]
+    most = MAXIMUM_SAMPLES // len(samples.records)
+    records = [record[:, ::step][:, :most] for record in samples.records]
     long = [record for record in records if record.shape[1] > 4 * LAGS]
     n_in, n_out = len(samples.inputs), len(samples.outputs)
     if not long:
         return []
     own = np.concatenate([_past(record[:n_in]) for record in long])
     others = np.concatenate([_past(record[n_in : n_in + n_out]) for record in long])
+    targets = np.concatenate([record[:n_in, LAGS:].T for record in long])
     found = []
-    for index, name in enumerate(samples.inputs):
-        target = np.concatenate([record[index, LAGS:] for record in long])
-        share, power, probability = _gain(own, others, target)
+    for name, (share, power, probability) in zip(
+        samples.inputs, _gains(own, others, targets), strict=True
+    ):
         large = share > SMALLEST_SHARE and power > SMALLEST_POWER
         if large and probability < SMALLEST_PROBABILITY:
             found.append(
@@ -78,25 +81,30 @@ def _past(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([rows[:, LAGS - k : n - k] for k in range(1, LAGS + 1)]).T
 
 
-def _gain(
-    own: NDArray[np.float64], others: NDArray[np.float64], target: NDArray[np.float64]
-) -> tuple[float, float, float]:
-    """What the others explain beyond the own past, and its F probability.
+def _gains(
+    own: NDArray[np.float64], others: NDArray[np.float64], targets: NDArray[np.float64]
+) -> list[tuple[float, float, float]]:
+    """What the others explain of each target beyond the own past, and its F probability.
 
-    First as a share of what the own past leaves, then as a share of the whole.
+    First as a share of what the own past leaves, then as a share of the whole. One triangular
+    factor of everything holds all these sums of squares.
     """
-    both = np.concatenate([own, others], axis=1)
-    free = len(target) - both.shape[1]
-    without, with_others = _residual(own, target), _residual(both, target)
-    if free <= 0 or without <= np.finfo(float).eps * float(target @ target):
-        return 0.0, 0.0, 1.0
-    share = max(0.0, 1.0 - with_others / without)
-    f = share / others.shape[1] / max((1.0 - share) / free, np.finfo(float).tiny)
-    power = (without - with_others) / float(target @ target)
-    return share, power, float(stats.f.sf(f, others.shape[1], free))
-
-
-def _residual(regressors: NDArray[np.float64], target: NDArray[np.float64]) -> float:
-    scale = np.maximum(np.linalg.norm(regressors, axis=0), np.finfo(float).tiny)
-    solution = np.linalg.lstsq(regressors / scale, target, rcond=1e-10)[0]
-    return float(np.sum((target - regressors / scale @ solution) ** 2))
+    table = np.concatenate([own, others, targets], axis=1)
+    before, after = own.shape[1], own.shape[1] + others.shape[1]
+    free = len(table) - after
+    if free <= others.shape[1]:
+        return [(0.0, 0.0, 1.0)] * targets.shape[1]
+    scale = np.maximum(np.sqrt(np.sum(table**2, axis=0)), np.finfo(float).tiny)
+    factor = np.asarray(np.linalg.qr(table / scale, mode="r"))
+    squares = factor[:, after:] ** 2
+    found = []
+    for column in range(targets.shape[1]):
+        left = float(np.sum(squares[after:, column]))
+        without = float(np.sum(squares[before:, column]))
+        if without <= 1e-12:
+            found.append((0.0, 0.0, 1.0))
+            continue
+        share = max(0.0, 1.0 - left / without)
+        f = share / others.shape[1] / max((1.0 - share) / free, np.finfo(float).tiny)
+        found.append((share, without - left, float(stats.f.sf(f, others.shape[1], free))))
+    return found

@@ -127,7 +127,8 @@ def fit_locally(
     )
     left, right = [], []
     for bins, place in zip(records, places, strict=True):
-        powers = np.vander((bins.omega[place] - omega) / width, order + 1, increasing=True)
+        distance = (bins.omega[place] - omega) / width
+        powers = distance[:, None] ** np.arange(order + 1)
         basis, _ = np.linalg.qr(powers)
         values = bins.values[:, place].T
         regressors = (values[:, :n_inputs, None] * powers[:, None, :]).reshape(len(values), -1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,9 @@ from numpy.typing import NDArray
 from flightid.errors import DataError
 from flightid.responses.local_fit import Bins, bins_needed, fit_locally
 from flightid.responses.samples import Samples
+
+BEYOND_BAND = 1.5
+"""Noise is estimated up to this multiple of the highest frequency of the response."""
 
 
 @dataclass(frozen=True)
@@ -78,9 +82,13 @@ def estimate_noise(
             action="use longer records, or covariance=False",
         )
     longest = max(records, key=lambda bins: len(bins.omega))
-    edges = longest.omega[:: max(count, len(longest.omega) * count // max(size, 1))]
+    # A window's side lobes beyond this are far below its main lobe; the last density is held there.
+    stride = max(count, len(longest.omega) * count // size)
+    edges = np.append(longest.omega[::stride], np.inf)
+    inside_band = int(np.searchsorted(edges, BEYOND_BAND * float(omega[-1])))
+    edges = edges[: max(inside_band + 1, 2)]
     centres, densities = [], []
-    for low, high in zip(edges, [*edges[1:], np.inf], strict=True):
+    for low, high in pairwise(edges):
         places = [
             slice(*np.searchsorted(bins.omega, [low * (1 - 1e-12), high * (1 - 1e-12)]))
             for bins in records
