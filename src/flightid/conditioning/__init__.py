@@ -11,6 +11,8 @@
 
 from flightid.conditioning.align import SkewEstimate, align, estimate_skew
 from flightid.conditioning.axes import AxisConversion, convert_attitude, convert_axes, flip_sign
+from flightid.conditioning.consistency import check_consistency
+from flightid.conditioning.consistency_result import InstrumentParameter, KinematicConsistency
 from flightid.conditioning.detrend import Trend, detrend
 from flightid.conditioning.filter import FilterDesign, filter_record
 from flightid.conditioning.resample import resample
@@ -32,7 +34,9 @@ __all__ = [
     "AxisConversion",
     "FilterDesign",
     "GapPolicy",
+    "InstrumentParameter",
     "Interpolation",
+    "KinematicConsistency",
     "SkewEstimate",
     "Smoothed",
     "StampPolicy",
@@ -41,6 +45,7 @@ __all__ = [
     "accelerations_at_cg",
     "air_data_at_cg",
     "align",
+    "check_consistency",
     "convert_attitude",
     "convert_axes",
     "detrend",

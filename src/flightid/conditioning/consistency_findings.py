@@ -1,0 +1,136 @@
+"""Verdicts of the consistency check: instrument errors, correlated pairs, poor fits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.conditioning.consistency_result import InstrumentParameter
+from flightid.conventions import Light
+from flightid.errors import SingularError
+from flightid.findings import Finding
+
+CORRELATED = 0.9
+INSEPARABLE = 0.99
+LARGEST_CONDITION = 1e9
+RATE_BIAS_RAD_S = np.deg2rad(0.5)
+FORCE_BIAS_M_S2 = 0.3
+SCALE_ERROR = 0.05
+POOR_FIT_PERCENT = 70.0
+
+
+def require_separable(parameters: Sequence[str], jacobian: NDArray[np.float64]) -> None:
+    """Refuse parameters whose effects on the outputs cannot be told apart.
+
+    Raises
+    ------
+    SingularError
+        A parameter without effect, or a combination of parameters without effect.
+    """
+    size = np.linalg.norm(jacobian, axis=0)
+    idle = [name for name, value in zip(parameters, size, strict=True) if not value > 0]
+    if idle:
+        raise SingularError(
+            "parameters have no effect on the outputs",
+            found=", ".join(idle),
+            action="leave them out of estimate=[...]",
+        )
+    _, values, rows = np.linalg.svd(jacobian / size, full_matrices=False)
+    if values[0] > LARGEST_CONDITION * values[-1]:
+        mixed = [p for p, part in zip(parameters, rows[-1], strict=True) if abs(part) > 0.1]
+        raise SingularError(
+            "the record cannot tell parameters apart",
+            found=", ".join(mixed),
+            needed="motion that separates them",
+            action="leave one of them out of estimate=[...]",
+        )
+
+
+def findings_of(
+    parameters: Mapping[str, InstrumentParameter],
+    correlation: NDArray[np.float64],
+    fit_percent: Mapping[str, float | None],
+    sample_time_s: float,
+) -> tuple[Finding, ...]:
+    """All verdicts, in the order: instruments, pairs, fits."""
+    found = [
+        finding
+        for parameter in parameters.values()
+        if parameter.is_significant and not parameter.name.endswith("_0")
+        for finding in _of_parameter(parameter, sample_time_s)
+    ]
+    names = list(parameters)
+    for i, j in zip(*np.nonzero(np.triu(np.abs(correlation) > CORRELATED, k=1)), strict=True):
+        value = float(correlation[i, j])
+        found.append(
+            Finding(
+                "correlated-pair",
+                Light.RED if abs(value) > INSEPARABLE else Light.AMBER,
+                f"{names[i]} and {names[j]} are correlated by {value:.3f}",
+                "fly more motion of these axes, or leave one of the two out of the estimate",
+            )
+        )
+    for name, percent in fit_percent.items():
+        if percent is not None and percent < POOR_FIT_PERCENT:
+            found.append(
+                Finding(
+                    "poor-fit",
+                    Light.RED if percent < 0 else Light.AMBER,
+                    f"{name} is rebuilt to {percent:.3g} % only",
+                    "check units, signs, sensor position and wind; try a shorter segment",
+                )
+            )
+    if not found:
+        found.append(
+            Finding("consistent", Light.GREEN, "rates, attitude and accelerations show one motion")
+        )
+    return tuple(found)
+
+
+def _of_parameter(parameter: InstrumentParameter, sample_time_s: float) -> list[Finding]:
+    kind, _, channel = parameter.name.partition("_")
+    text = f"{parameter.value:.4g} ± {1.96 * parameter.stderr:.2g} {parameter.unit}"
+    size = abs(parameter.value)
+    if kind == "bias":
+        limit = {"rad/s": RATE_BIAS_RAD_S, "m/s^2": FORCE_BIAS_M_S2}.get(parameter.unit)
+        if limit is not None and size > limit:
+            return [
+                Finding(
+                    "bias",
+                    Light.AMBER,
+                    f"{channel} has a bias of {text}",
+                    "use the corrected record",
+                )
+            ]
+    elif kind == "scale" and size > SCALE_ERROR:
+        gain = 1 + parameter.value
+        if gain < 0:
+            return [
+                Finding(
+                    "sign-reversed",
+                    Light.RED,
+                    f"{channel} reads {gain:.3g} of the truth",
+                    "check the sign convention; conditioning.flip_sign or convert_axes",
+                )
+            ]
+        light = Light.RED if not 0.5 < gain < 2 else Light.AMBER
+        return [
+            Finding(
+                "scale-factor",
+                light,
+                f"{channel} reads {gain:.4g} ± {1.96 * parameter.stderr:.2g} of the truth",
+                "check the unit" if light is Light.RED else "use the corrected record",
+            )
+        ]
+    elif kind == "delay" and size > sample_time_s:
+        return [
+            Finding(
+                "delay",
+                Light.AMBER,
+                f"{channel} lags the rates by {text}",
+                "use the corrected record, which is aligned",
+            )
+        ]
+    return []

@@ -1,0 +1,146 @@
+"""Result of the kinematic consistency check."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.findings import Finding
+from flightid.record import Record
+from flightid.table import Column, Table
+
+
+@dataclass(frozen=True)
+class InstrumentParameter:
+    """One estimated bias, scale factor, delay or initial state.
+
+    Attributes
+    ----------
+    name : str
+        For example ``"bias_p"``, ``"scale_q"``, ``"delay_phi"``, ``"theta_0"``.
+    value, stderr : float
+        Estimate and its standard error, corrected for coloured residuals.
+    unit : str
+        Unit of both; scale factors are relative (0.02: reads 2 % too much).
+
+    Example
+    -------
+    >>> InstrumentParameter("bias_p", 0.02, 0.001, "rad/s").is_significant
+    True
+    """
+
+    name: str
+    value: float
+    stderr: float
+    unit: str
+
+    @property
+    def interval95(self) -> tuple[float, float]:
+        """95 % interval."""
+        return self.value - 1.96 * self.stderr, self.value + 1.96 * self.stderr
+
+    @property
+    def is_significant(self) -> bool:
+        """Tell whether zero lies outside the 95 % interval."""
+        low, high = self.interval95
+        return low > 0 or high < 0
+
+
+@dataclass(frozen=True)
+class KinematicConsistency:
+    """How well rates, attitude, accelerations and velocities belong to one motion.
+
+    Attributes
+    ----------
+    parameters : mapping of str to InstrumentParameter
+        Estimates by name.
+    covariance : ndarray, shape (n_parameters, n_parameters)
+        Covariance in the order of `parameters`, corrected for coloured residuals.
+    correlation : ndarray, shape (n_parameters, n_parameters)
+        Correlation of the estimates by the information matrix.
+    reconstructed : mapping of str to ndarray, shape (n,)
+        Outputs rebuilt from the inputs with the estimated instrument errors, unit of the output.
+    residual_rms : mapping of str to float
+        Root mean square of measured less reconstructed output, unit of the output.
+    fit_percent : mapping of str to float
+        100 (1 − ‖z − ẑ‖/‖z − z̄‖) by output; None where the output stands still.
+    corrected : Record
+        The record without the estimated biases, scale factors and delays.
+    findings : tuple of Finding
+        Verdicts with what to do.
+
+    Example
+    -------
+    >>> from flightid.conditioning import check_consistency
+    >>> time_s = np.arange(500) / 50
+    >>> rate = np.cos(time_s)
+    >>> record = Record.from_arrays(time_s, outputs={"p": rate + 0.02, "q": 0 * rate,
+    ...     "r": 0 * rate, "phi": np.sin(time_s), "theta": 0 * rate},
+    ...     units={"p": "rad/s", "q": "rad/s", "r": "rad/s", "phi": "rad", "theta": "rad"})
+    >>> check_consistency(record, estimate=["bias_p"])
+    KinematicConsistency(500 samples, 3 parameters, worst fit 100 % (phi))
+    """
+
+    parameters: Mapping[str, InstrumentParameter]
+    covariance: NDArray[np.float64]
+    correlation: NDArray[np.float64]
+    reconstructed: Mapping[str, NDArray[np.float64]]
+    residual_rms: Mapping[str, float]
+    fit_percent: Mapping[str, float | None]
+    corrected: Record
+    findings: tuple[Finding, ...]
+
+    def summary(self) -> Table:
+        """Table of the estimates with their 95 % intervals."""
+        columns = (
+            Column("parameter"),
+            Column("unit"),
+            Column("value"),
+            Column("95 % from"),
+            Column("to"),
+            Column("significant"),
+        )
+        rows = tuple(
+            (p.name, p.unit, p.value, *p.interval95, p.is_significant)
+            for p in self.parameters.values()
+        )
+        return Table(repr(self), columns, rows, tuple(map(str, self.findings)))
+
+    def fits(self) -> Table:
+        """Table of the outputs with residual and fit."""
+        columns = (Column("output"), Column("residual"), Column("fit", "%"))
+        rows = tuple((name, rms, self.fit_percent[name]) for name, rms in self.residual_rms.items())
+        return Table("Outputs rebuilt from rates and accelerations", columns, rows)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values, signals left out."""
+        return {
+            "schema": "flightid.kinematic_consistency/1",
+            "parameters": {
+                key: {
+                    "value": p.value,
+                    "stderr": p.stderr,
+                    "interval95": list(p.interval95),
+                    "unit": p.unit,
+                }
+                for key, p in self.parameters.items()
+            },
+            "covariance": self.covariance.tolist(),
+            "correlation": self.correlation.tolist(),
+            "residual_rms": dict(self.residual_rms),
+            "fit_percent": dict(self.fit_percent),
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def __repr__(self) -> str:
+        """Size and the worst fit on one line."""
+        n = next(iter(self.reconstructed.values())).size
+        fits = [(fit, name) for name, fit in self.fit_percent.items() if fit is not None]
+        worst = f"worst fit {min(fits)[0]:.3g} % ({min(fits)[1]})" if fits else "nothing moves"
+        return f"KinematicConsistency({n} samples, {len(self.parameters)} parameters, {worst})"
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_() + self.fits()._repr_html_()
