@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,11 @@ from scipy.optimize import least_squares
 
 from flightid.conditioning.align import align
 from flightid.conditioning.coloured_residuals import corrected_covariance
-from flightid.conditioning.consistency_findings import findings_of, require_separable
+from flightid.conditioning.consistency_findings import (
+    drift_findings,
+    findings_of,
+    require_separable,
+)
 from flightid.conditioning.consistency_result import InstrumentParameter, KinematicConsistency
 from flightid.conditioning.kinematics import (
     FORCES,
@@ -22,6 +26,7 @@ from flightid.conditioning.kinematics import (
     UNITS,
     VELOCITIES,
     KinematicModel,
+    Prediction,
     rotation_rows,
 )
 from flightid.errors import DataError, FitError, OptionError, UnknownNameError
@@ -31,6 +36,7 @@ from flightid.units import require_match
 
 Array = NDArray[np.float64]
 ROUNDS = 6
+STEEPEST_RAD = np.deg2rad(85.0)
 UNIT_OF_KIND = {"scale": "1", "delay": "s"}
 
 
@@ -50,7 +56,9 @@ def check_consistency(
     delay is the lag of an output behind the rates.
 
     Standard errors are corrected for coloured residuals. Pairs of parameters that the record cannot
-    tell apart are named in the findings.
+    tell apart are named in the findings. Where noise of the gyros, integrated over the record, is
+    not small against the attitude's own noise, the finding ``"gyro-noise"`` says so: intervals of
+    the rate biases are then too narrow (a random walk is no stationary residual).
 
     Assumes: a rigid body, flat non-rotating earth, rates and accelerations whose noise is small
     against the outputs' own; with V, alpha, beta: still air or steady wind. Biased when: sensors
@@ -107,6 +115,8 @@ def check_consistency(
     measured = {name: record[source[name]] for name in OUTPUTS if name in source}
     for name in {"phi", "psi"} & set(measured):
         measured[name] = np.unwrap(measured[name])
+    if "theta" in measured and np.max(np.abs(measured["theta"])) > STEEPEST_RAD:
+        raise _too_steep(f"{np.rad2deg(np.max(np.abs(measured['theta']))):.1f} degrees")
     errors = _chosen(estimate, inputs, measured)
     states = [name for name in STATES if _is_seen(name, measured)]
     parameters = (*(f"{name}_0" for name in states), *errors)
@@ -119,6 +129,7 @@ def check_consistency(
     model = KinematicModel(record.time_s, inputs, tuple(measured), parameters)
     observed = np.array(list(measured.values()))
     start = _first_state(measured)
+    start |= _first_scales(inputs, measured)
     theta = np.array([start.get(name.removesuffix("_0"), 0.0) for name in parameters])
     theta, deviations = _fit(model, observed, theta)
     prediction = model.predict(theta)
@@ -143,7 +154,10 @@ def check_consistency(
         rms,
         fit,
         _corrected(record, source, found),
-        findings_of(found, correlation, fit, record.sample_time_s),
+        (
+            *findings_of(found, correlation, fit, record.sample_time_s),
+            *drift_findings(inputs, rms, record.sample_time_s),
+        ),
     )
 
 
@@ -232,14 +246,34 @@ class _Problem:
     model: KinematicModel
     observed: Array
     deviations: Array
+    _kept: dict[bytes, Prediction] = field(default_factory=dict)
 
     def residuals(self, theta: Array) -> Array:
-        values = self.model.predict(theta).values
+        values = self._prediction(theta).values
         return ((values - self.observed) / self.deviations[:, None]).ravel()
 
     def jacobian(self, theta: Array) -> Array:
-        slopes = self.model.predict(theta).slopes / self.deviations[:, None, None]
+        slopes = self._prediction(theta).slopes / self.deviations[:, None, None]
         return slopes.reshape(-1, theta.size)
+
+    def _prediction(self, theta: Array) -> Prediction:
+        """The last prediction, kept: SciPy asks for values and slopes at the same place."""
+        key = theta.tobytes()
+        if key not in self._kept:
+            self._kept.clear()
+            self._kept[key] = self.model.predict(theta)
+        return self._kept[key]
+
+
+def _first_scales(inputs: Mapping[str, Array], measured: Mapping[str, Array]) -> dict[str, float]:
+    """A rate that runs against its angle starts reversed: no small step leads through zero gain."""
+    scales = {}
+    for rate, angle in zip(RATES, ("phi", "theta", "psi"), strict=True):
+        if angle in measured:
+            slope = np.diff(measured[angle])
+            common = float((slope - slope.mean()) @ inputs[rate][:-1])
+            scales[f"scale_{rate}"] = -2.0 if common < 0 else 0.0
+    return scales
 
 
 def _fit(model: KinematicModel, observed: Array, theta: Array) -> tuple[Array, Array]:
@@ -279,14 +313,18 @@ def _sizes(problem: _Problem, theta: Array) -> Array:
     try:
         jacobian = problem.jacobian(theta)
     except OptionError as error:
-        raise DataError(
-            "the attitude cannot be rebuilt in Euler angles",
-            found=str(error),
-            needed="pitch angles well inside ±90 degrees",
-            action="take a segment without such pitch, or check the units of the rates",
-        ) from error
+        raise _too_steep(str(error)) from error
     require_separable(problem.model.parameters, jacobian)
     return np.asarray(1 / np.linalg.norm(jacobian, axis=0))
+
+
+def _too_steep(found: str) -> DataError:
+    return DataError(
+        "the attitude cannot be rebuilt in Euler angles",
+        found=found,
+        needed="pitch angles inside ±85 degrees",
+        action="take a segment without such pitch, or check the units of the rates",
+    )
 
 
 def _unit(parameter: str) -> str:

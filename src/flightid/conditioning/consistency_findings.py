@@ -19,6 +19,8 @@ RATE_BIAS_RAD_S = np.deg2rad(0.5)
 FORCE_BIAS_M_S2 = 0.3
 SCALE_ERROR = 0.05
 POOR_FIT_PERCENT = 70.0
+LARGEST_DRIFT = 0.15
+SMALLEST_DRIFT_RAD = 1e-4
 
 
 def require_separable(parameters: Sequence[str], jacobian: NDArray[np.float64]) -> None:
@@ -86,6 +88,32 @@ def findings_of(
         found.append(
             Finding("consistent", Light.GREEN, "rates, attitude and accelerations show one motion")
         )
+    return tuple(found)
+
+
+def drift_findings(
+    inputs: Mapping[str, NDArray[np.float64]],
+    residual_rms: Mapping[str, float],
+    sample_time_s: float,
+) -> tuple[Finding, ...]:
+    """Doubt of the bias intervals where integrated gyro noise shows in the attitude."""
+    found = []
+    for rate, angle in (("p", "phi"), ("q", "theta"), ("r", "psi")):
+        if angle not in residual_rms:
+            continue
+        # White noise of deviation s has fourth differences of variance 70 s²; motion has hardly any.
+        noise = float(np.sqrt(np.mean(np.diff(inputs[rate], 4) ** 2) / 70))
+        drift = noise * sample_time_s * np.sqrt(inputs[rate].size)
+        if drift > LARGEST_DRIFT * residual_rms[angle] and drift > SMALLEST_DRIFT_RAD:
+            found.append(
+                Finding(
+                    "gyro-noise",
+                    Light.AMBER,
+                    f"noise of {rate} drifts {angle} by {drift:.2g} rad over the record, beside a "
+                    f"residual of {residual_rms[angle]:.2g} rad",
+                    f"take the interval of bias_{rate} as too narrow; use a shorter segment",
+                )
+            )
     return tuple(found)
 
 
