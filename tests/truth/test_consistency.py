@@ -156,14 +156,14 @@ def test_derivatives_of_every_output_are_exact() -> None:
 
 def test_intervals_cover_the_truth_with_coloured_noise() -> None:
     inside = total = 0
-    for seed in range(4):
-        found = check_consistency(flight(seed=seed, noise=0.004, colour=0.9, n=600))
+    for seed in range(3):
+        found = check_consistency(flight(seed=seed, noise=0.004, colour=0.9, n=500))
         for name, value in TRUTH.items():
             low, high = found.parameters[name].interval95
             inside += low <= value <= high
             total += 1
-    # 36 intervals at 95 %: 29 or fewer has a chance below 1 in 100.
-    assert inside >= 30, f"{inside} of {total}"
+    # 27 intervals at 95 %: 21 or fewer has a chance below 1 in 100.
+    assert inside >= 22, f"{inside} of {total}"
 
 
 @pytest.mark.slow
@@ -199,7 +199,7 @@ def test_correlated_pairs_and_wrong_signs_are_named() -> None:
     rough = np.random.default_rng(1).standard_normal(1200)
     noisy = noisy.replace({"p": noisy["p"] + 0.005 * rough})
     assert "gyro-noise" in {f.code for f in check_consistency(noisy, estimate=["bias_p"]).findings}
-    poor = flight(truth={}).replace({"theta": np.random.default_rng(0).standard_normal(1200)})
+    poor = flight(truth={}).replace({"theta": 0.3 * np.sin(np.arange(1200))})
     assert "poor-fit" in {f.code for f in check_consistency(poor, estimate=["bias_p"]).findings}
 
 

@@ -101,7 +101,7 @@ def drift_findings(
     for rate, angle in (("p", "phi"), ("q", "theta"), ("r", "psi")):
         if angle not in residual_rms:
             continue
-        # White noise of deviation s has fourth differences of variance 70 s²; motion has hardly any.
+        # White noise of deviation s has fourth differences of variance 70 s²; motion has few.
         noise = float(np.sqrt(np.mean(np.diff(inputs[rate], 4) ** 2) / 70))
         drift = noise * sample_time_s * np.sqrt(inputs[rate].size)
         if drift > LARGEST_DRIFT * residual_rms[angle] and drift > SMALLEST_DRIFT_RAD:
