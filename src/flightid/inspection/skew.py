@@ -13,8 +13,10 @@ from flightid.inspection.thresholds import SKEW_CORRELATION
 from flightid.logs import Log
 
 LONGEST_LAG_S = 0.3
-STEPS = 241
-"""Lags tried on each side."""
+COARSE, FINE = 61, 41
+"""Lags tried over the whole range, then between the neighbours of the best one."""
+ENOUGH = 20_000
+"""Samples that settle a correlation; more only cost time."""
 
 
 @dataclass(frozen=True)
@@ -63,10 +65,18 @@ def _skew(quantity: str, first: Signal, second: Signal, spans: tuple[Span, ...])
     stamps, values = slow.time_s[mask], slow.values[mask]
     if stamps.size < 50 or np.std(values) == 0:
         return None
-    lags = np.linspace(-LONGEST_LAG_S, LONGEST_LAG_S, 2 * STEPS - 1)
-    correlations = np.array(
-        [_correlation(values, np.interp(stamps + lag, fast.time_s, fast.values)) for lag in lags]
-    )
+    every = max(1, stamps.size // ENOUGH)
+    stamps, values = stamps[::every], values[::every]
+
+    def correlations_at(lags: NDArray[np.float64]) -> NDArray[np.float64]:
+        late = (np.interp(stamps + lag, fast.time_s, fast.values) for lag in lags)
+        return np.array([_correlation(values, moved) for moved in late])
+
+    coarse = np.linspace(-LONGEST_LAG_S, LONGEST_LAG_S, COARSE)
+    near = float(coarse[int(np.argmax(correlations_at(coarse)))])
+    step = float(coarse[1] - coarse[0])
+    lags = np.linspace(near - step, near + step, FINE)
+    correlations = correlations_at(lags)
     best = int(np.argmax(correlations))
     if not 0 < best < lags.size - 1 or correlations[best] < SKEW_CORRELATION.value:
         return None

@@ -136,6 +136,7 @@ def _response(
             outputs=[axis.rate for axis in axes],
             omega_rad_s=(low, high, 60),
             window_s=[window, window / 2] if high > 4 * low else [window],
+            covariance=False,
         ), ""
     except FlightidError as error:
         return None, error.problem
