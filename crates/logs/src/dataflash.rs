@@ -136,6 +136,3 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
         self.bytes.as_ref()
     }
 }
-
-#[cfg(test)]
-mod tests;

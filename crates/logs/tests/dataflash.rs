@@ -1,6 +1,7 @@
-use proptest::prelude::*;
+//! The DataFlash reader on intact, damaged and absurd logs.
 
-use super::{Dataflash, SkipReason};
+use flightid_logs::dataflash::{Dataflash, SkipReason};
+use proptest::prelude::*;
 
 /// A `FMT` message.
 fn fmt(type_id: u8, name: &str, format: &str, columns: &str, size: u8) -> Vec<u8> {
