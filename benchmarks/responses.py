@@ -9,8 +9,8 @@ Times are processor time of one thread, which other work on the machine does not
 
 Measured on one core of a 2.6 GHz EPYC that was shared with other work: plain complex matrix
 product 0.54 to 0.60 s, folded real products (ours) 0.21 to 0.24 s, FFTs of the windows at their own
-bins 0.14 to 0.21 s. Not yet tried: fewer nodes than samples for slow frequencies, which the count of
-operations says would halve the folded products, and interpolation of zero-padded FFTs.
+bins 0.14 to 0.21 s. Not yet tried: fewer nodes than samples for slow frequencies, which the count
+of operations says would halve the folded products, and interpolation of zero-padded FFTs.
 """
 
 from __future__ import annotations
