@@ -110,6 +110,7 @@ def _reading(reader: TableReader, hint: object) -> Callable[[str], Any] | None:
         bool: reader.flag,
         int: reader.integer,
         float: reader.number,
+        float | None: reader.number,
         str: reader.text,
     }
     if hint in simple:
