@@ -82,8 +82,9 @@ def identify(
     Assumes
     -------
     A response without bias. Biased when a loop was closed during the flight and the response was
-    not estimated with the excitation as instrument; errors of different outputs are taken as
-    independent.
+    not estimated with the excitation as instrument, and where windows leak: over one short sweep
+    the bias of a windowed response can equal its scatter, which no interval covers (use
+    ``method="local_polynomial"``). Errors of different outputs are taken as independent.
 
     Reference
     ---------
