@@ -53,7 +53,7 @@ def test_intervals_of_flown_sweeps_cover_the_truth() -> None:
                 continue
             inside.append(found.interval95[0] <= value <= found.interval95[1])
             spread.append((found.value - value) / found.stderr)
-    # Windowed estimates of one short sweep keep a bias of leakage of the size of their scatter, which
-    # no interval covers; the local polynomial method removes it.
+    # Windowed estimates of one short sweep keep a bias of leakage of the size of their scatter,
+    # which no interval covers; the local polynomial method removes it.
     assert 0.93 <= np.mean(inside) <= 0.97
     assert 0.9 <= np.std(spread) <= 1.15
