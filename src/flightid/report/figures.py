@@ -13,6 +13,9 @@ from flightid.report.content import Figure
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
+SINGLE_LIMIT = 3e38
+"""Just inside the range of single precision."""
+
 
 def figure_block(figure: go.Figure, caption: str) -> Figure:
     """Take a picture into the content tree.
@@ -37,6 +40,8 @@ def _in_single_precision(node: Any) -> Any:  # noqa: ANN401 — any JSON value
     if not isinstance(node, dict):
         return node
     if node.get("dtype") == "f8" and "bdata" in node:
-        samples = np.frombuffer(base64.b64decode(node["bdata"]), dtype="<f8").astype("<f4")
+        double = np.frombuffer(base64.b64decode(node["bdata"]), dtype="<f8")
+        # A prediction that diverged does not fit; no screen shows where it went.
+        samples = np.clip(double, -SINGLE_LIMIT, SINGLE_LIMIT).astype("<f4")
         return {**node, "dtype": "f4", "bdata": base64.b64encode(samples.tobytes()).decode()}
     return {key: _in_single_precision(value) for key, value in node.items()}

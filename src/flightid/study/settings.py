@@ -120,6 +120,10 @@ class Settings:
         Or: the flight that is simulated, whose log is then read.
     channel_map : str or None
         Name of a shipped channel map, or path of one (*.toml); None: by autopilot and vehicle.
+    gaps : {"error", "interpolate"}
+        What to do where a channel has no samples for long.
+    max_gap_s : float or None
+        Longest gap that is bridged, s; None: the reader's own limit.
     sample_rate_hz : float or None
         Rate of the records; None: the slowest needed channel's.
     segments : tuple of Segment
@@ -140,6 +144,8 @@ class Settings:
     log: Path | None
     flight: FlightPlan | None
     channel_map: str | None
+    gaps: str
+    max_gap_s: float | None
     sample_rate_hz: float | None
     segments: tuple[Segment, ...]
     models: tuple[ModelSettings, ...]
@@ -180,6 +186,8 @@ def read_settings(path: Path) -> Settings:
     mapped = channels.maybe(channels.text, "map")
     if mapped is not None and mapped.endswith(".toml"):
         mapped = str(path.parent / mapped)
+    gaps = channels.choice("gaps", ("error", "interpolate"), "error")
+    max_gap_s = channels.maybe(channels.positive, "max_gap_s")
     rate = channels.maybe(channels.positive, "sample_rate_hz")
     channels.finish()
     segments = tuple(_segment(reader) for reader in root.tables("segment"))
@@ -194,7 +202,19 @@ def read_settings(path: Path) -> Settings:
     root.finish()
     _require_references(segments, models)
     return Settings(
-        *words, log, flight, mapped, rate, segments, models, response, starts, seed, initial
+        *words,
+        log,
+        flight,
+        mapped,
+        gaps,
+        max_gap_s,
+        rate,
+        segments,
+        models,
+        response,
+        starts,
+        seed,
+        initial,
     )
 
 

@@ -151,6 +151,8 @@ def _cut(log: Log, segment: Segment, settings: Settings, users: list[Task]) -> R
         sid_run=None if segment.sid_axis is None else sid_run(log, segment),
         sample_rate_hz=settings.sample_rate_hz,
         roles=roles,
+        gaps=settings.gaps,
+        max_gap_s=settings.max_gap_s,
         name=segment.name,
     )
 
