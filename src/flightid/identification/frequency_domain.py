@@ -8,13 +8,20 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, FitError, OptionError
 from flightid.findings import Finding
+from flightid.identification.bias_rounds import (
+    BiasRounds,
+    iterate,
+    judge_bias,
+    provenance,
+    sizes,
+)
 from flightid.identification.error_model import (
     ErrorModel,
     coherence_sensitivity,
@@ -30,6 +37,7 @@ from flightid.identification.fit_findings import (
     judge_parameters,
     judge_search,
 )
+from flightid.identification.model_outputs import HOLDS
 from flightid.identification.multistart import End, cluster, collect, draw_starts
 from flightid.identification.selection import Bands, SelectedResponse, select_points
 from flightid.identification.setup_checks import check_setup
@@ -57,6 +65,8 @@ class Options:
     weight_phase: float
     cost: str
     maximum_iterations: int
+    correct_bias: bool
+    hold: str
 
     def check(self) -> None:
         """Refuse options without a meaning.
@@ -64,8 +74,10 @@ class Options:
         Raises
         ------
         OptionError
-            The cost is not known, or no iteration is allowed.
+            The cost or the hold is not known, or no iteration is allowed.
         """
+        if self.hold not in HOLDS:
+            raise OptionError("hold is not known", found=repr(self.hold), needed=" or ".join(HOLDS))
         if self.cost not in COSTS:
             raise OptionError("cost is not known", found=repr(self.cost), needed=" or ".join(COSTS))
         if self.maximum_iterations < 1:
@@ -78,7 +90,33 @@ def fit_responses(model: TransferFunctionModel, data: FrequencyResponse, options
     """Fit a model to measured responses; see `flightid.identify`."""
     options.check()
     _check_model(model, data)
-    selected = select_points(
+    selected = _select(model, data, options)
+    setup = _check_start(model, selected)
+    errors = error_model(data, selected)
+    groups = cluster(_minimise(model, selected, errors, options))
+    fitted = _at(model, groups[0][0])
+    found = _statistics(fitted, selected, errors, groups[0][0], options)
+    correction: dict[str, object] = {"applied": False, "reason": "correct_bias=False"}
+    if options.correct_bias:
+        done = _without_bias(fitted, data, errors, found, options)
+        after = _select(model, done.data, options)
+        changes = sizes(selected, after, errors) if done.applied else {}
+        setup += judge_bias(done, changes)
+        correction = provenance(done, changes, options.hold)
+        if done.applied:
+            best = _minimise(done.model, after, errors, replace(options, starts=1))[0]
+            groups[0] = [best, *groups[0][1:]]
+            selected, fitted = after, _at(model, best)
+            found = _statistics(fitted, selected, errors, best, options)
+    responses = _compare(fitted, selected)
+    fit = _assemble(fitted, options, data, groups, responses, found, setup)
+    return replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
+
+
+def _select(
+    model: TransferFunctionModel, data: FrequencyResponse, options: Options
+) -> list[SelectedResponse]:
+    return select_points(
         data,
         model.response_names,
         bands=options.omega_rad_s,
@@ -87,18 +125,39 @@ def fit_responses(model: TransferFunctionModel, data: FrequencyResponse, options
         weight_gain=options.weight_gain,
         weight_phase=options.weight_phase,
     )
-    setup = _check_start(model, selected)
-    errors = error_model(data, selected)
-    ends = _minimise(model, selected, errors, options)
-    groups = cluster(ends)
-    best = ends[0]
-    values = dict(zip((p.name for p in model.parameters.free), map(float, best.x), strict=True))
-    fitted = model.with_values(values)
-    responses = _compare(fitted, selected)
-    found = statistics(
-        fitted, selected, errors, best, sensitivity=_sensitivity(fitted, selected, errors, options)
-    )
-    return _assemble(fitted, options, data, groups, responses, found, setup)
+
+
+def _at(model: TransferFunctionModel, end: End) -> TransferFunctionModel:
+    names = (parameter.name for parameter in model.parameters.free)
+    return model.with_values(dict(zip(names, map(float, end.x), strict=True)))
+
+
+def _statistics(
+    fitted: TransferFunctionModel,
+    selected: Sequence[SelectedResponse],
+    errors: ErrorModel,
+    end: End,
+    options: Options,
+) -> Statistics:
+    sensitivity = _sensitivity(fitted, selected, errors, options)
+    return statistics(fitted, selected, errors, end, sensitivity=sensitivity)
+
+
+def _without_bias(
+    fitted: TransferFunctionModel,
+    data: FrequencyResponse,
+    errors: ErrorModel,
+    found: Statistics,
+    options: Options,
+) -> BiasRounds:
+    once = replace(options, starts=1)
+
+    def refit(model: TransferFunctionModel, corrected: FrequencyResponse) -> TransferFunctionModel:
+        selected = _select(model, corrected, options)
+        return _at(model, _minimise(model, selected, errors, once)[0])
+
+    scales = {p.name: p.stderr for p in found.parameters.values() if p.stderr}
+    return iterate(fitted, data, scales, refit, options.hold)
 
 
 def _check_model(model: TransferFunctionModel, data: FrequencyResponse) -> None:
@@ -262,5 +321,7 @@ def _provenance(data: FrequencyResponse, options: Options) -> dict[str, object]:
             "weight_phase": options.weight_phase,
             "cost": options.cost,
             "maximum_iterations": options.maximum_iterations,
+            "correct_bias": options.correct_bias,
+            "hold": options.hold,
         },
     }

@@ -26,6 +26,8 @@ def identify(
     weight_phase: float = 0.01745,
     cost: str = "coherence",
     maximum_iterations: int = 200,
+    correct_bias: bool = True,
+    hold: str = "band_limited",
 ) -> Fit:
     """Fit the free parameters of a model to data.
 
@@ -58,6 +60,15 @@ def identify(
         that is too simple.
     maximum_iterations : int
         Most steps of each start.
+    correct_bias : bool
+        Take out, in rounds of fit and correction, what windows or local polynomials add by leakage
+        and finite resolution: computed from the fitted model's outputs on the measured inputs.
+        Where that is impossible (a response from a file or from arithmetic, a model that diverges
+        on the records) a finding says so and the fit stays as it is.
+    hold : {"band_limited", "first", "zero"}
+        What the inputs do between their samples, for that correction: smooth (filtered before they
+        were sampled), straight lines, or steps. "zero" takes the output hold's half sample out of
+        the model's delay; the others leave it there.
 
     Returns
     -------
@@ -81,10 +92,11 @@ def identify(
 
     Assumes
     -------
-    A response without bias. Biased when a loop was closed during the flight and the response was
-    not estimated with the excitation as instrument, and where windows leak: over one short sweep
-    the bias of a windowed response can equal its scatter, which no interval covers (use
-    ``method="local_polynomial"``). Errors of different outputs are taken as independent.
+    A response whose only bias is its estimator's, and a model that can hold the vehicle: the
+    correction is computed from the model. Without the correction the bias of a windowed response
+    of one short sweep can equal its scatter, which no interval covers. Biased when a loop was
+    closed during the flight and the response was not estimated with the excitation as instrument.
+    Errors of different outputs are taken as independent.
 
     Reference
     ---------
@@ -114,6 +126,8 @@ def identify(
         weight_phase=weight_phase,
         cost=cost,
         maximum_iterations=maximum_iterations,
+        correct_bias=correct_bias,
+        hold=hold,
     )
     fit = _FITS.get((type(model), type(data)))
     if fit is None:

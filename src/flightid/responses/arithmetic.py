@@ -308,6 +308,7 @@ def _mapped(
         cross_spectrum=None,
         output_spectrum=None,
         errors=None if response.errors is None else MappedErrors(response.errors, slope),
+        linear=None,
         method=f"{response.method}, arithmetic"
         if not response.method.endswith("arithmetic")
         else response.method,

@@ -78,7 +78,7 @@ class WindowedErrors:
         sensitivity = self.sensitivity[:, :, :, outputs][:, :, :, :, inputs][..., frequencies]
         for n_samples in sorted({record.shape[1] for record in self.instruments}):
             weights = [
-                [self._weights(record, share, inputs, frequencies) for share in self.shares]
+                [self.weights(record, share, inputs, frequencies) for share in self.shares]
                 for record in self.instruments
                 if record.shape[1] == n_samples
             ]
@@ -97,7 +97,7 @@ class WindowedErrors:
         last = min(length // 2, int(highest * length / (2.0 * np.pi)) + 1)
         return length, np.arange(last + 1)
 
-    def _weights(
+    def weights(
         self,
         record: Real,
         share: WindowShare,

@@ -13,6 +13,7 @@ from flightid.findings import Finding
 from flightid.record import Record
 from flightid.record.history import Step
 from flightid.responses.feedback import feedback_findings
+from flightid.responses.linear_estimate import LinearEstimate, WindowedWeights
 from flightid.responses.local_polynomial import estimate_local_polynomial
 from flightid.responses.planning import plan_frequencies, plan_windows
 from flightid.responses.response import FrequencyResponse
@@ -66,7 +67,8 @@ def estimate_response(
     detrend : {"mean", "line", "none"}
         What is removed from each window by itself.
     covariance : bool
-        Keep what `FrequencyResponse.covariance_at` needs (the inputs and a noise spectrum).
+        Keep what `FrequencyResponse.covariance_at` needs and what a fit needs to take the
+        estimator's bias out (the samples and a noise spectrum).
 
     Returns
     -------
@@ -136,10 +138,12 @@ def estimate_response(
     if not covariance:
         return response
     try:
-        return replace(response, errors=windowed_errors(estimate))
+        errors = windowed_errors(estimate)
     except DataError as error:
         missing = Finding("no-covariance", Light.UNKNOWN, str(error))
         return replace(response, findings=(*response.findings, missing))
+    linear = LinearEstimate.of(samples, WindowedWeights(errors), len(omega))
+    return replace(response, errors=errors, linear=linear)
 
 
 def _check_options(method: str, detrend: str) -> None:

@@ -12,6 +12,7 @@ from flightid.errors import DataError
 from flightid.record.history import Step
 from flightid.responses.cautions import correlation_findings
 from flightid.responses.conditioned import random_error
+from flightid.responses.linear_estimate import LinearEstimate, LocalWeights
 from flightid.responses.local_fit import Bins, LocalFit, around, bins_needed, fit_locally
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.samples import Samples
@@ -98,6 +99,11 @@ def _response(
         findings=tuple(correlation_findings(samples.inputs, spectrum[:n_in, :n_in])),
         history=(*samples.history, step),
         errors=LocalErrors(tuple(fits), noise) if covariance else None,
+        linear=LinearEstimate.of(
+            samples, LocalWeights(tuple(fits), samples.sample_time_s), len(omega)
+        )
+        if covariance
+        else None,
     )
 
 

@@ -81,7 +81,8 @@ def estimate_noise(
             needed=f"{count}",
             action="use longer records, or covariance=False",
         )
-    longest = max(records, key=lambda bins: len(bins.omega))
+    at_longest = int(np.argmax([len(bins.omega) for bins in records]))
+    longest = records[at_longest]
     # A window's side lobes beyond this are far below its main lobe; the last density is held there.
     stride = max(count, len(longest.omega) * count // size)
     edges = np.append(longest.omega[::stride], np.inf)
@@ -95,7 +96,7 @@ def estimate_noise(
         ]
         if sum(place.stop - place.start for place in places) < 0.9 * count * len(records):
             continue
-        inside = longest.omega[places[records.index(longest)]]
+        inside = longest.omega[places[at_longest]]
         centre = float(0.5 * (inside[0] + inside[-1]))
         residual = fit_locally(records, places, centre, n_regressors).residual
         densities.append(_of_outputs(residual, joint, centre, omega, response))

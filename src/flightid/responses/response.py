@@ -12,6 +12,7 @@ from flightid.errors import DataError, ShapeError, UnknownNameError
 from flightid.findings import Finding
 from flightid.record.history import Step
 from flightid.responses.bands import choose_frequencies, nearest
+from flightid.responses.linear_estimate import LinearEstimate
 from flightid.responses.pair import PairResponse, quotient_unit
 from flightid.responses.uncertainty import CovarianceSource, Selected
 from flightid.table import Column, Table
@@ -61,6 +62,9 @@ class FrequencyResponse:
         What was done.
     errors : CovarianceSource, optional
         What `covariance_at` asks.
+    linear : LinearEstimate, optional
+        The estimate as weights on the measured outputs, from which a fit computes its bias; None
+        after arithmetic, from a file, and where it was given.
 
     Example
     -------
@@ -89,6 +93,7 @@ class FrequencyResponse:
     findings: tuple[Finding, ...] = ()
     history: tuple[Step, ...] = ()
     errors: CovarianceSource | None = field(default=None)
+    linear: LinearEstimate | None = field(default=None)
 
     def __post_init__(self) -> None:
         sizes = {"o": len(self.outputs), "i": len(self.inputs), "f": len(self.omega_rad_s)}
@@ -290,6 +295,7 @@ class FrequencyResponse:
             outputs=tuple(self.outputs[k] for k in rows),
             inputs=tuple(self.inputs[k] for k in columns),
             errors=errors,
+            linear=None if self.linear is None else self.linear.select(*axes.values()),
         )
 
     def summary(self) -> Table:

@@ -1,0 +1,206 @@
+"""Rounds of fit and correction, until the parameters stand still."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.conventions import Light
+from flightid.errors import DataError, FitError, ModelError
+from flightid.findings import Finding
+from flightid.identification.error_model import ErrorModel
+from flightid.identification.estimator_bias import remove_bias, why_unknown
+from flightid.identification.selection import SelectedResponse
+from flightid.models import TransferFunctionModel
+from flightid.responses import FrequencyResponse
+
+Array = NDArray[np.float64]
+
+ENOUGH = 1e-3
+"""Largest move of a parameter in the last round, in standard errors."""
+TOLERABLE = 0.1
+"""Largest such move at which a correction that ran out of rounds is still kept."""
+RELATIVE = 1e-7
+"""Largest relative move in the last round where standard errors are not known."""
+MOST_ROUNDS = 20
+_DECIBEL = 20.0 / np.log(10.0)
+_DEGREE = 180.0 / np.pi
+
+
+@dataclass(frozen=True)
+class Size:
+    """Size of a correction over the fitted points of one response, root mean squares.
+
+    Attributes
+    ----------
+    magnitude_db, phase_deg : float
+    standard_errors : float or None
+        Size over the standard error of the point; None where that is not known.
+    """
+
+    magnitude_db: float
+    phase_deg: float
+    standard_errors: float | None
+
+
+@dataclass(frozen=True)
+class BiasRounds:
+    """How the correction went.
+
+    Attributes
+    ----------
+    model : TransferFunctionModel
+        The model after the last round.
+    data : FrequencyResponse
+        The response that the last fit saw.
+    rounds : int
+    move : float
+        Largest move of a parameter in the last round, in standard errors.
+    reason : str
+        Why nothing was corrected; empty where it was.
+    """
+
+    model: TransferFunctionModel
+    data: FrequencyResponse
+    rounds: int
+    move: float
+    reason: str = ""
+
+    @property
+    def applied(self) -> bool:
+        """Whether the response was corrected."""
+        return not self.reason
+
+    @property
+    def converged(self) -> bool:
+        """Whether the parameters stood still."""
+        return self.applied and self.move <= ENOUGH
+
+
+def iterate(
+    first: TransferFunctionModel,
+    data: FrequencyResponse,
+    scales: Mapping[str, float],
+    refit: Callable[[TransferFunctionModel, FrequencyResponse], TransferFunctionModel],
+    hold: str,
+) -> BiasRounds:
+    """Correct by the fitted model and fit again, until the parameters stand still.
+
+    Parameters
+    ----------
+    first : TransferFunctionModel
+        Fitted to the response as it was measured.
+    data : FrequencyResponse
+        As measured.
+    scales : mapping of str to float
+        Standard errors by parameter.
+    refit : callable
+        Fits the model, from its values, to a corrected response.
+    hold : str
+
+    Returns
+    -------
+    BiasRounds
+        With `first` and `data` themselves where nothing could be corrected.
+    """
+    reason = why_unknown(data)
+    if reason:
+        return BiasRounds(first, data, 0, 0.0, reason)
+    model, corrected, move, rounds = first, data, np.inf, 0
+    try:
+        while move > ENOUGH and rounds < MOST_ROUNDS:
+            corrected = remove_bias(model, data, hold)
+            moved = refit(model, corrected)
+            move, rounds = _move(model, moved, scales), rounds + 1
+            model = moved
+    except (DataError, ModelError, FitError) as error:
+        return BiasRounds(first, data, rounds, move, str(error))
+    if move > TOLERABLE:
+        reason = f"the rounds did not settle: {move:.2g} standard errors in the last of {rounds}"
+        return BiasRounds(first, data, rounds, move, reason)
+    return BiasRounds(model, corrected, rounds, move)
+
+
+def _move(
+    before: TransferFunctionModel, after: TransferFunctionModel, scales: Mapping[str, float]
+) -> float:
+    found = 0.0
+    for parameter in after.parameters.free:
+        new, old = parameter.value or 0.0, before.parameters[parameter.name].value or 0.0
+        scale = scales.get(parameter.name) or RELATIVE / ENOUGH * max(abs(new), abs(old))
+        if new != old:
+            found = max(found, abs(new - old) / scale)
+    return found
+
+
+def sizes(
+    before: Sequence[SelectedResponse], after: Sequence[SelectedResponse], errors: ErrorModel
+) -> dict[str, Size]:
+    """Size of the correction by response."""
+    result, variances = {}, _variances(before, errors)
+    for one, other, variance in zip(before, after, variances, strict=True):
+        ratio = np.log(one.response / other.response)
+        distance = np.abs(one.response - other.response)
+        share = None
+        if variance is not None and np.all(variance > 0.0):
+            share = float(np.sqrt(np.mean(distance**2 / variance)))
+        result[one.name] = Size(
+            float(np.sqrt(np.mean((_DECIBEL * ratio.real) ** 2))),
+            float(np.sqrt(np.mean((_DEGREE * ratio.imag) ** 2))),
+            share,
+        )
+    return result
+
+
+def _variances(selected: Sequence[SelectedResponse], errors: ErrorModel) -> list[Array | None]:
+    """Variance of each complex point, by response."""
+    result: list[Array | None] = []
+    for run in errors.runs:
+        diagonal = np.diag(run.covariance)
+        both = diagonal[: len(diagonal) // 2] + diagonal[len(diagonal) // 2 :]
+        counts = [len(each.places) for each in selected[run.first : run.first + run.count]]
+        result += np.split(both, np.cumsum(counts)[:-1])
+    return result or [None] * len(selected)
+
+
+def judge_bias(done: BiasRounds, found: Mapping[str, Size]) -> list[Finding]:
+    """Verdict on the correction: what it did, or why there was none."""
+    if not done.applied:
+        return [
+            Finding(
+                "estimator-bias-not-corrected",
+                Light.UNKNOWN,
+                f"leakage and resolution of the estimate were not corrected: {done.reason}",
+                "fit a response that was estimated from records, and widen the windows",
+            )
+        ]
+    texts = []
+    for name, size in found.items():
+        errors = size.standard_errors
+        share = "" if errors is None else f", {errors:.2g} standard errors"
+        texts.append(f"{name} {size.magnitude_db:.2g} dB and {size.phase_deg:.2g}°{share}")
+    light = Light.GREEN if done.converged else Light.AMBER
+    end = "" if done.converged else f"; the last moved by {done.move:.2g} standard errors"
+    return [
+        Finding(
+            "estimator-bias",
+            light,
+            f"taken out in {done.rounds} rounds{end} (rms): {'; '.join(texts)}",
+            "" if done.converged else "widen the windows or simplify the model",
+        )
+    ]
+
+
+def provenance(done: BiasRounds, found: Mapping[str, Size], hold: str) -> dict[str, object]:
+    """Plain values of what was done."""
+    return {
+        "applied": done.applied,
+        "reason": done.reason,
+        "hold": hold,
+        "rounds": done.rounds,
+        "converged": done.converged,
+        "responses": {name: vars(size).copy() for name, size in found.items()},
+    }

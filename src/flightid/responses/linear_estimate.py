@@ -1,0 +1,179 @@
+"""An estimate as what it is in its outputs: linear, with weights that the inputs have fixed.
+
+Windows and polynomials resolve a finite band, so the expected estimate of a known model is not the
+model's response but this functional of the model's outputs. The difference is the estimator's bias
+(leakage and resolution), which more signal does not shrink; with the functional it can be computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import ShapeError
+from flightid.responses.covariance import WindowedErrors
+from flightid.responses.local_fit import Bins, LocalFit
+from flightid.responses.samples import Samples
+from flightid.responses.transform import FoldedBasis, transform
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+
+class OutputWeights(Protocol):
+    """The weights of an estimate on its outputs."""
+
+    def apply(
+        self, changes: Sequence[Real], outputs: Places, inputs: Places, frequencies: Places
+    ) -> Complex:
+        """Change of the response for changes of the outputs, shape (n_out, n_in, n_f).
+
+        `changes` holds one array for each record, shape (len(outputs), n_samples).
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class WindowedWeights:
+    """Weights of a windowed estimate; a composite to first order, its window shares held fixed.
+
+    Attributes
+    ----------
+    errors : WindowedErrors
+    """
+
+    errors: WindowedErrors
+
+    def apply(
+        self, changes: Sequence[Real], outputs: Places, inputs: Places, frequencies: Places
+    ) -> Complex:
+        """See `OutputWeights`."""
+        errors = self.errors
+        shape = (len(outputs), len(inputs), len(frequencies))
+        total = np.zeros((2, *shape))
+        turns = errors.sensitivity[:, :, :, outputs][:, :, :, :, inputs][..., frequencies]
+        for share, turn in zip(errors.shares, turns, strict=True):
+            basis = FoldedBasis.of(share.plan, errors.omega[frequencies])
+            moved = np.zeros(shape, dtype=np.complex128)
+            for record, change in zip(errors.instruments, changes, strict=True):
+                if not share.plan.count(change.shape[1]):
+                    continue
+                weights = errors.weights(record, share, inputs, frequencies)
+                real, imaginary = transform(change, basis, errors.detrend)
+                moved += np.einsum("ifw,fow->oif", weights, real + 1j * imaginary, optimize=True)
+            parts = np.stack([moved.real, moved.imag])
+            total += np.einsum("aboif,boif->aoif", turn, parts)
+        return np.asarray(total[0] + 1j * total[1])
+
+
+@dataclass(frozen=True)
+class LocalWeights:
+    """Weights of local polynomial estimates on the Fourier bins of whole records.
+
+    Attributes
+    ----------
+    fits : tuple of LocalFit
+    sample_time_s : float
+    """
+
+    fits: tuple[LocalFit, ...]
+    sample_time_s: float
+
+    def apply(
+        self, changes: Sequence[Real], outputs: Places, inputs: Places, frequencies: Places
+    ) -> Complex:
+        """See `OutputWeights`."""
+        found = np.zeros((len(outputs), len(inputs), len(frequencies)), dtype=np.complex128)
+        for index, change in enumerate(changes):
+            values = Bins.of(change, self.sample_time_s).values
+            for place, frequency in enumerate(frequencies):
+                fit = self.fits[frequency]
+                bins = values[:, fit.places[index]]
+                found[:, :, place] += bins @ fit.weights[index][inputs].T
+        return found
+
+
+@dataclass(frozen=True)
+class LinearEstimate:
+    """What a response was estimated from, and the weights by which.
+
+    Attributes
+    ----------
+    weights : OutputWeights
+    inputs : tuple of str
+        Names of all inputs that the estimate was conditioned on.
+    input_records, output_records : tuple of ndarray, shapes (n_inputs, n) and (n_outputs, n)
+        Measured samples, one array for each record, means removed as for the estimate.
+    sample_time_s : float
+    places : tuple of ndarray of int
+        Outputs, inputs and frequencies of the estimate that the response holds.
+
+    Example
+    -------
+    >>> import numpy as np, flightid as fid
+    >>> u = np.random.default_rng(0).standard_normal(2000)
+    >>> record = fid.Record.from_arrays(np.arange(2000) / 100, inputs={"u": u},
+    ...                                 outputs={"y": np.convolve(u, [0.5, 0.5])[:2000]})
+    >>> response = fid.estimate_response(record, omega_rad_s=(2.0, 50.0, 5))
+    >>> again = response.linear.apply([record.matrix(["y"])])
+    >>> bool(np.allclose(again, response.response, rtol=0.01))
+    True
+    """
+
+    weights: OutputWeights
+    inputs: tuple[str, ...]
+    input_records: tuple[Real, ...]
+    output_records: tuple[Real, ...]
+    sample_time_s: float
+    places: tuple[Places, Places, Places]
+
+    @classmethod
+    def of(cls, samples: Samples, weights: OutputWeights, n_f: int) -> LinearEstimate:
+        """All outputs, inputs and frequencies of an estimate from `samples`."""
+        sizes = (len(samples.outputs), len(samples.inputs), n_f)
+        places = tuple(np.arange(size) for size in sizes)
+        return cls(
+            weights,
+            samples.inputs,
+            tuple(samples.part("inputs")),
+            tuple(samples.part("outputs")),
+            samples.sample_time_s,
+            (places[0], places[1], places[2]),
+        )
+
+    def select(self, outputs: Places, inputs: Places, frequencies: Places) -> LinearEstimate:
+        """Follow a selection of the response."""
+        rows, columns, points = self.places
+        return replace(
+            self,
+            output_records=tuple(record[outputs] for record in self.output_records),
+            places=(rows[outputs], columns[inputs], points[frequencies]),
+        )
+
+    def apply(self, changes: Sequence[Real]) -> Complex:
+        """Change of the response for changes of its outputs, to first order in a composite.
+
+        Parameters
+        ----------
+        changes : sequence of ndarray, each shape (n_out, n_samples)
+            One for each record, for the outputs of the response in their order and unit.
+
+        Returns
+        -------
+        ndarray of complex, shape (n_out, n_in, n_f)
+
+        Raises
+        ------
+        ShapeError
+            Changes do not fit the records.
+        """
+        needed = [record.shape for record in self.output_records]
+        found = [np.shape(change) for change in changes]
+        if found != needed:
+            raise ShapeError("changes do not fit the records", found=found, needed=needed)
+        return self.weights.apply(changes, *self.places)
