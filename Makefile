@@ -5,6 +5,7 @@ BIN    := $(VENV)/bin
 WHEELS := dist
 STAMP  := $(VENV)/.installed
 RUST   := $(shell find crates -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml
+# One worker a core; a linear-algebra library that starts threads of its own would only get in the way.
 JOBS   ?= auto
 FUZZ_RUNS ?= 1000000
 
@@ -49,10 +50,10 @@ stubs: develop  ## regenerate src/flightid/_native.pyi
 
 test: wheel lint  ## everything that must pass before a merge
 	cargo test --workspace --quiet
-	$(BIN)/python -m pytest -n $(JOBS) --doctest-modules
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --doctest-modules
 
 test-slow: wheel  ## Monte Carlo calibration of every printed interval, and the full studies
-	$(BIN)/python -m pytest -n $(JOBS) -m slow
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) -m slow
 
 bench: wheel  ## speed against peers, same data, one run
 	$(BIN)/python -m benchmarks
