@@ -4,17 +4,16 @@ VENV   := .venv
 BIN    := $(VENV)/bin
 WHEELS := dist
 STAMP  := $(VENV)/.installed
-RUST   := $(shell find crates -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml
 # One worker a core; a linear-algebra library that starts threads of its own would only get in the way.
 JOBS   ?= auto
 FUZZ_RUNS ?= 1000000
 
-.PHONY: demo test test-slow fuzz bench lint format stubs develop wheel docs clean help
+.PHONY: demo test test-slow fuzz bench lint format stubs develop wheel constraints clean help
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/ —/'
 
-$(STAMP): pyproject.toml
+$(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) tools/check_machine.py
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
@@ -62,6 +61,11 @@ fuzz:  ## throw damaged logs at the readers (needs a nightly toolchain and cargo
 	cd fuzz && for target in dataflash ulog; do \
 	  mkdir -p corpus/$$target seeds/$$target && cargo +nightly fuzz run -s none $$target \
 	    corpus/$$target seeds/$$target -- -runs=$(FUZZ_RUNS) -max_len=4096 || exit 1; done
+
+constraints: $(STAMP)  ## note the installed versions as the ones that `make` installs
+	head -2 constraints.txt > constraints.new
+	$(BIN)/python -m pip freeze --exclude flightid >> constraints.new
+	mv constraints.new constraints.txt
 
 clean:
 	rm -rf $(VENV) $(WHEELS) target demo-output

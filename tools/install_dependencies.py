@@ -17,5 +17,7 @@ def requirements(*extras: str) -> list[str]:
 
 
 if __name__ == "__main__":
-    command = [sys.executable, "-m", "pip", "install", "--quiet", *requirements(*sys.argv[1:])]
+    constraints = Path(__file__).parent.parent / "constraints.txt"
+    pip = [sys.executable, "-m", "pip", "install", "--quiet", "--constraint", str(constraints)]
+    command = [*pip, *requirements(*sys.argv[1:])]
     sys.exit(subprocess.run(command, check=False).returncode)
