@@ -19,6 +19,7 @@ The published cost divides by each part; near 0° or 90° one of them vanishes a
 whole weight.
 """
 MAXIMUM_STEPS = 40
+MAXIMUM_HALVINGS = 30
 TOLERANCE = 1e-11
 ROUNDING = 1e-13
 
@@ -153,31 +154,42 @@ def _cost(
 def _solve(
     start: NDArray[np.float64], target: NDArray[np.float64], scale: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    x = start
-    cost = _cost(x, target, scale)
+    """Gauss–Newton at every place by itself; a place that has come to rest costs nothing more."""
+    x = start.reshape(len(start), -1).copy()
+    target, scale = target.reshape(len(target), -1), scale.reshape(len(scale), -1)
+    moving = np.arange(x.shape[1])
     for _ in range(MAXIMUM_STEPS):
-        value, slope = _coherence_and_slope(x, scale)
-        gradient = (x - target[:4]) + COHERENCE_WEIGHT * slope * (value - target[4])
-        # Sherman–Morrison on identity + 5 s sᵀ.
-        along = np.sum(slope * gradient, axis=0)
-        bent = 1.0 + COHERENCE_WEIGHT * np.sum(slope**2, axis=0)
-        step = -(gradient - COHERENCE_WEIGHT * slope * along / bent)
-        length = np.ones_like(cost)
-        accepted = np.zeros(cost.shape, dtype=bool)
-        for _ in range(30):
-            trial = x + length * step
-            inside = (trial[0] > 0.0) & (trial[1] > 0.0)
-            trial_cost = np.where(inside, _cost(np.where(inside, trial, x), target, scale), np.inf)
-            accepted = trial_cost <= cost * (1.0 + ROUNDING)
-            if np.all(accepted):
-                break
-            length = np.where(accepted, length, 0.5 * length)
-        moved = np.where(accepted, trial, x)
-        change = np.max(np.abs(moved - x), initial=0.0)
-        x, cost = moved, np.where(accepted, trial_cost, cost)
-        if change < TOLERANCE:
+        before = x[:, moving]
+        x[:, moving] = _step(before, target[:, moving], scale[:, moving])
+        moving = moving[np.max(np.abs(x[:, moving] - before), axis=0) >= TOLERANCE]
+        if not moving.size:
             break
-    return x
+    return x.reshape(start.shape)
+
+
+def _step(
+    x: NDArray[np.float64], target: NDArray[np.float64], scale: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """The unknowns, shape (4, n), after one step, halved where the cost would rise."""
+    value, slope = _coherence_and_slope(x, scale)
+    gradient = (x - target[:4]) + COHERENCE_WEIGHT * slope * (value - target[4])
+    # Sherman–Morrison on identity + 5 s sᵀ.
+    along = np.sum(slope * gradient, axis=0)
+    bent = 1.0 + COHERENCE_WEIGHT * np.sum(slope**2, axis=0)
+    step = -(gradient - COHERENCE_WEIGHT * slope * along / bent)
+    allowed = _cost(x, target, scale) * (1.0 + ROUNDING)
+    moved, waiting, length = x.copy(), np.arange(x.shape[1]), 1.0
+    for _ in range(MAXIMUM_HALVINGS):
+        trial = x[:, waiting] + length * step[:, waiting]
+        inside = (trial[0] > 0.0) & (trial[1] > 0.0)
+        trial[:, ~inside] = x[:, waiting[~inside]]
+        cost = _cost(trial, target[:, waiting], scale[:, waiting])
+        accepted = inside & (cost <= allowed[waiting])
+        moved[:, waiting[accepted]] = trial[:, accepted]
+        waiting, length = waiting[~accepted], 0.5 * length
+        if not waiting.size:
+            break
+    return moved
 
 
 def _sensitivity(

@@ -19,8 +19,8 @@ from scipy.fft import next_fast_len
 from flightid.responses.noise import NoiseSpectrum
 from flightid.responses.transform import FoldedBasis, WindowPlan, transform
 
-COLUMNS = 2048
-"""Frequencies of the noise that are worked on at a time: bounds memory."""
+COLUMNS = 512
+"""Frequencies of the noise that are worked on at a time: bounds memory, and suits caches."""
 SIDE_LOBES = 40.0
 """Bins of the shortest window beyond the highest frequency, past which noise does not reach the
 estimate: a Hann window's side lobes are down by 1e-9 in power there."""
@@ -91,11 +91,15 @@ class WindowedErrors:
         self, n_samples: int, frequencies: NDArray[np.intp]
     ) -> tuple[int, NDArray[np.intp]]:
         """Length of the noise's Fourier transform, and its bins that reach the estimate."""
-        lengths = [share.plan.length for share in self.shares]
-        length = int(next_fast_len(n_samples + max(lengths) // 2, real=True))
-        highest = float(self.omega[frequencies].max()) + SIDE_LOBES * 2.0 * np.pi / min(lengths)
+        longest = max(share.plan.length for share in self.shares)
+        length = int(next_fast_len(n_samples + longest // 2, real=True))
+        highest = float(self.omega[frequencies].max()) + self._reach()
         last = min(length // 2, int(highest * length / (2.0 * np.pi)) + 1)
         return length, np.arange(last + 1)
+
+    def _reach(self) -> float:
+        """How far above a frequency noise reaches its estimate, rad per sample."""
+        return SIDE_LOBES * 2.0 * np.pi / min(share.plan.length for share in self.shares)
 
     def weights(
         self,
@@ -126,57 +130,69 @@ class WindowedErrors:
         twice = np.where((columns == 0) | (2 * columns == length), 1.0, 2.0) / length
         level = np.sqrt(twice * density[outputs])
         omega = self.omega[frequencies]
+        near = np.flatnonzero(omega + self._reach() >= angle[0])
         bases = [
             tuple(
-                basis_transform(share.plan.length, omega, sign * angle, self.detrend)
+                basis_transform(share.plan.length, omega[near], sign * angle, self.detrend)
                 for sign in (1.0, -1.0)
             )
             for share in self.shares
         ]
+        turns = [_turns(*one, angle) for one in zip(self.shares, records[0], strict=True)]
+        mixing = _mixing(sensitivity[..., near])
+        gram = np.zeros((len(outputs), *[2 * mixing.shape[0] * mixing.shape[1]] * 2))
         for weights in records:
-            parts = []
-            for share, weight, (above, below) in zip(self.shares, weights, bases, strict=True):
-                ahead = _places(share.plan, weight, angle) * above
-                mirrored = (_places(share.plan, weight, -angle) * below).conj()
-                parts.append(((ahead + mirrored) / 2.0, (ahead - mirrored) / 2.0j))
-            _add_gram(total, parts, sensitivity, level)
+            kernels = []
+            for weight, turn, (above, below) in zip(weights, turns, bases, strict=True):
+                ahead = (weight[:, near] @ turn) * above
+                mirrored = ((weight[:, near] @ turn.conj()) * below).conj()
+                kernels += [(ahead + mirrored) / 2.0, (ahead - mirrored) / 2.0j]
+            _add_gram(gram, np.stack(kernels, axis=2), mixing, level)
+        rows = np.add.outer(np.arange(2 * mixing.shape[0]) * len(omega), near).ravel()
+        total[:, rows[:, None], rows] += gram
 
 
-def _add_gram(
-    total: Real, parts: Sequence[tuple[Complex, Complex]], sensitivity: Real, level: Real
-) -> None:
+def _mixing(sensitivity: Real) -> Real:
+    """Sensitivities as one matrix for each input and frequency.
+
+    Shape (n_in, n_f, 2 · n_out, 2 · n_windows): parts and outputs of the estimate from parts of
+    the windows' responses.
+    """
+    windows, _, _, outputs, inputs, count = sensitivity.shape
+    ordered = sensitivity.transpose(4, 5, 1, 3, 0, 2)
+    return np.ascontiguousarray(ordered).reshape(inputs, count, 2 * outputs, 2 * windows)
+
+
+def _add_gram(total: Real, kernels: Complex, mixing: Real, level: Real) -> None:
     """Add the Gram matrix of the weighted kernels of each output.
 
     Parameters
     ----------
     total : ndarray, shape (n_out, rows, rows)
         Added to.
-    parts : sequence of (ndarray, ndarray), each shape (n_in, n_f, n_bins)
-        Kernels of real and imaginary part, for each window length.
-    sensitivity : ndarray, shape (n_windows, 2, 2, n_out, n_in, n_f)
+    kernels : ndarray of complex, shape (n_in, n_f, 2 · n_windows, n_bins)
+        Of real and imaginary part for each window length.
+    mixing : ndarray, shape (n_in, n_f, 2 · n_out, 2 · n_windows)
     level : ndarray, shape (n_out, n_bins)
         Root of the noise power at each bin.
     """
-    n_bins = level.shape[1]
-    for place in range(len(total)):
-        rows = np.zeros((2, *parts[0][0].shape), dtype=np.complex128)
-        for turn, kernels in zip(sensitivity, parts, strict=True):
-            for part, other in np.ndindex(2, 2):
-                weight = turn[part, other, place]
-                if np.any(weight):
-                    rows[part] += weight[:, :, None] * kernels[other]
-        rows *= level[place]
-        flat = rows.reshape(-1, n_bins).view(np.float64)
+    n_in, n_f, _, n_bins = kernels.shape
+    n_out = len(total)
+    mixed = (mixing @ kernels.view(np.float64)).reshape(n_in, n_f, 2, n_out, 2 * n_bins)
+    for place, root in enumerate(np.repeat(level, 2, axis=1)):
+        rows = np.multiply(mixed[:, :, :, place].transpose(2, 0, 1, 3), root, order="C")
+        flat = rows.reshape(-1, 2 * n_bins)
         total[place] += flat @ flat.T
 
 
-def _places(plan: WindowPlan, weight: Complex, angle: Real) -> Complex:
-    """Fourier transform of the windows' weights at their places, shape (n_in, n_f, n_angles).
+def _turns(share: WindowShare, weight: Complex, angle: Real) -> Complex:
+    """Transform of unit samples at the windows' middles, shape (n_windows, n_angles).
 
-    Windows are copies of one basis function, so the transform of g is this times the function's.
+    Windows are copies of one basis function, so the transform of g is that of the windows' weights
+    at their places times the function's.
     """
-    middles = plan.length // 2 + plan.hop * np.arange(weight.shape[2])
-    return np.asarray(weight @ np.exp(-1j * np.multiply.outer(middles, angle)))
+    middles = share.plan.length // 2 + share.plan.hop * np.arange(weight.shape[2])
+    return np.asarray(np.exp(-1j * np.multiply.outer(middles, angle)))
 
 
 def basis_transform(length: int, omega: Real, angle: Real, detrend: str) -> Complex:

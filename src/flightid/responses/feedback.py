@@ -18,6 +18,8 @@ SMALLEST_POWER = 5e-4
 """Share of an input's whole power that this must be: below it the bias does not matter, and a clean
 sweep, which hardly has an innovation, gives no false alarm."""
 SMALLEST_PROBABILITY = 1e-6
+RIDGE = 1e-11
+"""Added to columns of unit length: noise 110 dB below each channel."""
 SAMPLES_A_CYCLE = 8.0
 """Samples kept in a cycle of the highest frequency of interest."""
 MAXIMUM_SAMPLES = 20000
@@ -87,7 +89,8 @@ def _gains(
     """What the others explain of each target beyond the own past, and its F probability.
 
     First as a share of what the own past leaves, then as a share of the whole. One triangular
-    factor of everything holds all these sums of squares.
+    factor of everything holds all these sums of squares. It comes from the normal equations, whose
+    rounding is far below the shares that matter, and `RIDGE` keeps them definite.
     """
     table = np.concatenate([own, others, targets], axis=1)
     before, after = own.shape[1], own.shape[1] + others.shape[1]
@@ -95,13 +98,14 @@ def _gains(
     if free <= others.shape[1]:
         return [(0.0, 0.0, 1.0)] * targets.shape[1]
     scale = np.maximum(np.sqrt(np.sum(table**2, axis=0)), np.finfo(float).tiny)
-    factor = np.asarray(np.linalg.qr(table / scale, mode="r"))
+    table /= scale
+    factor = np.linalg.cholesky(table.T @ table + RIDGE * np.eye(table.shape[1])).T
     squares = factor[:, after:] ** 2
     found = []
     for column in range(targets.shape[1]):
         left = float(np.sum(squares[after:, column]))
         without = float(np.sum(squares[before:, column]))
-        if without <= 1e-12:
+        if without <= SMALLEST_POWER:
             found.append((0.0, 0.0, 1.0))
             continue
         share = max(0.0, 1.0 - left / without)

@@ -126,10 +126,15 @@ def fit_locally(
         for bins, place in zip(records, places, strict=True)
     )
     left, right = [], []
+    # Records of one length share their bins, and so their polynomials.
+    shared: dict[tuple[float, int, int], tuple[NDArray[np.float64], NDArray[np.float64]]] = {}
     for bins, place in zip(records, places, strict=True):
-        distance = (bins.omega[place] - omega) / width
-        powers = distance[:, None] ** np.arange(order + 1)
-        basis, _ = np.linalg.qr(powers)
+        key = (float(bins.omega[0]), place.start, place.stop)
+        if key not in shared:
+            distance = (bins.omega[place] - omega) / width
+            powers = distance[:, None] ** np.arange(order + 1)
+            shared[key] = powers, np.linalg.qr(powers)[0]
+        powers, basis = shared[key]
         values = bins.values[:, place].T
         regressors = (values[:, :n_inputs, None] * powers[:, None, :]).reshape(len(values), -1)
         left.append(regressors - basis @ (basis.T @ regressors))
