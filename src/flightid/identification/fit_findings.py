@@ -23,17 +23,19 @@ SINGLE_COST_LIMIT = 200.0
 """Tischler & Remple, 2nd ed., §12.2.5, §12.3.4 and §13.7."""
 
 _NEAR_COST = 1.1
+_DETERMINED = 0.2
+"""Half-width of a 95 % interval, as a share of the value, below which the data do determine it."""
 
 
 def judge_cost(costs: Mapping[str, float], average: float) -> list[Finding]:
     """Verdicts on the costs: the average, and each response that stands out."""
     if average <= EXCELLENT_COST:
         found = [
-            Finding("cost", Light.GREEN, f"average cost {average:.1f}, nearly indistinguishable")
+            Finding("cost", Light.GREEN, f"average cost {average:.2g}, nearly indistinguishable")
         ]
     elif average <= AVERAGE_COST_GUIDE:
         found = [
-            Finding("cost", Light.GREEN, f"average cost {average:.1f}, within the guide of 100")
+            Finding("cost", Light.GREEN, f"average cost {average:.2g}, within the guide of 100")
         ]
     else:
         found = [
@@ -65,26 +67,33 @@ def judge_parameters(parameters: Mapping[str, FittedParameter]) -> list[Finding]
                     "widen the bound if physics allows, else fix the parameter there",
                 )
             )
-        insensitive, bounded = p.insensitivity_percent, p.cramer_rao_percent
-        if insensitive is not None and insensitive > INSENSITIVITY_GUIDE_PERCENT:
-            found.append(
-                Finding(
-                    "insensitive",
-                    Light.AMBER,
-                    f"{p.name}: insensitivity {insensitive:.0f} % is above the guide of 10 %",
-                    "fix it or drop it from the model: the data hardly see it",
-                )
-            )
-        elif bounded is not None and bounded > CRAMER_RAO_GUIDE_PERCENT:
-            found.append(
-                Finding(
-                    "cramer-rao",
-                    Light.AMBER,
-                    f"{p.name}: Cramér–Rao bound {bounded:.0f} % is above the guide of 20 %",
-                    "it is correlated with others: fix or tie one of them, or widen the band",
-                )
-            )
+        found += _judge_guides(p)
     return found
+
+
+def _judge_guides(p: FittedParameter) -> list[Finding]:
+    insensitive, bounded = p.insensitivity_percent, p.cramer_rao_percent
+    if insensitive is not None and insensitive > INSENSITIVITY_GUIDE_PERCENT:
+        code, what = "insensitive", f"insensitivity {insensitive:.0f} % is above the guide of 10 %"
+        action = "fix it or drop it from the model: the data hardly see it"
+    elif bounded is not None and bounded > CRAMER_RAO_GUIDE_PERCENT:
+        code, what = "cramer-rao", f"Cramér–Rao bound {bounded:.0f} % is above the guide of 20 %"
+        action = "it is correlated with others: fix or tie one of them, or widen the band"
+    else:
+        return []
+    share = _half_width_share(p)
+    if share is not None and share < _DETERMINED:
+        # The guides know nothing of the noise: a quiet record can determine what they would drop.
+        what += f", yet its 95 % interval is only ±{100 * share:.2g} %"
+        action = "keep it; sweep to higher frequency if it matters"
+    return [Finding(code, Light.AMBER, f"{p.name}: {what}", action)]
+
+
+def _half_width_share(p: FittedParameter) -> float | None:
+    if p.interval95 is None or p.value == 0.0:
+        return None
+    low, high = p.interval95
+    return 0.5 * (high - low) / abs(p.value)
 
 
 def judge_correlation(names: Sequence[str], correlation: NDArray[np.float64]) -> list[Finding]:
