@@ -73,7 +73,7 @@ def average_spectra(
     -------
     Spectra
     """
-    plan, n_f = basis.plan, len(basis.cosine)
+    plan, n_f = basis.plan, basis.n_frequencies
     channels = records[0].shape[0]
     total = np.zeros((n_f, 2 * channels, 2 * channels))
     for samples in records:
