@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from flightid.conditioning import check_consistency
-from flightid.conditioning.coloured_residuals import autocovariance
+from flightid.conditioning.coloured_residuals import autoregression, periodogram
 from flightid.conditioning.kinematics import OUTPUTS, UNITS, KinematicModel, rotation_rows
 from flightid.conventions import STANDARD_GRAVITY_M_S2
 from flightid.errors import DataError, OptionError, SingularError, UnitError, UnknownNameError
@@ -85,18 +85,24 @@ def flight(
     seed: int = 0,
     noise: float = 0.0,
     colour: float = 0.0,
+    gyro: float = 0.0,
+    accelerometer: float = 0.0,
     n: int = 1200,
 ) -> Record:
-    """Channels as measured with known errors; `colour` is the pole of the outputs' noise."""
+    """Channels as measured with known errors; `colour` is the pole of the outputs' noise.
+
+    `gyro` and `accelerometer` are deviations of white noise of rates and specific forces.
+    """
     random = np.random.default_rng(seed)
     time_s = np.arange(n) * 0.02
     forces = ("ax", "ay", "az") if len(outputs) > 3 else ()
     samples = {}
+    size = {**dict.fromkeys(("p", "q", "r"), gyro), **dict.fromkeys(forces, accelerometer)}
     for name in ("p", "q", "r", *forces, *outputs):
         motion = _motion(time_s - truth.get(f"delay_{name}", 0.0))[name]
         white = random.standard_normal(n + 500)
         coloured = lfilter([np.sqrt(1 - colour**2)], [1, -colour], white)[500:]
-        error = noise * (coloured if name in outputs else 0.0)
+        error = noise * coloured if name in outputs else size[name] * white[500:]
         gain = 1 + truth.get(f"scale_{name}", 0.0)
         samples[name] = gain * motion + truth.get(f"bias_{name}", 0.0) + error
     return Record.from_arrays(time_s, outputs=samples, units={k: UNITS[k] for k in samples})
@@ -181,8 +187,10 @@ def test_intervals_are_calibrated_with_coloured_noise() -> None:
 def test_autocovariance_of_an_autoregression() -> None:
     noise = lfilter([1.0], [1, -0.9], np.random.default_rng(0).standard_normal(100_000))
     expected = 0.9 ** np.arange(40) / (1 - 0.81)
-    assert_close(autocovariance(noise, 40), expected, atol=0.3, why="100,000 samples")
-    assert autocovariance(np.zeros(100), 5).tolist() == [0.0] * 5
+    model = autoregression(periodogram(noise[:, None]), noise.size)
+    assert_close(model.autocovariance(40), expected, atol=0.3, why="100,000 samples")
+    still = autoregression(periodogram(np.zeros((100, 1))), 100)
+    assert still.autocovariance(5).tolist() == [0.0] * 5
 
 
 def test_correlated_pairs_and_wrong_signs_are_named() -> None:

@@ -17,9 +17,11 @@ from flightid.record.interpolation import windowed_sinc
 from flightid.table import Column, Table
 from flightid.units import require_match
 
-HANN_NEIGHBOURS = 1 + 2 * ((2 / 3) ** 2 + (1 / 6) ** 2)
-"""Growth of the variance of a weighted sum over frequency: neighbouring estimates under a Hann
-window are correlated by (2/3)² and (1/6)²."""
+HANN_NEIGHBOURS = 2.000
+"""Growth of the variance of a weighted sum over frequency beyond that of its terms: estimates under
+half-overlapped Hann windows are correlated over neighbouring frequencies, in one window (by (2/3)²
+and (1/6)²) and across two."""
+FEWEST_FREE = 0.25
 HANN_OVERLAP = 1 + 2 * (1 / 6) ** 2
 """Growth of the variance of an average over Hann windows that overlap by half."""
 ROUNDS = 4
@@ -259,13 +261,17 @@ def _phase_slope(
     frequency, cross = frequency[used], cross[used]
     coherence = np.clip(np.abs(cross) ** 2 / (power * other)[used], 1e-12, 1 - 1e-12)
     n_windows = 1 + (first.size - length) // (length - length // 2)
-    information = 2 * (n_windows / HANN_OVERLAP) * coherence / (1 - coherence)
+    n_free = n_windows / HANN_OVERLAP
+    information = 2 * n_free * coherence / (1 - coherence)
     omega = 2 * np.pi * frequency
     # A lag turns the phase of the cross-spectrum by -omega lag; aligned channels never wrap it.
     total = float(np.sum(information * omega**2))
     lag = -float(np.sum(information * omega * np.angle(cross))) / total
     mean_coherence = float(np.sum(coherence * information) / np.sum(information))
-    return _Slope(lag, float(np.sqrt(HANN_NEIGHBOURS / total)), mean_coherence)
+    # Weights from n averages are too large by n/(n - 2) in the mean, and their scatter makes the
+    # sum less exact by (n - 2)/(n - 3): moments of the inverse of a gamma of n - 1.
+    scatter = n_free / max(n_free - 3, FEWEST_FREE)
+    return _Slope(lag, float(np.sqrt(scatter * HANN_NEIGHBOURS / total)), mean_coherence)
 
 
 def _spectrum(

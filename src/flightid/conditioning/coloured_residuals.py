@@ -1,65 +1,138 @@
 """Covariance of least-squares estimates whose residuals are coloured.
 
-The usual inverse information assumes white residuals. Residuals of flight data are not: gyro noise
-integrates into slow drifts. Here each output's residual gets an autoregressive model (order by the
-Bayesian information criterion), whose autocovariance stands for the noise in
-``D [sum_ij s_i R(i - j) s_j'] D``. Sample autocovariances alone would give too little: the fit has
-already taken out of the residuals what lies along the sensitivities.
+The usual inverse information assumes white residuals. Residuals of flight data are not: sensors and
+filters colour them, and gyro noise integrates to a random walk, which is not stationary. Here the
+walk goes its own way to the covariance (`input_noise.py`), and what else an output's residual holds
+gets an autoregressive model (order by the Bayesian information criterion), whose autocovariance
+stands for the noise in ``D [sum_ij s_i R(i - j) s_j'] D``. Sample autocovariances alone would give
+too little: the fit has already taken out of the residuals what lies along the sensitivities. How
+much that is, draws from the model tell.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, signal
 
+from flightid.conditioning.input_noise import InputNoise
+
 Array = NDArray[np.float64]
 LARGEST_ORDER = 20
+SEPARATIONS = 20
+RESTORATIONS = 2
+DRAWS = 32
 
 
-def autocovariance(residual: Array, n_lags: int) -> Array:
-    """Autocovariance of a residual by an autoregressive model, lags 0 to ``n_lags - 1``.
+@dataclass(frozen=True)
+class Autoregression:
+    """Autoregressive model of a stationary residual.
+
+    Attributes
+    ----------
+    lags : ndarray, shape (largest_order + 1,)
+        Autocovariance at the first lags, square of the residual's unit.
+    weights : ndarray, shape (order,)
+        Weights of the past samples.
+    n : int
+        Number of samples of the residual.
+    """
+
+    lags: Array
+    weights: Array
+    n: int
+
+    def autocovariance(self, n_lags: int) -> Array:
+        """Autocovariance at lags 0 to ``n_lags - 1``."""
+        result = np.zeros(n_lags)
+        order = self.weights.size
+        result[: order + 1] = self.lags[: order + 1]
+        if order:
+            # Beyond its order the model continues its autocovariance by its own recursion.
+            denominator = np.concatenate(([1.0], -self.weights))
+            state = signal.lfiltic([1.0], denominator, y=result[order:0:-1])
+            result[order + 1 :] = signal.lfilter(
+                [1.0], denominator, np.zeros(n_lags - order - 1), zi=state
+            )[0]
+        return result
+
+    def spectrum(self) -> Array:
+        """Spectrum at the frequencies of `periodogram`."""
+        order = self.weights.size
+        innovation = float(self.lags[0] - self.weights @ self.lags[1 : order + 1])
+        gain = fft.rfft(np.concatenate(([1.0], -self.weights)), _length(self.n))
+        return np.asarray(max(innovation, 0.0) / np.abs(gain) ** 2)
+
+
+def autoregression(power: Array, n: int, known: Array | None = None) -> Autoregression:
+    """Autoregressive model of a residual by its `periodogram`.
+
+    A part of the residual whose mean periodogram is `known` is left out of the model, by
+    expectation and maximisation over the spectrum: both parts keep positive spectra.
 
     Parameters
     ----------
-    residual : ndarray, shape (n,)
-        Residual of one output.
-    n_lags : int
-        Number of lags.
+    power : ndarray, shape (n_bins,)
+        Periodogram of the residual.
+    n : int
+        Number of samples of the residual.
+    known : ndarray, shape (n_bins,), optional
+        Mean periodogram of the part to leave out.
 
     Returns
     -------
-    ndarray, shape (n_lags,)
-        In the square of the residual's unit.
+    Autoregression
 
     Reference
     ---------
-    Brockwell & Davis, Time Series: Theory and Methods (2nd ed.), sections 8.1-8.2 (Yule-Walker).
+    Brockwell & Davis, Time Series: Theory and Methods (2nd ed.), sections 8.1-8.2 (Yule-Walker);
+    Dempster, Laird & Rubin (1977), J. Royal Statistical Society B 39(1), section 2.
 
     Example
     -------
-    >>> white = np.random.default_rng(0).standard_normal(4000)
-    >>> autocovariance(white, 3).round(1)
+    >>> white = np.random.default_rng(0).standard_normal((4000, 1))
+    >>> autoregression(periodogram(white), 4000).autocovariance(3).round(1)
     array([1., 0., 0.])
     """
-    n = residual.size
-    largest = min(LARGEST_ORDER, n // 20, n_lags - 1)
-    sample = np.array([float(residual[: n - k] @ residual[k:]) / n for k in range(largest + 1)])
-    weights = _autoregression(sample, n)
-    result = np.zeros(n_lags)
-    order = weights.size
-    result[: order + 1] = sample[: order + 1]
-    if order:
-        # Beyond its order the model continues its autocovariance by its own recursion.
-        denominator = np.concatenate(([1.0], -weights))
-        state = signal.lfiltic([1.0], denominator, y=result[order:0:-1])
-        result[order + 1 :] = signal.lfilter(
-            [1.0], denominator, np.zeros(n_lags - order - 1), zi=state
-        )[0]
-    return result
+    largest = min(LARGEST_ORDER, n // 20)
+    lags = _lags(power, n, largest)
+    model = Autoregression(lags, _weights(lags, n), n)
+    if known is None:
+        return model
+    for _ in range(SEPARATIONS):
+        own = model.spectrum()
+        share = own / np.maximum(own + known, np.finfo(float).tiny)
+        lags = _lags(share**2 * power + share * known, n, largest)
+        model = Autoregression(lags, _weights(lags, n), n)
+    return model
 
 
-def _autoregression(sample: Array, n: int) -> Array:
+def periodogram(columns: Array) -> Array:
+    """Mean periodogram of columns (n, k), zero-padded to the next fast length from 2 n."""
+    n = columns.shape[0]
+    transform = fft.rfft(columns, _length(n), axis=0)
+    return np.asarray(np.mean(np.abs(transform) ** 2, axis=1) / n)
+
+
+def _length(n: int) -> int:
+    """Fast transform length with room for all lags of n samples."""
+    return int(fft.next_fast_len(2 * n, real=True))
+
+
+def _leaking(spectrum: Array, n: int) -> Array:
+    """Mean periodogram of n samples with this spectrum: lag k is seen n - k times in n."""
+    lags = fft.irfft(spectrum, _length(n))[:n] * (1 - np.arange(n) / n)
+    return np.asarray(2 * fft.rfft(lags, _length(n)).real - lags[0])
+
+
+def _lags(power: Array, n: int, largest: int) -> Array:
+    """Autocovariance at lags 0 to `largest` from a zero-padded periodogram."""
+    return np.asarray(fft.irfft(power, _length(n))[: largest + 1])
+
+
+def _weights(sample: Array, n: int) -> Array:
     """Weights of the best autoregression by Levinson's recursion over the orders."""
     trial = best = np.empty(0)
     innovation = float(sample[0])
@@ -77,7 +150,9 @@ def _autoregression(sample: Array, n: int) -> Array:
     return best
 
 
-def corrected_covariance(slopes: Array, residuals: Array, deviations: Array) -> tuple[Array, Array]:
+def corrected_covariance(
+    slopes: Array, residuals: Array, deviations: Array, noise: InputNoise | None = None
+) -> tuple[Array, Array]:
     """Covariance for white residuals, and the one corrected for their colour.
 
     Parameters
@@ -88,6 +163,8 @@ def corrected_covariance(slopes: Array, residuals: Array, deviations: Array) -> 
         Residuals.
     deviations : ndarray, shape (n_outputs,)
         Standard deviations by which the fit weighed the outputs.
+    noise : InputNoise, optional
+        Noise of the inputs; None where the inputs are exact.
 
     Returns
     -------
@@ -106,23 +183,71 @@ def corrected_covariance(slopes: Array, residuals: Array, deviations: Array) -> 
     >>> float(white[0, 0])
     0.0025
     """
-    n, n_parameters = slopes.shape[1:]
-    information = np.zeros((n_parameters, n_parameters))
-    middle = np.zeros((n_parameters, n_parameters))
-    for slope, residual, deviation in zip(slopes, residuals, deviations, strict=True):
-        scaled = slope / deviation**2
-        information += slope.T @ scaled
-        middle += scaled.T @ _toeplitz_product(autocovariance(residual, n), scaled)
+    n = slopes.shape[1]
+    weighed = slopes / deviations[:, None, None] ** 2
+    information = np.einsum("onp,onq->pq", slopes, weighed, optimize=True)
     # Columns differ by many orders of magnitude: scale them before inverting.
     size = np.sqrt(np.diag(information))
     inverse = np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size)
-    return inverse, inverse @ middle @ inverse * n / (n - n_parameters / len(residuals))
+    projection = _Projection(slopes, weighed, inverse)
+    walks = None if noise is None else projection.walks(noise)
+    middle = np.zeros_like(information)
+    for scaled, model in zip(weighed, projection.models(residuals, walks), strict=True):
+        middle += scaled.T @ _toeplitz_product(model.autocovariance(n), scaled)
+    if noise is not None:
+        paths = noise.transposed(weighed)
+        middle += np.einsum("sjp,sjq->pq", paths, paths, optimize=True)
+    return inverse, inverse @ middle @ inverse
+
+
+@dataclass(frozen=True)
+class _Projection:
+    """What the fit leaves of noise in the residuals.
+
+    Draws come from a fixed seed: the same record gives the same intervals.
+    """
+
+    slopes: Array
+    weighed: Array
+    inverse: Array
+
+    def left(self, noise: Array) -> Array:
+        """Noise of the outputs (n_outputs, n, n_draws) less the share that the fit takes."""
+        taken = self.inverse @ np.einsum("onp,ond->pd", self.weighed, noise, optimize=True)
+        return np.asarray(noise - self.slopes @ taken)
+
+    def walks(self, noise: InputNoise) -> Array:
+        """Mean periodogram of each residual's random walk."""
+        n = self.slopes.shape[1]
+        draws = np.random.default_rng(0).standard_normal((n - 1, noise.steps.shape[2], DRAWS))
+        return np.array([periodogram(walk) for walk in self.left(noise.outputs_of(draws))])
+
+    def models(self, residuals: Array, walks: Array | None) -> list[Autoregression]:
+        """Models of the outputs' own noise, in rounds: what the fit took of it is given back."""
+        n_outputs, n = residuals.shape
+        seen = np.array([periodogram(residual[:, None]) for residual in residuals])
+        known = [None] * n_outputs if walks is None else list(walks)
+        random = np.random.default_rng(1)
+        white = fft.rfft(random.standard_normal((n_outputs, _length(n), DRAWS)), axis=1)
+        lost = np.zeros_like(seen)
+        models: list[Autoregression] = []
+        for _ in range(RESTORATIONS + 1):
+            models = [
+                autoregression(power, n, walk)
+                for power, walk in zip(seen + lost, known, strict=True)
+            ]
+            spectra = np.array([model.spectrum() for model in models])
+            drawn = fft.irfft(white * np.sqrt(spectra)[:, :, None], _length(n), axis=1)[:, :n]
+            taken = zip(drawn, self.left(drawn), strict=True)
+            lost = np.array([periodogram(before) - periodogram(after) for before, after in taken])
+            lost += [spectrum - _leaking(spectrum, n) for spectrum in spectra]
+        return models
 
 
 def _toeplitz_product(first: Array, columns: Array) -> Array:
     """Product of a symmetric Toeplitz matrix with columns, by one circulant of twice the size."""
     n = first.size
-    length = fft.next_fast_len(2 * n, real=True)
+    length = _length(n)
     ring = np.zeros(length)
     ring[:n] = first
     ring[length - n + 1 :] = first[:0:-1]

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from flightid.conditioning.align import align
 from flightid.conditioning.coloured_residuals import corrected_covariance
 from flightid.conditioning.consistency_findings import (
     drift_findings,
     findings_of,
-    require_separable,
 )
 from flightid.conditioning.consistency_result import InstrumentParameter, KinematicConsistency
 from flightid.conditioning.kinematics import (
@@ -26,16 +23,15 @@ from flightid.conditioning.kinematics import (
     UNITS,
     VELOCITIES,
     KinematicModel,
-    Prediction,
     rotation_rows,
 )
-from flightid.errors import DataError, FitError, OptionError, UnknownNameError
+from flightid.conditioning.output_error import OutputError, too_steep
+from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.record import Record, Step
 from flightid.table import Cell
 from flightid.units import require_match
 
 Array = NDArray[np.float64]
-ROUNDS = 6
 STEEPEST_RAD = np.deg2rad(85.0)
 UNIT_OF_KIND = {"scale": "1", "delay": "s"}
 
@@ -55,13 +51,15 @@ def check_consistency(
     (1 + scale) true + bias``. Output: ``measured(t) = (1 + scale) true(t − delay) + bias``, so a
     delay is the lag of an output behind the rates.
 
-    Standard errors are corrected for coloured residuals. Pairs of parameters that the record cannot
-    tell apart are named in the findings. Where noise of the gyros, integrated over the record, is
-    not small against the attitude's own noise, the finding ``"gyro-noise"`` says so: intervals of
-    the rate biases are then too narrow (a random walk is no stationary residual).
+    Standard errors carry both the colour of the outputs' own noise and the noise of the rates and
+    accelerations, which integrates to random walks in the outputs; its intensity is taken from the
+    upper half of the inputs' spectra. Where such a walk is not small against the residual, the
+    finding ``"gyro-noise"`` says so: the intervals allow for it, the estimates pay for it. Pairs of
+    parameters that the record cannot tell apart are named in the findings.
 
-    Assumes: a rigid body, flat non-rotating earth, rates and accelerations whose noise is small
-    against the outputs' own; with V, alpha, beta: still air or steady wind. Biased when: sensors
+    Assumes: a rigid body, flat non-rotating earth, white noise of rates and accelerations; with V,
+    alpha, beta: still air or steady wind. Intervals are too narrow when: noisy inputs were
+    low-passed below a quarter of the sampling frequency. Biased when: sensors
     sit away from the centre of gravity (use `accelerations_at_cg` first), or the attitude comes
     from an estimator that is itself driven by these gyros and has already removed their bias.
 
@@ -116,7 +114,7 @@ def check_consistency(
     for name in {"phi", "psi"} & set(measured):
         measured[name] = np.unwrap(measured[name])
     if "theta" in measured and np.max(np.abs(measured["theta"])) > STEEPEST_RAD:
-        raise _too_steep(f"{np.rad2deg(np.max(np.abs(measured['theta']))):.1f} degrees")
+        raise too_steep(f"{np.rad2deg(np.max(np.abs(measured['theta']))):.1f} degrees")
     errors = _chosen(estimate, inputs, measured)
     states = [name for name in STATES if _is_seen(name, measured)]
     parameters = (*(f"{name}_0" for name in states), *errors)
@@ -131,10 +129,10 @@ def check_consistency(
     start = _first_state(measured)
     start |= _first_scales(inputs, measured)
     theta = np.array([start.get(name.removesuffix("_0"), 0.0) for name in parameters])
-    theta, deviations = _fit(model, observed, theta)
-    prediction = model.predict(theta)
+    theta, prediction, deviations = OutputError(model, observed).fit(theta)
     residuals = observed - prediction.values
-    white, covariance = corrected_covariance(prediction.slopes, residuals, deviations)
+    noise = model.input_noise(theta)
+    white, covariance = corrected_covariance(prediction.slopes, residuals, deviations, noise)
     spread = np.sqrt(np.diag(white))
     found = {
         name: InstrumentParameter(name, float(value), float(error), _unit(name))
@@ -156,7 +154,12 @@ def check_consistency(
         _corrected(record, source, found),
         (
             *findings_of(found, correlation, fit, record.sample_time_s),
-            *drift_findings(inputs, rms, record.sample_time_s),
+            *drift_findings(
+                dict(zip(INPUTS, noise.deviations, strict=True)),
+                rms,
+                record.sample_time_s,
+                record.n_samples,
+            ),
         ),
     )
 
@@ -239,32 +242,6 @@ def _first_state(measured: Mapping[str, Array]) -> dict[str, float]:
     return state
 
 
-@dataclass(frozen=True)
-class _Problem:
-    """Weighed residuals and their Jacobian, in the form that SciPy takes."""
-
-    model: KinematicModel
-    observed: Array
-    deviations: Array
-    _kept: dict[bytes, Prediction] = field(default_factory=dict)
-
-    def residuals(self, theta: Array) -> Array:
-        values = self._prediction(theta).values
-        return ((values - self.observed) / self.deviations[:, None]).ravel()
-
-    def jacobian(self, theta: Array) -> Array:
-        slopes = self._prediction(theta).slopes / self.deviations[:, None, None]
-        return slopes.reshape(-1, theta.size)
-
-    def _prediction(self, theta: Array) -> Prediction:
-        """The last prediction, kept: SciPy asks for values and slopes at the same place."""
-        key = theta.tobytes()
-        if key not in self._kept:
-            self._kept.clear()
-            self._kept[key] = self.model.predict(theta)
-        return self._kept[key]
-
-
 def _first_scales(inputs: Mapping[str, Array], measured: Mapping[str, Array]) -> dict[str, float]:
     """A rate that runs against its angle starts reversed: no small step leads through zero gain."""
     scales = {}
@@ -274,57 +251,6 @@ def _first_scales(inputs: Mapping[str, Array], measured: Mapping[str, Array]) ->
             common = float((slope - slope.mean()) @ inputs[rate][:-1])
             scales[f"scale_{rate}"] = -2.0 if common < 0 else 0.0
     return scales
-
-
-def _fit(model: KinematicModel, observed: Array, theta: Array) -> tuple[Array, Array]:
-    """Output-error estimate, and the residual deviations by which it weighed the outputs."""
-    reach = np.maximum(np.ptp(observed, axis=1), 1e-9)
-    deviations = 0.1 * reach
-    for _ in range(ROUNDS):
-        problem = _Problem(model, observed, deviations)
-        solution = least_squares(
-            problem.residuals,
-            theta,
-            jac=problem.jacobian,
-            x_scale=_sizes(problem, theta),
-            xtol=1e-12,
-            ftol=1e-12,
-            gtol=1e-12,
-        )
-        if not solution.success:
-            raise FitError(
-                "the consistency fit does not settle",
-                found=solution.message,
-                action="estimate fewer instrument errors, or take a calmer record",
-            )
-        theta = np.asarray(solution.x)
-        residuals = observed - model.predict(theta).values
-        # The floor keeps an output that fits to rounding from taking all the weight.
-        fresh = np.maximum(np.sqrt(np.mean(residuals**2, axis=1)), 1e-7 * reach)
-        settled = bool(np.all(np.abs(fresh / deviations - 1) < 1e-3))
-        deviations = fresh
-        if settled:
-            break
-    return theta, deviations
-
-
-def _sizes(problem: _Problem, theta: Array) -> Array:
-    """Step of each parameter that moves the residuals by one; refuses what cannot be told apart."""
-    try:
-        jacobian = problem.jacobian(theta)
-    except OptionError as error:
-        raise _too_steep(str(error)) from error
-    require_separable(problem.model.parameters, jacobian)
-    return np.asarray(1 / np.linalg.norm(jacobian, axis=0))
-
-
-def _too_steep(found: str) -> DataError:
-    return DataError(
-        "the attitude cannot be rebuilt in Euler angles",
-        found=found,
-        needed="pitch angles inside ±85 degrees",
-        action="take a segment without such pitch, or check the units of the rates",
-    )
 
 
 def _unit(parameter: str) -> str:

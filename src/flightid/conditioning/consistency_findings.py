@@ -23,15 +23,18 @@ LARGEST_DRIFT = 0.15
 SMALLEST_DRIFT_RAD = 1e-4
 
 
-def require_separable(parameters: Sequence[str], jacobian: NDArray[np.float64]) -> None:
+def require_separable(
+    parameters: Sequence[str], size: NDArray[np.float64], triangle: NDArray[np.float64]
+) -> None:
     """Refuse parameters whose effects on the outputs cannot be told apart.
+
+    `size` is the norm of each effect; `triangle` is R of the effects at unit norm.
 
     Raises
     ------
     SingularError
         A parameter without effect, or a combination of parameters without effect.
     """
-    size = np.linalg.norm(jacobian, axis=0)
     idle = [name for name, value in zip(parameters, size, strict=True) if not value > 0]
     if idle:
         raise SingularError(
@@ -39,7 +42,7 @@ def require_separable(parameters: Sequence[str], jacobian: NDArray[np.float64]) 
             found=", ".join(idle),
             action="leave them out of estimate=[...]",
         )
-    _, values, rows = np.linalg.svd(jacobian / size, full_matrices=False)
+    _, values, rows = np.linalg.svd(triangle)
     if values[0] > LARGEST_CONDITION * values[-1]:
         mixed = [p for p, part in zip(parameters, rows[-1], strict=True) if abs(part) > 0.1]
         raise SingularError(
@@ -92,26 +95,26 @@ def findings_of(
 
 
 def drift_findings(
-    inputs: Mapping[str, NDArray[np.float64]],
+    noise: Mapping[str, float],
     residual_rms: Mapping[str, float],
     sample_time_s: float,
+    n_samples: int,
 ) -> tuple[Finding, ...]:
-    """Doubt of the bias intervals where integrated gyro noise shows in the attitude."""
+    """Notice of integrated gyro noise that shows in the attitude."""
     found = []
     for rate, angle in (("p", "phi"), ("q", "theta"), ("r", "psi")):
         if angle not in residual_rms:
             continue
-        # White noise of deviation s has fourth differences of variance 70 s²; motion has few.
-        noise = float(np.sqrt(np.mean(np.diff(inputs[rate], 4) ** 2) / 70))
-        drift = noise * sample_time_s * np.sqrt(inputs[rate].size)
+        drift = noise[rate] * sample_time_s * np.sqrt(n_samples)
         if drift > LARGEST_DRIFT * residual_rms[angle] and drift > SMALLEST_DRIFT_RAD:
             found.append(
                 Finding(
                     "gyro-noise",
                     Light.AMBER,
                     f"noise of {rate} drifts {angle} by {drift:.2g} rad over the record, beside a "
-                    f"residual of {residual_rms[angle]:.2g} rad",
-                    f"take the interval of bias_{rate} as too narrow; use a shorter segment",
+                    f"residual of {residual_rms[angle]:.2g} rad; the interval of bias_{rate} "
+                    "allows for it as white noise",
+                    "take a longer record for a better bias, a shorter one for a better attitude",
                 )
             )
     return tuple(found)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from flightid._native import reconstruct_kinematics
+from flightid.conditioning.input_noise import InputNoise, white_deviation
 from flightid.conventions import STANDARD_GRAVITY_M_S2
 
 Array = NDArray[np.float64]
@@ -87,17 +88,44 @@ class KinematicModel:
         OptionError
             The reconstructed pitch angle reaches 90 degrees.
         """
+        value, gain, states, raw = self._reconstructed(theta)
+        slopes = self._by_parameter(raw, gain)
+        found = [
+            self._output(name, states, slopes, value, self.parameters) for name in self.outputs
+        ]
+        return Prediction(np.array([y for y, _ in found]), np.array([s for _, s in found]))
+
+    def input_noise(self, theta: Sequence[float] | Array) -> InputNoise:
+        """White noise of the inputs and its way to the outputs at these parameters."""
+        value, gain, states, raw = self._reconstructed(theta)
+        by_start = raw[:, :, :6]
+        # Offsets since the start, brought back to it; their growth is what one step adds.
+        steps = np.diff(np.linalg.solve(by_start, raw[:, :, 6:12]), axis=0) / gain
+        slopes = [self._output(name, states, by_start, value, ())[1] for name in self.outputs]
+        delays = np.array([value.get(f"delay_{name}", 0.0) for name in self.outputs])
+        deviations = [white_deviation(self.inputs[k]) if k in self.inputs else 0.0 for k in INPUTS]
+        late = np.rint(delays / self._step_s).astype(np.int_)
+        return InputNoise(np.array(deviations), np.array(slopes), steps, late)
+
+    @property
+    def _step_s(self) -> float:
+        return float(self.time_s[-1] - self.time_s[0]) / (self.time_s.size - 1)
+
+    def _reconstructed(
+        self, theta: Sequence[float] | Array
+    ) -> tuple[dict[str, float], Array, Array, Array]:
+        """Parameters by name, gains of the inputs, states, and their raw sensitivities."""
         value = dict(zip(self.parameters, np.asarray(theta, dtype=np.float64), strict=True))
         bias = np.array([value.get(f"bias_{name}", 0.0) for name in INPUTS])
         gain = 1 + np.array([value.get(f"scale_{name}", 0.0) for name in INPUTS])
         start = np.array([value.get(f"{name}_0", 0.0) for name in STATES])
-        step = (self.time_s[-1] - self.time_s[0]) / (self.time_s.size - 1)
         states, raw = reconstruct_kinematics(
-            np.ascontiguousarray((self._half_steps - bias) / gain), start, step, self.gravity
+            np.ascontiguousarray((self._half_steps - bias) / gain),
+            start,
+            self._step_s,
+            self.gravity,
         )
-        slopes = self._by_parameter(raw, gain)
-        found = [self._output(name, states, slopes, value) for name in self.outputs]
-        return Prediction(np.array([y for y, _ in found]), np.array([s for _, s in found]))
+        return value, gain, states, raw
 
     def _by_parameter(self, raw: Array, gain: Array) -> Array:
         """Derivatives of the states by the model's parameters, (n, 6, n_parameters)."""
@@ -114,8 +142,14 @@ class KinematicModel:
         return slopes
 
     def _output(
-        self, name: str, states: Array, slopes: Array, value: Mapping[str, float]
+        self,
+        name: str,
+        states: Array,
+        slopes: Array,
+        value: Mapping[str, float],
+        parameters: tuple[str, ...],
     ) -> tuple[Array, Array]:
+        """One output and its derivatives; `parameters` name the columns of `slopes`."""
         y, gradient = OUTPUT_FUNCTIONS[name](states)
         slope = np.einsum("nx,nxc->nc", gradient, slopes)
         delay = value.get(f"delay_{name}")
@@ -128,8 +162,8 @@ class KinematicModel:
         gain = 1 + value.get(f"scale_{name}", 0.0)
         slope = gain * slope
         for kind, own in (("bias", 1.0), ("scale", y), ("delay", -gain * drift)):
-            if f"{kind}_{name}" in value:
-                slope[:, self.parameters.index(f"{kind}_{name}")] += own
+            if f"{kind}_{name}" in parameters:
+                slope[:, parameters.index(f"{kind}_{name}")] += own
         return gain * y + value.get(f"bias_{name}", 0.0), slope
 
 

@@ -10,7 +10,6 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from flightid.record.stamps import Stamped
 
@@ -103,6 +102,9 @@ def spline(source: Stamped, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
     """Cubic spline through the samples at their true stamps; a line where there are only two."""
     if source.time_s.size < 3:
         return np.interp(time_s, source.time_s, source.values)
+    # Half a second of imports that no record of uniform stamps needs.
+    from scipy.interpolate import CubicSpline  # noqa: PLC0415
+
     return np.asarray(CubicSpline(source.time_s, source.values)(time_s), dtype=np.float64)
 
 
