@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -66,6 +68,44 @@ def test_tables_know_instances_units_and_frames(log: fid.Log) -> None:
     assert table.to_pandas().shape == (100, 15)
     assert log.table("PARM").text("Name") == ["ATC_RAT_RLL_P"] * 2
     assert not table["GyrX"].flags.writeable
+
+
+def test_columns_read_together_are_those_read_alone(tmp_path: Path) -> None:
+    # Rows of several blocks, not a whole number of them.
+    time_us = np.arange(1001) * 2500
+    writer = DataflashWriter()
+    writer.add("IMU", time_us, {"I": time_us // 2500 % 2, "GyrX": time_us / 1e6, "EG": 7})
+    path = writer.write(tmp_path / "a.bin")
+    together = fid.read_log(path).table("IMU", 1).arrays()
+    assert list(together) == list(fid.read_log(path).table("IMU").columns)
+    alone = fid.read_log(path).table("IMU", 1)
+    for name, values in together.items():
+        np.testing.assert_array_equal(values, alone[name])
+    np.testing.assert_array_equal(together["GyrX"], np.float32(time_us[1::2] / 1e6))
+    assert list(alone.arrays(["EG", "GyrX", "EG"])) == ["EG", "GyrX"]
+    assert alone.arrays(["EG"])["EG"] is alone["EG"]
+    with pytest.raises(MissingColumnError, match="no such field"):
+        alone.arrays(["EG", "none"])
+
+
+def test_a_file_that_has_become_shorter_is_refused(tmp_path: Path) -> None:
+    path = _writer().write(tmp_path / "a.bin")
+    log = fid.read_log(path)
+    with path.open("r+b") as file:
+        file.truncate(5000)
+    with pytest.raises(LogFormatError, match="the log changed while it was read"):
+        log.table("IMU")["GyrX"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes are of Unix")
+def test_what_cannot_be_mapped_is_read(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    feeder = threading.Thread(target=pipe.write_bytes, args=(SMALL,))
+    feeder.start()
+    file = _native.open_dataflash(str(pipe))
+    feeder.join()
+    assert file.size() == len(SMALL)
 
 
 def test_parameters_are_final_and_changes_are_kept(log: fid.Log) -> None:
@@ -191,9 +231,10 @@ def test_damaged_logs_never_break_the_reader(data: st.DataObject) -> None:
         file = _native.index_dataflash(bytes(content))
     except LogFormatError:
         return
-    for index, (_, _, rows, fields) in enumerate(file.tables()):
+    for index, (_, _, rows) in enumerate(file.tables()):
         file.describe(index)
-        for place, (*_, width) in enumerate(fields):
-            assert file.numbers(index, place, None).size == rows * width
+        widths = [width for *_, width in file.fields(index)]
+        columns = file.columns(index, list(range(len(widths))), None)
+        assert [values.size for values in columns] == [rows * width for width in widths]
     skipped = sum(stop - start for start, stop, _ in file.skipped())
     assert 0 <= skipped <= len(content) == file.size()

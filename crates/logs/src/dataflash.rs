@@ -131,6 +131,11 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
             })
     }
 
+    /// What owns the bytes.
+    pub fn source(&self) -> &B {
+        &self.bytes
+    }
+
     /// The raw bytes.
     pub fn bytes(&self) -> &[u8] {
         self.bytes.as_ref()

@@ -9,6 +9,7 @@ pub mod chirp;
 pub mod dataflash;
 pub mod error;
 pub mod expression;
+pub mod file_bytes;
 pub mod interrupt;
 pub mod kinematics;
 pub mod least_squares;

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple
@@ -45,11 +46,30 @@ class _Column(NamedTuple):
     width: int
 
 
-class _Layout(NamedTuple):
+@dataclass(frozen=True)
+class _Layout:
+    """A table of the file; most are never asked for, so what follows from it waits for that."""
+
+    file: _native.DataflashFile
     table: int
     n_rows: int
-    columns: dict[str, int]
-    fields: list[_Column]
+
+    @cached_property
+    def fields(self) -> list[_Column]:
+        return [_Column(*field) for field in self.file.fields(self.table)]
+
+    @cached_property
+    def columns(self) -> dict[str, int]:
+        """Place of each label, the first where one stands twice."""
+        return {field.label: place for place, field in reversed(list(enumerate(self.fields)))}
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        return {field.label: UNITS.get(field.unit, DIMENSIONLESS) for field in self.fields}
+
+    @cached_property
+    def text_fields(self) -> tuple[str, ...]:
+        return tuple(field.label for field in self.fields if field.width == 0)
 
 
 class _Messages(Mapping[str, MessageInfo]):
@@ -81,8 +101,8 @@ class _Messages(Mapping[str, MessageInfo]):
             name,
             layout.n_rows,
             tuple(instances),
-            {field.label: UNITS.get(field.unit, DIMENSIONLESS) for field in layout.fields},
-            tuple(field.label for field in layout.fields if field.width == 0),
+            layout.units,
+            layout.text_fields,
             None if step_s is None else 1.0 / step_s,
             first_s,
             last_s,
@@ -90,7 +110,7 @@ class _Messages(Mapping[str, MessageInfo]):
 
 
 def open_dataflash(path: Path) -> DataflashSource:
-    """Read and index a DataFlash log.
+    """Map and index a DataFlash log.
 
     Raises
     ------
@@ -117,12 +137,12 @@ class DataflashSource:
         self._file = file
         self._layouts: dict[str, _Layout] = {}
         self._renamed: list[str] = []
-        for index, (name, _, count, fields) in enumerate(file.tables()):
+        for index, (name, _, count) in enumerate(file.tables()):
             if count > 0:
-                self._adopt(index, name, count, [_Column(*field) for field in fields])
+                self._adopt(name, _Layout(file, index, count))
         self._messages = _Messages(file, self._layouts)
 
-    def _adopt(self, table: int, name: str, count: int, fields: list[_Column]) -> None:
+    def _adopt(self, name: str, layout: _Layout) -> None:
         """Take in a table of the file; a second layout under one name becomes ``NAME~2``."""
         label, copy = name, 1
         while label in self._layouts:
@@ -130,13 +150,17 @@ class DataflashSource:
             label = f"{name}~{copy}"
         if copy > 1:
             self._renamed.append(label)
-        places = {field.label: place for place, field in reversed(list(enumerate(fields)))}
-        self._layouts[label] = _Layout(table, count, places, fields)
+        self._layouts[label] = layout
 
     @property
     def messages(self) -> Mapping[str, MessageInfo]:
         """Message types that have rows, in order of definition."""
         return self._messages
+
+    def fields(self, message: str) -> tuple[Mapping[str, str], tuple[str, ...]]:
+        """Unit by field name, and which fields hold text."""
+        layout = self._layouts[message]
+        return layout.units, layout.text_fields
 
     def rows(self, message: str, instance: int | None) -> int:
         """Rows of a message, or of one of its instances."""
@@ -144,10 +168,20 @@ class DataflashSource:
 
     def numbers(self, message: str, field: str, instance: int | None) -> NDArray[np.float64]:
         """Scaled numbers; an int16[32] field has shape (n_rows, 32)."""
+        return self.columns(message, [field], instance)[0]
+
+    def columns(
+        self, message: str, fields: Sequence[str], instance: int | None
+    ) -> list[NDArray[np.float64]]:
+        """Scaled numbers of several fields in one pass over the rows."""
         layout = self._layouts[message]
-        values = self._file.numbers(layout.table, layout.columns[field], instance)
-        width = layout.fields[layout.columns[field]].width
-        return values.reshape(-1, width) if width > 1 else values
+        places = [layout.columns[field] for field in fields]
+        widths = [layout.fields[place].width for place in places]
+        found = self._file.columns(layout.table, places, instance)
+        return [
+            values.reshape(-1, width) if width > 1 else values
+            for values, width in zip(found, widths, strict=True)
+        ]
 
     def texts(self, message: str, field: str, instance: int | None) -> list[str]:
         """Texts up to their first zero byte."""

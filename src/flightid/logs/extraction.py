@@ -122,9 +122,10 @@ def _stamps(table: LogTable, source: ChannelSource) -> NDArray[np.float64]:
 
 
 def _values(table: LogTable, source: ChannelSource) -> NDArray[np.float64]:
+    fields = [*table.arrays(source.fields).values()]
     if source.angle is not None:
-        return _euler(source.angle, *(table[field] for field in source.fields))
-    return np.asarray(np.sum([table[field] for field in source.fields], axis=0), np.float64)
+        return _euler(source.angle, *fields)
+    return np.asarray(np.sum(fields, axis=0), np.float64)
 
 
 def _unit(table: LogTable, source: ChannelSource, channel: MappedChannel) -> str:

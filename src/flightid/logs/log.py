@@ -145,12 +145,11 @@ class Log:
         MissingColumnError
             The log holds no such message or instance.
         """
-        messages = self._source.messages
-        if name not in messages:
+        if name not in self._source.messages:
             raise MissingColumnError(
                 "the log holds no such message", found=name, needed=self._near(name)
             )
-        return LogTable(self._source, messages[name], instance)
+        return LogTable(self._source, name, instance)
 
     @cached_property
     def sid_runs(self) -> tuple[SidRun, ...]:

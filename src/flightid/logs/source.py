@@ -213,11 +213,19 @@ class LogSource(Protocol):
     def findings(self) -> Sequence[Finding]:
         """What the reader noticed."""
 
+    def fields(self, message: str) -> tuple[Mapping[str, str], tuple[str, ...]]:
+        """Unit by field name, and which fields hold text, as in `MessageInfo`."""
+
     def rows(self, message: str, instance: int | None) -> int:
         """Rows of a message, or of one of its instances."""
 
     def numbers(self, message: str, field: str, instance: int | None) -> NDArray[np.float64]:
         """Scaled numbers, shape (n_rows,) or (n_rows, n_elements) for an array field."""
+
+    def columns(
+        self, message: str, fields: Sequence[str], instance: int | None
+    ) -> list[NDArray[np.float64]]:
+        """Scaled numbers of several fields, as by `numbers`, in one pass over the rows."""
 
     def texts(self, message: str, field: str, instance: int | None) -> list[str]:
         """Texts of a field that holds text, one a row."""

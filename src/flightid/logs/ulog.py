@@ -6,7 +6,7 @@ unit "1"; the channel maps know the units of the fields that they use.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -177,6 +177,11 @@ class UlogSource:
             )
         return found
 
+    def fields(self, message: str) -> tuple[Mapping[str, str], tuple[str, ...]]:
+        """Unit by column name, and which columns hold text."""
+        info = self.messages[message]
+        return info.fields, info.text_fields
+
     def rows(self, message: str, instance: int | None) -> int:
         """Rows of a topic, or of one of its instances."""
         return sum(
@@ -187,7 +192,13 @@ class UlogSource:
 
     def numbers(self, message: str, field: str, instance: int | None) -> NDArray[np.float64]:
         """Values as logged, shape (n_rows,)."""
-        return self._native.gather(message, instance, [field])[0]
+        return self.columns(message, [field], instance)[0]
+
+    def columns(
+        self, message: str, fields: Sequence[str], instance: int | None
+    ) -> list[NDArray[np.float64]]:
+        """Values of several fields as logged."""
+        return self._native.gather(message, instance, list(fields))
 
     def texts(self, message: str, field: str, instance: int | None) -> list[str]:
         """Character array as text, one a row, up to its first zero."""

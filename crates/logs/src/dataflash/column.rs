@@ -8,6 +8,9 @@ use super::{Dataflash, Table};
 
 /// Numbers of an array field in one row.
 const ARRAY_WIDTH: usize = 32;
+/// Rows of which all columns are read before the next rows: few enough that their bytes are still
+/// in the nearest cache for the last column, enough that a column's loop is worth its start.
+pub(super) const BLOCK: usize = 256;
 
 /// A little-endian number at the start of a slice; None where the slice is too short.
 macro_rules! number {
@@ -21,14 +24,37 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
     ///
     /// `instance` keeps the rows whose instance field holds that number.
     pub fn numbers(&self, table: &Table, field: &Field, instance: Option<i64>) -> Vec<f64> {
+        self.columns(table, &[field], instance).pop().unwrap_or_default()
+    }
+
+    /// Scaled numbers of several fields as by `numbers`, in one pass over the rows.
+    pub fn columns(
+        &self,
+        table: &Table,
+        fields: &[&Field],
+        instance: Option<i64>,
+    ) -> Vec<Vec<f64>> {
         let places = self.places(table, instance);
-        let mut values = self.stored(&places, field);
+        let room = |field: &&Field| Vec::with_capacity(places.len() * field.kind.width());
+        let mut columns: Vec<Vec<f64>> = fields.iter().map(room).collect();
+        for block in places.chunks(BLOCK) {
+            for (column, field) in columns.iter_mut().zip(fields) {
+                self.append(column, block, field);
+            }
+        }
+        columns
+    }
+
+    /// Add the scaled numbers of some rows to a column.
+    pub(super) fn append(&self, column: &mut Vec<f64>, places: &[usize], field: &Field) {
+        let start = column.len();
+        self.append_stored(column, places, field);
+        let added = column.get_mut(start..).unwrap_or_default();
         match field.scale {
             Scale::One => {}
-            Scale::Multiply(factor) => values.iter_mut().for_each(|value| *value *= factor),
-            Scale::Divide(divisor) => values.iter_mut().for_each(|value| *value /= divisor),
+            Scale::Multiply(factor) => added.iter_mut().for_each(|value| *value *= factor),
+            Scale::Divide(divisor) => added.iter_mut().for_each(|value| *value /= divisor),
         }
-        values
     }
 
     /// Stamps in seconds; None where the message has no stamp.
@@ -85,7 +111,7 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
     }
 
     /// Places of the rows of one instance, or of all.
-    fn places<'a>(&self, table: &'a Table, instance: Option<i64>) -> Cow<'a, [usize]> {
+    pub(super) fn places<'a>(&self, table: &'a Table, instance: Option<i64>) -> Cow<'a, [usize]> {
         let Some(wanted) = instance else {
             return (&table.offsets).into();
         };
@@ -112,34 +138,31 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
     }
 
     /// Stored numbers as f64. The match stands outside the loop: each kind gets its own tight one.
-    fn stored(&self, places: &[usize], field: &Field) -> Vec<f64> {
+    fn append_stored(&self, column: &mut Vec<f64>, places: &[usize], field: &Field) {
         let bytes = self.bytes();
-        macro_rules! column {
+        macro_rules! stored {
             ($type:ty, $convert:expr) => {{
                 let convert = $convert;
-                places
-                    .iter()
-                    .map(|at| {
-                        let rest = bytes.get(at + field.offset..).unwrap_or_default();
-                        convert(number!($type, rest).unwrap_or_default())
-                    })
-                    .collect()
+                column.extend(places.iter().map(|at| {
+                    let rest = bytes.get(at + field.offset..).unwrap_or_default();
+                    convert(number!($type, rest).unwrap_or_default())
+                }))
             }};
         }
         match field.kind {
-            Kind::I8 => column!(i8, f64::from),
-            Kind::U8 => column!(u8, f64::from),
-            Kind::I16 | Kind::CentiI16 => column!(i16, f64::from),
-            Kind::U16 | Kind::CentiU16 => column!(u16, f64::from),
-            Kind::F16 => column!(u16, half),
-            Kind::I32 | Kind::CentiI32 | Kind::Degrees7 => column!(i32, f64::from),
-            Kind::U32 | Kind::CentiU32 => column!(u32, f64::from),
-            Kind::I64 => column!(i64, |value| value as f64),
-            Kind::U64 => column!(u64, |value| value as f64),
-            Kind::F32 => column!(f32, f64::from),
-            Kind::F64 => column!(f64, |value| value),
-            Kind::Array => arrays(bytes, places, field),
-            Kind::Text(_) => Vec::new(),
+            Kind::I8 => stored!(i8, f64::from),
+            Kind::U8 => stored!(u8, f64::from),
+            Kind::I16 | Kind::CentiI16 => stored!(i16, f64::from),
+            Kind::U16 | Kind::CentiU16 => stored!(u16, f64::from),
+            Kind::F16 => stored!(u16, half),
+            Kind::I32 | Kind::CentiI32 | Kind::Degrees7 => stored!(i32, f64::from),
+            Kind::U32 | Kind::CentiU32 => stored!(u32, f64::from),
+            Kind::I64 => stored!(i64, |value| value as f64),
+            Kind::U64 => stored!(u64, |value| value as f64),
+            Kind::F32 => stored!(f32, f64::from),
+            Kind::F64 => stored!(f64, |value| value),
+            Kind::Array => append_arrays(column, bytes, places, field),
+            Kind::Text(_) => {}
         }
     }
 }
@@ -155,16 +178,14 @@ fn instance_field(table: &Table) -> Option<&Field> {
     })
 }
 
-fn arrays(bytes: &[u8], places: &[usize], field: &Field) -> Vec<f64> {
-    let mut values = Vec::with_capacity(places.len() * ARRAY_WIDTH);
+fn append_arrays(column: &mut Vec<f64>, bytes: &[u8], places: &[usize], field: &Field) {
     for at in places {
         let start = at + field.offset;
         let row = bytes.get(start..start + 2 * ARRAY_WIDTH).unwrap_or_default();
-        values.extend(
+        column.extend(
             row.chunks_exact(2).map(|pair| f64::from(number!(i16, pair).unwrap_or_default())),
         );
     }
-    values
 }
 
 /// IEEE 754 half precision to double: exact.

@@ -1,6 +1,7 @@
 //! What the stamps of a table say: span and usual interval.
 
-use super::{Dataflash, Table};
+use super::column::BLOCK;
+use super::{Dataflash, Field, Table};
 
 /// Steps that the median is taken of: the rate of a table needs no more.
 const STEPS: usize = 4096;
@@ -20,22 +21,39 @@ pub struct Stamps {
 impl<B: AsRef<[u8]>> Dataflash<B> {
     /// Describe the stamps of a table, given its instances; None without rows or stamps.
     pub fn describe(&self, table: &Table, instances: &[i64]) -> Option<Stamps> {
-        let all = self.stamps(table, None)?;
-        let first_s = all.iter().copied().reduce(f64::min)?;
-        let last_s = all.iter().copied().reduce(f64::max)?;
-        let interval_s = match instances {
-            [lowest, _, ..] => median_step(&self.stamps(table, Some(*lowest))?),
-            _ => median_step(&all),
+        let field = table.layout.stamp()?;
+        let (first_s, last_s) = self.extremes(&table.offsets, field)?;
+        let lowest = match instances {
+            [lowest, _, ..] => Some(*lowest),
+            _ => None,
         };
+        let interval_s = self.median_step(&self.places(table, lowest), field);
         Some(Stamps { first_s, last_s, interval_s })
     }
-}
 
-fn median_step(stamps: &[f64]) -> Option<f64> {
-    let stride = (stamps.len() / STEPS).max(1);
-    let pairs = stamps.windows(2).step_by(stride);
-    let mut steps: Vec<f64> =
-        pairs.map(|pair| pair[1] - pair[0]).filter(|step| *step > 0.0).collect();
-    let middle = steps.len() / 2;
-    (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+    /// Least and greatest number of a field.
+    fn extremes(&self, places: &[usize], field: &Field) -> Option<(f64, f64)> {
+        let mut values = Vec::with_capacity(BLOCK);
+        let blocks = places.chunks(BLOCK).map(|block| {
+            values.clear();
+            self.append(&mut values, block, field);
+            let least = values.iter().copied().fold(f64::NAN, f64::min);
+            (least, values.iter().copied().fold(f64::NAN, f64::max))
+        });
+        blocks.reduce(|all, block| (all.0.min(block.0), all.1.max(block.1)))
+    }
+
+    fn median_step(&self, places: &[usize], field: &Field) -> Option<f64> {
+        let stride = (places.len() / STEPS).max(1);
+        let pairs: Vec<usize> = places.windows(2).step_by(stride).flatten().copied().collect();
+        let mut stamps = Vec::with_capacity(pairs.len());
+        self.append(&mut stamps, &pairs, field);
+        let mut steps: Vec<f64> = stamps
+            .chunks_exact(2)
+            .map(|pair| pair[1] - pair[0])
+            .filter(|step| *step > 0.0)
+            .collect();
+        let middle = steps.len() / 2;
+        (!steps.is_empty()).then(|| *steps.select_nth_unstable_by(middle, f64::total_cmp).1)
+    }
 }
