@@ -32,7 +32,8 @@ if TYPE_CHECKING:
     from flightid.simulation.simulate import LinearSystem, simulate
     from flightid.study import Study, run_study
     from flightid.table import Table
-    from flightid.validation import Verification
+    from flightid.validation import ResidualTests, Verification
+    from flightid.validation.residuals import residual_tests
     from flightid.validation.verify import verify
 
 # Name -> the module that holds it (a public module is its own home).
@@ -53,6 +54,7 @@ _HOMES = {
     "Parameter": "flightid.models",
     "Parameters": "flightid.models",
     "Record": "flightid.record",
+    "ResidualTests": "flightid.validation",
     "Study": "flightid.study",
     "Table": "flightid.table",
     "TransferFunction": "flightid.models",
@@ -67,6 +69,7 @@ _HOMES = {
     "load_model": "flightid.models",
     "read_log": "flightid.logs",
     "read_records": "flightid.record",
+    "residual_tests": "flightid.validation.residuals",
     "run_study": "flightid.study",
     "simulate": "flightid.simulation.simulate",
     "validation": "flightid.validation",
@@ -91,6 +94,7 @@ __all__ = [
     "Parameter",
     "Parameters",
     "Record",
+    "ResidualTests",
     "Study",
     "Table",
     "TransferFunction",
@@ -106,6 +110,7 @@ __all__ = [
     "load_model",
     "read_log",
     "read_records",
+    "residual_tests",
     "run_study",
     "simulate",
     "validation",

@@ -51,3 +51,23 @@ def test_a_value_without_number_is_explained(
 ) -> None:
     assert run(["verify", "rate_first_order", str(flown), "--value", "Lp"]) == 2
     assert "is not NAME=NUMBER" in capsys.readouterr().err
+
+
+def test_residual_tests_on_demand(
+    flown: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    record = fid.read_records(flown)[0]
+    noise = 0.02 * np.random.default_rng(0).standard_normal(record.n_samples)
+    path = tmp_path / "noisy.parquet"
+    fid.write_records(path, [record.replace({"p": record["p"] + noise})])
+    page = tmp_path / "page.html"
+    options = ["verify", "rate_first_order", str(path), "--value", "Lp=-4", "--residuals"]
+    run([*options, "--html", str(page)])
+    shown = capsys.readouterr().out
+    assert "Verification(" in shown
+    assert "ResidualTests(1 output, 1 input" in shown
+    assert "loop open, as declared" in shown
+    assert "Residual tests" in page.read_text()
+    run([*options, "--json"])
+    plain = json.loads(capsys.readouterr().out)
+    assert plain["residual_tests"]["horizon"] == "free run"

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flightid.cli.output import emit, json_option, leave_by_verdict, note
+from flightid.cli.output import emit, emit_values, json_option, leave_by_verdict, note
 
 if TYPE_CHECKING:
-    from flightid.validation import Verification
+    from flightid.validation import ResidualTests, Verification
 
 
 @click.command()
@@ -29,6 +29,12 @@ if TYPE_CHECKING:
 @click.option("--free-bias/--no-free-bias", default=True, help="Solve for state biases.")
 @click.option("--free-reference/--no-free-reference", default=True, help="Solve for offsets.")
 @click.option(
+    "--residuals",
+    "with_residuals",
+    is_flag=True,
+    help="Test measured minus predicted for independence of the inputs (loop taken as open).",
+)
+@click.option(
     "--html",
     type=click.Path(dir_okay=False, path_type=Path),
     help="Write a page with pictures to this file.",
@@ -44,15 +50,16 @@ def command(
     hold: str,
     free_bias: bool,
     free_reference: bool,
+    with_residuals: bool,
     html: Path | None,
     as_json: bool,
 ) -> None:
     """Predict RECORDS with MODEL, a .toml file or the name of a library model.
 
     The records (CSV, Parquet, .mat, netCDF) hold the model's channels by name. The exit code is 1
-    where a prediction misses its guide.
+    where a prediction misses its guide, or a residual test that was asked for fails.
     """
-    from flightid import load_model, read_records, verify
+    from flightid import load_model, read_records, residual_tests, verify
 
     chosen = load_model(model, axis=axis)
     if values:
@@ -72,10 +79,17 @@ def command(
         outputs=compared,
         hold="zero" if hold == "zero" else "first",
     )
-    emit(result, as_json=as_json)
+    tests = residual_tests(result) if with_residuals else None
+    if as_json:
+        extra = {} if tests is None else {"residual_tests": tests.to_dict()}
+        emit_values(result.to_dict() | extra)
+    else:
+        emit(result, as_json=False)
+        if tests is not None:
+            emit(tests, as_json=False)
     if html is not None:
-        note(f"Wrote {_write_page(result, str(chosen), html)}")
-    leave_by_verdict(result.findings)
+        note(f"Wrote {_write_page(result, tests, str(chosen), html)}")
+    leave_by_verdict((*result.findings, *(() if tests is None else tests.findings)))
 
 
 def _number(text: str) -> tuple[str, float]:
@@ -86,8 +100,9 @@ def _number(text: str) -> tuple[str, float]:
         raise click.BadParameter(f"{text!r} is not NAME=NUMBER", param_hint="--value") from None
 
 
-def _write_page(result: Verification, model: str, path: Path) -> Path:
+def _write_page(result: Verification, tests: ResidualTests | None, model: str, path: Path) -> Path:
     from flightid.files import write_atomically
+    from flightid.plot.residuals import correlations
     from flightid.plot.verification import prediction, residuals
     from flightid.report.blocks import result_blocks
     from flightid.report.content import Document, Section
@@ -101,4 +116,11 @@ def _write_page(result: Verification, model: str, path: Path) -> Path:
             figure_block(residuals(item), "Measured minus predicted."),
         )
         sections.append(Section(item.measured.name, pictures))
+    if tests is not None:
+        drawn = tuple(
+            figure_block(correlations(tests, output, name), f"Residual of {output} against {name}.")
+            for output in tests.outputs
+            for name in tests.inputs
+        )
+        sections.append(Section("Residual tests", (*result_blocks(tests), *drawn)))
     return write_atomically(path, to_html(Document("Verification", model, tuple(sections))))

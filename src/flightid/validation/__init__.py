@@ -5,6 +5,7 @@
 0.0
 """
 
+from flightid.validation.correlation_test import CorrelationTest, Horizon, Kind, Loop, Verdict
 from flightid.validation.metrics import (
     fit_percent,
     mse,
@@ -15,21 +16,37 @@ from flightid.validation.metrics import (
     weighted_rms,
 )
 from flightid.validation.muad import Envelopes, Mismatch, mismatch, muad_envelopes
+from flightid.validation.residual_result import ResidualTests
+from flightid.validation.residuals import residual_tests
 from flightid.validation.shifts import Shifts
+from flightid.validation.spectra import compare_spectra, residual_spectra
+from flightid.validation.spectra_result import Peak, ResidualSpectra, SpectrumComparison
 from flightid.validation.verification import Prediction, Verification
 from flightid.validation.verify import verify
 
 __all__ = [
+    "CorrelationTest",
     "Envelopes",
+    "Horizon",
+    "Kind",
+    "Loop",
     "Mismatch",
+    "Peak",
     "Prediction",
+    "ResidualSpectra",
+    "ResidualTests",
     "Shifts",
+    "SpectrumComparison",
+    "Verdict",
     "Verification",
+    "compare_spectra",
     "fit_percent",
     "mismatch",
     "mse",
     "muad_envelopes",
     "r_squared",
+    "residual_spectra",
+    "residual_tests",
     "rms_error",
     "theil",
     "vaf_percent",
