@@ -188,7 +188,8 @@ def judge_bias(done: BiasRounds, found: Mapping[str, Size]) -> list[Finding]:
         Finding(
             "estimator-bias",
             light,
-            f"taken out in {done.rounds} rounds{end} (rms): {'; '.join(texts)}",
+            f"estimator's leakage and resolution, taken out in {done.rounds} rounds{end} (rms): "
+            + "; ".join(texts),
             "" if done.converged else "widen the windows or simplify the model",
         )
     ]

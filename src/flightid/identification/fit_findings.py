@@ -85,7 +85,7 @@ def _judge_guides(p: FittedParameter) -> list[Finding]:
     if share is not None and share < _DETERMINED:
         # The guides know nothing of the noise: a quiet record can determine what they would drop.
         what += f", yet its 95 % interval is only ±{100 * share:.2g} %"
-        action = "keep it; sweep to higher frequency if it matters"
+        action = "keep it; widen the band if it matters"
     return [Finding(code, Light.AMBER, f"{p.name}: {what}", action)]
 
 
