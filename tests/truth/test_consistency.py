@@ -184,6 +184,19 @@ def test_intervals_are_calibrated_with_coloured_noise() -> None:
     assert 0.93 <= np.mean(inside) <= 0.97
 
 
+def test_freedom_of_an_autoregression_is_the_scatter_of_its_level() -> None:
+    n, levels, freedom = 1200, [], []
+    for seed in range(150):
+        white = np.random.default_rng(seed).standard_normal((n + 200, 1))
+        model = autoregression(periodogram(lfilter([1.0], [1, -0.8], white, axis=0)[200:]), n)
+        levels.append(model.spectrum()[0])
+        freedom.append(model.freedom())
+    scatter = np.var(levels) / np.mean(levels) ** 2
+    # A chi-square level with f degrees of freedom scatters by 2 / f; 150 draws tell to 12 %.
+    assert_close(2 / np.median(freedom), scatter, rtol=0.4, why="level at zero frequency")
+    assert 30 < np.median(freedom) < 120
+
+
 def test_autocovariance_of_an_autoregression() -> None:
     noise = lfilter([1.0], [1, -0.9], np.random.default_rng(0).standard_normal(100_000))
     expected = 0.9 ** np.arange(40) / (1 - 0.81)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, signal
+from scipy import fft, linalg, signal
 
 from flightid.conditioning.input_noise import InputNoise
 
@@ -57,6 +57,21 @@ class Autoregression:
                 [1.0], denominator, np.zeros(n_lags - order - 1), zi=state
             )[0]
         return result
+
+    def freedom(self) -> float:
+        """Degrees of freedom of the model's level at zero frequency, where slow sensitivities look.
+
+        Weights are known to ``innovation / n`` times the inverse of their autocovariance, and the
+        level goes with the inverse square of one less their sum.
+        """
+        order = self.weights.size
+        share = 2.0 / self.n
+        if order:
+            innovation = float(self.lags[0] - self.weights @ self.lags[1 : order + 1])
+            ones = np.ones(order)
+            spread = linalg.solve_toeplitz(self.lags[:order], ones) @ ones * innovation / self.n
+            share += 4.0 * max(float(spread), 0.0) / (1.0 - float(self.weights.sum())) ** 2
+        return 2.0 / share
 
     def spectrum(self) -> Array:
         """Spectrum at the frequencies of `periodogram`."""
@@ -152,8 +167,8 @@ def _weights(sample: Array, n: int) -> Array:
 
 def corrected_covariance(
     slopes: Array, residuals: Array, deviations: Array, noise: InputNoise | None = None
-) -> tuple[Array, Array]:
-    """Covariance for white residuals, and the one corrected for their colour.
+) -> tuple[Array, Array, Array]:
+    """Covariance for white residuals, the one corrected for their colour, and its freedom.
 
     Parameters
     ----------
@@ -169,17 +184,21 @@ def corrected_covariance(
     Returns
     -------
     white, corrected : ndarray, shape (n_parameters, n_parameters)
+    freedom : ndarray, shape (n_parameters,)
+        Degrees of freedom of the corrected variances: noise models of one record are themselves
+        estimates. The noise of the inputs, seen at many frequencies, counts as known.
 
     Reference
     ---------
     Morelli & Klein (1997), Accuracy of aerodynamic model parameters estimated from flight test
-    data, J. Guidance, Control and Dynamics 20(1), eqs. 19-25.
+    data, J. Guidance, Control and Dynamics 20(1), eqs. 19-25; Satterthwaite (1946), An approximate
+    distribution of estimates of variance components, Biometrics Bulletin 2(6), eq. 17.
 
     Example
     -------
     >>> slopes = np.ones((1, 400, 1))
     >>> residuals = np.random.default_rng(1).standard_normal((1, 400))
-    >>> white, corrected = corrected_covariance(slopes, residuals, np.ones(1))
+    >>> white, corrected, freedom = corrected_covariance(slopes, residuals, np.ones(1))
     >>> float(white[0, 0])
     0.0025
     """
@@ -191,13 +210,17 @@ def corrected_covariance(
     inverse = np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size)
     projection = _Projection(slopes, weighed, inverse)
     walks = None if noise is None else projection.walks(noise)
-    middle = np.zeros_like(information)
+    total = np.zeros_like(information)
+    doubt = np.zeros(len(information))
     for scaled, model in zip(weighed, projection.models(residuals, walks), strict=True):
-        middle += scaled.T @ _toeplitz_product(model.autocovariance(n), scaled)
+        part = inverse @ (scaled.T @ _toeplitz_product(model.autocovariance(n), scaled)) @ inverse
+        total += part
+        doubt += np.diag(part) ** 2 / model.freedom()
     if noise is not None:
         paths = noise.transposed(weighed)
-        middle += np.einsum("sjp,sjq->pq", paths, paths, optimize=True)
-    return inverse, inverse @ middle @ inverse
+        total += inverse @ np.einsum("sjp,sjq->pq", paths, paths, optimize=True) @ inverse
+    tiny = np.finfo(float).tiny
+    return inverse, total, np.diag(total) ** 2 / np.maximum(doubt, tiny)
 
 
 @dataclass(frozen=True)

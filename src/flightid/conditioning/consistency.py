@@ -132,11 +132,15 @@ def check_consistency(
     theta, prediction, deviations = OutputError(model, observed).fit(theta)
     residuals = observed - prediction.values
     noise = model.input_noise(theta)
-    white, covariance = corrected_covariance(prediction.slopes, residuals, deviations, noise)
+    white, covariance, freedom = corrected_covariance(
+        prediction.slopes, residuals, deviations, noise
+    )
     spread = np.sqrt(np.diag(white))
     found = {
-        name: InstrumentParameter(name, float(value), float(error), _unit(name))
-        for name, value, error in zip(parameters, theta, np.sqrt(np.diag(covariance)), strict=True)
+        name: InstrumentParameter(name, float(value), float(error), _unit(name), float(degrees))
+        for name, value, error, degrees in zip(
+            parameters, theta, np.sqrt(np.diag(covariance)), freedom, strict=True
+        )
     }
     rms = {name: float(np.sqrt(np.mean(r**2))) for name, r in zip(measured, residuals, strict=True)}
     fit = {

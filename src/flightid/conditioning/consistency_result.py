@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from flightid.findings import Finding
 from flightid.record import Record
@@ -25,6 +27,8 @@ class InstrumentParameter:
         Estimate and its standard error, corrected for coloured residuals.
     unit : str
         Unit of both; scale factors are relative (0.02: reads 2 % too much).
+    freedom : float
+        Degrees of freedom of the standard error, for Student's distribution.
 
     Example
     -------
@@ -36,11 +40,13 @@ class InstrumentParameter:
     value: float
     stderr: float
     unit: str
+    freedom: float = math.inf
 
     @property
     def interval95(self) -> tuple[float, float]:
-        """95 % interval."""
-        return self.value - 1.96 * self.stderr, self.value + 1.96 * self.stderr
+        """95 % interval, by Student's distribution."""
+        half = float(stdtrit(self.freedom, 0.975)) * self.stderr
+        return self.value - half, self.value + half
 
     @property
     def is_significant(self) -> bool:
