@@ -99,6 +99,16 @@ class Table:
             isinstance(cell, int | float) and not isinstance(cell, bool) for cell in cells
         )
 
+    def without_empty_columns(self) -> Table:
+        """Copy without columns in which no row says anything."""
+        keep = [
+            index
+            for index in range(len(self.columns))
+            if any(row[index] not in (None, "") for row in self.rows)
+        ]
+        rows = tuple(tuple(row[index] for index in keep) for row in self.rows)
+        return Table(self.title, tuple(self.columns[i] for i in keep), rows, self.notes)
+
     def to_text(self) -> str:
         """Plain text with aligned columns."""
         headings = [column.heading for column in self.columns]

@@ -171,7 +171,9 @@ def require_match(found: str, needed: str, *, subject: str) -> None:
 
 @cache
 def exponents(unit: str) -> dict[str, float]:
-    """Powers of the base names that a unit is written in; the radian counts as a plain number.
+    """Powers of the names that a unit is written in; the radian counts as a plain number.
+
+    Units that are products of SI base units without a factor are written out.
 
     Returns
     -------
@@ -184,8 +186,17 @@ def exponents(unit: str) -> dict[str, float]:
 
     Example
     -------
-    >>> exponents("ft/s^2"), exponents("rad/s")
-    ({'foot': 1.0, 'second': -2.0}, {'second': -1.0})
+    >>> exponents("ft/s^2"), exponents("rad/s"), exponents("N*m/W")
+    ({'foot': 1.0, 'second': -2.0}, {'second': -1.0}, {'second': 1.0})
     """
-    items = _registry().Quantity(1.0, _parse(unit)).unit_items()
-    return {str(name): float(str(power)) for name, power in items if name != "radian"}
+    registry = _registry()
+    result: dict[str, float] = {}
+    for name, power in registry.Quantity(1.0, _parse(unit)).unit_items():
+        # A newton is written out, since it is exactly kg m/s²; a foot is not a metre.
+        written = registry.Quantity(1.0, registry.Unit(str(name)))
+        in_base = written.to_base_units()
+        chosen = in_base if in_base.magnitude == 1.0 else written
+        for base, inner in chosen.unit_items():
+            total = result.get(str(base), 0.0) + float(str(power)) * float(str(inner))
+            result[str(base)] = total
+    return {name: power for name, power in result.items() if name != "radian" and power != 0.0}

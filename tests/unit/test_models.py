@@ -193,9 +193,12 @@ def test_parameters_are_changed_by_copy() -> None:
     assert "K" in model.parameters._repr_html_()
 
 
-@pytest.mark.parametrize("name", fid.library_names())
+TEMPLATES = [name for name in fid.library_names() if name.startswith(("rate_", "attitude_"))]
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
 @pytest.mark.parametrize("axis", ["roll", "pitch", "yaw"])
-def test_every_library_model_loads_and_simulates(name: str, axis: str) -> None:
+def test_every_template_loads_and_simulates(name: str, axis: str) -> None:
     model = fid.load_model(name, axis=axis)
     assert model.source
     assert all(parameter.note for parameter in model.parameters.values())

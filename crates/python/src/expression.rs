@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use flightid_core::expression::Expression;
+use flightid_core::expression::{Expression, Node};
 use flightid_core::tape::{Registers, Tape as CoreTape};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -16,6 +16,27 @@ use crate::error::from_core;
 fn expression_names(text: &str) -> PyResult<Vec<String>> {
     let expression = Expression::parse(text).map_err(from_core)?;
     Ok(expression.names().into_iter().map(String::from).collect())
+}
+
+type Printed = (String, String, f64, Vec<usize>);
+
+/// expression_nodes(text: str) -> list[tuple[str, str, float, list[int]]]
+///
+/// Parsed formula: kind ("number", "name" or the function), name, number and the places of the
+/// arguments; arguments stand before what uses them and the last node is the whole formula.
+#[pyfunction]
+fn expression_nodes(text: &str) -> PyResult<Vec<Printed>> {
+    let expression = Expression::parse(text).map_err(from_core)?;
+    let function = |kind: &dyn std::fmt::Debug| format!("{kind:?}").to_lowercase();
+    let nodes = expression.nodes.into_iter().take(expression.root + 1);
+    Ok(nodes
+        .map(|node| match node {
+            Node::Number(value) => ("number".into(), String::new(), value, vec![]),
+            Node::Name(name) => ("name".into(), name, 0.0, vec![]),
+            Node::Unary(kind, a) => (function(&kind), String::new(), 0.0, vec![a]),
+            Node::Binary(kind, a, b) => (function(&kind), String::new(), 0.0, vec![a, b]),
+        })
+        .collect())
 }
 
 /// __init__(self, expressions: Sequence[str], names: Sequence[str], definitions: dict[str, str]) -> None
@@ -90,5 +111,6 @@ impl Tape {
 /// Never in practice; PyO3's own.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(expression_names, module)?)?;
+    module.add_function(wrap_pyfunction!(expression_nodes, module)?)?;
     module.add_class::<Tape>()
 }

@@ -10,11 +10,13 @@ pub mod dataflash;
 pub mod error;
 pub mod expression;
 pub mod file_bytes;
+pub mod frequency_fit;
 pub mod interrupt;
 pub mod kinematics;
 pub mod least_squares;
 pub mod linear_simulation;
 pub mod quadrotor;
+pub mod state_space;
 pub mod transfer;
 pub mod ulog;
 
@@ -39,5 +41,6 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     expression::register(module)?;
     least_squares::register(module)?;
     transfer::register(module)?;
+    state_space::register(module)?;
     Ok(())
 }

@@ -10,7 +10,7 @@ import click
 from flightid.cli.output import emit, json_option, leave_by_verdict, note
 
 if TYPE_CHECKING:
-    from flightid.models import TransferFunctionModel
+    from flightid.models import Model
     from flightid.record import Record
 
 LOGS = {".bin", ".ulg", ".log"}
@@ -73,7 +73,7 @@ def command(
 
 def _records(
     file: Path,
-    model: TransferFunctionModel,
+    model: Model,
     span: tuple[float, float] | None,
     sid_run: int | None,
 ) -> list[Record]:

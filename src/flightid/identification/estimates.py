@@ -16,7 +16,7 @@ from flightid.identification.selection import SelectedResponse
 from flightid.inference import correlation as correlation_of
 from flightid.inference import cramer_rao, insensitivity, interval95, null_combination, propagate
 from flightid.inference.cramer_rao import inverse_hessian
-from flightid.models import Parameter, TransferFunctionModel
+from flightid.models import Model, Parameter
 
 Array = NDArray[np.float64]
 _DECIBEL = 20.0 / np.log(10.0)
@@ -48,7 +48,7 @@ class Statistics:
 
 
 def statistics(
-    fitted: TransferFunctionModel,
+    fitted: Model,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     end: End,
@@ -99,9 +99,7 @@ def _require_identifiable(names: tuple[str, ...], jacobian: Array) -> None:
     )
 
 
-def coherence_jacobian(
-    fitted: TransferFunctionModel, selected: Sequence[SelectedResponse]
-) -> Array:
+def coherence_jacobian(fitted: Model, selected: Sequence[SelectedResponse]) -> Array:
     """Derivatives of the weighted dB and degree residuals with respect to the free parameters."""
     values = fitted.parameters.independent_values()
     free = fitted.parameters.free_indices
@@ -116,7 +114,7 @@ def coherence_jacobian(
 
 
 def _parameters(
-    fitted: TransferFunctionModel, names: tuple[str, ...], covariance: Array | None, weighted: Array
+    fitted: Model, names: tuple[str, ...], covariance: Array | None, weighted: Array
 ) -> dict[str, FittedParameter]:
     bounds = dict(zip(names, cramer_rao(weighted), strict=True)) if names else {}
     slack = dict(zip(names, insensitivity(weighted), strict=True)) if names else {}
@@ -157,7 +155,7 @@ def _reason(parameter: Parameter, *, at_bound: bool, known: bool, value: float) 
 
 
 def _standard_errors(
-    fitted: TransferFunctionModel, names: tuple[str, ...], covariance: Array | None
+    fitted: Model, names: tuple[str, ...], covariance: Array | None
 ) -> dict[str, float]:
     """Of the estimated parameters and, through their ties, of the tied ones."""
     if covariance is None:

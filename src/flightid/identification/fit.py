@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.findings import Finding
-from flightid.models import TransferFunctionModel
+from flightid.models import Model
 from flightid.responses import PairResponse
 from flightid.table import Cell, Column, Table
 
@@ -156,7 +156,7 @@ class Fit:
 
     Attributes
     ----------
-    model : TransferFunctionModel
+    model : TransferFunctionModel or StateSpaceModel
         The model with the estimates as values.
     parameters : mapping of str to FittedParameter
         All parameters, in the model's order.
@@ -199,7 +199,7 @@ class Fit:
     200.0
     """
 
-    model: TransferFunctionModel
+    model: Model
     parameters: Mapping[str, FittedParameter]
     cost: float
     average_cost: float

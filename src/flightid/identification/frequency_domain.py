@@ -41,7 +41,7 @@ from flightid.identification.model_outputs import HOLDS
 from flightid.identification.multistart import End, cluster, collect, draw_starts
 from flightid.identification.selection import Bands, SelectedResponse, select_points
 from flightid.identification.setup_checks import check_setup
-from flightid.models import TransferFunctionModel
+from flightid.models import Model
 from flightid.responses import FrequencyResponse
 from flightid.units import require_match
 from flightid.version import VERSION
@@ -86,7 +86,7 @@ class Options:
             )
 
 
-def fit_responses(model: TransferFunctionModel, data: FrequencyResponse, options: Options) -> Fit:
+def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fit:
     """Fit a model to measured responses; see `flightid.identify`."""
     options.check()
     _check_model(model, data)
@@ -160,7 +160,7 @@ def _without_bias(
     return iterate(fitted, data, scales, refit, options.hold)
 
 
-def _check_model(model: TransferFunctionModel, data: FrequencyResponse) -> None:
+def _check_model(model: Model, data: FrequencyResponse) -> None:
     if not model.parameters.free:
         raise FitError(
             "the model has no free parameter",
@@ -173,27 +173,32 @@ def _check_model(model: TransferFunctionModel, data: FrequencyResponse) -> None:
         require_match(data.units[name], model.units[name], subject=f"channel {name}")
 
 
-def _model_at(model: TransferFunctionModel, omega: Array, place: int) -> NDArray[np.complex128]:
+def _model_at(model: Model, omega: Array, place: int) -> NDArray[np.complex128]:
     values = model.parameters.independent_values()
     return np.asarray(model.native.response(values, np.ascontiguousarray(omega))[place])
 
 
-def _check_start(
-    model: TransferFunctionModel, selected: Sequence[SelectedResponse]
-) -> list[Finding]:
+def _check_start(model: Model, selected: Sequence[SelectedResponse]) -> list[Finding]:
     found: list[Finding] = []
     for place, each in enumerate(selected):
         try:
             start = _model_at(model, each.omega_rad_s, place)
         except DataError:
             continue  # no value at the start: the search will say so if no start has one
+        if not np.any(start):
+            raise FitError(
+                f"the model has no response of {each.name}",
+                found="zero at every frequency with the start values",
+                needed="a path from this input to this output",
+                action="leave the pair out, or start its parameters away from zero",
+            )
         if np.all(np.isfinite(start)) and np.all(np.abs(start) > 0.0):
             found += check_setup(each.name, each.omega_rad_s, each.response, start)
     return found
 
 
 def _minimise(
-    model: TransferFunctionModel,
+    model: Model,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     options: Options,
@@ -218,7 +223,7 @@ def _minimise(
 
 
 def _sensitivity(
-    fitted: TransferFunctionModel,
+    fitted: Model,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     options: Options,
@@ -234,9 +239,7 @@ def _sensitivity(
     return coherence_sensitivity(selected, curves, errors)
 
 
-def _compare(
-    fitted: TransferFunctionModel, selected: Sequence[SelectedResponse]
-) -> tuple[FittedResponse, ...]:
+def _compare(fitted: Model, selected: Sequence[SelectedResponse]) -> tuple[FittedResponse, ...]:
     result = []
     for place, each in enumerate(selected):
         curve = _model_at(fitted, each.measured.omega_rad_s, place)
@@ -252,7 +255,7 @@ def _compare(
 
 
 def _assemble(
-    fitted: TransferFunctionModel,
+    fitted: Model,
     options: Options,
     data: FrequencyResponse,
     groups: Sequence[Sequence[End]],

@@ -6,15 +6,18 @@ from flightid.errors import FitError
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain import Options, fit_responses
 from flightid.identification.selection import Bands
-from flightid.models import TransferFunctionModel
+from flightid.models import Model, StateSpaceModel, TransferFunctionModel
 from flightid.responses import FrequencyResponse
 
 # Kind of model, kind of data -> the fit; a new kind adds its line.
-_FITS = {(TransferFunctionModel, FrequencyResponse): fit_responses}
+_FITS = {
+    (TransferFunctionModel, FrequencyResponse): fit_responses,
+    (StateSpaceModel, FrequencyResponse): fit_responses,
+}
 
 
 def identify(
-    model: TransferFunctionModel,
+    model: Model,
     data: FrequencyResponse,
     *,
     starts: int = 1,
@@ -37,7 +40,7 @@ def identify(
 
     Parameters
     ----------
-    model : TransferFunctionModel
+    model : TransferFunctionModel or StateSpaceModel
         Structure, start values and bounds; every response in it is fitted.
     data : FrequencyResponse
         Measured responses with the model's channels, in the model's units.
@@ -134,7 +137,7 @@ def identify(
         raise FitError(
             "there is no fit for this model and these data",
             found=f"{type(model).__name__} and {type(data).__name__}",
-            needed="TransferFunctionModel and FrequencyResponse",
+            needed="TransferFunctionModel or StateSpaceModel, and FrequencyResponse",
             action="estimate a response with flightid.estimate_response",
         )
     return fit(model, data, options)

@@ -1,12 +1,23 @@
-"""Models: a structure as data, with named parameters (native: `expression.rs`, `transfer.rs`)."""
+"""Models: a structure as data, with named parameters (native: `expression.rs`, `transfer.rs`).
 
+State space: `model_tape.rs`, `state_space_fit.rs`.
+"""
+
+from flightid.models.description import Model
 from flightid.models.load import library_names, load_model
 from flightid.models.parameters import Parameter, Parameters
+from flightid.models.statespace import StateSpaceModel
+from flightid.models.statespace_parts import Output, ResponsePair, StateSpaceMatrices
 from flightid.models.transfer import TransferFunction, TransferFunctionModel
 
 __all__ = [
+    "Model",
+    "Output",
     "Parameter",
     "Parameters",
+    "ResponsePair",
+    "StateSpaceMatrices",
+    "StateSpaceModel",
     "TransferFunction",
     "TransferFunctionModel",
     "library_names",

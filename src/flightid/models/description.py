@@ -2,33 +2,40 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
-from typing import Any
 
 from flightid.errors import ModelError
-from flightid.models.parameters import Parameter, Parameters
+from flightid.models.parameters import Parameters
+from flightid.models.reading import (
+    read_parameter,
+    read_table,
+    read_text,
+    read_texts,
+    require_keys,
+)
+from flightid.models.statespace import StateSpaceModel
 from flightid.models.transfer import TransferFunction, TransferFunctionModel
 
-MAXIMUM_ENTRIES = 1_000
+Model = TransferFunctionModel | StateSpaceModel
+
 _TOP = {"kind", "name", "source", "note", "inputs", "outputs", "responses", "parameters"}
 _TOP |= {"constraints", "schema"}
-_PARAMETER = {"value", "unit", "min", "max", "fixed", "tie", "note", "status"}
 _RESPONSE = {"gain", "numerator", "denominator", "delay"}
 
 
-def model_from_description(content: Mapping[str, object]) -> TransferFunctionModel:
+def model_from_description(content: Mapping[str, object]) -> Model:
     """Build a model from a dictionary such as a TOML file gives.
 
     Parameters
     ----------
     content : mapping
         Keys ``kind``, ``name``, ``inputs``, ``outputs``, ``parameters``, ``responses`` and, as
-        needed, ``constraints``, ``source``, ``note``.
+        needed, ``constraints``, ``source``, ``note``; with kind ``"state-space"`` those of
+        `StateSpaceModel.from_dict`.
 
     Returns
     -------
-    TransferFunctionModel
+    TransferFunctionModel or StateSpaceModel
 
     Raises
     ------
@@ -42,95 +49,33 @@ def model_from_description(content: Mapping[str, object]) -> TransferFunctionMod
     ...     "parameters": {"K": {"value": 2.0}}, "responses": {"y/u": {"gain": "K"}}})
     TransferFunctionModel('transfer functions', 1 response [y/u], 1 parameters, 1 free)
     """
-    _only(content, _TOP, "the model")
     kind = content.get("kind", "transfer")
+    if kind == "state-space":
+        return StateSpaceModel.from_dict(content)
     if kind != "transfer":
-        raise ModelError("kind of model is not known", found=repr(kind), needed="'transfer'")
-    inputs = _texts(_table(content, "inputs"), "inputs")
-    outputs = _texts(_table(content, "outputs"), "outputs")
-    ties = _texts(_table(content, "constraints", required=False), "constraints")
-    described = _table(content, "parameters")
-    parameters = [_parameter(name, item, ties) for name, item in described.items()]
+        raise ModelError(
+            "kind of model is not known", found=repr(kind), needed="'transfer' or 'state-space'"
+        )
+    require_keys(content, _TOP, "the model")
+    inputs = read_texts(read_table(content, "inputs"), "inputs")
+    outputs = read_texts(read_table(content, "outputs"), "outputs")
+    ties = read_texts(read_table(content, "constraints", required=False), "constraints")
+    described = read_table(content, "parameters")
+    parameters = [read_parameter(name, item, ties) for name, item in described.items()]
     stray = set(ties) - set(described)
     if stray:
         raise ModelError("a constraint names no parameter", found=", ".join(sorted(stray)))
     responses = tuple(
         _response(name, item, inputs, outputs)
-        for name, item in _table(content, "responses").items()
+        for name, item in read_table(content, "responses").items()
     )
     return TransferFunctionModel(
         responses,
         Parameters(parameters),
         units={**inputs, **outputs},
-        name=_text(content.get("name", "transfer functions"), "name"),
-        source=_text(content.get("source", ""), "source"),
-        note=_text(content.get("note", ""), "note"),
-    )
-
-
-def _only(item: Mapping[str, object], known: set[str], subject: str) -> None:
-    unknown = set(item) - known
-    if unknown:
-        raise ModelError(
-            f"{subject} has an unknown key",
-            found=", ".join(sorted(map(str, unknown))),
-            needed=f"one of {', '.join(sorted(known))}",
-        )
-
-
-def _table(content: Mapping[str, object], key: str, *, required: bool = True) -> dict[str, Any]:
-    item = content.get(key, None if required else {})
-    if not isinstance(item, dict) or (required and not item):
-        raise ModelError(f"the model has no table [{key}]", needed="a table with entries")
-    if len(item) > MAXIMUM_ENTRIES:
-        raise ModelError(
-            f"table [{key}] is too long", found=len(item), needed=f"at most {MAXIMUM_ENTRIES}"
-        )
-    return item
-
-
-def _text(item: object, subject: str) -> str:
-    if isinstance(item, bool) or not isinstance(item, str | int | float):
-        raise ModelError(f"{subject} must be a text", found=repr(item)[:80])
-    return str(item)
-
-
-def _texts(item: Mapping[str, object], subject: str) -> dict[str, str]:
-    return {name: _text(value, f"{subject}.{name}") for name, value in item.items()}
-
-
-def _number(item: object, subject: str) -> float:
-    if isinstance(item, bool) or not isinstance(item, int | float):
-        raise ModelError(f"{subject} must be a number", found=repr(item)[:80])
-    try:
-        return float(item)
-    except OverflowError as error:
-        raise ModelError(f"{subject} is too large", found="an integer beyond 1e308") from error
-
-
-def _parameter(name: str, item: object, ties: Mapping[str, str]) -> Parameter:
-    if not isinstance(item, dict):
-        item = {"value": item}
-    _only(item, _PARAMETER, f"parameter {name}")
-    fixed = item.get("fixed", item.get("status") == "fixed")
-    if not isinstance(fixed, bool):
-        raise ModelError(f"parameters.{name}.fixed must be true or false", found=repr(fixed)[:80])
-    tie = ties.get(name, item.get("tie"))
-
-    def bound(key: str, default: float) -> float:
-        value = item.get(key)
-        return default if value is None else _number(value, f"parameters.{name}.{key}")
-
-    value = item.get("value")
-    return Parameter(
-        name,
-        None if value is None else _number(value, f"parameters.{name}.value"),
-        _text(item.get("unit", "1"), f"parameters.{name}.unit"),
-        minimum=bound("min", -math.inf),
-        maximum=bound("max", math.inf),
-        free=not fixed,
-        tie=None if tie is None else _text(tie, f"parameters.{name}.tie"),
-        note=_text(item.get("note", ""), f"parameters.{name}.note"),
+        name=read_text(content.get("name", "transfer functions"), "name"),
+        source=read_text(content.get("source", ""), "source"),
+        note=read_text(content.get("note", ""), "note"),
     )
 
 
@@ -139,7 +84,7 @@ def _response(
 ) -> TransferFunction:
     if not isinstance(item, dict):
         raise ModelError(f"response {name} must be a table", found=repr(item)[:80])
-    _only(item, _RESPONSE, f"response {name}")
+    require_keys(item, _RESPONSE, f"response {name}")
     output, _, source = name.partition("/")
     if output not in outputs or source not in inputs:
         raise ModelError(
@@ -152,13 +97,13 @@ def _response(
         listed = item.get(key, [])
         if not isinstance(listed, list):
             raise ModelError(f"{key} of response {name} must be a list of factors")
-        return tuple(_text(factor, f"{key} of response {name}") for factor in listed)
+        return tuple(read_text(factor, f"{key} of response {name}") for factor in listed)
 
     return TransferFunction(
         output,
         source,
-        _text(item.get("gain", "1"), f"gain of response {name}"),
+        read_text(item.get("gain", "1"), f"gain of response {name}"),
         factors("numerator"),
         factors("denominator"),
-        _text(item.get("delay", "0"), f"delay of response {name}"),
+        read_text(item.get("delay", "0"), f"delay of response {name}"),
     )

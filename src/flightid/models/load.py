@@ -8,8 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from flightid.errors import FileFormatError, OptionError, UnknownNameError
-from flightid.models.description import model_from_description
-from flightid.models.transfer import TransferFunctionModel
+from flightid.models.description import Model, model_from_description
 
 MAXIMUM_BYTES = 1 << 20
 _LIBRARY_NAME = re.compile(r"[a-z0-9_]+")
@@ -40,7 +39,7 @@ def library_names() -> list[str]:
     return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
-def load_model(source: str | Path, *, axis: str | None = None) -> TransferFunctionModel:
+def load_model(source: str | Path, *, axis: str | None = None) -> Model:
     """Load a model from a TOML file, or one of the library by its name.
 
     Parameters
@@ -53,7 +52,7 @@ def load_model(source: str | Path, *, axis: str | None = None) -> TransferFuncti
 
     Returns
     -------
-    TransferFunctionModel
+    TransferFunctionModel or StateSpaceModel
 
     Raises
     ------
@@ -120,7 +119,7 @@ def _parse(text: str, name: str) -> dict[str, object]:
         ) from error
 
 
-def _build(content: dict[str, object], axis: str | None, name: str) -> TransferFunctionModel:
+def _build(content: dict[str, object], axis: str | None, name: str) -> Model:
     axes = content.pop("axes", None)
     if not isinstance(axes, dict):
         if axis is not None:

@@ -7,14 +7,16 @@ coefficients of the factors are formulas of the parameters; factors are polynomi
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid import _native
 from flightid.errors import DataError, ModelError, UnknownNameError
-from flightid.models.formula import formula_names, require_unit
+from flightid.models.adjustable import Adjustable
+from flightid.models.dimensions import require_unit
+from flightid.models.formula import formula_names
 from flightid.models.parameters import Parameters
 from flightid.models.realisation import Matrices, canonical_form, one_delay_for_each_input
 from flightid.table import Table
@@ -72,7 +74,7 @@ class TransferFunction:
 
 
 @dataclass(frozen=True, repr=False)
-class TransferFunctionModel:
+class TransferFunctionModel(Adjustable):
     """Transfer functions of the same parameters.
 
     Attributes
@@ -257,45 +259,6 @@ class TransferFunctionModel:
         )
         return a, b, c, d, delays
 
-    def with_values(self, values: Mapping[str, float]) -> TransferFunctionModel:
-        """Copy with other parameter values.
-
-        Raises
-        ------
-        UnknownNameError
-            There is no such parameter.
-        ModelError
-            A parameter is tied, or a value lies outside its bounds.
-        """
-        return replace(self, parameters=self.parameters.with_values(values))
-
-    def with_fixed(self, **values: float) -> TransferFunctionModel:
-        """Copy with parameters fixed at values, given as ``name=value``."""
-        changed = self.parameters
-        for name, value in values.items():
-            changed = changed.with_parameter(
-                replace(changed[name], value=value, free=False, tie=None)
-            )
-        return replace(self, parameters=changed)
-
-    def with_free(self, *names: str) -> TransferFunctionModel:
-        """Copy with parameters free, tied ones without their tie."""
-        changed = self.parameters
-        for name in names:
-            changed = changed.with_parameter(replace(changed[name], free=True, tie=None))
-        return replace(self, parameters=changed)
-
-    def with_tie(self, name: str, formula: str) -> TransferFunctionModel:
-        """Copy with one parameter given by a formula of others.
-
-        Raises
-        ------
-        ModelError
-            The formula is outside the grammar, circular, or wrong in its unit.
-        """
-        tied = replace(self.parameters[name], tie=formula, value=None)
-        return replace(self, parameters=self.parameters.with_parameter(tied))
-
     def response(self, name: str) -> TransferFunction:
         """The transfer function of one pair, by ``"output/input"``.
 
@@ -329,12 +292,12 @@ class TransferFunctionModel:
         -------
         Table
         """
-        table = self.parameters.summary()
+        table = self.parameters.summary().without_empty_columns()
         notes = [*map(str, self.responses), self.source and f"Source: {self.source}", self.note]
         return Table(
             self.name,
-            _without_empty(table).columns,
-            _without_empty(table).rows,
+            table.columns,
+            table.rows,
             tuple(note for note in notes if note),
         )
 
@@ -375,12 +338,3 @@ def _descending(ascending: list[float]) -> NDArray[np.float64]:
 def _roots(factors: list[NDArray[np.float64]]) -> NDArray[np.complex128]:
     found = [np.roots(factor).astype(np.complex128) for factor in factors]
     return np.concatenate([np.zeros(0, dtype=np.complex128), *found])
-
-
-def _without_empty(table: Table) -> Table:
-    """The table without columns in which no row says anything."""
-    keep = [
-        i for i in range(len(table.columns)) if any(row[i] not in (None, "") for row in table.rows)
-    ]
-    rows = tuple(tuple(row[i] for i in keep) for row in table.rows)
-    return Table(table.title, tuple(table.columns[i] for i in keep), rows, table.notes)

@@ -10,7 +10,7 @@ from flightid.errors import StudyError
 from flightid.findings import Finding
 from flightid.identification import Fit, identify
 from flightid.logs import Log, SidRun
-from flightid.models import TransferFunctionModel, load_model
+from flightid.models import Model, load_model
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
 from flightid.study.settings import ModelSettings, Segment, Settings
@@ -27,12 +27,12 @@ class Task:
     ----------
     settings : ModelSettings
         What was asked.
-    model : TransferFunctionModel
+    model : TransferFunctionModel or StateSpaceModel
         Structure and start values, overrides applied.
     """
 
     settings: ModelSettings
-    model: TransferFunctionModel
+    model: Model
 
     @property
     def channels(self) -> tuple[str, ...]:

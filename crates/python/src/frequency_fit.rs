@@ -1,0 +1,134 @@
+//! Face of `flightid_core::frequency_fit` for every kind of model. (Python side:
+//! identification/frequency_domain.py)
+
+use flightid_core::CoreError;
+use flightid_core::frequency_fit::{
+    Cost, FrequencyFit, Measured, ResponseModel, Whitening, minimise_from,
+};
+use flightid_core::least_squares::{Minimum, Options};
+use num_complex::Complex64;
+use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::error::from_core;
+use crate::interrupt;
+use crate::least_squares::{Ending, ending};
+
+/// Frequencies, response, square roots of the weights of decibels and degrees.
+pub type Response<'py> = (
+    PyReadonlyArray1<'py, f64>,
+    PyReadonlyArray1<'py, Complex64>,
+    PyReadonlyArray1<'py, f64>,
+    PyReadonlyArray1<'py, f64>,
+);
+/// First response, number of responses and matrix of a whitening.
+pub type Run<'py> = (usize, usize, PyReadonlyArray2<'py, f64>);
+
+/// Starts, bounds and limit of a search.
+pub struct Search<'py> {
+    /// Rows are starts.
+    pub starts: PyReadonlyArray2<'py, f64>,
+    /// Lower bounds.
+    pub lower: PyReadonlyArray1<'py, f64>,
+    /// Upper bounds.
+    pub upper: PyReadonlyArray1<'py, f64>,
+    /// Most steps of each start.
+    pub maximum_iterations: usize,
+}
+
+/// Measured responses, copied out of NumPy.
+///
+/// # Errors
+/// For arrays that are not contiguous.
+pub fn measured(data: Vec<Response<'_>>) -> PyResult<Vec<Measured>> {
+    data.into_iter()
+        .map(|(omega, response, weight_db, weight_deg)| {
+            Ok(Measured {
+                omega: omega.as_slice()?.to_vec(),
+                response: response.as_slice()?.to_vec(),
+                weight_db: weight_db.as_slice()?.to_vec(),
+                weight_deg: weight_deg.as_slice()?.to_vec(),
+            })
+        })
+        .collect()
+}
+
+/// H(jω) of each response of a prepared model, shape (n_responses, n_freqs).
+///
+/// # Errors
+/// NumPy's own.
+pub fn responses<'py>(
+    py: Python<'py>,
+    model: &impl ResponseModel,
+    omega: &[f64],
+) -> PyResult<Bound<'py, PyArray2<Complex64>>> {
+    let n = model.n_responses();
+    let mut result = Vec::with_capacity(n * omega.len());
+    for index in 0..n {
+        result.extend(omega.iter().map(|&each| model.response(index, each, None)));
+    }
+    result.into_pyarray(py).reshape([n, omega.len()])
+}
+
+/// Derivative of log H of a model prepared with gradient, shape (n_responses, n_freqs, n_free).
+///
+/// # Errors
+/// NumPy's own.
+pub fn log_gradients<'py>(
+    py: Python<'py>,
+    model: &impl ResponseModel,
+    omega: &[f64],
+) -> PyResult<Bound<'py, PyArray3<Complex64>>> {
+    let (n, n_free) = (model.n_responses(), model.n_free());
+    let mut result = vec![Complex64::default(); n * omega.len() * n_free];
+    for (place, row) in result.chunks_exact_mut(n_free.max(1)).enumerate() {
+        model.response(place / omega.len(), omega[place % omega.len()], Some(row));
+    }
+    result.into_pyarray(py).reshape([n, omega.len(), n_free])
+}
+
+/// Minimum from each start, or the words of the error that stopped it.
+///
+/// # Errors
+/// Where data, weights and model do not belong together, or the user interrupts.
+pub fn search<'py>(
+    py: Python<'py>,
+    model: impl ResponseModel + Clone + Send + Sync,
+    data: &[Measured],
+    whitening: Vec<Run<'_>>,
+    search: &Search<'py>,
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let runs = whitening
+        .into_iter()
+        .map(|(first, count, matrix)| {
+            Ok(Whitening { first, count, matrix: matrix.as_slice()?.to_vec() })
+        })
+        .collect::<PyResult<Vec<_>>>()?;
+    let cost = if runs.is_empty() { Cost::DecibelPhase } else { Cost::Whitened(runs) };
+    let width = model.n_free().max(1);
+    let fit = FrequencyFit::new(model, data, &cost).map_err(from_core)?;
+    let starts: Vec<_> =
+        search.starts.as_slice()?.chunks_exact(width).map(<[f64]>::to_vec).collect();
+    let (lower, upper) = (search.lower.as_slice()?, search.upper.as_slice()?);
+    let options = Options { maximum_iterations: search.maximum_iterations, ..Options::default() };
+    let work =
+        |stop: interrupt::Stop<'_>| minimise_from(&fit, &starts, lower, upper, &options, stop);
+    let found = if starts.len() == 1 {
+        interrupt::run_here(py, work)?
+    } else {
+        interrupt::run_beside(py, work)?
+    };
+    found.into_iter().map(|each| outcome(py, each)).collect()
+}
+
+fn outcome<'py>(py: Python<'py>, found: Result<Minimum, CoreError>) -> PyResult<Bound<'py, PyAny>> {
+    match found {
+        Ok(minimum) => {
+            let values: Ending<'py> = ending(py, minimum)?;
+            Ok(values.into_pyobject(py)?.into_any())
+        }
+        // A wrong shape is the caller's fault; anything else belongs to this start alone.
+        Err(error @ (CoreError::Shape { .. } | CoreError::Range { .. })) => Err(from_core(error)),
+        Err(error) => Ok(error.to_string().into_pyobject(py)?.into_any()),
+    }
+}

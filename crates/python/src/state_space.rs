@@ -1,0 +1,166 @@
+//! Face of `flightid_core::model_tape` and `state_space_fit`. (Python side: models/statespace.py)
+
+use std::collections::BTreeMap;
+
+use flightid_core::frequency_fit::ResponseModel;
+use flightid_core::model_tape::{ModelTape, ModelText};
+use flightid_core::state_space_fit::FreeStateSpace;
+use num_complex::Complex64;
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+};
+use pyo3::prelude::*;
+
+use crate::error::from_core;
+use crate::frequency_fit::{Response, Run, Search, log_gradients, measured, responses, search};
+
+/// __init__(self, states: Sequence[str], inputs: Sequence[str], equations: Sequence[tuple[str, str]], outputs: Sequence[str], delays: Sequence[str], names: Sequence[str], definitions: dict[str, str], pairs: Sequence[tuple[int, int]], point: Sequence[float]) -> None
+///
+/// A state-space model: left and right side of each equation, formulas of outputs and of the delay
+/// of each input, and the (output, input) pairs whose responses are asked for, at the point ẋ, x, u.
+#[pyclass(frozen, module = "flightid._native")]
+struct StateSpace {
+    tape: ModelTape,
+    pairs: Vec<(usize, usize)>,
+    point: Vec<f64>,
+}
+
+impl StateSpace {
+    fn prepared(
+        &self,
+        values: &[f64],
+        free: &[usize],
+        omega: &[f64],
+        with_gradient: bool,
+    ) -> PyResult<FreeStateSpace<'_>> {
+        let omega = omega.iter().copied();
+        let mut model =
+            FreeStateSpace::new(&self.tape, &self.pairs, &self.point, values, free, omega)
+                .map_err(from_core)?;
+        let start: Vec<f64> = free.iter().map(|&index| values[index]).collect();
+        model.prepare(&start, with_gradient).map_err(from_core)?;
+        Ok(model)
+    }
+}
+
+#[pymethods]
+impl StateSpace {
+    #[new]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        states: Vec<String>,
+        inputs: Vec<String>,
+        equations: Vec<(String, String)>,
+        outputs: Vec<String>,
+        delays: Vec<String>,
+        names: Vec<String>,
+        definitions: BTreeMap<String, String>,
+        pairs: Vec<(usize, usize)>,
+        point: Vec<f64>,
+    ) -> PyResult<Self> {
+        let parameters = names;
+        let text =
+            ModelText { states, inputs, equations, outputs, delays, parameters, definitions };
+        Ok(Self { tape: ModelTape::new(&text).map_err(from_core)?, pairs, point })
+    }
+
+    /// linearise(self, values: NDArray[np.float64], point: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    ///
+    /// Residuals, outputs and delays at a point ẋ, x, u, and the derivatives of residuals and
+    /// outputs, shape (n_states + n_outputs, 2 n_states + n_inputs).
+    #[allow(clippy::type_complexity)]
+    fn linearise<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'_, f64>,
+        point: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let found =
+            self.tape.linearise(point.as_slice()?, values.as_slice()?).map_err(from_core)?;
+        let shape = [self.tape.height(), self.tape.width()];
+        Ok((found.values.into_pyarray(py), found.slopes.into_pyarray(py).reshape(shape)?))
+    }
+
+    /// sensitivities(self, values: NDArray[np.float64], point: NDArray[np.float64], free: Sequence[int]) -> NDArray[np.float64]
+    ///
+    /// Exact derivatives of what `linearise` returns second, by some of the values, shape (n_free,
+    /// n_states + n_outputs, 2 n_states + n_inputs).
+    fn sensitivities<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'_, f64>,
+        point: PyReadonlyArray1<'_, f64>,
+        free: Vec<usize>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let (height, width) = (self.tape.height(), self.tape.width());
+        let found = self
+            .tape
+            .sensitivities(point.as_slice()?, values.as_slice()?, &free)
+            .map_err(from_core)?;
+        let mut dense = vec![0.0; free.len() * height * width];
+        for each in found {
+            dense[(each.parameter * height + each.row) * width + each.column] = each.value;
+        }
+        dense.into_pyarray(py).reshape([free.len(), height, width])
+    }
+
+    /// response(self, values: NDArray[np.float64], omega_rad_s: NDArray[np.float64]) -> NDArray[np.complex128]
+    ///
+    /// H(jω) of each pair, shape (n_responses, n_freqs).
+    fn response<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'_, f64>,
+        omega_rad_s: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<Complex64>>> {
+        let omega = omega_rad_s.as_slice()?;
+        responses(py, &self.prepared(values.as_slice()?, &[], omega, false)?, omega)
+    }
+
+    /// log_gradient(self, values: NDArray[np.float64], free: Sequence[int], omega_rad_s: NDArray[np.float64]) -> NDArray[np.complex128]
+    ///
+    /// Derivative of log H, shape (n_responses, n_freqs, n_free).
+    fn log_gradient<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'_, f64>,
+        free: Vec<usize>,
+        omega_rad_s: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Bound<'py, PyArray3<Complex64>>> {
+        let omega = omega_rad_s.as_slice()?;
+        log_gradients(py, &self.prepared(values.as_slice()?, &free, omega, true)?, omega)
+    }
+
+    /// fit(self, values: NDArray[np.float64], free: Sequence[int], data: Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], whitening: Sequence[tuple[int, int, NDArray[np.float64]]], starts: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], maximum_iterations: int) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], NDArray[np.float64], int, str] | str]
+    ///
+    /// As `TransferFunctions.fit`.
+    #[allow(clippy::too_many_arguments)]
+    fn fit<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'_, f64>,
+        free: Vec<usize>,
+        data: Vec<Response<'_>>,
+        whitening: Vec<Run<'_>>,
+        starts: PyReadonlyArray2<'py, f64>,
+        lower: PyReadonlyArray1<'py, f64>,
+        upper: PyReadonlyArray1<'py, f64>,
+        maximum_iterations: usize,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let data = measured(data)?;
+        let omega = data.iter().flat_map(|each| each.omega.iter().copied());
+        let values = values.as_slice()?;
+        let model = FreeStateSpace::new(&self.tape, &self.pairs, &self.point, values, &free, omega)
+            .map_err(from_core)?;
+        let wanted = Search { starts, lower, upper, maximum_iterations };
+        search(py, model, &data, whitening, &wanted)
+    }
+}
+
+/// Add this file's names to the module.
+///
+/// # Errors
+/// Never in practice; PyO3's own.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<StateSpace>()
+}

@@ -1,0 +1,121 @@
+"""Entries of a plain dictionary that describes a model, checked one by one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from flightid.errors import ModelError
+from flightid.models.parameters import Parameter
+
+MAXIMUM_ENTRIES = 1_000
+PARAMETER_KEYS = {"value", "unit", "min", "max", "fixed", "tie", "note", "status"}
+
+
+def require_keys(item: Mapping[str, object], known: set[str], subject: str) -> None:
+    """Refuse a table with keys that nobody reads.
+
+    Raises
+    ------
+    ModelError
+        A key is unknown.
+    """
+    unknown = set(item) - known
+    if unknown:
+        raise ModelError(
+            f"{subject} has an unknown key",
+            found=", ".join(sorted(map(str, unknown))),
+            needed=f"one of {', '.join(sorted(known))}",
+        )
+
+
+def read_table(content: Mapping[str, object], key: str, *, required: bool = True) -> dict[str, Any]:
+    """A table of a model, bounded in length.
+
+    Raises
+    ------
+    ModelError
+        It is missing though required, no table, or too long.
+    """
+    item = content.get(key, None if required else {})
+    if not isinstance(item, dict) or (required and not item):
+        raise ModelError(f"the model has no table [{key}]", needed="a table with entries")
+    if len(item) > MAXIMUM_ENTRIES:
+        raise ModelError(
+            f"table [{key}] is too long", found=len(item), needed=f"at most {MAXIMUM_ENTRIES}"
+        )
+    return item
+
+
+def read_text(item: object, subject: str) -> str:
+    """A text, or a number as text.
+
+    Raises
+    ------
+    ModelError
+        It is something else.
+    """
+    if isinstance(item, bool) or not isinstance(item, str | int | float):
+        raise ModelError(f"{subject} must be a text", found=repr(item)[:80])
+    return str(item)
+
+
+def read_texts(item: Mapping[str, object], subject: str) -> dict[str, str]:
+    """A table of texts.
+
+    Raises
+    ------
+    ModelError
+        An entry is no text.
+    """
+    return {name: read_text(value, f"{subject}.{name}") for name, value in item.items()}
+
+
+def read_number(item: object, subject: str) -> float:
+    """A number.
+
+    Raises
+    ------
+    ModelError
+        It is something else, or beyond the range of numbers.
+    """
+    if isinstance(item, bool) or not isinstance(item, int | float):
+        raise ModelError(f"{subject} must be a number", found=repr(item)[:80])
+    try:
+        return float(item)
+    except OverflowError as error:
+        raise ModelError(f"{subject} is too large", found="an integer beyond 1e308") from error
+
+
+def read_parameter(name: str, item: object, ties: Mapping[str, str]) -> Parameter:
+    """A parameter from its table, or from its value alone.
+
+    Raises
+    ------
+    ModelError
+        A key is unknown or of the wrong type, or the numbers contradict each other.
+    """
+    if not isinstance(item, dict):
+        item = {"value": item}
+    require_keys(item, PARAMETER_KEYS, f"parameter {name}")
+    fixed = item.get("fixed", item.get("status") == "fixed")
+    if not isinstance(fixed, bool):
+        raise ModelError(f"parameters.{name}.fixed must be true or false", found=repr(fixed)[:80])
+    tie = ties.get(name, item.get("tie"))
+
+    def bound(key: str, default: float) -> float:
+        value = item.get(key)
+        return default if value is None else read_number(value, f"parameters.{name}.{key}")
+
+    value = item.get("value")
+    return Parameter(
+        name,
+        None if value is None else read_number(value, f"parameters.{name}.value"),
+        read_text(item.get("unit", "1"), f"parameters.{name}.unit"),
+        minimum=bound("min", -math.inf),
+        maximum=bound("max", math.inf),
+        free=not fixed,
+        tie=None if tie is None else read_text(tie, f"parameters.{name}.tie"),
+        note=read_text(item.get("note", ""), f"parameters.{name}.note"),
+    )
