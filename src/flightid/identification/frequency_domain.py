@@ -113,9 +113,7 @@ def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fi
     return replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
 
 
-def _select(
-    model: TransferFunctionModel, data: FrequencyResponse, options: Options
-) -> list[SelectedResponse]:
+def _select(model: Model, data: FrequencyResponse, options: Options) -> list[SelectedResponse]:
     return select_points(
         data,
         model.response_names,
@@ -127,13 +125,13 @@ def _select(
     )
 
 
-def _at(model: TransferFunctionModel, end: End) -> TransferFunctionModel:
+def _at(model: Model, end: End) -> Model:
     names = (parameter.name for parameter in model.parameters.free)
     return model.with_values(dict(zip(names, map(float, end.x), strict=True)))
 
 
 def _statistics(
-    fitted: TransferFunctionModel,
+    fitted: Model,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     end: End,
@@ -144,7 +142,7 @@ def _statistics(
 
 
 def _without_bias(
-    fitted: TransferFunctionModel,
+    fitted: Model,
     data: FrequencyResponse,
     errors: ErrorModel,
     found: Statistics,
@@ -152,7 +150,7 @@ def _without_bias(
 ) -> BiasRounds:
     once = replace(options, starts=1)
 
-    def refit(model: TransferFunctionModel, corrected: FrequencyResponse) -> TransferFunctionModel:
+    def refit(model: Model, corrected: FrequencyResponse) -> Model:
         selected = _select(model, corrected, options)
         return _at(model, _minimise(model, selected, errors, once)[0])
 
