@@ -14,7 +14,7 @@ from flightid.findings import Finding
 from flightid.identification.error_model import ErrorModel
 from flightid.identification.estimator_bias import remove_bias, why_unknown
 from flightid.identification.selection import SelectedResponse
-from flightid.models import TransferFunctionModel
+from flightid.models import Model
 from flightid.responses import FrequencyResponse
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ class BiasRounds:
 
     Attributes
     ----------
-    model : TransferFunctionModel
+    model : Model
         The model after the last round.
     data : FrequencyResponse
         The response that the last fit saw.
@@ -63,7 +63,7 @@ class BiasRounds:
         Why nothing was corrected; empty where it was.
     """
 
-    model: TransferFunctionModel
+    model: Model
     data: FrequencyResponse
     rounds: int
     move: float
@@ -81,17 +81,17 @@ class BiasRounds:
 
 
 def iterate(
-    first: TransferFunctionModel,
+    first: Model,
     data: FrequencyResponse,
     scales: Mapping[str, float],
-    refit: Callable[[TransferFunctionModel, FrequencyResponse], TransferFunctionModel],
+    refit: Callable[[Model, FrequencyResponse], Model],
     hold: str,
 ) -> BiasRounds:
     """Correct by the fitted model and fit again, until the parameters stand still.
 
     Parameters
     ----------
-    first : TransferFunctionModel
+    first : Model
         Fitted to the response as it was measured.
     data : FrequencyResponse
         As measured.
@@ -124,9 +124,7 @@ def iterate(
     return BiasRounds(model, corrected, rounds, move)
 
 
-def _move(
-    before: TransferFunctionModel, after: TransferFunctionModel, scales: Mapping[str, float]
-) -> float:
+def _move(before: Model, after: Model, scales: Mapping[str, float]) -> float:
     found = 0.0
     for parameter in after.parameters.free:
         new, old = parameter.value or 0.0, before.parameters[parameter.name].value or 0.0

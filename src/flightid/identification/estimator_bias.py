@@ -12,14 +12,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError
+from flightid.errors import DataError, ModelError
 from flightid.identification.model_outputs import (
     PairSystem,
     driven_output,
     free_outputs,
     pair_systems,
 )
-from flightid.models import TransferFunctionModel
+from flightid.models import Model, TransferFunctionModel
 from flightid.responses import FrequencyResponse
 from flightid.responses.linear_estimate import LinearEstimate
 
@@ -53,9 +53,7 @@ def why_unknown(data: FrequencyResponse) -> str:
     return "the response was read from a file or estimated with covariance=False"
 
 
-def remove_bias(
-    model: TransferFunctionModel, data: FrequencyResponse, hold: str
-) -> FrequencyResponse:
+def remove_bias(model: Model, data: FrequencyResponse, hold: str) -> FrequencyResponse:
     """The measured response without the bias that its estimator has for this model.
 
     Unknown initial states and trims of each record are fitted to its outputs, so that a record may
@@ -63,7 +61,7 @@ def remove_bias(
 
     Parameters
     ----------
-    model : TransferFunctionModel
+    model : Model
     data : FrequencyResponse
         Estimated from records, with `linear`.
     hold : {"band_limited", "first", "zero"}
@@ -83,6 +81,12 @@ def remove_bias(
     linear = data.linear
     if linear is None:
         raise DataError("the estimator's weights are not known", found=why_unknown(data))
+    if not isinstance(model, TransferFunctionModel):
+        raise ModelError(
+            "the estimator's bias is known for transfer functions only",
+            found=type(model).__name__,
+            needed="TransferFunctionModel",
+        )
     systems = pair_systems(model)
     residuals = [
         np.stack(
