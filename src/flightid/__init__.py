@@ -15,12 +15,19 @@ if TYPE_CHECKING:
     from flightid import conditioning, excitation, validation
     from flightid.errors import FlightidError
     from flightid.findings import Finding
-    from flightid.identification import Fit, FittedParameter, FittedResponse, LocalMinimum
+    from flightid.identification import (
+        Fit,
+        FittedParameter,
+        FittedResponse,
+        LocalMinimum,
+        NarxFit,
+    )
     from flightid.identification.identify import identify
     from flightid.inspection import Inspection, inspect_log
     from flightid.logs import Log, LogTable, read_log
     from flightid.models import (
         Output,
+        NarxModel,
         Parameter,
         Parameters,
         StateSpaceModel,
@@ -53,6 +60,8 @@ _HOMES = {
     "Log": "flightid.logs",
     "LogTable": "flightid.logs",
     "Output": "flightid.models",
+    "NarxFit": "flightid.identification",
+    "NarxModel": "flightid.models",
     "PairResponse": "flightid.responses",
     "Parameter": "flightid.models",
     "Parameters": "flightid.models",
@@ -95,6 +104,8 @@ __all__ = [
     "Log",
     "LogTable",
     "Output",
+    "NarxFit",
+    "NarxModel",
     "PairResponse",
     "Parameter",
     "Parameters",

@@ -17,6 +17,8 @@ use crate::radial_basis::{Radial, require_finite};
 const COLLINEAR: f64 = 1e-10;
 /// Below this share of its last exact value a squared length has lost digits to cancellation.
 const CANCELLED: f64 = 1e-6;
+/// A sum of squared errors below this share of the target's is rounding: nothing is left to explain.
+const ROUNDING: f64 = 1e-26;
 /// Candidates of one parallel task.
 const CHUNK: usize = 16;
 
@@ -288,8 +290,9 @@ pub fn select(
         terms.push(index);
         sums.push(dot(&state.residual, &state.residual));
         press.push(state.press());
-        let reached = matches!(stop, Stop::SumOfSquares(goal) if sums[sums.len() - 1] <= goal);
-        if reached && terms.len() >= forced {
+        let left = sums[sums.len() - 1];
+        let reached = matches!(stop, Stop::SumOfSquares(goal) if left <= goal);
+        if terms.len() >= forced && (reached || left <= ROUNDING * power) {
             break;
         }
         state.deflate();

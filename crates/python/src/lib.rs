@@ -15,6 +15,7 @@ pub mod interrupt;
 pub mod kinematics;
 pub mod least_squares;
 pub mod linear_simulation;
+pub mod narx;
 pub mod quadrotor;
 pub mod state_space;
 pub mod transfer;
@@ -40,6 +41,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     quadrotor::register(module)?;
     expression::register(module)?;
     least_squares::register(module)?;
+    narx::register(module)?;
     transfer::register(module)?;
     state_space::register(module)?;
     Ok(())

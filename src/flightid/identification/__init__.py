@@ -2,5 +2,14 @@
 
 from flightid.identification.fit import Fit, FittedParameter, FittedResponse, LocalMinimum
 from flightid.identification.identify import identify
+from flightid.identification.narx_fit import ChosenTerm, NarxFit
 
-__all__ = ["Fit", "FittedParameter", "FittedResponse", "LocalMinimum", "identify"]
+__all__ = [
+    "ChosenTerm",
+    "Fit",
+    "FittedParameter",
+    "FittedResponse",
+    "LocalMinimum",
+    "NarxFit",
+    "identify",
+]

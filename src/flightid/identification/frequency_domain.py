@@ -56,17 +56,17 @@ _DEGREE = 180.0 / np.pi
 class Options:
     """Options of a frequency-domain fit; see `flightid.identify`."""
 
-    starts: int
-    seed: int
-    omega_rad_s: Bands
-    n_omega: int
-    minimum_coherence: float | None
-    weight_gain: float
-    weight_phase: float
-    cost: str
-    maximum_iterations: int
-    correct_bias: bool
-    hold: str
+    starts: int = 1
+    seed: int = 0
+    omega_rad_s: Bands = None
+    n_omega: int = 20
+    minimum_coherence: float | None = 0.6
+    weight_gain: float = 1.0
+    weight_phase: float = 0.01745
+    cost: str = "coherence"
+    maximum_iterations: int = 200
+    correct_bias: bool = True
+    hold: str = "band_limited"
 
     def check(self) -> None:
         """Refuse options without a meaning.

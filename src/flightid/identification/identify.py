@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import Any, overload
+
 from flightid.errors import FitError
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain import Options, fit_responses
+from flightid.identification.narx_fit import NarxFit
+from flightid.identification.orthogonal_least_squares import fit_narx
 from flightid.identification.selection import Bands
 from flightid.models import Model, StateSpaceModel, TransferFunctionModel
 from flightid.responses import FrequencyResponse
@@ -13,12 +18,44 @@ from flightid.responses import FrequencyResponse
 _FITS = {
     (TransferFunctionModel, FrequencyResponse): fit_responses,
     (StateSpaceModel, FrequencyResponse): fit_responses,
+from flightid.models import TransferFunctionModel
+from flightid.models.narx import NarxModel
+from flightid.record import Record
+from flightid.responses import FrequencyResponse
+
+# Kind of model, kind of data -> the fit; a new kind adds its line.
+_FITS: dict[tuple[type, type], Callable[..., Any]] = {
+    (TransferFunctionModel, FrequencyResponse): fit_responses,
+    (NarxModel, Record): fit_narx,
 }
 
 
+@overload
+def identify(model: NarxModel, data: Record | Sequence[Record]) -> NarxFit: ...
+
+
+@overload
 def identify(
     model: Model,
     data: FrequencyResponse,
+    *,
+    starts: int = ...,
+    seed: int = ...,
+    omega_rad_s: Bands = ...,
+    n_omega: int = ...,
+    minimum_coherence: float | None = ...,
+    weight_gain: float = ...,
+    weight_phase: float = ...,
+    cost: str = ...,
+    maximum_iterations: int = ...,
+    correct_bias: bool = ...,
+    hold: str = ...,
+) -> Fit: ...
+
+
+def identify(
+    model: TransferFunctionModel | NarxModel,
+    data: FrequencyResponse | Record | Sequence[Record],
     *,
     starts: int = 1,
     seed: int = 0,
@@ -31,19 +68,22 @@ def identify(
     maximum_iterations: int = 200,
     correct_bias: bool = True,
     hold: str = "band_limited",
-) -> Fit:
+) -> Fit | NarxFit:
     """Fit the free parameters of a model to data.
 
-    Each response is fitted at `n_omega` of its measured frequencies, log-spaced over its band. The
-    cost of one response is (20/n) Σ W_γ [W_g (Δ dB)² + W_p (Δ degrees)²] with
-    W_γ = [1.58 (1 − exp(−γ²))]².
+    A `NarxModel` is fitted to one record or several by orthogonal least squares; its options are
+    its own and none below applies. For transfer functions each response is fitted at `n_omega` of
+    its measured frequencies, log-spaced over its band. The cost of one response is (20/n) Σ W_γ
+    [W_g (Δ dB)² + W_p (Δ degrees)²] with W_γ = [1.58 (1 − exp(−γ²))]².
 
     Parameters
     ----------
     model : TransferFunctionModel or StateSpaceModel
+    model : TransferFunctionModel or NarxModel
         Structure, start values and bounds; every response in it is fitted.
-    data : FrequencyResponse
-        Measured responses with the model's channels, in the model's units.
+    data : FrequencyResponse, or Record or sequence of Record
+        Measured responses, or for a `NarxModel` records, with the model's channels, in the model's
+        units.
     starts : int
         Number of starts: the model's own values, then a Latin hypercube inside the bounds.
     seed : int
@@ -75,7 +115,7 @@ def identify(
 
     Returns
     -------
-    Fit
+    Fit or NarxFit
         Estimates with 95 % intervals that carry the errors of the response through the fit,
         Cramér–Rao bounds and insensitivities, costs, correlations, findings.
 
@@ -91,7 +131,7 @@ def identify(
     UnknownNameError
         A channel of the model is not in the data.
     OptionError
-        An option outside its range.
+        An option outside its range, or one that this kind of model does not have.
 
     Assumes
     -------
@@ -105,6 +145,7 @@ def identify(
     ---------
     Tischler & Remple, *Aircraft and Rotorcraft System Identification*, 2nd ed., eqs. 11.4, 11.5,
     12.24 to 12.28; intervals: Pintelon & Schoukens, *System Identification*, 2nd ed., §9.7.
+    NARX: Chen, Cowan & Grant, IEEE Trans. Neural Networks 2 (1991), section III.
 
     Example
     -------
@@ -132,12 +173,15 @@ def identify(
         correct_bias=correct_bias,
         hold=hold,
     )
-    fit = _FITS.get((type(model), type(data)))
+    single = data[0] if isinstance(data, list | tuple) and data else data
+    fit = _FITS.get((type(model), type(single)))
     if fit is None:
         raise FitError(
             "there is no fit for this model and these data",
             found=f"{type(model).__name__} and {type(data).__name__}",
             needed="TransferFunctionModel or StateSpaceModel, and FrequencyResponse",
+            needed="TransferFunctionModel and FrequencyResponse, or NarxModel and Record",
             action="estimate a response with flightid.estimate_response",
         )
-    return fit(model, data, options)
+    result: Fit | NarxFit = fit(model, data, options)
+    return result

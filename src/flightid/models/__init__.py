@@ -5,6 +5,8 @@ State space: `model_tape.rs`, `state_space_fit.rs`.
 
 from flightid.models.description import Model
 from flightid.models.load import library_names, load_model
+from flightid.models.narx import NarxEquation, NarxModel, NarxPrediction
+from flightid.models.narx_terms import Lag, Term
 from flightid.models.parameters import Parameter, Parameters
 from flightid.models.statespace import StateSpaceModel
 from flightid.models.statespace_parts import Output, ResponsePair, StateSpaceMatrices
@@ -18,6 +20,13 @@ __all__ = [
     "ResponsePair",
     "StateSpaceMatrices",
     "StateSpaceModel",
+    "Lag",
+    "NarxEquation",
+    "NarxModel",
+    "NarxPrediction",
+    "Parameter",
+    "Parameters",
+    "Term",
     "TransferFunction",
     "TransferFunctionModel",
     "library_names",

@@ -16,6 +16,7 @@ from flightid.validation.metrics import (
     weighted_rms,
 )
 from flightid.validation.muad import Envelopes, Mismatch, mismatch, muad_envelopes
+from flightid.validation.narx_search import NarxSearch, search_narx
 from flightid.validation.residual_result import ResidualTests
 from flightid.validation.residuals import residual_tests
 from flightid.validation.shifts import Shifts
@@ -31,6 +32,7 @@ __all__ = [
     "Kind",
     "Loop",
     "Mismatch",
+    "NarxSearch",
     "Peak",
     "Prediction",
     "ResidualSpectra",
@@ -48,6 +50,7 @@ __all__ = [
     "residual_spectra",
     "residual_tests",
     "rms_error",
+    "search_narx",
     "theil",
     "vaf_percent",
     "verify",

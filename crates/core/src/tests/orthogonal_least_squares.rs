@@ -165,6 +165,16 @@ fn stops_keep_what_they_promise() {
 }
 
 #[test]
+fn an_exact_fit_ends_the_selection() {
+    let (columns, _) = sparse_problem();
+    let y: Vec<f64> = (0..200).map(|t| columns[800 + t] - 0.5 * columns[3400 + t]).collect();
+    let candidates = Candidates { columns: &columns, radial: None, n_samples: 200 };
+    let mut terms = select(&candidates, &y, 0, Stop::Press, 20).unwrap().terms;
+    terms.sort_unstable();
+    assert_eq!(terms, [4, 17]);
+}
+
+#[test]
 fn forced_terms_come_first_and_one_thread_gives_the_same_bits() {
     let (columns, y) = sparse_problem();
     let candidates = Candidates { columns: &columns, radial: None, n_samples: 200 };

@@ -1,0 +1,155 @@
+//! Binding of term selection and NARX runs.
+//! (Python side: models/narx.py, identification/orthogonal_least_squares.py)
+
+use crate::error::from_core;
+use flightid_core::CoreError;
+use flightid_core::narx::{Lag, Monomial, Narx};
+use flightid_core::orthogonal_least_squares::{Candidates, Stop, select};
+use flightid_core::radial_basis::{Kernel, Radial};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+type Path<'py> = (
+    Vec<usize>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
+    usize,
+);
+
+fn stop_rule(name: &str, goal: f64) -> Result<Stop, CoreError> {
+    match name {
+        "sse" => Ok(Stop::SumOfSquares(goal)),
+        "err" => Ok(Stop::ErrorReduction(goal)),
+        "terms" => Ok(Stop::Terms),
+        "press" => Ok(Stop::Press),
+        "aic" => Ok(Stop::Akaike),
+        "aicc" => Ok(Stop::AkaikeCorrected),
+        "bic" => Ok(Stop::Bayes),
+        _ => Err(CoreError::UnknownName { name: name.to_owned() }),
+    }
+}
+
+/// select_terms(target: NDArray[np.float64], columns: NDArray[np.float64], regressors: NDArray[np.float64], centres: NDArray[np.float64], kernel: str, beta: float, forced: int, stop: str, goal: float, maximum_terms: int) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int]
+///
+/// Orthogonal least squares over given columns, then radial functions at the centres: terms, error
+/// reduction, sums of squares, leave-one-out mean squares; weights and flat triangular factor of the
+/// kept terms; number of collinear candidates.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn select_terms<'py>(
+    py: Python<'py>,
+    target: PyReadonlyArray1<'py, f64>,
+    columns: PyReadonlyArray2<'py, f64>,
+    regressors: PyReadonlyArray2<'py, f64>,
+    centres: PyReadonlyArray2<'py, f64>,
+    kernel: &str,
+    beta: f64,
+    forced: usize,
+    stop: &str,
+    goal: f64,
+    maximum_terms: usize,
+) -> PyResult<Path<'py>> {
+    let dimension = regressors.as_array().ncols();
+    let (y, columns) = (target.as_slice()?, columns.as_slice()?);
+    let (regressors, centres) = (regressors.as_slice()?, centres.as_slice()?);
+    let found = py
+        .detach(|| {
+            let radial = if centres.is_empty() {
+                None
+            } else {
+                let kernel = Kernel::from_name(kernel)?;
+                Some((Radial::new(kernel, beta, centres, dimension)?, regressors))
+            };
+            let candidates = Candidates { columns, radial, n_samples: y.len() };
+            select(&candidates, y, forced, stop_rule(stop, goal)?, maximum_terms)
+        })
+        .map_err(from_core)?;
+    Ok((
+        found.terms,
+        found.error_reduction.into_pyarray(py),
+        found.sum_of_squares.into_pyarray(py),
+        found.press.into_pyarray(py),
+        found.weights.into_pyarray(py),
+        found.factor.into_pyarray(py),
+        found.collinear,
+    ))
+}
+
+/// radial_columns(regressors: NDArray[np.float64], centres: NDArray[np.float64], kernel: str, beta: float) -> NDArray[np.float64]
+///
+/// Radial functions of the regressors, one after another, flat, (n_centres × n_samples).
+#[pyfunction]
+fn radial_columns<'py>(
+    py: Python<'py>,
+    regressors: PyReadonlyArray2<'py, f64>,
+    centres: PyReadonlyArray2<'py, f64>,
+    kernel: &str,
+    beta: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let dimension = regressors.as_array().ncols();
+    let (regressors, centres) = (regressors.as_slice()?, centres.as_slice()?);
+    let values = py
+        .detach(|| {
+            let kernel = Kernel::from_name(kernel)?;
+            let radial = Radial::new(kernel, beta, centres, dimension)?;
+            Ok((0..radial.len())
+                .flat_map(|index| {
+                    regressors.chunks_exact(dimension).map(move |x| radial.value(index, x))
+                })
+                .collect::<Vec<f64>>())
+        })
+        .map_err(from_core)?;
+    Ok(values.into_pyarray(py))
+}
+
+/// run_narx(measured: NDArray[np.float64], inputs: NDArray[np.float64], lags: list[tuple[int, int]], monomials: list[tuple[float, list[tuple[int, int]]]], centres: NDArray[np.float64], radial_weights: NDArray[np.float64], kernel: str, beta: float, bounds: tuple[float, float], horizon: int) -> tuple[NDArray[np.float64], int, int | None]
+///
+/// Prediction of a NARX model, `horizon` samples ahead (0: free run); samples that initialise it;
+/// first sample at which the guard held it.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn run_narx<'py>(
+    py: Python<'py>,
+    measured: PyReadonlyArray1<'py, f64>,
+    inputs: PyReadonlyArray2<'py, f64>,
+    lags: Vec<(usize, usize)>,
+    monomials: Vec<(f64, Vec<(usize, i32)>)>,
+    centres: PyReadonlyArray2<'py, f64>,
+    radial_weights: PyReadonlyArray1<'py, f64>,
+    kernel: &str,
+    beta: f64,
+    bounds: (f64, f64),
+    horizon: usize,
+) -> PyResult<(Bound<'py, PyArray1<f64>>, usize, Option<usize>)> {
+    let (measured, inputs) = (measured.as_slice()?, inputs.as_slice()?);
+    let (centres, radial_weights) = (centres.as_slice()?, radial_weights.as_slice()?);
+    let found = py
+        .detach(|| {
+            let radial = Radial::new(Kernel::from_name(kernel)?, beta, centres, lags.len())?;
+            let lags = lags.iter().map(|&(channel, lag)| Lag { channel, lag }).collect();
+            let monomials = monomials
+                .into_iter()
+                .map(|(weight, factors)| Monomial { weight, factors })
+                .collect();
+            let model = Narx { lags, monomials, radial, radial_weights, bounds };
+            match horizon {
+                0 => model.free_run(measured, inputs),
+                steps => model.ahead(measured, inputs, steps),
+            }
+        })
+        .map_err(from_core)?;
+    Ok((found.output.into_pyarray(py), found.start, found.diverged_at))
+}
+
+/// Add this area to the module.
+///
+/// # Errors
+/// Never in practice; PyO3's own.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(select_terms, module)?)?;
+    module.add_function(wrap_pyfunction!(radial_columns, module)?)?;
+    module.add_function(wrap_pyfunction!(run_narx, module)?)
+}
