@@ -209,12 +209,12 @@ def _select(
             "no term explains any of the output", action="allow linear terms or other lags"
         )
     spread = np.linalg.norm(np.linalg.inv(factor.reshape(kept, kept)), axis=1)
-    error = math.sqrt(squares[kept - 1] / (target.size - kept))
+    residual = math.sqrt(squares[kept - 1] / (target.size - kept))
     chosen = tuple(
         ChosenTerm(terms[index], *map(float, values))
         for index, values in zip(
             order[:kept],
-            zip(weights, error * spread, reduction, squares, press, strict=False),
+            zip(weights, residual * spread, reduction, squares, press, strict=False),
             strict=True,
         )
     )
