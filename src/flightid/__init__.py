@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from flightid.inspection import Inspection, inspect_log
     from flightid.logs import Log, LogTable, read_log
     from flightid.models import (
-        Output,
         NarxModel,
+        Output,
         Parameter,
         Parameters,
         StateSpaceModel,
@@ -103,9 +103,9 @@ __all__ = [
     "LocalMinimum",
     "Log",
     "LogTable",
-    "Output",
     "NarxFit",
     "NarxModel",
+    "Output",
     "PairResponse",
     "Parameter",
     "Parameters",

@@ -66,7 +66,7 @@ impl Narx<'_> {
             return Err(CoreError::Shape { what, found: n, needed: start + 1 });
         }
         let n_inputs = self.lags.iter().map(|lag| lag.channel).max().unwrap_or(0);
-        if inputs.len() % n != 0 || inputs.len() / n < n_inputs {
+        if !inputs.len().is_multiple_of(n) || inputs.len() / n < n_inputs {
             let (found, needed) = (inputs.len(), n_inputs * n);
             return Err(CoreError::Shape { what: "input samples", found, needed });
         }

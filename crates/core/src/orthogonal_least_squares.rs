@@ -64,7 +64,7 @@ impl Candidates<'_> {
 
     fn check(&self, y: &[f64]) -> Result<(), CoreError> {
         let n = self.n_samples;
-        if n == 0 || y.len() != n || self.columns.len() % n != 0 {
+        if n == 0 || y.len() != n || !self.columns.len().is_multiple_of(n) {
             let (found, needed) = (self.columns.len(), y.len());
             return Err(CoreError::Shape { what: "samples of the candidates", found, needed });
         }

@@ -12,13 +12,6 @@ from flightid.identification.narx_fit import NarxFit
 from flightid.identification.orthogonal_least_squares import fit_narx
 from flightid.identification.selection import Bands
 from flightid.models import Model, StateSpaceModel, TransferFunctionModel
-from flightid.responses import FrequencyResponse
-
-# Kind of model, kind of data -> the fit; a new kind adds its line.
-_FITS = {
-    (TransferFunctionModel, FrequencyResponse): fit_responses,
-    (StateSpaceModel, FrequencyResponse): fit_responses,
-from flightid.models import TransferFunctionModel
 from flightid.models.narx import NarxModel
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
@@ -26,6 +19,7 @@ from flightid.responses import FrequencyResponse
 # Kind of model, kind of data -> the fit; a new kind adds its line.
 _FITS: dict[tuple[type, type], Callable[..., Any]] = {
     (TransferFunctionModel, FrequencyResponse): fit_responses,
+    (StateSpaceModel, FrequencyResponse): fit_responses,
     (NarxModel, Record): fit_narx,
 }
 
@@ -54,7 +48,7 @@ def identify(
 
 
 def identify(
-    model: TransferFunctionModel | NarxModel,
+    model: Model | NarxModel,
     data: FrequencyResponse | Record | Sequence[Record],
     *,
     starts: int = 1,
@@ -78,8 +72,7 @@ def identify(
 
     Parameters
     ----------
-    model : TransferFunctionModel or StateSpaceModel
-    model : TransferFunctionModel or NarxModel
+    model : TransferFunctionModel, StateSpaceModel or NarxModel
         Structure, start values and bounds; every response in it is fitted.
     data : FrequencyResponse, or Record or sequence of Record
         Measured responses, or for a `NarxModel` records, with the model's channels, in the model's
@@ -179,8 +172,8 @@ def identify(
         raise FitError(
             "there is no fit for this model and these data",
             found=f"{type(model).__name__} and {type(data).__name__}",
-            needed="TransferFunctionModel or StateSpaceModel, and FrequencyResponse",
-            needed="TransferFunctionModel and FrequencyResponse, or NarxModel and Record",
+            needed="TransferFunctionModel or StateSpaceModel and FrequencyResponse, "
+            "or NarxModel and Record",
             action="estimate a response with flightid.estimate_response",
         )
     result: Fit | NarxFit = fit(model, data, options)

@@ -13,19 +13,17 @@ from flightid.models.statespace_parts import Output, ResponsePair, StateSpaceMat
 from flightid.models.transfer import TransferFunction, TransferFunctionModel
 
 __all__ = [
+    "Lag",
     "Model",
+    "NarxEquation",
+    "NarxModel",
+    "NarxPrediction",
     "Output",
     "Parameter",
     "Parameters",
     "ResponsePair",
     "StateSpaceMatrices",
     "StateSpaceModel",
-    "Lag",
-    "NarxEquation",
-    "NarxModel",
-    "NarxPrediction",
-    "Parameter",
-    "Parameters",
     "Term",
     "TransferFunction",
     "TransferFunctionModel",
