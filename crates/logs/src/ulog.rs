@@ -15,7 +15,8 @@ use crate::LogError;
 use crate::ulog_entry::{self, Entry, Line};
 use crate::ulog_format::{Formats, Shape, is_message_name};
 use crate::ulog_record::{
-    Known, Reason, Worth, carries_on, is_one_damaged_record, judge, next_record,
+    Found, Known, Reason, Worth, carries_on, is_one_damaged_record, judge, next_record,
+    record_across,
 };
 
 const MAGIC: [u8; 7] = [0x55, 0x4c, 0x6f, 0x67, 0x01, 0x12, 0x35];
@@ -166,28 +167,50 @@ impl Ulog {
         let mut at = start;
         while at < bytes.len() {
             let found = judge(bytes, at, self, false);
-            match found.worth {
-                Worth::Certain | Worth::Valid => {
-                    self.accept(bytes, at, found.kind, found.stop);
-                    at = found.stop;
-                }
-                Worth::Doubtful(reason) if self.frames(bytes, at, found.stop) => {
-                    if matches!(found.kind, b'C' | b'L') {
-                        self.accept(bytes, at, found.kind, found.stop);
-                    } else {
-                        self.skip(at, found.stop, reason);
-                    }
-                    at = found.stop;
-                }
-                worth => at = self.resume(bytes, at, worth, at_end),
+            if matches!(found.worth, Worth::Certain | Worth::Valid) {
+                self.accept(bytes, at, found.kind, found.stop);
+                at = found.stop;
+            } else if let Some(inside) = self.take_back(bytes, at) {
+                at = inside;
+            } else {
+                at = self.pass(bytes, at, found, at_end);
             }
         }
     }
 
+    /// Take back the sample before `at` where it bit into the next record: a damaged length can
+    /// still fit the definition, by the padding that may be left out. Returns where that record
+    /// starts.
+    fn take_back(&mut self, bytes: &[u8], at: usize) -> Option<usize> {
+        let (table, start, stop) = self.last_sample.filter(|&(_, _, stop)| stop == at)?;
+        let inside = record_across(bytes, start + 1, stop, self)?;
+        self.tables.get_mut(table as usize)?.offsets.pop();
+        self.last_sample = None;
+        self.skip(start, inside, Reason::Unreadable);
+        Some(inside)
+    }
+
+    /// Step over a record that cannot be vouched for, or over the damage; returns where to go on.
+    fn pass(&mut self, bytes: &[u8], at: usize, found: Found, at_end: Reason) -> usize {
+        match found.worth {
+            Worth::Doubtful(reason) if self.frames(bytes, at, found.stop) => {
+                if matches!(found.kind, b'C' | b'L') {
+                    self.accept(bytes, at, found.kind, found.stop);
+                } else {
+                    self.skip(at, found.stop, reason);
+                }
+                found.stop
+            }
+            worth => self.resume(bytes, at, worth, at_end),
+        }
+    }
+
     /// Tell whether a doubtful record can at least be stepped over: records go on behind it, and
-    /// none starts inside it, as they would if its length were damaged.
+    /// none starts inside it or reaches across its end, as they would if its length were damaged.
     fn frames(&self, bytes: &[u8], at: usize, stop: usize) -> bool {
-        carries_on(bytes, stop, self) && next_record(&bytes[..stop], at + 1, self) == stop
+        carries_on(bytes, stop, self)
+            && next_record(&bytes[..stop], at + 1, self) == stop
+            && record_across(bytes, at + 1, stop, self).is_none()
     }
 
     /// Go on behind damage at `at`; returns the place of the next record.

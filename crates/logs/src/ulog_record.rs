@@ -207,6 +207,17 @@ pub fn next_record(bytes: &[u8], from: usize, known: &impl Known) -> usize {
         .unwrap_or(bytes.len())
 }
 
+/// First record that starts in `from..stop`, ends behind `stop` and is followed by another: where
+/// it is there, what was read up to `stop` had a damaged length and bit into it.
+pub fn record_across(bytes: &[u8], from: usize, stop: usize, known: &impl Known) -> Option<usize> {
+    (from..stop).find(|&at| {
+        let found = judge(bytes, at, known, true);
+        found.stop > stop
+            && matches!(found.worth, Worth::Certain | Worth::Valid)
+            && carries_on(bytes, found.stop, known)
+    })
+}
+
 /// Tell whether the bytes of a gap look like one record of which only the head was damaged.
 pub fn is_one_damaged_record(gap: &[u8], known: &impl Known) -> bool {
     let Some((&[low, high, kind], payload)) = gap.split_first_chunk::<HEAD>() else {
