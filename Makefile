@@ -49,7 +49,7 @@ stubs: develop  ## regenerate src/flightid/_native.pyi
 
 test: wheel lint  ## everything that must pass before a merge
 	cargo test --workspace --quiet
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --doctest-modules
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --doctest-modules tests --pyargs flightid
 
 test-slow: wheel  ## Monte Carlo calibration of every printed interval, and the full studies
 	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) -m slow
