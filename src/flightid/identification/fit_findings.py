@@ -31,11 +31,11 @@ def judge_cost(costs: Mapping[str, float], average: float) -> list[Finding]:
     """Verdicts on the costs: the average, and each response that stands out."""
     if average <= EXCELLENT_COST:
         found = [
-            Finding("cost", Light.GREEN, f"average cost {average:.2g}, nearly indistinguishable")
+            Finding("cost", Light.GREEN, f"average cost {average:.3g}, nearly indistinguishable")
         ]
     elif average <= AVERAGE_COST_GUIDE:
         found = [
-            Finding("cost", Light.GREEN, f"average cost {average:.2g}, within the guide of 100")
+            Finding("cost", Light.GREEN, f"average cost {average:.3g}, within the guide of 100")
         ]
     else:
         found = [
@@ -43,7 +43,8 @@ def judge_cost(costs: Mapping[str, float], average: float) -> list[Finding]:
                 "cost",
                 Light.RED,
                 f"average cost {average:.0f} is above the guide of 100",
-                "add missing dynamics, narrow the band, or look for a wrong sign or unit",
+                "do not use its numbers, whose intervals assume that the structure holds: add "
+                "missing dynamics, narrow the band, or look for a wrong sign or unit",
             )
         ]
     for name, cost in costs.items():

@@ -115,7 +115,7 @@ def _in_short(item: Identified) -> Finding:
     light = worst(findings)
     reasons = [finding for finding in findings if finding.light is light]
     name, fitted = item.settings.name, item.fit
-    first = f"{name}: average cost {fitted.average_cost:.2g}"
+    first = f"{name}: average cost {fitted.average_cost:.3g}"
     if not reasons or light is worst(()):
         return Finding("model", light, f"{first}; every guideline is met.")
     return Finding("model", light, f"{first}; {reasons[0].message}", reasons[0].action)
