@@ -86,8 +86,10 @@ def test_truth_belongs_to_models_that_can_follow_it() -> None:
     assert truth.response(load_model("attitude_first_order", axis="roll"), np.ones(1)) is None
 
 
+# Honest intervals miss 2 of 13 in 14 % of flights, 3 in 2.5 %, 4 in 0.3 %.
 @pytest.mark.parametrize(
-    ("missed", "light"), [(0, Light.GREEN), (1, Light.AMBER), (2, Light.AMBER), (6, Light.RED)]
+    ("missed", "light"),
+    [(0, Light.GREEN), (2, Light.GREEN), (3, Light.AMBER), (4, Light.RED), (6, Light.RED)],
 )
 def test_misses_are_judged_by_how_rare_they_are(missed: int, light: Light) -> None:
     inside = np.arange(13) >= missed
