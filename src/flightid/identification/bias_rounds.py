@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.errors import DataError, FitError, ModelError
+from flightid.errors import DataError, FitError, ModelError, SingularError
 from flightid.findings import Finding
 from flightid.identification.error_model import ErrorModel
 from flightid.identification.estimator_bias import remove_bias, why_unknown
@@ -116,7 +116,7 @@ def iterate(
             moved = refit(model, corrected)
             move, rounds = _move(model, moved, scales), rounds + 1
             model = moved
-    except (DataError, ModelError, FitError) as error:
+    except (DataError, ModelError, FitError, SingularError) as error:
         return BiasRounds(first, data, rounds, move, str(error))
     if move > TOLERABLE:
         reason = f"the rounds did not settle: {move:.2g} standard errors in the last of {rounds}"

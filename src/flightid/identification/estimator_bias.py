@@ -12,21 +12,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, ModelError
+from flightid.errors import DataError
 from flightid.identification.model_outputs import (
-    PairSystem,
-    driven_output,
+    System,
+    driven_outputs,
     free_outputs,
-    pair_systems,
+    split_modes,
+    systems_of,
 )
-from flightid.models import Model, TransferFunctionModel
+from flightid.models import Model
 from flightid.responses import FrequencyResponse
-from flightid.responses.linear_estimate import LinearEstimate
 
 Array = NDArray[np.float64]
 
-LARGEST_GROWTH = 7.0
-"""Largest growth exponent over a record that an unstable model may have: a factor of a thousand."""
 LARGEST_RESIDUAL = 10.0
 """Largest residual, in multiples of the measured output's rms, before a simulation is not believed:
 a loop may hold an output well below its disturbances, but no model that is right diverges so."""
@@ -57,7 +55,8 @@ def remove_bias(model: Model, data: FrequencyResponse, hold: str) -> FrequencyRe
     """The measured response without the bias that its estimator has for this model.
 
     Unknown initial states and trims of each record are fitted to its outputs, so that a record may
-    begin in motion. Coherence and covariance stay; responses that the model lacks stay.
+    begin in motion. Unstable modes are followed from the end of a record backwards, so that its
+    length is no limit. Coherence and covariance stay; responses that the model lacks stay.
 
     Parameters
     ----------
@@ -75,68 +74,71 @@ def remove_bias(model: Model, data: FrequencyResponse, hold: str) -> FrequencyRe
     ------
     ModelError
         More zeros than poles, or a negative delay.
+    SingularError
+        The equations do not give every state derivative.
     DataError
         The weights are not known, or the model diverges on the records.
     """
     linear = data.linear
     if linear is None:
         raise DataError("the estimator's weights are not known", found=why_unknown(data))
-    if not isinstance(model, TransferFunctionModel):
-        raise ModelError(
-            "the estimator's bias is known for transfer functions only",
-            found=type(model).__name__,
-            needed="TransferFunctionModel",
-        )
-    systems = pair_systems(model)
+    systems = systems_of(model)
+    outputs = {each.output for each in model.responses}
     residuals = [
-        np.stack(
-            [
-                _residual(systems, data, linear, record, row, hold)
-                for row in range(len(data.outputs))
-            ]
-        )
+        _residuals(systems, data, outputs, record, hold)
         for record in range(len(linear.output_records))
     ]
     left = linear.apply(residuals)
     values = np.array(data.response)
     curves = model.frequency_response(data.omega_rad_s)
-    for each in systems:
+    for each in model.responses:
         row, column = data.outputs.index(each.output), data.inputs.index(each.input)
         place = model.outputs.index(each.output), model.inputs.index(each.input)
         values[row, column] = curves[place] + left[row, column]
     return replace(data, response=values)
 
 
-def _residual(
-    systems: list[PairSystem],
+def _residuals(
+    systems: list[System],
     data: FrequencyResponse,
-    linear: LinearEstimate,
+    fitted: set[str],
     record: int,
-    row: int,
     hold: str,
 ) -> Array:
-    """Measured less modelled output of one record, unknown states and trims fitted."""
-    measured = linear.output_records[record][row]
-    n, step = len(measured), linear.sample_time_s
-    mine = [each for each in systems if each.output == data.outputs[row]]
-    if not mine:
-        return np.asarray(measured)
-    if max(each.growth_1_s for each in mine) * n * step > LARGEST_GROWTH:
-        raise _diverges(data.outputs[row], "an unstable model on a long record")
-    rest, unknown = measured.copy(), [np.ones((n, 1))]
-    for each in mine:
-        values = linear.input_records[record][linear.inputs.index(each.input)]
-        rest -= driven_output(each, values, step, hold)
-        unknown.append(free_outputs(each, n, step))
-    basis = np.concatenate(unknown, axis=1)
-    if not (np.all(np.isfinite(rest)) and np.all(np.isfinite(basis))):
-        raise _diverges(data.outputs[row], "a simulation without bounds")
-    basis /= np.maximum(np.linalg.norm(basis, axis=0), np.finfo(float).tiny)
-    rest -= basis @ np.linalg.lstsq(basis, rest, rcond=_RANK)[0]
-    if np.std(rest) > LARGEST_RESIDUAL * np.std(measured):
-        ratio = float(np.std(rest) / max(np.std(measured), np.finfo(float).tiny))
-        raise _diverges(data.outputs[row], f"a residual {ratio:.0f} times the measured output")
-    return np.asarray(rest)
+    """Measured less modelled outputs of one record, unknown states and trims fitted.
+
+    Outputs that no response of the model needs stay as they are.
+    """
+    linear = data.linear
+    assert linear is not None
+    measured = linear.output_records[record]
+    n, step = measured.shape[1], linear.sample_time_s
+    rest = measured.copy()
+    unknown: dict[str, list[Array]] = {name: [np.ones((1, n))] for name in fitted}
+    for each in systems:
+        modes = split_modes(each, n * step)
+        places = [linear.inputs.index(name) for name in each.inputs]
+        driven = driven_outputs(modes, linear.input_records[record][places], step, hold)
+        free = free_outputs(modes, n, step)
+        for place, name in enumerate(each.outputs):
+            if name in fitted:
+                rest[data.outputs.index(name)] -= driven[place]
+                unknown[name].append(free[:, place])
+    for name, rows in unknown.items():
+        row = data.outputs.index(name)
+        rest[row] = _less_unknown(name, rest[row], np.concatenate(rows), measured[row])
+    return rest
+
+
+def _less_unknown(name: str, rest: Array, unknown: Array, measured: Array) -> Array:
+    if not (np.all(np.isfinite(rest)) and np.all(np.isfinite(unknown))):
+        raise _diverges(name, "a simulation without bounds")
+    basis = unknown.T / np.maximum(np.linalg.norm(unknown, axis=1), np.finfo(float).tiny)
+    left = rest - basis @ np.linalg.lstsq(basis, rest, rcond=_RANK)[0]
+    if np.std(left) > LARGEST_RESIDUAL * np.std(measured):
+        ratio = float(np.std(left) / max(np.std(measured), np.finfo(float).tiny))
+        raise _diverges(name, f"a residual {ratio:.0f} times the measured output")
+    return np.asarray(left)
 
 
 def _diverges(output: str, found: str) -> DataError:
@@ -144,5 +146,5 @@ def _diverges(output: str, found: str) -> DataError:
         f"the model cannot be followed over the records of output {output}",
         found=found,
         needed="a simulation that stays near the measured output",
-        action="use shorter records for an unstable model",
+        action="check the structure, or fit shorter records",
     )

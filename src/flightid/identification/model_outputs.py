@@ -1,17 +1,23 @@
-"""A model's outputs on measured inputs, without noise (native side: `linear_simulation.rs`)."""
+"""A model's outputs on measured inputs, without noise (native side: `linear_simulation.rs`).
+
+Modes that would grow over the record are followed from its end backwards, where they decay. What
+comes out is a solution of the same equations, with the state of those modes given at the last
+sample instead of the first, and it stays near its inputs however long the record is: the steady
+response G(jω) of an unstable model is the transform of this two-sided response.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
+from scipy.linalg import schur, solve_sylvester
 
 from flightid import _native
 from flightid.errors import ModelError
-from flightid.models import TransferFunctionModel
+from flightid.models import Model, TransferFunctionModel
 from flightid.models.realisation import canonical_form
 
 Array = NDArray[np.float64]
@@ -19,40 +25,53 @@ HOLDS = ("band_limited", "first", "zero")
 FINER = 4
 """Steps within a sample in which a band-limited input is followed."""
 SPLINE_DEGREE = 5
+SLOW, FAST = 0.5, 7.0
+"""Growth exponents over a record: below the first a mode is followed forwards, above the second
+backwards, and between them the modes are parted where their rates lie furthest from each other."""
 
 
 @dataclass(frozen=True)
-class PairSystem:
-    """State space of one response.
+class System:
+    """State space of one response, or of all responses of a state-space model.
 
     Attributes
     ----------
-    output, input : str
+    outputs, inputs : tuple of str
     matrices : tuple of ndarray
-        A (n, n), B (n, 1), C (1, n), D (1, 1).
-    delay_s : float
+        A (n, n), B (n, m), C (p, n), D (p, m).
+    delays_s : ndarray, shape (m,)
     """
 
-    output: str
-    input: str
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
     matrices: tuple[Array, ...]
-    delay_s: float
-
-    @property
-    def growth_1_s(self) -> float:
-        """Largest real part of a pole, 1/s; minus infinity without states."""
-        poles = np.linalg.eigvals(self.matrices[0])
-        return float(np.max(poles.real, initial=-np.inf))
+    delays_s: Array
 
 
-def pair_systems(model: TransferFunctionModel) -> list[PairSystem]:
-    """State spaces of the responses, one by one, so that each may have a delay of its own.
+@dataclass(frozen=True)
+class Modes:
+    """Those modes of a system that are followed in one direction of time."""
+
+    matrices: tuple[Array, ...]
+    delays_s: Array
+    backwards: bool
+
+
+def systems_of(model: Model) -> list[System]:
+    """State spaces of a model: one of a state-space model, one for each response of the others.
+
+    Responses of a transfer-function model may each have a delay of their own.
 
     Raises
     ------
     ModelError
         More zeros than poles, or a negative delay.
+    SingularError
+        The equations do not give every state derivative.
     """
+    if not isinstance(model, TransferFunctionModel):
+        a, b, c, d, delays = model.state_space()
+        return [System(model.outputs, model.inputs, (a, b, c, d), delays)]
     systems = []
     for response, (gain, above, below, delay) in zip(
         model.responses, model.factored().values(), strict=True
@@ -62,25 +81,67 @@ def pair_systems(model: TransferFunctionModel) -> list[PairSystem]:
                 "a negative delay cannot be simulated", found=f"{delay:g} s", needed="0 s or more"
             )
         matrices = canonical_form((1, 1), [(0, 0, gain, above, below)])
-        systems.append(PairSystem(response.output, response.input, matrices, delay))
+        systems.append(System((response.output,), (response.input,), matrices, np.array([delay])))
     return systems
 
 
-def driven_output(system: PairSystem, values: Array, sample_time_s: float, hold: str) -> Array:
-    """Output of one response from rest.
+def split_modes(system: System, duration_s: float) -> list[Modes]:
+    """Part a system into modes that are followed forwards and modes followed backwards.
 
     Parameters
     ----------
-    system : PairSystem
-    values : ndarray, shape (n_samples,)
-        The measured input.
-    sample_time_s : float
-    hold : {"band_limited", "first", "zero"}
-        What the input does between its samples.
+    system : System
+    duration_s : float
+        Length of the record, s.
 
     Returns
     -------
-    ndarray, shape (n_samples,)
+    list of Modes
+        Their outputs add up to the system's.
+
+    Reference
+    ---------
+    Golub & Van Loan, *Matrix Computations*, 4th ed., §7.6.3: block diagonalisation by an ordered
+    Schur form and a Sylvester equation.
+    """
+    a, b, c, d = system.matrices
+    growth = np.linalg.eigvals(a).real * duration_s
+    if np.max(growth, initial=-np.inf) <= SLOW:
+        return [Modes(system.matrices, system.delays_s, backwards=False)]
+    between = np.sort(growth[(growth > SLOW) & (growth < FAST)])
+    edges = np.concatenate([[SLOW], between, [FAST]])
+    widest = int(np.argmax(np.diff(edges)))
+    parting = 0.5 * (edges[widest] + edges[widest + 1]) / duration_s
+    triangle, turn, n = schur(a, output="real", sort=lambda re, _: re <= parting)
+    cross = solve_sylvester(triangle[:n, :n], -triangle[n:, n:], -triangle[:n, n:])
+    to_modes, from_modes = turn.T.copy(), turn.copy()
+    to_modes[:n] -= cross @ turn.T[n:]
+    from_modes[:, n:] += turn[:, :n] @ cross
+    slow = (triangle[:n, :n], to_modes[:n] @ b, c @ from_modes[:, :n], d)
+    fast = (triangle[n:, n:], to_modes[n:] @ b, c @ from_modes[:, n:], np.zeros_like(d))
+    return [
+        Modes(slow, system.delays_s, backwards=False),
+        Modes(fast, system.delays_s, backwards=True),
+    ]
+
+
+def driven_outputs(
+    modes: list[Modes], values: Array, sample_time_s: float, hold: str
+) -> NDArray[np.float64]:
+    """Outputs that the inputs drive, from rest at the end from which each mode is followed.
+
+    Parameters
+    ----------
+    modes : list of Modes
+    values : ndarray, shape (m, n_samples)
+        The measured inputs.
+    sample_time_s : float
+    hold : {"band_limited", "first", "zero"}
+        What the inputs do between their samples.
+
+    Returns
+    -------
+    ndarray, shape (p, n_samples)
 
     Reference
     ---------
@@ -88,43 +149,67 @@ def driven_output(system: PairSystem, values: Array, sample_time_s: float, hold:
     Magazine* 16 (1999): an interpolating spline tends to the band-limited interpolation.
     """
     if hold != "band_limited":
-        return _simulate(system, values, sample_time_s, first=hold == "first")
-    n = len(values)
+        return np.asarray(sum(_driven(each, values, sample_time_s, hold) for each in modes))
+    n = values.shape[1]
     fine = np.arange(FINER * (n - 1) + 1) / FINER
-    dense = np.asarray(make_interp_spline(np.arange(n), values, k=min(SPLINE_DEGREE, n - 1))(fine))
+    spline = make_interp_spline(np.arange(n), values, k=min(SPLINE_DEGREE, n - 1), axis=1)
+    dense = np.array(spline(fine))
     # Straight lines between points weaken ω by sinc²(ωT/2) = 1 − (ωT)²/12 + …: given back here.
-    dense[1:-1] -= np.diff(dense, 2) / 12.0
-    return _simulate(system, dense, sample_time_s / FINER, first=True)[::FINER]
+    dense[:, 1:-1] -= np.diff(dense, 2, axis=1) / 12.0
+    step = sample_time_s / FINER
+    return np.asarray(sum(_driven(each, dense, step, "first")[:, ::FINER] for each in modes))
 
 
-def free_outputs(system: PairSystem, n_samples: int, sample_time_s: float) -> Array:
-    """What unknown states and an unknown input trim add, shape (n_samples, n_states + 1)."""
-    a, b, c, d = system.matrices
-    still, steady = np.zeros(n_samples), np.ones(n_samples)
-    columns = [
-        _run((a, b, c, d), still, start, 0.0, sample_time_s, first=True) for start in np.eye(len(a))
-    ]
-    columns.append(_simulate(system, steady, sample_time_s, first=True))
-    return np.stack(columns, axis=1)
+def free_outputs(modes: list[Modes], n_samples: int, sample_time_s: float) -> Array:
+    """What unknown states and unknown trims of the inputs add.
+
+    Returns
+    -------
+    ndarray, shape (n_states + m, p, n_samples)
+        States at the first sample, or at the last for modes that are followed backwards.
+    """
+    columns = []
+    m = len(modes[0].delays_s)
+    still = np.zeros((m, n_samples))
+    for each in modes:
+        for start in np.eye(len(each.matrices[0])):
+            found = _run(each, still, start, each.delays_s, sample_time_s, first=True)
+            columns.append(found[:, ::-1] if each.backwards else found)
+    for steady in np.eye(m):
+        values = np.repeat(steady[:, None], n_samples, axis=1)
+        columns.append(driven_outputs(modes, values, sample_time_s, "first"))
+    return np.stack(columns)
 
 
-def _simulate(system: PairSystem, values: Array, sample_time_s: float, *, first: bool) -> Array:
-    start = np.zeros(len(system.matrices[0]))
-    return _run(system.matrices, values, start, system.delay_s, sample_time_s, first=first)
+def _driven(modes: Modes, values: Array, sample_time_s: float, hold: str) -> Array:
+    start = np.zeros(len(modes.matrices[0]))
+    first = hold == "first"
+    if not modes.backwards:
+        return _run(modes, values, start, modes.delays_s, sample_time_s, first=first)
+    # From the end a delay is a lead: whole samples by a shift, less the part of one that is over.
+    lead = np.ceil(modes.delays_s / sample_time_s - 1e-9)
+    rest = np.maximum(lead * sample_time_s - modes.delays_s, 0.0)
+    # A step held after its sample is held before it when time runs backwards.
+    shift = lead.astype(np.intp) + (0 if first else 1)
+    places = np.arange(values.shape[1]) + shift[:, None]
+    turned = np.take_along_axis(values[:, ::-1], np.minimum(places, values.shape[1] - 1), axis=1)
+    return _run(modes, turned, start, rest, sample_time_s, first=first)[:, ::-1]
 
 
 def _run(
-    matrices: Sequence[Array],
+    modes: Modes,
     values: Array,
     start: Array,
-    delay_s: float,
+    delays_s: Array,
     sample_time_s: float,
     *,
     first: bool,
 ) -> Array:
-    a, b, c, d = (np.ascontiguousarray(matrix, dtype=np.float64) for matrix in matrices)
-    driven = np.ascontiguousarray(values, dtype=np.float64)[None]
+    sign = -1.0 if modes.backwards else 1.0
+    a, b, c, d = (np.ascontiguousarray(each, dtype=np.float64) for each in modes.matrices)
+    driven = np.ascontiguousarray(values, dtype=np.float64)
+    late, at_rest = np.ascontiguousarray(delays_s), np.ascontiguousarray(start)
     _, found = _native.simulate_linear(
-        a, b, c, d, np.array([delay_s]), driven, np.ascontiguousarray(start), sample_time_s, first
+        sign * a, sign * b, c, d, late, driven, at_rest, sample_time_s, first
     )
-    return np.asarray(found[0])
+    return np.asarray(found)
