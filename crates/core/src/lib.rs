@@ -9,6 +9,7 @@ pub mod ardupilot_mixer;
 pub mod ardupilot_mode;
 pub mod ardupilot_pid;
 pub mod chirp;
+pub mod closed_loop;
 pub mod complex_lu;
 pub mod dual;
 pub mod error;

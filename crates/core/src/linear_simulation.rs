@@ -180,31 +180,64 @@ impl Discrete {
         let mut outputs = vec![0.0; self.p * n_samples];
         let mut x = initial.to_vec();
         let mut next = vec![0.0; self.n];
-        let mut delayed = vec![0.0; self.m];
+        let mut y = vec![0.0; self.p];
         for k in 0..n_samples {
-            for (row, out) in next.iter_mut().enumerate() {
-                *out = dot(&self.transition[row * self.n..(row + 1) * self.n], &x);
-                states[row * n_samples + k] = x[row];
+            for (row, value) in x.iter().enumerate() {
+                states[row * n_samples + k] = *value;
             }
-            for (j, weights) in self.inputs.iter().enumerate() {
-                let u = weights.samples(&inputs[j * n_samples..(j + 1) * n_samples], k);
-                delayed[j] = dot(&weights.value, &u);
-                for (weight, value) in weights.state.iter().zip(u) {
-                    for (out, w) in next.iter_mut().zip(weight) {
-                        *out += w * value;
-                    }
-                }
+            self.outputs_at(inputs, n_samples, k, &x, &mut y);
+            for (row, value) in y.iter().enumerate() {
+                outputs[row * n_samples + k] = *value;
             }
-            for row in 0..self.p {
-                outputs[row * n_samples + k] = dot(&self.c[row * self.n..(row + 1) * self.n], &x)
-                    + dot(&self.d[row * self.m..(row + 1) * self.m], &delayed);
-            }
+            self.advance(inputs, n_samples, k, &x, &mut next);
             std::mem::swap(&mut x, &mut next);
         }
         match outputs.iter().position(|v| !v.is_finite()) {
             Some(index) => Err(CoreError::NotFinite { what: "simulated output", index }),
             None => Ok((states, outputs)),
         }
+    }
+
+    /// Outputs at sample `k`, from inputs (m × n_samples) up to that sample.
+    pub fn outputs_at(&self, inputs: &[f64], n_samples: usize, k: usize, x: &[f64], y: &mut [f64]) {
+        for (row, out) in y.iter_mut().enumerate() {
+            *out = dot(&self.c[row * self.n..(row + 1) * self.n], x);
+        }
+        for (j, weights) in self.inputs.iter().enumerate() {
+            let u = weights.samples(&inputs[j * n_samples..(j + 1) * n_samples], k);
+            let delayed = dot(&weights.value, &u);
+            for (row, out) in y.iter_mut().enumerate() {
+                *out += self.d[row * self.m + j] * delayed;
+            }
+        }
+    }
+
+    /// State at sample `k + 1` from that at `k`: inputs (m × n_samples) up to `k + 1` less the
+    /// whole samples of each delay.
+    pub fn advance(&self, inputs: &[f64], n_samples: usize, k: usize, x: &[f64], next: &mut [f64]) {
+        for (row, out) in next.iter_mut().enumerate() {
+            *out = dot(&self.transition[row * self.n..(row + 1) * self.n], x);
+        }
+        for (j, weights) in self.inputs.iter().enumerate() {
+            let u = weights.samples(&inputs[j * n_samples..(j + 1) * n_samples], k);
+            for (weight, value) in weights.state.iter().zip(u) {
+                for (out, w) in next.iter_mut().zip(weight) {
+                    *out += w * value;
+                }
+            }
+        }
+    }
+
+    /// Whole samples in the shortest delay; the largest number there is without inputs.
+    #[must_use]
+    pub fn shortest_lag(&self) -> usize {
+        self.inputs.iter().map(|weights| weights.lag).min().unwrap_or(usize::MAX)
+    }
+
+    /// Numbers of states, inputs and outputs.
+    #[must_use]
+    pub fn size(&self) -> (usize, usize, usize) {
+        (self.n, self.m, self.p)
     }
 }
 

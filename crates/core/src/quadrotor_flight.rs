@@ -301,22 +301,22 @@ fn run(
     let mut log_random = Random::new(!plan.seed);
     let mut x = vehicle.hover();
     let t = turbulence;
-    let mut wind = Markov::new(t.velocity_m_s, t.velocity_time_s, dt, &mut random);
-    let mut turn = Markov::new(t.rate_rad_s, t.rate_time_s, dt, &mut random);
+    let mut wind = Markov::<3>::new(t.velocity_m_s, t.velocity_time_s, dt, &mut random);
+    let mut turn = Markov::<3>::new(t.rate_rad_s, t.rate_time_s, dt, &mut random);
     let mut delay = MotorDelay::new(vehicle.motor_delay_s, dt, [x[13], x[14], x[15], x[16]]);
     let width = COLUMNS.split_whitespace().count();
     let mut rows = Vec::with_capacity((n_loops / plan.log_every + 1) * width);
     for k in 0..n_loops {
         let time_s = k as f64 * dt;
         let gust = Gust { velocity_m_s: wind.value, rate_rad_s: turn.value };
-        let noise = random.normal3(sensors.gyro_noise_rad_s);
+        let noise = random.normals::<3>(sensors.gyro_noise_rad_s);
         let omega = rates(&x);
         let gyro = std::array::from_fn(|i| omega[i] + sensors.gyro_bias_rad_s[i] + noise[i]);
         let acted = state.act(&x, gyro, k)?;
         let pilot = std::array::from_fn(|i| plan.pilot[i * n_loops + k]);
         state.plan(&x, pilot, time_s);
         if k % plan.log_every == 0 {
-            let noise = log_random.normal3(sensors.accelerometer_noise_m_s2);
+            let noise = log_random.normals::<3>(sensors.accelerometer_noise_m_s2);
             let force = vehicle.specific_force(&x, &gust);
             let accel =
                 std::array::from_fn(|i| force[i] + sensors.accelerometer_bias_m_s2[i] + noise[i]);

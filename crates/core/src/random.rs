@@ -53,8 +53,8 @@ impl Random {
         }
     }
 
-    /// Three independent normal numbers of one standard deviation.
-    pub fn normal3(&mut self, sigma: f64) -> [f64; 3] {
+    /// Independent normal numbers of one standard deviation.
+    pub fn normals<const N: usize>(&mut self, sigma: f64) -> [f64; N] {
         std::array::from_fn(|_| sigma * self.normal())
     }
 }

@@ -19,25 +19,25 @@ pub struct Turbulence {
 
 /// First-order Gauss–Markov vector, exact over a step.
 #[derive(Debug, Clone)]
-pub struct Markov {
+pub struct Markov<const N: usize> {
     keep: f64,
     drive: f64,
     /// Present value.
-    pub value: [f64; 3],
+    pub value: [f64; N],
 }
 
-impl Markov {
+impl<const N: usize> Markov<N> {
     /// A process with a standard deviation and a correlation time (s), started in its steady state.
     pub fn new(sigma: f64, time_s: f64, dt: f64, random: &mut Random) -> Self {
         let keep = if time_s > 0.0 { (-dt / time_s).exp() } else { 0.0 };
-        let value = random.normal3(sigma);
+        let value = random.normals(sigma);
         Self { keep, drive: sigma * (1.0 - keep * keep).sqrt(), value }
     }
 
     /// One step of `dt`.
     pub fn advance(&mut self, random: &mut Random) {
         if self.drive > 0.0 {
-            let push = random.normal3(self.drive);
+            let push: [f64; N] = random.normals(self.drive);
             self.value = std::array::from_fn(|i| self.keep * self.value[i] + push[i]);
         }
     }
@@ -50,7 +50,7 @@ mod tests {
     #[test]
     fn variance_and_correlation_are_those_asked_for() {
         let (mut random, dt, time_s) = (Random::new(3), 0.01, 0.1);
-        let mut process = Markov::new(2.0, time_s, dt, &mut random);
+        let mut process = Markov::<1>::new(2.0, time_s, dt, &mut random);
         let n = 400_000;
         let mut x = Vec::with_capacity(n);
         for _ in 0..n {

@@ -6,6 +6,7 @@
 use pyo3::prelude::*;
 
 pub mod chirp;
+pub mod closed_loop;
 pub mod dataflash;
 pub mod error;
 pub mod expression;
@@ -36,6 +37,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     chirp::register(module)?;
     kinematics::register(module)?;
     linear_simulation::register(module)?;
+    closed_loop::register(module)?;
     dataflash::register(module)?;
     ulog::register(module)?;
     quadrotor::register(module)?;

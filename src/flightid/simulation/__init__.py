@@ -1,7 +1,14 @@
 """Simulation: models driven by records, and a simulated quadrotor with its autopilot."""
 
+from flightid.simulation.actuators import actuator_positions
 from flightid.simulation.ardupilot_log import write_ardupilot_log
 from flightid.simulation.autopilot import Autopilot, PilotDoublet, RateGains, SidRun
+from flightid.simulation.closed_loop import (
+    CrudePilot,
+    Disturbance,
+    FlightConditions,
+    fly_closed_loop,
+)
 from flightid.simulation.flight import Flight, fly
 from flightid.simulation.quadrotor import QuadrotorParameters, Sensors, Turbulence
 from flightid.simulation.scenario import fly_scenario
@@ -10,7 +17,10 @@ from flightid.simulation.truth import RateTruth, rate_truth
 
 __all__ = [
     "Autopilot",
+    "CrudePilot",
+    "Disturbance",
     "Flight",
+    "FlightConditions",
     "LinearModel",
     "LinearSystem",
     "PilotDoublet",
@@ -20,7 +30,9 @@ __all__ = [
     "Sensors",
     "SidRun",
     "Turbulence",
+    "actuator_positions",
     "fly",
+    "fly_closed_loop",
     "fly_scenario",
     "rate_truth",
     "simulate",
