@@ -41,13 +41,14 @@ if TYPE_CHECKING:
     from flightid.simulation.simulate import LinearSystem, simulate
     from flightid.study import Study, run_study
     from flightid.table import Table
-    from flightid.validation import ResidualTests, Verification
+    from flightid.validation import Comparison, ResidualTests, Verification
     from flightid.validation.residuals import residual_tests
     from flightid.validation.verify import verify
 
 # Name -> the module that holds it (a public module is its own home).
 _HOMES = {
     "Channel": "flightid.record",
+    "Comparison": "flightid.validation",
     "Finding": "flightid.findings",
     "Fit": "flightid.identification",
     "FittedParameter": "flightid.identification",
@@ -92,6 +93,7 @@ _HOMES = {
 
 __all__ = [
     "Channel",
+    "Comparison",
     "Finding",
     "Fit",
     "FittedParameter",

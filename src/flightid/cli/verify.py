@@ -10,7 +10,7 @@ import click
 from flightid.cli.output import emit, emit_values, json_option, leave_by_verdict, note
 
 if TYPE_CHECKING:
-    from flightid.validation import ResidualTests, Verification
+    from flightid.validation import Comparison, ResidualTests, Verification
 
 
 @click.command()
@@ -23,6 +23,13 @@ if TYPE_CHECKING:
 )
 @click.option("--axis", type=click.Choice(["roll", "pitch", "yaw"]), help="For library models.")
 @click.option("--value", "values", multiple=True, metavar="NAME=NUMBER", help="Parameter value.")
+@click.option(
+    "--against",
+    "rivals",
+    multiple=True,
+    metavar="MODEL",
+    help="Rival model to verify side by side; may be repeated.",
+)
 @click.option("--output", "outputs", multiple=True, help="Output to compare; default: all.")
 @click.option("--initial", type=click.Choice(["trim", "fit"]), default="trim", show_default=True)
 @click.option("--hold", type=click.Choice(["first", "zero"]), default="first", show_default=True)
@@ -45,6 +52,7 @@ def command(
     records: tuple[Path, ...],
     axis: str | None,
     values: tuple[str, ...],
+    rivals: tuple[str, ...],
     outputs: tuple[str, ...],
     initial: str,
     hold: str,
@@ -57,21 +65,23 @@ def command(
     """Predict RECORDS with MODEL, a .toml file or the name of a library model.
 
     The records (CSV, Parquet, .mat, netCDF) hold the model's channels by name. The exit code is 1
-    where a prediction misses its guide, or a residual test that was asked for fails.
+    where a prediction of MODEL misses its guide, or a residual test that was asked for fails.
     """
-    from flightid import load_model, read_records, residual_tests, verify
+    from flightid import Comparison, load_model, read_records, residual_tests, verify
 
     chosen = load_model(model, axis=axis)
     if values:
         chosen = chosen.with_values(dict(map(_number, values)))
-    compared = outputs or chosen.outputs
+    models = [chosen, *(load_model(rival, axis=axis) for rival in rivals)]
+    shared = tuple(name for name in chosen.outputs if all(name in m.outputs for m in models))
+    compared = outputs or shared
     flown = [
         record
         for path in records
         for record in read_records(path, inputs=chosen.inputs, outputs=compared)
     ]
-    result = verify(
-        chosen,
+    result: Verification | Comparison = verify(
+        models if rivals else chosen,
         flown,
         free_bias=free_bias,
         free_reference=free_reference,
@@ -79,7 +89,8 @@ def command(
         outputs=compared,
         hold="zero" if hold == "zero" else "first",
     )
-    tests = residual_tests(result) if with_residuals else None
+    on_trial = result.first if isinstance(result, Comparison) else result
+    tests = residual_tests(on_trial) if with_residuals else None
     if as_json:
         extra = {} if tests is None else {"residual_tests": tests.to_dict()}
         emit_values(result.to_dict() | extra)
@@ -100,22 +111,18 @@ def _number(text: str) -> tuple[str, float]:
         raise click.BadParameter(f"{text!r} is not NAME=NUMBER", param_hint="--value") from None
 
 
-def _write_page(result: Verification, tests: ResidualTests | None, model: str, path: Path) -> Path:
+def _write_page(
+    result: Verification | Comparison, tests: ResidualTests | None, model: str, path: Path
+) -> Path:
     from flightid.files import write_atomically
     from flightid.plot.residuals import correlations
-    from flightid.plot.verification import prediction, residuals
     from flightid.report.blocks import result_blocks
     from flightid.report.content import Document, Section
     from flightid.report.figures import figure_block
     from flightid.report.html import to_html
+    from flightid.report.verification import verification_sections
 
-    sections = [Section("Verdicts", result_blocks(result))]
-    for item in result.predictions:
-        pictures = (
-            figure_block(prediction(item), "Measured, and predicted from the input alone."),
-            figure_block(residuals(item), "Measured minus predicted."),
-        )
-        sections.append(Section(item.measured.name, pictures))
+    sections = [*verification_sections(result)]
     if tests is not None:
         drawn = tuple(
             figure_block(correlations(tests, output, name), f"Residual of {output} against {name}.")

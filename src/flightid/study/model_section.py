@@ -6,17 +6,16 @@ from typing import TYPE_CHECKING
 
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
-from flightid.plot.record import Panel, Trace, time_histories
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Figure, Lights, Section, TableBlock
 from flightid.report.figures import figure_block
+from flightid.report.verification import verification_blocks
 from flightid.table import Cell, Column, Table
 
 if TYPE_CHECKING:
     from flightid.identification import FittedParameter
     from flightid.study.stages import Identified
     from flightid.study.truth import Truth
-    from flightid.validation import Verification
 
 ESTIMATORS = {
     "composite": "direct estimate",
@@ -49,7 +48,7 @@ def model_section(item: Identified, truth: Truth | None) -> Section:
     if item.response.findings:
         blocks.append(Lights(item.response.findings, "Frequency response"))
     parts = tuple(
-        Section(f"Prediction of “{name}”", tuple(_verification_blocks(verification)))
+        Section(f"Prediction of “{name}”", verification_blocks(verification))
         for name, verification in item.verifications.items()
     )
     return Section(item.settings.name, tuple(blocks), parts)
@@ -96,24 +95,6 @@ def _comparison(item: Identified, truth: Truth | None) -> Table:
     return Table(
         "The same model fitted to each estimate, with 95 % intervals", tuple(columns), tuple(rows)
     )
-
-
-def _verification_blocks(verification: Verification) -> list[Block]:
-    record = verification.measured
-    panels = [
-        Panel(
-            look.axis_title(name, record.unit(name)),
-            (
-                Trace("measured", record.time_s, record[name]),
-                Trace("model", record.time_s, verification.predicted[name], look.MODEL, "dash"),
-            ),
-        )
-        for name in verification.outputs
-    ]
-    figure = figure_block(
-        time_histories(panels), "Measured response and the model's prediction from the input alone."
-    )
-    return [figure, *result_blocks(verification, title="Errors of the prediction")]
 
 
 def _with_interval(parameter: FittedParameter) -> str:

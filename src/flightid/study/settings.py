@@ -60,6 +60,8 @@ class ModelSettings:
         Lowest and highest frequency of the fit, rad/s.
     parameters : mapping
         Overrides by parameter: value, min, max, free.
+    rivals : mapping of str to str
+        Models to verify side by side: library name, or path of a model file, by name.
     """
 
     name: str
@@ -69,6 +71,7 @@ class ModelSettings:
     verify: tuple[str, ...]
     band_rad_s: tuple[float, float]
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    rivals: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def segments(self) -> tuple[str, ...]:
@@ -288,6 +291,10 @@ def _model(reader: TableReader, folder: Path) -> ModelSettings:
         reader.names("verify", ()),
         band,
         _overrides(reader),
+        {
+            rival: str(folder / rival) if rival.endswith(".toml") else rival
+            for rival in reader.names("rivals", ())
+        },
     )
     reader.finish()
     return made

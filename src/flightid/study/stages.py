@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from flightid.conventions import Role
 from flightid.errors import StudyError
@@ -14,7 +14,7 @@ from flightid.models import Model, load_model
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
 from flightid.study.settings import ModelSettings, Segment, Settings
-from flightid.validation import Verification, verify
+from flightid.validation import Comparison, Verification, verify
 
 EXCITATION = "excitation"
 
@@ -29,10 +29,13 @@ class Task:
         What was asked.
     model : TransferFunctionModel or StateSpaceModel
         Structure and start values, overrides applied.
+    rivals : mapping of str to TransferFunctionModel or StateSpaceModel
+        Models to verify side by side with the fit, by name.
     """
 
     settings: ModelSettings
     model: Model
+    rivals: Mapping[str, Model] = field(default_factory=dict)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -52,14 +55,14 @@ class Identified:
         By estimator; the first is the one that counts.
     fits : mapping of str to Fit
         By estimator.
-    verifications : mapping of str to Verification
-        By segment, none of which the fit has seen.
+    verifications : mapping of str to Verification or Comparison
+        By segment, none of which the fit has seen; side by side where there are rivals.
     """
 
     settings: ModelSettings
     responses: Mapping[str, FrequencyResponse]
     fits: Mapping[str, Fit]
-    verifications: Mapping[str, Verification]
+    verifications: Mapping[str, Verification | Comparison]
 
     @property
     def response(self) -> FrequencyResponse:
@@ -108,7 +111,11 @@ def load_task(settings: ModelSettings) -> Task:
     parameters = model.parameters
     for name, given in settings.parameters.items():
         parameters = parameters.with_parameter(replace(parameters[name], **given))
-    return Task(settings, replace(model, parameters=parameters))
+    rivals = {
+        name: load_model(path if path.endswith(".toml") else name, axis=settings.axis)
+        for name, path in settings.rivals.items()
+    }
+    return Task(settings, replace(model, parameters=parameters), rivals)
 
 
 def cut_records(log: Log, settings: Settings, tasks: Iterable[Task]) -> dict[str, Record]:
@@ -213,9 +220,17 @@ def fit(
 
 def check(
     task: Task, fitted: Fit, records: Mapping[str, Record], settings: Settings
-) -> dict[str, Verification]:
-    """Predict each segment that the fit has not seen."""
-    return {
-        name: verify(fitted, records[name], initial=settings.initial, outputs=task.model.outputs)
-        for name in task.settings.verify
-    }
+) -> dict[str, Verification | Comparison]:
+    """Predict each segment that the fit has not seen, beside the rivals where there are any."""
+    outputs, initial = task.model.outputs, settings.initial
+    checked: dict[str, Verification | Comparison] = {}
+    for name in task.settings.verify:
+        record = records[name]
+        if task.rivals:
+            models = {task.settings.name: fitted, **task.rivals}
+            checked[name] = verify(
+                [*models.values()], record, names=[*models], initial=initial, outputs=outputs
+            )
+        else:
+            checked[name] = verify(fitted, record, initial=initial, outputs=outputs)
+    return checked

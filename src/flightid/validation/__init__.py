@@ -5,6 +5,7 @@
 0.0
 """
 
+from flightid.validation.comparison import Comparison, Contrast
 from flightid.validation.correlation_test import CorrelationTest, Horizon, Kind, Loop, Verdict
 from flightid.validation.metrics import (
     fit_percent,
@@ -26,6 +27,8 @@ from flightid.validation.verification import Prediction, Verification
 from flightid.validation.verify import verify
 
 __all__ = [
+    "Comparison",
+    "Contrast",
     "CorrelationTest",
     "Envelopes",
     "Horizon",

@@ -205,9 +205,9 @@ def mismatch(
     model : Fit or model
         A fit, or anything with inputs, outputs and state_space() or frequency_response().
     response : FrequencyResponse
-        Measured; pairs that the model does not have are left out.
+        Measured; pairs that the model does not have, or does not fit, are left out.
     minimum_coherence : float
-        Frequencies with less are drawn but not judged.
+        Frequencies with less are neither judged nor drawn.
 
     Returns
     -------
@@ -239,8 +239,12 @@ def mismatch(
     inner = getattr(model, "model", model)
     inputs = tuple(getattr(inner, "inputs", ()))
     outputs = tuple(getattr(inner, "outputs", ()))
+    chosen = getattr(inner, "response_names", None)
     pairs = [
-        (y, u) for y in response.outputs if y in outputs for u in response.inputs if u in inputs
+        (y, u)
+        for y in response.outputs
+        for u in response.inputs
+        if y in outputs and u in inputs and (chosen is None or f"{y}/{u}" in chosen)
     ]
     computed = _model_response(inner, response.omega_rad_s)
     kept, ratios, judged = [], [], []

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid import _native
 from flightid.errors import DataError
 from flightid.simulation.simulate import Matrices
+from flightid.validation.free_run import Answer, FreeRun
 
 RANK_TOLERANCE = 1e-10
 """Singular values below this share of the largest count as zero (columns have unit length)."""
@@ -36,6 +36,8 @@ class Shifts:
     rank : int
         How many of them the record tells apart; fewer than `n_free` means that their values are
         one choice among many, while the prediction is not touched.
+    e_folds : float
+        How often the model's fastest growing mode grows by e over the record; 0 where none grows.
 
     Example
     -------
@@ -48,6 +50,7 @@ class Shifts:
     initial_state: NDArray[np.float64]
     n_free: int
     rank: int
+    e_folds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -93,75 +96,50 @@ def predict(
     tuple of ndarray and Shifts
         Prediction, shape (n_outputs, n_samples), and the shifts.
     """
-    a, b, c, d, delays_s = matrices
-    n_states, n_outputs = a.shape[0], c.shape[0]
-    rest = np.zeros(n_states)
-    _, plain = _native.simulate_linear(
-        a, b, c, d, delays_s, driven, rest, sample_time_s, first_order_hold
+    run = FreeRun(
+        matrices,
+        driven.shape[1],
+        sample_time_s,
+        first_order_hold=first_order_hold,
+        backward=freedom.initial_state,
     )
-    columns = _columns(a, c, n_outputs, driven.shape[1], sample_time_s, freedom)
-    if not columns:
-        none = Shifts(rest, np.zeros(n_outputs), rest, 0, 0)
-        return plain, none
-    design = np.stack(columns, axis=-1)
+    plain = run.driven(driven)
+    n_outputs = len(plain.outputs)
+    answers = []
+    if freedom.bias:
+        answers += [run.constant(index) for index in range(run.n_states)]
+    if freedom.initial_state:
+        answers += [run.free_state(index) for index in range(run.n_states)]
+    if freedom.reference:
+        answers += _reference_shifts(n_outputs, driven.shape[1], run.n_states)
+    if not answers:
+        none = np.zeros(run.n_states)
+        return plain.outputs, Shifts(none, np.zeros(n_outputs), none, 0, 0, run.e_folds)
+    design = np.stack([answer.outputs for answer in answers], axis=-1)
     scale = np.sqrt(weights)[:, None]
     solution, rank = _solve(
-        (scale[..., None] * design).reshape(-1, len(columns)),
-        (scale * (measured - plain)).reshape(-1),
+        (scale[..., None] * design).reshape(-1, len(answers)),
+        (scale * (measured - plain.outputs)).reshape(-1),
     )
-    return plain + design @ solution, _sorted(solution, rank, n_states, n_outputs, freedom)
+    # The state at the first sample is that of all runs together.
+    start = plain.start + np.stack([answer.start for answer in answers], axis=-1) @ solution
+    shifts = Shifts(
+        solution[: run.n_states] if freedom.bias else np.zeros(run.n_states),
+        solution[-n_outputs:] if freedom.reference else np.zeros(n_outputs),
+        start if freedom.initial_state else np.zeros(run.n_states),
+        solution.size,
+        rank,
+        run.e_folds,
+    )
+    return plain.outputs + design @ solution, shifts
 
 
-def _columns(
-    a: NDArray[np.float64],
-    c: NDArray[np.float64],
-    n_outputs: int,
-    n_samples: int,
-    sample_time_s: float,
-    freedom: Freedom,
-) -> list[NDArray[np.float64]]:
-    n_states = a.shape[0]
+def _reference_shifts(n_outputs: int, n_samples: int, n_states: int) -> list[Answer]:
     found = []
-    if freedom.bias:
-        # A bias is a constant input that enters every state derivative by itself.
-        constant = np.ones((1, n_samples))
-        for index in range(n_states):
-            entry = np.zeros((n_states, 1))
-            entry[index] = 1.0
-            _, answer = _native.simulate_linear(
-                a,
-                entry,
-                c,
-                np.zeros((n_outputs, 1)),
-                np.zeros(1),
-                constant,
-                np.zeros(n_states),
-                sample_time_s,
-                False,
-            )
-            found.append(answer)
-    if freedom.initial_state:
-        nothing = np.zeros((1, n_samples))
-        for index in range(n_states):
-            start = np.zeros(n_states)
-            start[index] = 1.0
-            _, answer = _native.simulate_linear(
-                a,
-                np.zeros((n_states, 1)),
-                c,
-                np.zeros((n_outputs, 1)),
-                np.zeros(1),
-                nothing,
-                start,
-                sample_time_s,
-                False,
-            )
-            found.append(answer)
-    if freedom.reference:
-        for index in range(n_outputs):
-            shift = np.zeros((n_outputs, n_samples))
-            shift[index] = 1.0
-            found.append(shift)
+    for index in range(n_outputs):
+        shift = np.zeros((n_outputs, n_samples))
+        shift[index] = 1.0
+        found.append(Answer(shift, np.zeros(n_states)))
     return found
 
 
@@ -178,16 +156,3 @@ def _solve(
     length[length == 0] = 1.0
     solution, _, rank, _ = np.linalg.lstsq(design / length, target, rcond=RANK_TOLERANCE)
     return solution / length, int(rank)
-
-
-def _sorted(
-    solution: NDArray[np.float64], rank: int, n_states: int, n_outputs: int, freedom: Freedom
-) -> Shifts:
-    parts = {"bias": np.zeros(n_states), "initial": np.zeros(n_states)}
-    place = 0
-    for name, is_free in (("bias", freedom.bias), ("initial", freedom.initial_state)):
-        if is_free:
-            parts[name] = solution[place : place + n_states]
-            place += n_states
-    reference = solution[place:] if freedom.reference else np.zeros(n_outputs)
-    return Shifts(parts["bias"], reference, parts["initial"], solution.size, rank)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.table import Cell, Column, Table
+from flightid.validation.muad import Mismatch
 from flightid.validation.shifts import Shifts
 
 
@@ -70,6 +71,8 @@ class Verification:
         Which shifts were solved for.
     hold : {"first", "zero"}
         What inputs do between samples.
+    mismatch : Mismatch or None
+        The model's frequency response against a measured one, where one was given.
     findings : tuple of Finding
         Verdicts against the guides.
 
@@ -97,6 +100,7 @@ class Verification:
     free_bias: bool
     free_reference: bool
     hold: str
+    mismatch: Mismatch | None = None
     findings: tuple[Finding, ...] = ()
 
     @property
@@ -196,6 +200,7 @@ class Verification:
                 }
                 for prediction in self.predictions
             ],
+            "mismatch": None if self.mismatch is None else self.mismatch.to_dict(),
             "findings": [finding.to_dict() for finding in self.findings],
         }
 
