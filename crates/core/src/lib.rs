@@ -34,5 +34,6 @@ pub mod state_space_fit;
 pub mod tape;
 pub mod transfer;
 pub mod turbulence;
+pub mod twin_rotor;
 
 pub use error::CoreError;

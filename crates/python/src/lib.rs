@@ -12,6 +12,7 @@ pub mod error;
 pub mod expression;
 pub mod file_bytes;
 pub mod frequency_fit;
+pub mod group;
 pub mod interrupt;
 pub mod kinematics;
 pub mod least_squares;
@@ -20,6 +21,7 @@ pub mod narx;
 pub mod quadrotor;
 pub mod state_space;
 pub mod transfer;
+pub mod twin_rotor;
 pub mod ulog;
 
 /// version() -> str
@@ -45,6 +47,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     least_squares::register(module)?;
     narx::register(module)?;
     transfer::register(module)?;
+    twin_rotor::register(module)?;
     state_space::register(module)?;
     Ok(())
 }

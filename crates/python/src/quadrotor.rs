@@ -2,6 +2,7 @@
 //! mappings from field name to value.
 
 use crate::error::from_core;
+use crate::group::{item, read};
 use flightid_core::ardupilot_mixer::Mixer;
 use flightid_core::ardupilot_mode::{AttitudeGains, SidRun};
 use flightid_core::ardupilot_pid::{Pid, PidGains};
@@ -13,16 +14,6 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2}
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-
-macro_rules! read {
-    ($mapping:expr, $type:ident { $($field:ident),* $(,)? }) => {
-        $type { $($field: item($mapping, stringify!($field))?.extract()?),* }
-    };
-}
-
-fn item<'py>(mapping: &Bound<'py, PyDict>, key: &str) -> PyResult<Bound<'py, PyAny>> {
-    mapping.get_item(key)?.ok_or_else(|| PyValueError::new_err(format!("{key} is missing")))
-}
 
 fn vehicle(m: &Bound<'_, PyDict>) -> PyResult<Quadrotor> {
     Ok(read!(

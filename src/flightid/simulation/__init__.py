@@ -14,11 +14,15 @@ from flightid.simulation.quadrotor import QuadrotorParameters, Sensors, Turbulen
 from flightid.simulation.scenario import fly_scenario
 from flightid.simulation.simulate import LinearModel, LinearSystem, simulate
 from flightid.simulation.truth import RateTruth, rate_truth
+from flightid.simulation.twin_rotor import TwinRotor
+from flightid.simulation.twin_rotor_parameters import Draught, Encoders, TwinRotorParameters
 
 __all__ = [
     "Autopilot",
     "CrudePilot",
     "Disturbance",
+    "Draught",
+    "Encoders",
     "Flight",
     "FlightConditions",
     "LinearModel",
@@ -30,6 +34,8 @@ __all__ = [
     "Sensors",
     "SidRun",
     "Turbulence",
+    "TwinRotor",
+    "TwinRotorParameters",
     "actuator_positions",
     "fly",
     "fly_closed_loop",
