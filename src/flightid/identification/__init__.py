@@ -3,6 +3,13 @@
 from flightid.identification.fit import Fit, FittedParameter, FittedResponse, LocalMinimum
 from flightid.identification.identify import identify
 from flightid.identification.narx_fit import ChosenTerm, NarxFit
+from flightid.identification.reduce import reduce
+from flightid.identification.reduction import Reduction, ReductionStep
+from flightid.identification.structures import (
+    StructureComparison,
+    StructureRow,
+    compare_structures,
+)
 
 __all__ = [
     "ChosenTerm",
@@ -11,5 +18,11 @@ __all__ = [
     "FittedResponse",
     "LocalMinimum",
     "NarxFit",
+    "Reduction",
+    "ReductionStep",
+    "StructureComparison",
+    "StructureRow",
+    "compare_structures",
     "identify",
+    "reduce",
 ]
