@@ -28,6 +28,9 @@ FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, s
 GRID = "rgba(128,128,128,0.22)"
 LINE = "rgba(128,128,128,0.65)"
 BAND_OPACITY = 0.16
+# 1, 2 and 5 of each decade, whole: the library's own labels drop the zeros of 20 and 50.
+LOG_TICKS = [digit * 10.0**decade for decade in range(-5, 6) for digit in (1, 2, 5)]
+LOG_LABELS = [f"{tick:g}" for tick in LOG_TICKS]
 ROW_HEIGHT_PX = 170
 MARGIN_PX = 130
 
@@ -122,8 +125,8 @@ def label_axes(
     for row, title in enumerate(y, start=1):
         made.update_yaxes(title_text=title, row=row, col=column)
     if log_x:
-        made.update_xaxes(type="log", dtick="D2", tickfont={"size": 11}, col=column)
-        made.update_xaxes(minor={"showgrid": False}, col=column)
+        made.update_xaxes(type="log", tickvals=LOG_TICKS, ticktext=LOG_LABELS, col=column)
+        made.update_xaxes(minor={"showgrid": False}, tickfont={"size": 11}, col=column)
     made.update_xaxes(title_text=x, row=len(y), col=column)
 
 
