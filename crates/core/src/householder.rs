@@ -41,9 +41,17 @@ pub fn back_substitute(r: &[f64], m: usize, n: usize, b: &[f64], x: &mut [f64]) 
     }
 }
 
-/// Inner product.
+/// Inner product; eight running sums, so that the additions need not wait for one another.
 pub fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
+    let mut sums = [0.0; 8];
+    let (left, right) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = left.remainder().iter().zip(right.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in left.zip(right) {
+        for (sum, (p, q)) in sums.iter_mut().zip(x.iter().zip(y)) {
+            *sum += p * q;
+        }
+    }
+    sums.iter().sum::<f64>() + rest
 }
 
 /// Euclidean norm, safe against overflow of the squares.

@@ -18,6 +18,16 @@ pub trait Problem {
     /// # Errors
     /// Where the derivatives have no value at `x`.
     fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) -> Result<(), CoreError>;
+    /// Triangle of [Jacobian | residuals] at `x`, (n + 1 × n + 1), column-major, from a problem that
+    /// makes it without keeping its long Jacobian; false: take the Jacobian.
+    ///
+    /// # Errors
+    /// Where the derivatives have no value at `x`.
+    fn triangle(&mut self, _x: &[f64], _triangle: &mut [f64]) -> Result<bool, CoreError> {
+        Ok(false)
+    }
+    /// Move a trial point to where the residuals have a value.
+    fn project(&self, _x: &mut [f64]) {}
 }
 
 /// When to stop.
@@ -95,8 +105,10 @@ pub struct Minimum {
     pub cost: f64,
     /// Residuals at `x`.
     pub residuals: Vec<f64>,
-    /// Jacobian at `x`, row-major.
+    /// Jacobian at `x`, row-major; empty from a problem that makes the triangle itself.
     pub jacobian: Vec<f64>,
+    /// Triangle R of the Jacobian at `x`, (n × n), column-major.
+    pub triangle: Vec<f64>,
     /// Steps tried.
     pub iterations: usize,
     /// Why it ended.

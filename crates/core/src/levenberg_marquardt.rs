@@ -26,7 +26,8 @@ pub fn minimise<P: Problem>(
     proceed: &mut dyn FnMut(&Progress) -> bool,
 ) -> Result<Minimum, CoreError> {
     check(problem.n_parameters(), start, lower, upper)?;
-    let x = (0..start.len()).map(|j| start[j].clamp(lower[j], upper[j])).collect();
+    let mut x: Vec<f64> = (0..start.len()).map(|j| start[j].clamp(lower[j], upper[j])).collect();
+    problem.project(&mut x);
     let mut search = Search::begin(problem, x, lower, upper)?;
     let termination = loop {
         if let Some(reason) = search.finished(options) {
@@ -48,6 +49,7 @@ pub fn minimise<P: Problem>(
         cost: search.cost,
         residuals: search.residuals,
         jacobian: search.jacobian,
+        triangle: search.triangle,
         iterations: search.iterations,
         termination,
     })
@@ -119,7 +121,7 @@ impl<'a> Search<'a> {
             scale: vec![0.0; n],
             projected: vec![0.0; n],
             triangle: vec![0.0; n * n],
-            jacobian: vec![0.0; m * n],
+            jacobian: Vec::new(),
             trial_residuals: vec![0.0; m],
             work: Vec::new(),
             residuals,
@@ -134,9 +136,30 @@ impl<'a> Search<'a> {
         Ok(search)
     }
 
-    /// Jacobian at `x`, its triangle, the gradient and the scales.
+    /// The triangle of the Jacobian at `x`, the gradient and the scales.
     fn linearise<P: Problem>(&mut self, problem: &mut P) -> Result<(), CoreError> {
+        let n = self.x.len();
+        self.work.clear();
+        self.work.resize((n + 1) * (n + 1), 0.0);
+        if !problem.triangle(&self.x, &mut self.work)? {
+            return self.triangularise_jacobian(problem);
+        }
+        if let Some(index) = self.work.iter().position(|value| !value.is_finite()) {
+            return Err(CoreError::NotFinite { what: "the triangle of the Jacobian", index });
+        }
+        for j in 0..n {
+            let column = &self.work[j * (n + 1)..j * (n + 1) + n];
+            self.scale[j] = self.scale[j].max(norm(column));
+            self.gradient[j] = dot(column, &self.work[n * (n + 1)..n * (n + 1) + n]);
+            self.triangle[j * n..(j + 1) * n].copy_from_slice(column);
+        }
+        self.projected.copy_from_slice(&self.work[n * (n + 1)..n * (n + 1) + n]);
+        Ok(())
+    }
+
+    fn triangularise_jacobian<P: Problem>(&mut self, problem: &mut P) -> Result<(), CoreError> {
         let (n, m) = (self.x.len(), self.residuals.len());
+        self.jacobian.resize(m * n, 0.0);
         problem.jacobian(&self.x, &mut self.jacobian)?;
         if let Some(index) = self.jacobian.iter().position(|value| !value.is_finite()) {
             return Err(CoreError::NotFinite { what: "the Jacobian", index });
@@ -205,6 +228,7 @@ impl<'a> Search<'a> {
             self.delta[j] = self.trial[j] - self.x[j];
         }
         let predicted = self.predicted_reduction();
+        problem.project(&mut self.trial);
         let scaled = |values: &[f64]| -> f64 {
             values.iter().zip(&self.scale).map(|(v, s)| (v * s).powi(2)).sum::<f64>().sqrt()
         };

@@ -18,6 +18,7 @@ pub mod kinematics;
 pub mod least_squares;
 pub mod linear_simulation;
 pub mod narx;
+pub mod polynomial;
 pub mod quadrotor;
 pub mod state_space;
 pub mod transfer;
@@ -46,6 +47,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     expression::register(module)?;
     least_squares::register(module)?;
     narx::register(module)?;
+    polynomial::register(module)?;
     transfer::register(module)?;
     twin_rotor::register(module)?;
     state_space::register(module)?;

@@ -3,6 +3,7 @@
 from flightid.identification.fit import Fit, FittedParameter, FittedResponse, LocalMinimum
 from flightid.identification.identify import identify
 from flightid.identification.narx_fit import ChosenTerm, NarxFit
+from flightid.identification.polynomial_fit import PolynomialFit
 from flightid.identification.reduce import reduce
 from flightid.identification.reduction import Reduction, ReductionStep
 from flightid.identification.structures import (
@@ -18,6 +19,7 @@ __all__ = [
     "FittedResponse",
     "LocalMinimum",
     "NarxFit",
+    "PolynomialFit",
     "Reduction",
     "ReductionStep",
     "StructureComparison",

@@ -10,9 +10,12 @@ from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain import Options, fit_responses
 from flightid.identification.narx_fit import NarxFit
 from flightid.identification.orthogonal_least_squares import fit_narx
+from flightid.identification.polynomial_fit import PolynomialFit
+from flightid.identification.prediction_error import fit_polynomial
 from flightid.identification.selection import Bands
 from flightid.models import Model, StateSpaceModel, TransferFunctionModel
 from flightid.models.narx import NarxModel
+from flightid.models.polynomial_structure import PolynomialStructure
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 
@@ -21,11 +24,16 @@ _FITS: dict[tuple[type, type], Callable[..., Any]] = {
     (TransferFunctionModel, FrequencyResponse): fit_responses,
     (StateSpaceModel, FrequencyResponse): fit_responses,
     (NarxModel, Record): fit_narx,
+    (PolynomialStructure, Record): fit_polynomial,
 }
 
 
 @overload
 def identify(model: NarxModel, data: Record | Sequence[Record]) -> NarxFit: ...
+
+
+@overload
+def identify(model: PolynomialStructure, data: Record | Sequence[Record]) -> PolynomialFit: ...
 
 
 @overload
@@ -48,7 +56,7 @@ def identify(
 
 
 def identify(
-    model: Model | NarxModel,
+    model: Model | NarxModel | PolynomialStructure,
     data: FrequencyResponse | Record | Sequence[Record],
     *,
     starts: int = 1,
@@ -62,17 +70,18 @@ def identify(
     maximum_iterations: int = 200,
     correct_bias: bool = True,
     hold: str = "band_limited",
-) -> Fit | NarxFit:
+) -> Fit | NarxFit | PolynomialFit:
     """Fit the free parameters of a model to data.
 
-    A `NarxModel` is fitted to one record or several by orthogonal least squares; its options are
-    its own and none below applies. For transfer functions each response is fitted at `n_omega` of
+    A `NarxModel` is fitted to one record or several by orthogonal least squares, a polynomial
+    structure (`PolynomialModel.arx` … `.general`) by prediction errors; their options are their
+    own and none below applies. For transfer functions each response is fitted at `n_omega` of
     its measured frequencies, log-spaced over its band. The cost of one response is (20/n) Σ W_γ
     [W_g (Δ dB)² + W_p (Δ degrees)²] with W_γ = [1.58 (1 − exp(−γ²))]².
 
     Parameters
     ----------
-    model : TransferFunctionModel, StateSpaceModel or NarxModel
+    model : TransferFunctionModel, StateSpaceModel, NarxModel or PolynomialStructure
         Structure, start values and bounds; every response in it is fitted.
     data : FrequencyResponse, or Record or sequence of Record
         Measured responses, or for a `NarxModel` records, with the model's channels, in the model's
@@ -108,7 +117,7 @@ def identify(
 
     Returns
     -------
-    Fit or NarxFit
+    Fit, NarxFit or PolynomialFit
         Estimates with 95 % intervals that carry the errors of the response through the fit,
         Cramér–Rao bounds and insensitivities, costs, correlations, findings.
 
@@ -173,8 +182,8 @@ def identify(
             "there is no fit for this model and these data",
             found=f"{type(model).__name__} and {type(data).__name__}",
             needed="TransferFunctionModel or StateSpaceModel and FrequencyResponse, "
-            "or NarxModel and Record",
+            "or NarxModel or PolynomialStructure and Record",
             action="estimate a response with flightid.estimate_response",
         )
-    result: Fit | NarxFit = fit(model, data, options)
+    result: Fit | NarxFit | PolynomialFit = fit(model, data, options)
     return result

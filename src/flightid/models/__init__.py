@@ -8,6 +8,9 @@ from flightid.models.load import library_names, load_model
 from flightid.models.narx import NarxEquation, NarxModel, NarxPrediction
 from flightid.models.narx_terms import Lag, Term
 from flightid.models.parameters import Parameter, Parameters
+from flightid.models.polynomial import PolynomialModel
+from flightid.models.polynomial_prediction import PolynomialPrediction
+from flightid.models.polynomial_structure import PolynomialStructure
 from flightid.models.statespace import StateSpaceModel
 from flightid.models.statespace_parts import Output, ResponsePair, StateSpaceMatrices
 from flightid.models.transfer import TransferFunction, TransferFunctionModel
@@ -21,6 +24,9 @@ __all__ = [
     "Output",
     "Parameter",
     "Parameters",
+    "PolynomialModel",
+    "PolynomialPrediction",
+    "PolynomialStructure",
     "ResponsePair",
     "StateSpaceMatrices",
     "StateSpaceModel",

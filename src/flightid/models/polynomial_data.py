@@ -1,0 +1,139 @@
+"""Records as the arrays that polynomial models run on, after their checks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError, OptionError, UnitError
+from flightid.record import Record
+
+Array = NDArray[np.float64]
+SAME_SAMPLE_TIME = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialData:
+    """Channels of all records end to end, their offsets taken off.
+
+    Attributes
+    ----------
+    output : ndarray, shape (n_samples,)
+    inputs : ndarray, shape (n_inputs, n_samples)
+    lengths : tuple of int
+        Samples of each record.
+    offsets : tuple of mapping
+        What was taken off, by channel, for each record.
+    units : mapping of str to str
+    sample_time_s : float
+
+    Example
+    -------
+    >>> record = Record.from_arrays([0.0, 0.1, 0.2], inputs={"u": [0.0, 1.0, 2.0]},
+    ...                             outputs={"y": [4.0, 4.0, 7.0]})
+    >>> gather_channels([record], "y", ("u",), "mean").output
+    array([-1., -1.,  2.])
+    """
+
+    output: Array
+    inputs: Array
+    lengths: tuple[int, ...]
+    offsets: tuple[Mapping[str, float], ...]
+    units: Mapping[str, str]
+    sample_time_s: float
+
+    @property
+    def spans(self) -> tuple[slice, ...]:
+        """Place of each record in the arrays."""
+        ends = np.cumsum([0, *self.lengths])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+
+    def require_change(self) -> None:
+        """Refuse channels that are constant over all records.
+
+        Raises
+        ------
+        DataError
+            A channel does not change.
+        """
+        for name, row in zip(list(self.units), (self.output, *self.inputs), strict=True):
+            if np.ptp(row) <= 1e-14 * np.max(np.abs(row)):
+                raise DataError(
+                    f"channel {name!r} is constant",
+                    found=f"{row[0] + self.offsets[0][name]:.6g} throughout",
+                    needed="a channel that changes",
+                    action="leave the channel out or choose another record",
+                )
+
+
+def gather_channels(
+    records: Sequence[Record], output: str, inputs: Sequence[str], offsets: str
+) -> PolynomialData:
+    """Channels of records with one sample time and one set of units.
+
+    Raises
+    ------
+    DataError
+        No record, or sample times that differ.
+    UnitError
+        A channel has another unit in a later record.
+    OptionError
+        Offsets ``"trim"`` without a declared trim value.
+    UnknownNameError
+        A channel is missing.
+
+    Example
+    -------
+    >>> record = Record.from_arrays([0.0, 0.1], inputs={"u": [0.0, 1.0]}, outputs={"y": [2.0, 4.0]})
+    >>> gather_channels([record, record], "y", ["u"], "none").lengths
+    (2, 2)
+    """
+    if not records:
+        raise DataError("there is no record", needed="one or more")
+    names = (output, *inputs)
+    first = records[0]
+    units = {name: first.unit(name) for name in names}
+    for record in records[1:]:
+        if abs(record.sample_time_s / first.sample_time_s - 1.0) > SAME_SAMPLE_TIME:
+            raise DataError(
+                "records have different sample times",
+                found=f"{first.sample_time_s:.6g} and {record.sample_time_s:.6g} s",
+                needed="one: a lag is a number of samples",
+                action="resample them with conditioning.resample",
+            )
+        for name in names:
+            if record.unit(name) != units[name]:
+                raise UnitError(
+                    f"channel {name!r} has another unit in another record",
+                    found=record.unit(name),
+                    needed=units[name],
+                    action="convert it with Record.to_units",
+                )
+    removed = tuple(_offsets(record, names, offsets) for record in records)
+    rows = [
+        np.concatenate([r[name] - o[name] for r, o in zip(records, removed, strict=True)])
+        for name in names
+    ]
+    stacked = np.array(rows[1:]).reshape(len(inputs), rows[0].size)
+    lengths = tuple(record.n_samples for record in records)
+    return PolynomialData(rows[0], stacked, lengths, removed, units, first.sample_time_s)
+
+
+def _offsets(record: Record, names: Sequence[str], kind: str) -> dict[str, float]:
+    if kind == "none":
+        return dict.fromkeys(names, 0.0)
+    if kind == "mean":
+        return {name: float(np.mean(record[name])) for name in names}
+    missing = [name for name in names if name not in record.trim]
+    if missing:
+        raise OptionError(
+            "a record has no trim value for a channel",
+            found=", ".join(missing),
+            needed="trim values of all channels",
+            action="declare them with the record, or take offsets='mean'",
+        )
+    return {name: float(record.trim[name]) for name in names}

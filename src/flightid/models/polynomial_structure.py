@@ -1,0 +1,227 @@
+"""Structure of a linear polynomial model: which coefficients are to be found, and how."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypedDict
+
+from flightid.errors import OptionError
+
+INITIAL = ("estimate", "zero", "backcast")
+METHODS = ("prediction_error", "iv4")
+OFFSETS = ("mean", "trim", "none")
+KERNELS = ("tc", "dc")
+LARGEST = 100
+"""Most coefficients of one polynomial, and the longest delay in samples, times ten."""
+
+NativeOrders = tuple[int, list[int], int, int, list[int], list[int]]
+
+
+class PolynomialOptions(TypedDict, total=False):
+    """Options of `PolynomialStructure` by name."""
+
+    initial: str
+    method: str
+    offsets: str
+    enforce_stability: bool
+    kernel: str | None
+    starts: int
+    seed: int
+    maximum_iterations: int
+
+
+@dataclass(frozen=True)
+class PolynomialStructure:
+    """Orders of A y = Σ (Bᵢ/Fᵢ) uᵢ(t - nkᵢ) + (C/D) e, for `identify`.
+
+    Made by `PolynomialModel.arx`, `.armax`, `.oe`, `.bj` and `.general`.
+
+    Attributes
+    ----------
+    output : str
+    inputs : tuple of str
+    na, nc, nd : int
+        Degrees of A, C, D.
+    nb, nf, nk : tuple of int
+        For each input the number of coefficients of B, the degree of F and the delay in samples
+        (0: a direct path).
+    initial : str
+        Before each record: ``"estimate"`` fits the values that stand for it, ``"zero"`` takes
+        rest, ``"backcast"`` runs the noise model backwards over the record (inputs at rest).
+    method : str
+        ``"prediction_error"`` or, for ARX, ``"iv4"``: optimal instruments, consistent with noise
+        of any colour.
+    offsets : str
+        What is taken off each channel of each record: its ``"mean"``, its declared ``"trim"`` or
+        nothing (``"none"``).
+    enforce_stability : bool
+        Keep the roots of A inside the unit circle too; the fit says when that moved it.
+    kernel : str or None
+        Regularisation of an ARX model, ``"tc"`` or ``"dc"``, its size by marginal likelihood.
+    starts : int
+        Number of starts of the iteration: the systematic ones, then random noise models.
+    seed : int
+        Of the random starts.
+    maximum_iterations : int
+
+    Raises
+    ------
+    OptionError
+        Orders or options outside their range.
+
+    Example
+    -------
+    >>> PolynomialStructure("y", ("u",), 2, (2,), 1, 0, (0,), (1,))
+    PolynomialStructure(ARMAX, 'y' from u, na 2, nb 2, nc 1, nk 1)
+    """
+
+    output: str
+    inputs: tuple[str, ...]
+    na: int
+    nb: tuple[int, ...]
+    nc: int
+    nd: int
+    nf: tuple[int, ...]
+    nk: tuple[int, ...]
+    initial: str = "estimate"
+    method: str = "prediction_error"
+    offsets: str = "mean"
+    enforce_stability: bool = False
+    kernel: str | None = None
+    starts: int = 4
+    seed: int = 0
+    maximum_iterations: int = 200
+
+    def __post_init__(self) -> None:
+        self._check_orders()
+        choices = {
+            "initial": INITIAL,
+            "method": METHODS,
+            "offsets": OFFSETS,
+            "kernel": (*KERNELS, None),
+        }
+        for name, allowed in choices.items():
+            if getattr(self, name) not in allowed:
+                needed = ", ".join(map(str, allowed))
+                raise OptionError(f"unknown {name}", found=getattr(self, name), needed=needed)
+        if (self.kernel or self.method == "iv4") and not self.is_regression:
+            raise OptionError(
+                "instruments and kernels belong to ARX models",
+                found=self.kind,
+                needed="nc, nd and nf zero",
+            )
+        if self.kernel and (self.method == "iv4" or self.enforce_stability):
+            raise OptionError(
+                "a kernel stands alone",
+                found=f"method {self.method!r}, enforce_stability {self.enforce_stability}",
+                needed="method 'prediction_error' without enforce_stability",
+            )
+        for name in ("starts", "maximum_iterations"):
+            if getattr(self, name) < 1:
+                raise OptionError(f"{name} is too small", found=getattr(self, name), needed=1)
+
+    def _check_orders(self) -> None:
+        channels = [self.output, *self.inputs]
+        if len(set(channels)) < len(channels):
+            raise OptionError("a channel is named twice", found=", ".join(channels))
+        for name in ("nb", "nf", "nk"):
+            if len(getattr(self, name)) != len(self.inputs):
+                raise OptionError(
+                    f"{name} does not fit the inputs",
+                    found=len(getattr(self, name)),
+                    needed=f"one for each of {len(self.inputs)} inputs",
+                )
+        for name in ("na", "nb", "nc", "nd", "nf", "nk"):
+            value = getattr(self, name)
+            limit = 10 * LARGEST if name in ("nb", "nk") else LARGEST
+            for count in value if isinstance(value, tuple) else (value,):
+                if not 0 <= count <= limit:
+                    raise OptionError(
+                        f"{name} is outside its range", found=count, needed=f"0 to {limit}"
+                    )
+        for name, nb, nf in zip(self.inputs, self.nb, self.nf, strict=True):
+            if nb == 0 and nf > 0:
+                raise OptionError(f"input {name!r} has a denominator alone", needed="nb above 0")
+        if self.n_parameters == 0:
+            raise OptionError("the model has no coefficients", needed="at least one order above 0")
+
+    @property
+    def kind(self) -> str:
+        """ARX, ARMAX, OE, BJ or the general form, by which orders are zero."""
+        filtered = any(self.nf)
+        if not filtered:
+            if self.nd == 0:
+                return "ARMAX" if self.nc else ("ARX" if self.na else "FIR")
+            return "ARARMAX" if self.nc else "ARARX"
+        if self.na == 0:
+            return "BJ" if self.nc or self.nd else "OE"
+        return "general"
+
+    @property
+    def is_regression(self) -> bool:
+        """Whether the prediction errors are linear in the coefficients."""
+        return not (self.nc or self.nd or any(self.nf))
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of coefficients."""
+        return self.na + sum(self.nb) + self.nc + self.nd + sum(self.nf)
+
+    @property
+    def longest_lag(self) -> int:
+        """Samples before a record on which its first values depend through A and B."""
+        spans = [n + k - 1 for n, k in zip(self.nb, self.nk, strict=True) if n]
+        return max([self.na, *spans])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the coefficients, by lag: ``a1``, ``b1``, or ``b1[u]`` with several inputs."""
+        several = len(self.inputs) > 1
+
+        def of_input(letter: str, first: int, count: int, name: str) -> list[str]:
+            tail = f"[{name}]" if several else ""
+            return [f"{letter}{lag}{tail}" for lag in range(first, first + count)]
+
+        found = [f"a{lag}" for lag in range(1, self.na + 1)]
+        for name, count, delay in zip(self.inputs, self.nb, self.nk, strict=True):
+            found += of_input("b", delay, count, name)
+        found += [f"c{lag}" for lag in range(1, self.nc + 1)]
+        found += [f"d{lag}" for lag in range(1, self.nd + 1)]
+        for name, count in zip(self.inputs, self.nf, strict=True):
+            found += of_input("f", 1, count, name)
+        return tuple(found)
+
+    @property
+    def native(self) -> NativeOrders:
+        """Orders as the native half takes them."""
+        return self.na, list(self.nb), self.nc, self.nd, list(self.nf), list(self.nk)
+
+    def __repr__(self) -> str:
+        """Kind and orders on one line."""
+
+        def shown(counts: Sequence[int]) -> str:
+            return str(counts[0]) if len(counts) == 1 else str(list(counts))
+
+        orders = {
+            "na": str(self.na) if self.na else "",
+            "nb": shown(self.nb) if self.inputs else "",
+            "nc": str(self.nc) if self.nc else "",
+            "nd": str(self.nd) if self.nd else "",
+            "nf": shown(self.nf) if any(self.nf) else "",
+            "nk": shown(self.nk) if self.inputs else "",
+        }
+        text = ", ".join(f"{name} {value}" for name, value in orders.items() if value)
+        source = f" from {', '.join(self.inputs)}" if self.inputs else ""
+        return f"PolynomialStructure({self.kind}, {self.output!r}{source}, {text})"
+
+
+def per_input(value: int | Sequence[int], n_inputs: int) -> tuple[int, ...]:
+    """One order for each input, from one number or a sequence.
+
+    Example
+    -------
+    >>> per_input(2, 3), per_input((1, 2), 2)
+    ((2, 2, 2), (1, 2))
+    """
+    return (value,) * n_inputs if isinstance(value, int) else tuple(value)

@@ -1,0 +1,291 @@
+"""Fits of polynomial structures: recovery, options, findings and refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.errors import DataError, FitError, OptionError, UnitError
+from flightid.identification.polynomial_starts import polynomial_starts
+from flightid.models.polynomial_data import gather_channels
+from tests.closeness import assert_close
+from tests.polynomial_records import ARMAX, TWO_INPUTS, flown
+
+P = fid.PolynomialModel
+
+
+def _codes(fit):
+    return {finding.code for finding in fit.findings}
+
+
+@pytest.mark.parametrize("initial", ["estimate", "zero"])
+def test_arx_recovers_a_noise_free_system_to_machine_precision(initial):
+    record = flown(ARMAX, 0, warm_up=0 if initial == "zero" else 300)
+    asked = P.arx("y", "u", na=2, nb=2, offsets="none", initial=initial)
+    fit = fid.identify(asked, record)
+    assert_close(fit.model.theta, [-1.5, 0.7, 1.0, 0.5], atol=1e-13, why="rounding")
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        P.armax("y", "u", na=2, nb=2, nc=2, offsets="none"),
+        P.oe("y", "u", nb=2, nf=2, offsets="none"),
+        P.bj("y", "u", nb=2, nf=2, nc=1, nd=1, offsets="none"),
+        P.arx("y", "u", na=2, nb=2, offsets="none", method="iv4"),
+    ],
+    ids=lambda structure: f"{structure.kind} {structure.method}",
+)
+def test_every_structure_recovers_the_noise_free_plant(asked):
+    fit = fid.identify(asked, [flown(ARMAX, 1), flown(ARMAX, 2)])
+    above, below = fit.model.transfer("u")
+    assert_close(above, [0.0, 1.0, 0.5], atol=1e-9, why="rounding through the iteration")
+    assert_close(below, [1.0, -1.5, 0.7], atol=1e-9, why="rounding through the iteration")
+
+
+def test_two_inputs_with_their_own_denominators_and_delays_are_recovered():
+    asked = P.oe("y", ["u", "v"], nb=[2, 3], nf=[2, 1], nk=[1, 3], offsets="none")
+    fit = fid.identify(asked, flown(TWO_INPUTS, 3))
+    wanted = [1.0, 0.5, 0.3, -0.2, 0.1, -1.5, 0.7, -0.6]
+    assert_close(fit.model.theta, wanted, atol=1e-9, why="rounding through the iteration")
+    assert list(fit.parameters) == [
+        "b1[u]", "b2[u]", "b3[v]", "b4[v]", "b5[v]", "f1[u]", "f2[u]", "f1[v]",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("initial", ["estimate", "zero", "backcast"])
+def test_box_jenkins_with_noise_lies_within_its_errors(initial):
+    asked = P.bj("y", ["u", "v"], nb=[2, 3], nf=[2, 1], nk=[1, 3], nc=1, nd=1, initial=initial)
+    warm_up = 0 if initial == "zero" else 300
+    records = [flown(TWO_INPUTS, s, n=1500, noise=0.2, warm_up=warm_up) for s in (4, 5)]
+    fit = fid.identify(asked, records)
+    truth = TWO_INPUTS.theta
+    errors = np.array([p.stderr for p in fit.parameters.values()])
+    assert np.all(np.abs(fit.model.theta - truth) < 4.0 * errors)
+    assert_close(fit.model.noise_variance, 0.04, rtol=0.1, why="3000 samples")
+    assert fit.termination in ("gradient", "step", "cost")
+
+
+def test_the_minimum_has_no_gradient_and_the_errors_belong_to_it():
+    record = flown(ARMAX, 6, n=500, noise=0.5)
+    fit = fid.identify(P.armax("y", "u", na=2, nb=2, nc=2, initial="zero"), record)
+
+    def loss(theta):
+        model = P.from_theta(fit.structure, theta, 0.1)
+        return np.sum(model.predict(record, 1, initial="zero").residual ** 2)
+
+    here = loss(fit.model.theta)
+    assert_close(here, fit.criteria.loss * 500, rtol=1e-12, why="the same errors")
+    step = 1e-5
+    for k in range(6):
+        there = [loss(fit.model.theta + sign * step * np.eye(6)[k]) for sign in (1, -1)]
+        assert abs(there[0] - there[1]) / (2 * step) < 1e-4 * here
+        assert min(there) > here
+
+
+def test_wrong_delay_and_right_delay_are_told_apart_by_the_loss():
+    record = flown(TWO_INPUTS, 7, noise=0.1)
+    losses = [
+        fid.identify(P.arx("y", ["u", "v"], na=4, nb=4, nk=[1, k]), record).criteria.loss
+        for k in (1, 3, 5)
+    ]
+    assert losses[1] < losses[2]
+
+
+def test_regularised_arx_is_closer_to_the_truth_than_least_squares():
+    records = [flown(ARMAX, seed, n=200, noise=1.0) for seed in (11, 12, 13)]
+    omega = np.geomspace(0.3, 30.0, 60)
+    truth = ARMAX.frequency_response(omega)
+
+    def fits(**options):
+        return [fid.identify(P.arx("y", "u", na=15, nb=15, **options), r) for r in records]
+
+    def miss(found):
+        return sum(np.linalg.norm(fit.model.frequency_response(omega) - truth) for fit in found)
+
+    plain = fits()
+    assert "few-samples" in _codes(plain[0])
+    for kernel in ("tc", "dc"):
+        smooth = fits(kernel=kernel)
+        assert miss(smooth) < 0.75 * miss(plain)
+        assert smooth[0].termination == "kernel"
+        assert "few-samples" not in _codes(smooth[0])
+
+
+def test_instruments_are_consistent_where_least_squares_is_not():
+    truth = P("y", ("u",), 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]], d=[1, -0.9])
+    records = [flown(truth, seed, n=3000, noise=0.5) for seed in (9, 10)]
+    plain = fid.identify(P.arx("y", "u", na=2, nb=2), records)
+    fit = fid.identify(P.arx("y", "u", na=2, nb=2, method="iv4"), records)
+    errors = np.array([p.stderr for p in fit.parameters.values()])
+    wanted = np.array([-1.5, 0.7, 1.0, 0.5])
+    assert np.all(np.abs(fit.model.theta - wanted) < 4.0 * errors)
+    assert np.any(np.abs(plain.model.theta - wanted) > 10.0 * errors)
+
+
+def test_a_pole_that_a_zero_cancels_is_named():
+    fit = fid.identify(P.armax("y", "u", na=3, nb=3, nc=2), flown(ARMAX, 11, n=800, noise=0.3))
+    assert "pole-zero-cancellation" in _codes(fit)
+    good = fid.identify(P.armax("y", "u", na=2, nb=2, nc=2), flown(ARMAX, 11, n=800, noise=0.3))
+    assert not _codes(good) & {"pole-zero-cancellation", "overfit", "not-converged"}
+    over = fid.identify(P.armax("y", "u", na=2, nb=2, nc=4), flown(ARMAX, 11, n=800, noise=0.3))
+    assert "overfit" in _codes(over)
+
+
+def test_noise_zeros_at_the_circle_are_named_and_kept_inside():
+    truth = P("y", ("u",), 0.1, a=[1, -0.5], b=[[1.0]], c=[1, -1.0])
+    fit = fid.identify(
+        P.armax("y", "u", na=1, nb=1, nc=1, initial="zero"),
+        flown(truth, 12, n=300, noise=0.5, warm_up=0),
+    )
+    assert abs(fit.model.c[1]) < 1.0
+    flipped = P("y", ("u",), 0.1, a=[1, -0.5], b=[[1.0]], c=[1, -2.0])
+    fit = fid.identify(P.armax("y", "u", na=1, nb=1, nc=1), flown(flipped, 12, n=900, noise=0.5))
+    # A zero outside has the same spectrum as its reflection.
+    assert_close(fit.model.c[1], -0.5, atol=0.15, why="900 samples")
+
+
+def test_an_unstable_plant_is_legal_and_can_be_held_stable():
+    truth = P("y", ("u",), 0.1, a=[1, -1.005], b=[[1.0]])
+    record = flown(truth, 13, n=300, noise=0.3, warm_up=0)
+    fit = fid.identify(P.arx("y", "u", na=1, nb=1, offsets="none"), record)
+    assert fit.model.a[1] < -1.0
+    assert "unstable-model" in _codes(fit)
+    held = fid.identify(P.arx("y", "u", na=1, nb=1, offsets="none", enforce_stability=True), record)
+    assert held.model.a[1] > -1.0
+    assert "stability-enforced" in _codes(held)
+    with pytest.raises(FitError, match="cannot be run backwards"):
+        fid.identify(P.arx("y", "u", na=1, nb=1, offsets="none", initial="backcast"), record)
+
+
+def test_roots_gains_and_modes_carry_intervals():
+    fit = fid.identify(
+        P.armax("y", "u", na=2, nb=2, nc=2), [flown(ARMAX, s, n=1500, noise=0.5) for s in (14, 15)]
+    )
+    (mode,) = fit.modes
+    truth = ARMAX.modes()["y/u"][0]
+    for found, wanted in (
+        (mode.natural_frequency, truth.natural_frequency_rad_s),
+        (mode.damping, truth.damping),
+        (fit.gains["y/u"], 7.5),
+    ):
+        assert abs(found.value - wanted) < 4.0 * found.stderr
+    step = 1e-6
+    for k in range(fit.model.theta.size):
+        moved = P.from_theta(fit.structure, fit.model.theta + step * np.eye(6)[k], 0.1)
+        pole = moved.modes()["y/u"][0].z
+        assert_close((pole - mode.z) / step, mode.gradient[k], atol=1e-4, why="difference")
+    table = fit.roots_table().to_text()
+    assert "zero" in table
+    assert "±" in table
+
+
+def test_a_fit_states_horizon_and_initial_state_and_keeps_everything_plain():
+    fit = fid.identify(P.armax("y", "u", na=2, nb=2, nc=1), flown(ARMAX, 16, noise=0.2, offset=3.0))
+    text = fit.summary().to_text()
+    assert "one step ahead from an estimated state" in text
+    assert "free run from an estimated state" in text
+    values = fit.to_dict()
+    assert values["schema"] == "flightid.polynomial_fit/1"
+    assert values["criteria"]["n_parameters"] == 5
+    assert values["provenance"]["offsets"][0]["y"] == pytest.approx(3.0, abs=1.0)
+    again = P.from_dict(values["model"])
+    np.testing.assert_array_equal(again.covariance, fit.covariance)
+    assert "free-run fit" in repr(fit)
+    assert "<table" in fit._repr_html_()
+    assert fit.predict(flown(ARMAX, 17), "free_run").error_rms < 1.0
+
+
+def test_starts_are_systematic_first_then_random_and_reproducible():
+    asked = P.armax("y", "u", na=2, nb=2, nc=3, starts=6, seed=5)
+    data = gather_channels([flown(ARMAX, 18, noise=0.5)], "y", ("u",), "mean")
+    one, two = polynomial_starts(asked, data), polynomial_starts(asked, data)
+    assert one.shape == (6, 7)
+    np.testing.assert_array_equal(one, two)
+    fit = fid.identify(asked, flown(ARMAX, 18, noise=0.5))
+    assert sum(m.count for m in fit.minima) <= 6
+    assert fit.minima[0].objective == min(m.objective for m in fit.minima)
+
+
+def test_few_iterations_are_reported():
+    asked = P.armax("y", "u", na=2, nb=2, nc=2, maximum_iterations=1, starts=1)
+    fit = fid.identify(asked, flown(ARMAX, 19, noise=0.5))
+    assert "not-converged" in _codes(fit)
+
+
+def test_time_series_without_input():
+    truth = P("y", (), 0.1, a=[1, -1.2, 0.5], c=[1, 0.4])
+    fit = fid.identify(P.armax("y", (), na=2, nb=0, nc=1), flown(truth, 20, n=3000, noise=1.0))
+    errors = np.array([p.stderr for p in fit.parameters.values()])
+    assert np.all(np.abs(fit.model.theta - truth.theta) < 4.0 * errors)
+
+
+def test_data_that_cannot_be_fitted():
+    record = flown(ARMAX, 21)
+    constant = record.replace({"u": np.full(400, 2.5)})
+    asked = P.arx("y", "u", na=2, nb=2)
+    with pytest.raises(DataError, match="channel 'u' is constant"):
+        fid.identify(asked, constant)
+    with pytest.raises(DataError, match="too few samples for the orders"):
+        fid.identify(asked, flown(ARMAX, 21, n=8))
+    with pytest.raises(FitError, match="there is no fit for this model and these data"):
+        fid.identify(asked, [])
+    twice = fid.Record.from_arrays(
+        record.time_s,
+        inputs={"u": record["u"], "v": record["u"]},
+        outputs={"y": record["y"]},
+        units={"y": "rad"},
+    )
+    with pytest.raises(DataError, match=r"b1\[v\] is a combination"):
+        fid.identify(P.arx("y", ["u", "v"], na=2, nb=2), twice)
+    tone = record.replace({"u": np.sin(0.5 * np.arange(400))})
+    with pytest.raises(DataError, match="cannot tell the coefficients apart"):
+        fid.identify(P.arx("y", "u", na=0, nb=4, offsets="none"), tone)
+    other = fid.Record.from_arrays(
+        np.arange(400) / 20, inputs={"u": record["u"]}, outputs={"y": record["y"]},
+        units={"y": "rad"},
+    )  # fmt: skip
+    with pytest.raises(DataError, match="different sample times"):
+        fid.identify(asked, [record, other])
+    degrees = fid.Record.from_arrays(
+        record.time_s, inputs={"u": record["u"]}, outputs={"y": record["y"]}, units={"y": "deg"}
+    )
+    with pytest.raises(UnitError, match="another unit in another record"):
+        fid.identify(asked, [record, degrees])
+
+
+def test_instruments_that_fail_say_so():
+    record = flown(ARMAX, 22)
+    twice = record.replace({"u": np.sin(0.5 * np.arange(400))})
+    with pytest.raises(DataError, match="apart"):
+        fid.identify(P.arx("y", "u", na=3, nb=4, method="iv4", offsets="none"), twice)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: P.arx("y", "u", na=-1, nb=2), "na is outside"),
+        (lambda: P.arx("y", "u", na=0, nb=0), "no coefficients"),
+        (lambda: P.arx("y", ["u", "y"], na=1, nb=1), "named twice"),
+        (lambda: P.arx("y", ["u", "v"], na=1, nb=[1]), "nb does not fit"),
+        (lambda: P.oe("y", "u", nb=0, nf=2), "denominator alone"),
+        (lambda: P.armax("y", "u", na=1, nb=1, nc=1, method="iv4"), "belong to ARX"),
+        (lambda: P.arx("y", "u", na=1, nb=1, kernel="tc", method="iv4"), "stands alone"),
+        (lambda: P.arx("y", "u", na=1, nb=1, initial="guess"), "unknown initial"),
+        (lambda: P.arx("y", "u", na=1, nb=1, starts=0), "starts is too small"),
+    ],
+)
+def test_structures_outside_their_range(make, words):
+    with pytest.raises(OptionError, match=words):
+        make()
+
+
+def test_kernels_too_need_samples():
+    with pytest.raises(DataError, match="too few samples for the orders"):
+        fid.identify(P.arx("y", "u", na=20, nb=20, kernel="tc"), flown(ARMAX, 23, n=60))
+
+
+def test_frequency_domain_options_are_refused():
+    with pytest.raises(OptionError, match="takes no options of a frequency-domain fit"):
+        fid.identify(P.arx("y", "u", na=1, nb=1), flown(ARMAX, 24), starts=3)
