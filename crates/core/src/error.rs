@@ -39,6 +39,12 @@ pub enum CoreError {
         /// The matrix.
         what: &'static str,
     },
+    /// A run that grows beyond all bounds.
+    #[error("the run diverges at sample {sample}")]
+    Diverged {
+        /// First sample without a meaningful state or output.
+        sample: usize,
+    },
     /// A formula that is outside the grammar or too large.
     #[error("at character {position}: {problem}")]
     Expression {

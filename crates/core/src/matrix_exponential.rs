@@ -42,12 +42,12 @@ fn one_norm(a: &[f64], n: usize) -> f64 {
 }
 
 /// Solve `a x = b` for square `x` by elimination with row pivots; both are overwritten.
-fn solve(a: &mut [f64], b: &mut [f64], n: usize) -> Result<(), CoreError> {
+pub(crate) fn solve(a: &mut [f64], b: &mut [f64], n: usize) -> Result<(), CoreError> {
     for k in 0..n {
         let pivot = (k..n)
             .fold(k, |best, i| if a[i * n + k].abs() > a[best * n + k].abs() { i } else { best });
         if a[pivot * n + k] == 0.0 {
-            return Err(CoreError::Singular { what: "Padé denominator" });
+            return Err(CoreError::Singular { what: "a matrix to be inverted" });
         }
         for j in 0..n {
             a.swap(k * n + j, pivot * n + j);

@@ -108,6 +108,10 @@ impl ModelTape {
         Ok(Self { tape, n_states: n, n_inputs: m, n_outputs: text.outputs.len() })
     }
 
+    pub(crate) fn tape(&self) -> &Tape {
+        &self.tape
+    }
+
     /// Number of states.
     pub fn n_states(&self) -> usize {
         self.n_states

@@ -14,11 +14,32 @@ pub const MAXIMUM_OPERATIONS: usize = 200_000;
 const LANES: usize = 4;
 
 #[derive(Debug, Clone, Copy)]
-enum Operation {
+pub(crate) enum Operation {
     Constant(f64),
     Input(usize),
     Unary(Unary, usize),
     Binary(Binary, usize, usize),
+}
+
+impl Operation {
+    /// Registers that it reads.
+    pub(crate) fn arguments(&self) -> impl Iterator<Item = usize> {
+        let (a, b) = match *self {
+            Self::Constant(_) | Self::Input(_) => (None, None),
+            Self::Unary(_, a) => (Some(a), None),
+            Self::Binary(_, a, b) => (Some(a), Some(b)),
+        };
+        a.into_iter().chain(b)
+    }
+
+    /// The same operation where its arguments have other places.
+    pub(crate) fn moved(self, places: &[usize]) -> Self {
+        match self {
+            Self::Unary(function, a) => Self::Unary(function, places[a]),
+            Self::Binary(function, a, b) => Self::Binary(function, places[a], places[b]),
+            leaf => leaf,
+        }
+    }
 }
 
 #[derive(PartialEq, Eq, Hash)]
@@ -32,9 +53,9 @@ enum Key {
 /// Several expressions of the same inputs, ready to be evaluated many times.
 #[derive(Debug, Clone)]
 pub struct Tape {
-    operations: Vec<Operation>,
-    outputs: Vec<usize>,
-    n_inputs: usize,
+    pub(crate) operations: Vec<Operation>,
+    pub(crate) outputs: Vec<usize>,
+    pub(crate) n_inputs: usize,
 }
 
 /// Registers that are reused from call to call.
@@ -62,12 +83,12 @@ impl Tape {
             definitions,
             done: HashMap::new(),
             open: Vec::new(),
-            operations: Vec::new(),
-            seen: HashMap::new(),
+            assembler: Assembler::default(),
         };
         let outputs =
             expressions.iter().map(|each| builder.expression(each)).collect::<Result<_, _>>()?;
-        Ok(Self { operations: builder.operations, outputs, n_inputs: inputs.len() })
+        let operations = builder.assembler.operations;
+        Ok(Self { operations, outputs, n_inputs: inputs.len() })
     }
 
     /// Number of expressions.
@@ -180,7 +201,7 @@ fn finite(what: &'static str, values: &[f64]) -> Result<(), CoreError> {
     }
 }
 
-fn apply_unary<T: Scalar>(function: Unary, a: T) -> T {
+pub(crate) fn apply_unary<T: Scalar>(function: Unary, a: T) -> T {
     match function {
         Unary::Negate => -a,
         Unary::Sin => a.sin(),
@@ -200,7 +221,7 @@ fn apply_unary<T: Scalar>(function: Unary, a: T) -> T {
     }
 }
 
-fn apply_binary<T: Scalar>(function: Binary, a: T, b: T) -> T {
+pub(crate) fn apply_binary<T: Scalar>(function: Binary, a: T, b: T) -> T {
     match function {
         Binary::Add => a + b,
         Binary::Subtract => a - b,
@@ -213,13 +234,84 @@ fn apply_binary<T: Scalar>(function: Binary, a: T, b: T) -> T {
     }
 }
 
+/// Appends operations to a tape; equal ones share a register and constants are folded.
+#[derive(Default)]
+pub(crate) struct Assembler {
+    pub(crate) operations: Vec<Operation>,
+    seen: HashMap<Key, usize>,
+}
+
+impl Assembler {
+    /// Go on after the operations of a tape.
+    pub(crate) fn resume(operations: Vec<Operation>) -> Self {
+        let places = operations.iter().enumerate().map(|(place, operation)| {
+            let key = match *operation {
+                Operation::Constant(value) => Key::Constant(value.to_bits()),
+                Operation::Input(input) => Key::Input(input),
+                Operation::Unary(function, a) => Key::Unary(function, a),
+                Operation::Binary(function, a, b) => Key::Binary(function, a, b),
+            };
+            (key, place)
+        });
+        let seen = places.collect();
+        Self { operations, seen }
+    }
+
+    pub(crate) fn input(&mut self, place: usize) -> Result<usize, CoreError> {
+        self.push(Key::Input(place), Operation::Input(place))
+    }
+
+    pub(crate) fn value(&self, register: usize) -> Option<f64> {
+        match self.operations[register] {
+            Operation::Constant(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn constant(&mut self, value: f64) -> Result<usize, CoreError> {
+        self.push(Key::Constant(value.to_bits()), Operation::Constant(value))
+    }
+
+    pub(crate) fn unary(&mut self, function: Unary, a: usize) -> Result<usize, CoreError> {
+        match self.value(a) {
+            Some(value) => self.constant(apply_unary(function, value)),
+            None => self.push(Key::Unary(function, a), Operation::Unary(function, a)),
+        }
+    }
+
+    pub(crate) fn binary(
+        &mut self,
+        function: Binary,
+        a: usize,
+        b: usize,
+    ) -> Result<usize, CoreError> {
+        match (self.value(a), self.value(b)) {
+            (Some(left), Some(right)) => self.constant(apply_binary(function, left, right)),
+            _ => self.push(Key::Binary(function, a, b), Operation::Binary(function, a, b)),
+        }
+    }
+
+    fn push(&mut self, key: Key, operation: Operation) -> Result<usize, CoreError> {
+        if let Some(&register) = self.seen.get(&key) {
+            return Ok(register);
+        }
+        let register = self.operations.len();
+        if register >= MAXIMUM_OPERATIONS {
+            let problem = format!("more than {MAXIMUM_OPERATIONS} operations in one model");
+            return Err(CoreError::Expression { position: 0, problem });
+        }
+        self.operations.push(operation);
+        self.seen.insert(key, register);
+        Ok(register)
+    }
+}
+
 struct Builder<'a> {
     places: HashMap<&'a str, usize>,
     definitions: &'a BTreeMap<String, Expression>,
     done: HashMap<String, usize>,
     open: Vec<String>,
-    operations: Vec<Operation>,
-    seen: HashMap<Key, usize>,
+    assembler: Assembler,
 }
 
 impl Builder<'_> {
@@ -239,11 +331,11 @@ impl Builder<'_> {
                 continue;
             }
             registers[index] = match node {
-                Node::Number(value) => self.constant(*value)?,
+                Node::Number(value) => self.assembler.constant(*value)?,
                 Node::Name(name) => self.name(name)?,
-                Node::Unary(function, a) => self.unary(*function, registers[*a])?,
+                Node::Unary(function, a) => self.assembler.unary(*function, registers[*a])?,
                 Node::Binary(function, a, b) => {
-                    self.binary(*function, registers[*a], registers[*b])?
+                    self.assembler.binary(*function, registers[*a], registers[*b])?
                 }
             };
         }
@@ -252,7 +344,7 @@ impl Builder<'_> {
 
     fn name(&mut self, name: &str) -> Result<usize, CoreError> {
         if let Some(&place) = self.places.get(name) {
-            return self.push(Key::Input(place), Operation::Input(place));
+            return self.assembler.input(place);
         }
         if let Some(&register) = self.done.get(name) {
             return Ok(register);
@@ -268,45 +360,6 @@ impl Builder<'_> {
         let register = self.expression(definition)?;
         self.open.pop();
         self.done.insert(name.to_string(), register);
-        Ok(register)
-    }
-
-    fn value(&self, register: usize) -> Option<f64> {
-        match self.operations[register] {
-            Operation::Constant(value) => Some(value),
-            _ => None,
-        }
-    }
-
-    fn constant(&mut self, value: f64) -> Result<usize, CoreError> {
-        self.push(Key::Constant(value.to_bits()), Operation::Constant(value))
-    }
-
-    fn unary(&mut self, function: Unary, a: usize) -> Result<usize, CoreError> {
-        match self.value(a) {
-            Some(value) => self.constant(apply_unary(function, value)),
-            None => self.push(Key::Unary(function, a), Operation::Unary(function, a)),
-        }
-    }
-
-    fn binary(&mut self, function: Binary, a: usize, b: usize) -> Result<usize, CoreError> {
-        match (self.value(a), self.value(b)) {
-            (Some(left), Some(right)) => self.constant(apply_binary(function, left, right)),
-            _ => self.push(Key::Binary(function, a, b), Operation::Binary(function, a, b)),
-        }
-    }
-
-    fn push(&mut self, key: Key, operation: Operation) -> Result<usize, CoreError> {
-        if let Some(&register) = self.seen.get(&key) {
-            return Ok(register);
-        }
-        let register = self.operations.len();
-        if register >= MAXIMUM_OPERATIONS {
-            let problem = format!("more than {MAXIMUM_OPERATIONS} operations in one model");
-            return Err(CoreError::Expression { position: 0, problem });
-        }
-        self.operations.push(operation);
-        self.seen.insert(key, register);
         Ok(register)
     }
 }

@@ -25,6 +25,7 @@ pub fn from_core(error: CoreError) -> PyErr {
         CoreError::Shape { .. } => raise("ShapeError", message),
         CoreError::Range { .. } => raise("OptionError", message),
         CoreError::NotFinite { .. } => raise("DataError", message),
+        CoreError::Diverged { .. } => raise("DataError", message),
         CoreError::Singular { .. } => raise("SingularError", message),
         CoreError::Expression { .. } => raise("ModelError", message),
         CoreError::UnknownName { .. } => raise("ModelError", message),

@@ -19,6 +19,7 @@ pub mod least_squares;
 pub mod linear_simulation;
 pub mod narx;
 pub mod polynomial;
+pub mod nonlinear_simulation;
 pub mod quadrotor;
 pub mod state_space;
 pub mod transfer;
@@ -48,6 +49,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     least_squares::register(module)?;
     narx::register(module)?;
     polynomial::register(module)?;
+    nonlinear_simulation::register(module)?;
     transfer::register(module)?;
     twin_rotor::register(module)?;
     state_space::register(module)?;

@@ -19,8 +19,8 @@ use crate::frequency_fit::{Response, Run, Search, log_gradients, measured, respo
 /// A state-space model: left and right side of each equation, formulas of outputs and of the delay
 /// of each input, and the (output, input) pairs whose responses are asked for, at the point ẋ, x, u.
 #[pyclass(frozen, module = "flightid._native")]
-struct StateSpace {
-    tape: ModelTape,
+pub(crate) struct StateSpace {
+    pub(crate) tape: ModelTape,
     pairs: Vec<(usize, usize)>,
     point: Vec<f64>,
 }

@@ -1,0 +1,178 @@
+//! A tape made ready to run along a trajectory: what never changes there is computed once, dead parts
+//! are left out, and B points are evaluated side by side.
+
+use crate::expression::{Binary, Unary};
+use crate::tape::{Operation, Tape, apply_binary, apply_unary};
+
+#[derive(Debug, Clone, Copy)]
+enum Step {
+    Negate(usize, usize),
+    Add(usize, usize, usize),
+    Subtract(usize, usize, usize),
+    Multiply(usize, usize, usize),
+    Divide(usize, usize, usize),
+    Integer(usize, usize, i32),
+    Unary(Unary, usize, usize),
+    Binary(Binary, usize, usize, usize),
+}
+
+/// Some registers of a tape in the order of their computation.
+#[derive(Debug, Clone)]
+pub(crate) struct Program {
+    n_registers: usize,
+    constants: Vec<(usize, f64)>,
+    /// Register of each input; none where nothing depends on it.
+    inputs: Vec<Option<usize>>,
+    /// Computed once in a run.
+    fixed: Vec<Step>,
+    /// Computed at every point.
+    moving: Vec<Step>,
+    is_moving: Vec<bool>,
+}
+
+/// Values of all registers at B points.
+pub(crate) type Lanes<const B: usize> = Vec<[f64; B]>;
+
+impl Program {
+    /// What `outputs` (registers) need; the first `n_moving` inputs change from point to point.
+    pub(crate) fn new(tape: &Tape, outputs: &[usize], n_moving: usize) -> Self {
+        let needed = tape.needed(outputs);
+        let mut program = Self {
+            n_registers: tape.operations.len(),
+            constants: Vec::new(),
+            inputs: vec![None; tape.n_inputs],
+            fixed: Vec::new(),
+            moving: Vec::new(),
+            is_moving: vec![false; tape.operations.len()],
+        };
+        for (register, &operation) in tape.operations.iter().enumerate() {
+            if !needed[register] {
+                continue;
+            }
+            let moves = operation.arguments().any(|a| program.is_moving[a]);
+            match operation {
+                Operation::Constant(value) => program.constants.push((register, value)),
+                Operation::Input(place) => {
+                    program.inputs[place] = Some(register);
+                    program.is_moving[register] = place < n_moving;
+                    continue;
+                }
+                _ => {
+                    let step = step(tape, register, operation);
+                    let list = if moves { &mut program.moving } else { &mut program.fixed };
+                    list.extend(step);
+                }
+            }
+            program.is_moving[register] = moves;
+        }
+        program
+    }
+
+    /// Whether a register changes from point to point.
+    pub(crate) fn moves(&self, register: usize) -> bool {
+        self.is_moving[register]
+    }
+
+    /// Set constants and fixed inputs (those after the moving ones), and what follows from them.
+    pub(crate) fn prepare<const B: usize>(
+        &self,
+        n_moving: usize,
+        fixed: &[f64],
+        lanes: &mut Lanes<B>,
+    ) {
+        lanes.clear();
+        lanes.resize(self.n_registers, [0.0; B]);
+        for &(register, value) in &self.constants {
+            lanes[register] = [value; B];
+        }
+        for (place, &value) in self.inputs[n_moving..].iter().zip(fixed) {
+            if let Some(register) = place {
+                lanes[*register] = [value; B];
+            }
+        }
+        run(&self.fixed, lanes);
+    }
+
+    /// Give an input its values at the B points.
+    pub(crate) fn load<const B: usize>(
+        &self,
+        input: usize,
+        values: [f64; B],
+        lanes: &mut Lanes<B>,
+    ) {
+        if let Some(register) = self.inputs[input] {
+            lanes[register] = values;
+        }
+    }
+
+    /// Whether anything here depends on an input.
+    pub(crate) fn uses(&self, input: usize) -> bool {
+        self.inputs[input].is_some()
+    }
+
+    /// Compute all that moves.
+    pub(crate) fn run<const B: usize>(&self, lanes: &mut Lanes<B>) {
+        run(&self.moving, lanes);
+    }
+}
+
+fn step(tape: &Tape, register: usize, operation: Operation) -> Option<Step> {
+    Some(match operation {
+        Operation::Constant(_) | Operation::Input(_) => return None,
+        Operation::Unary(Unary::Negate, a) => Step::Negate(register, a),
+        Operation::Unary(function, a) => Step::Unary(function, register, a),
+        Operation::Binary(Binary::Add, a, b) => Step::Add(register, a, b),
+        Operation::Binary(Binary::Subtract, a, b) => Step::Subtract(register, a, b),
+        Operation::Binary(Binary::Multiply, a, b) => Step::Multiply(register, a, b),
+        Operation::Binary(Binary::Divide, a, b) => Step::Divide(register, a, b),
+        Operation::Binary(Binary::Power, a, b) => match tape.operations[b] {
+            Operation::Constant(2.0) => Step::Multiply(register, a, a),
+            Operation::Constant(power) if power.fract() == 0.0 && power.abs() <= 64.0 => {
+                Step::Integer(register, a, power as i32)
+            }
+            _ => Step::Binary(Binary::Power, register, a, b),
+        },
+        Operation::Binary(function, a, b) => Step::Binary(function, register, a, b),
+    })
+}
+
+#[inline(always)]
+fn each<const B: usize>(
+    lanes: &mut [[f64; B]],
+    to: usize,
+    a: usize,
+    function: impl Fn(f64) -> f64,
+) {
+    let a = &lanes[a];
+    let result = std::array::from_fn(|lane| function(a[lane]));
+    lanes[to] = result;
+}
+
+#[inline(always)]
+fn pair<const B: usize>(
+    lanes: &mut [[f64; B]],
+    to: usize,
+    (a, b): (usize, usize),
+    function: impl Fn(f64, f64) -> f64,
+) {
+    let (a, b) = (&lanes[a], &lanes[b]);
+    let result = std::array::from_fn(|lane| function(a[lane], b[lane]));
+    lanes[to] = result;
+}
+
+fn run<const B: usize>(steps: &[Step], lanes: &mut [[f64; B]]) {
+    for step in steps {
+        match *step {
+            Step::Negate(to, a) => each(lanes, to, a, |x| -x),
+            Step::Add(to, a, b) => pair(lanes, to, (a, b), |x, y| x + y),
+            Step::Subtract(to, a, b) => pair(lanes, to, (a, b), |x, y| x - y),
+            Step::Multiply(to, a, b) => pair(lanes, to, (a, b), |x, y| x * y),
+            Step::Divide(to, a, b) => pair(lanes, to, (a, b), |x, y| x / y),
+            Step::Integer(to, a, power) => each(lanes, to, a, |x| x.powi(power)),
+            Step::Unary(function, to, a) => each(lanes, to, a, |x| apply_unary(function, x)),
+            Step::Binary(function, to, a, b) => {
+                pair(lanes, to, (a, b), |x, y| apply_binary(function, x, y));
+            }
+        }
+    }
+}

@@ -1,0 +1,56 @@
+//! Binding of simulation by Runge–Kutta steps (Python side: `simulation/nonlinear.py`).
+
+use flightid_core::linear_simulation::Hold;
+use flightid_core::motion::Motion;
+use flightid_core::runge_kutta::{Course, Setting};
+use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::error::from_core;
+use crate::state_space::StateSpace;
+
+type States<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
+/// simulate_equations(model: StateSpace, values: NDArray[np.float64], inputs: NDArray[np.float64], initial_state: NDArray[np.float64], sample_time_s: float, first_order_hold: bool, substeps: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+///
+/// States (n, n_samples) and outputs (p, n_samples) of a model over sampled inputs (m, n_samples).
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn simulate_equations<'py>(
+    py: Python<'py>,
+    model: &StateSpace,
+    values: PyReadonlyArray1<'py, f64>,
+    inputs: PyReadonlyArray2<'py, f64>,
+    initial_state: PyReadonlyArray1<'py, f64>,
+    sample_time_s: f64,
+    first_order_hold: bool,
+    substeps: usize,
+) -> PyResult<States<'py>> {
+    let n_samples = inputs.as_array().ncols();
+    let hold = if first_order_hold { Hold::First } else { Hold::Zero };
+    let (values, inputs, initial) =
+        (values.as_slice()?, inputs.as_slice()?, initial_state.as_slice()?);
+    let course = Course { inputs, n_samples, sample_s: sample_time_s, hold, substeps };
+    let tape = &model.tape;
+    let (states, outputs) = py
+        .detach(|| {
+            let motion = Motion::new(tape)?;
+            let mut setting = Setting::default();
+            setting.prepare(&motion, values, &course)?;
+            setting.simulate(&motion, initial)
+        })
+        .map_err(from_core)?;
+    let (n, p) = (initial.len(), tape.n_outputs());
+    Ok((
+        states.into_pyarray(py).reshape([n, n_samples])?,
+        outputs.into_pyarray(py).reshape([p, n_samples])?,
+    ))
+}
+
+/// Add this area to the module.
+///
+/// # Errors
+/// Never in practice; PyO3's own.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(simulate_equations, module)?)
+}
