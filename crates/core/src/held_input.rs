@@ -55,7 +55,7 @@ impl HeldInput {
         hold: Hold,
     ) -> Result<(), CoreError> {
         let late = delay_s / sample_s;
-        if !(late >= 0.0 && late < 1e9) {
+        if !(0.0..1e9).contains(&late) {
             let needed = "zero or positive seconds";
             return Err(CoreError::Range { what: "input delay", found: delay_s, needed });
         }

@@ -8,6 +8,7 @@
 pub mod ardupilot_mixer;
 pub mod ardupilot_mode;
 pub mod ardupilot_pid;
+mod boundary_system;
 pub mod chirp;
 pub mod closed_loop;
 pub mod complex_lu;
@@ -37,13 +38,16 @@ pub mod quadrotor_flight;
 pub mod radial_basis;
 pub mod random;
 pub mod runge_kutta;
+pub mod shooting;
 pub mod state_space_fit;
 pub mod tangent;
+pub mod tangent_pattern;
 pub mod tape;
 mod tape_derivative;
 mod tape_program;
 pub mod transfer;
 pub mod turbulence;
 pub mod twin_rotor;
+pub mod walk;
 
 pub use error::CoreError;

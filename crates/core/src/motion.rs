@@ -123,6 +123,19 @@ impl Motion {
         2 * self.n_states + self.n_inputs
     }
 
+    /// Whether states, inputs and their derivatives enter equations and outputs linearly, with factors
+    /// that depend on parameters alone.
+    pub fn is_affine(&self) -> bool {
+        let fixed = |entries: &[Entry], program: &Program| {
+            entries
+                .iter()
+                .all(|entry| entry.column >= self.n_moving() || !program.moves(entry.register))
+        };
+        !matches!(self.mass, Mass::Moving(_))
+            && fixed(&self.rate_entries, &self.rate_slopes)
+            && fixed(&self.output_entries, &self.output_slopes)
+    }
+
     /// Number of states.
     pub fn n_states(&self) -> usize {
         self.n_states

@@ -41,16 +41,21 @@ pub struct Course<'a> {
     pub substeps: usize,
 }
 
-/// A model with the values of its parameters on the inputs of one record; buffers for its runs.
+/// A model with the values of its parameters on the inputs of one record; buffers for its runs, to be
+/// used for one record and model only.
 #[derive(Debug, Clone, Default)]
 pub struct Setting {
     pub(crate) leaves: Vec<f64>,
     pub(crate) delays: Vec<f64>,
     pub(crate) held: Vec<HeldInput>,
     pub(crate) inverse_mass: Vec<f64>,
+    /// Its entries that are not zero: row, column, value.
+    weights: Vec<(usize, usize, f64)>,
     pub(crate) n_samples: usize,
     pub(crate) substeps: usize,
     pub(crate) step_s: f64,
+    /// Delays for which `held` was made.
+    followed: Option<Vec<f64>>,
     rates: Lanes<1>,
     outputs: Lanes<1>,
     mass: Vec<f64>,
@@ -84,7 +89,8 @@ pub(crate) fn inverse(
 }
 
 impl Setting {
-    /// Take parameter values and a record.
+    /// Take parameter values and a record; for the same record as before the inputs are followed
+    /// again only where a delay changed.
     ///
     /// # Errors
     /// `Shape` or `Range` for what does not fit, `NotFinite` where a formula has no value, `Singular`
@@ -107,10 +113,14 @@ impl Setting {
         self.substeps = course.substeps;
         self.step_s = course.sample_s / course.substeps as f64;
         self.held.resize_with(motion.n_inputs, HeldInput::default);
-        for (input, held) in self.held.iter_mut().enumerate() {
-            let samples = &course.inputs[input * course.n_samples..][..course.n_samples];
-            let delay = self.delays[input];
-            held.follow(samples, delay, course.sample_s, course.substeps, course.hold)?;
+        if self.followed.as_ref() != Some(&self.delays) {
+            self.followed = None;
+            for (input, held) in self.held.iter_mut().enumerate() {
+                let samples = &course.inputs[input * course.n_samples..][..course.n_samples];
+                let delay = self.delays[input];
+                held.follow(samples, delay, course.sample_s, course.substeps, course.hold)?;
+            }
+            self.followed = Some(self.delays.clone());
         }
         let n_moving = motion.n_moving();
         motion.rates.prepare(n_moving, &self.leaves, &mut self.rates);
@@ -124,8 +134,15 @@ impl Setting {
         if let Mass::Fixed(entries) = &motion.mass {
             let lanes = &self.rates;
             inverse(entries, n, |r| lanes[r][0], &mut self.mass, &mut self.inverse_mass)?;
+            self.gather_weights(n);
         }
         Ok(())
+    }
+
+    fn gather_weights(&mut self, n: usize) {
+        let entries = self.inverse_mass.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
+        self.weights.clear();
+        self.weights.extend(entries.map(|(place, &weight)| (place / n, place % n, weight)));
     }
 
     /// ẋ at a state and the driven inputs.
@@ -146,15 +163,17 @@ impl Setting {
         let lanes = &self.rates;
         if let Mass::Moving(entries) = &motion.mass {
             inverse(entries, n, |r| lanes[r][0], &mut self.mass, &mut self.inverse_mass)?;
+            self.gather_weights(n);
         }
+        let lanes = &self.rates;
         if motion.mass.is_one() {
             for (rate, &register) in result.iter_mut().zip(&motion.residuals) {
                 *rate = -lanes[register][0];
             }
         } else {
-            for (rate, row) in result.iter_mut().zip(self.inverse_mass.chunks_exact(n)) {
-                *rate =
-                    -row.iter().zip(&motion.residuals).map(|(w, &r)| w * lanes[r][0]).sum::<f64>();
+            result.fill(0.0);
+            for &(row, column, weight) in &self.weights {
+                result[row] -= weight * lanes[motion.residuals[column]][0];
             }
         }
         Ok(())
@@ -171,8 +190,8 @@ impl Setting {
         stride: usize,
     ) -> Result<(), CoreError> {
         let n = motion.n_states;
-        for input in 0..motion.n_inputs {
-            self.driven[input] = self.held[input].samples[sample].0 + shift[input];
+        for (input, shift) in shift.iter().enumerate() {
+            self.driven[input] = self.held[input].samples[sample].0 + shift;
             motion.outputs.load(2 * n + input, [self.driven[input]], &mut self.outputs);
         }
         if motion.outputs_need_rates {
@@ -206,8 +225,8 @@ impl Setting {
         let mut moved = std::mem::take(&mut self.moved);
         let mut found = Ok(());
         for (stage, (place, share)) in STAGES.into_iter().enumerate() {
-            for input in 0..motion.n_inputs {
-                self.driven[input] = self.held[input].steps[step].at(place).0 + shift[input];
+            for (input, shift) in shift.iter().enumerate() {
+                self.driven[input] = self.held[input].steps[step].at(place).0 + shift;
             }
             let (before, now) = slopes.split_at_mut(stage);
             match before.last() {
@@ -234,8 +253,8 @@ impl Setting {
 
     /// Run over the samples of `range` from an initial state. `states` takes the state at the beginning
     /// of every step and after the last one (a state contiguous): one step fewer than samples where the
-    /// range ends with the record. `outputs` (n_outputs × n_samples of the record) gets the columns of
-    /// the range.
+    /// range ends with the record. `outputs` (n_outputs × n_samples of the record), where asked for,
+    /// gets the columns of the range.
     ///
     /// # Errors
     /// `Diverged` where a state or output grows beyond all bounds, `Singular` as in `prepare`.
@@ -246,12 +265,14 @@ impl Setting {
         initial: &[f64],
         shift: &[f64],
         states: &mut Vec<f64>,
-        outputs: &mut [f64],
+        mut outputs: Option<&mut [f64]>,
     ) -> Result<(), CoreError> {
         let (n, n_samples) = (motion.n_states, self.n_samples);
         expect("initial state", initial.len(), n)?;
         expect("input shifts", shift.len(), motion.n_inputs)?;
-        expect("outputs", outputs.len(), motion.n_outputs * n_samples)?;
+        if let Some(outputs) = &outputs {
+            expect("outputs", outputs.len(), motion.n_outputs * n_samples)?;
+        }
         if range.end > n_samples {
             let (found, needed) = (range.end, n_samples);
             return Err(CoreError::Shape { what: "samples of a run", found, needed });
@@ -260,9 +281,14 @@ impl Setting {
         states.extend_from_slice(initial);
         let mut state = initial.to_vec();
         for sample in range {
-            self.measure(motion, sample, &state, shift, &mut outputs[sample..], n_samples)?;
-            let found = (0..motion.n_outputs).map(|row| outputs[row * n_samples + sample]);
-            if !found.chain(state.iter().copied()).all(|v| v.abs() < LARGEST_STATE) {
+            if let Some(outputs) = outputs.as_deref_mut() {
+                self.measure(motion, sample, &state, shift, &mut outputs[sample..], n_samples)?;
+                let found = outputs[sample..].iter().step_by(n_samples);
+                if !found.copied().all(|v| v.abs() < LARGEST_STATE) {
+                    return Err(CoreError::Diverged { sample });
+                }
+            }
+            if !state.iter().all(|v| v.abs() < LARGEST_STATE) {
                 return Err(CoreError::Diverged { sample });
             }
             if sample + 1 == n_samples {
@@ -291,7 +317,7 @@ impl Setting {
         let (n, n_samples) = (motion.n_states, self.n_samples);
         let mut outputs = vec![0.0; motion.n_outputs * n_samples];
         let (shift, mut steps) = (vec![0.0; motion.n_inputs], Vec::new());
-        self.run(motion, 0..n_samples, initial, &shift, &mut steps, &mut outputs)?;
+        self.run(motion, 0..n_samples, initial, &shift, &mut steps, Some(&mut outputs))?;
         let stride = n * self.substeps;
         let place = |k: usize| k % n_samples * stride + k / n_samples;
         Ok(((0..n * n_samples).map(|k| steps[place(k)]).collect(), outputs))

@@ -5,67 +5,17 @@
 //! the few derivatives that are not always zero, for many samples side by side; what remains in
 //! sequence is a sparse product for each stage.
 
-use std::ops::Range;
-
 use crate::error::CoreError;
 use crate::motion::{Mass, Motion};
 use crate::runge_kutta::{STAGES, Setting, WEIGHTS, expect, inverse};
+use crate::tangent_pattern::{Directions, GROUP, Pattern, Seeds};
 use crate::tape::Registers;
-use crate::tape_derivative::Entry;
 use crate::tape_program::Lanes;
+use crate::walk::{Rate, Walk};
 
 /// Samples that are evaluated side by side.
 const BLOCK: usize = 16;
-/// Derivatives that are carried side by side.
-const GROUP: usize = 4;
 type Many = [f64; GROUP];
-
-/// By what a trajectory is differentiated; columns in this order.
-#[derive(Debug, Clone, Copy)]
-pub struct Directions<'a> {
-    /// Indices of parameters.
-    pub parameters: &'a [usize],
-    /// Number of columns whose derivatives come in with the initial state alone.
-    pub n_initial: usize,
-    /// By the shifts of these inputs.
-    pub shift: &'a [usize],
-}
-
-impl Directions<'_> {
-    /// Number of columns.
-    pub fn count(&self) -> usize {
-        self.parameters.len() + self.n_initial + self.shift.len()
-    }
-}
-
-/// What one derivative of one row adds without any state.
-#[derive(Debug, Clone, Copy)]
-struct Force {
-    row: usize,
-    lane: usize,
-    /// Place among the entries.
-    entry: usize,
-    factor: f64,
-    /// Input whose rate by the delay multiplies it too.
-    delayed: Option<usize>,
-}
-
-/// A row of residuals or outputs with the state or rate that it depends on.
-#[derive(Debug, Clone, Copy)]
-struct Link {
-    row: usize,
-    from: usize,
-    entry: usize,
-}
-
-/// Sparse derivatives of a set of rows.
-#[derive(Debug, Clone, Default)]
-struct Pattern {
-    by_rate: Vec<Link>,
-    by_state: Vec<Link>,
-    /// By group of columns.
-    forces: Vec<Vec<Force>>,
-}
 
 /// Buffers, kept from run to run.
 #[derive(Debug, Clone, Default)]
@@ -96,7 +46,7 @@ impl Tangent {
     /// Differentiate the run that `states` holds. `seeds` (n_states × columns, row-major) are the
     /// derivatives of the state at its beginning. Rows of `stride` numbers, the output and its
     /// derivatives in the order of `directions`, go to `sink` block by block: first sample of the
-    /// block, then its rows by sample, then output.
+    /// block, then its rows by sample, then output; none where `stride` is zero.
     ///
     /// # Errors
     /// `Shape` for what does not fit; `Diverged`, `NotFinite` or `Singular` where a derivative has no
@@ -127,15 +77,20 @@ impl Tangent {
             let mut rows = std::mem::take(&mut self.rows);
             rows.clear();
             rows.resize((stop - start) * height, 0.0);
-            for (sample, rows) in (start..stop).zip(rows.chunks_exact_mut(height.max(1))) {
-                self.measure(walk, sample, sample - start, n_columns, stride, rows);
+            for sample in start..stop {
+                if stride > 0 {
+                    let rows = &mut rows[(sample - start) * height..][..height];
+                    self.measure(walk, sample, sample - start, n_columns, stride, rows);
+                }
                 if sample + 1 < setting.n_samples {
                     (0..setting.substeps).for_each(|part| {
                         self.advance(walk, sample, part, sample - start);
                     });
                 }
             }
-            sink(start, &mut rows);
+            if stride > 0 {
+                sink(start, &mut rows);
+            }
             self.rows = rows;
             start = stop;
         }
@@ -405,112 +360,5 @@ impl Tangent {
                 rows[force.row * stride + first + force.lane] += factor * force.factor * late;
             }
         }
-    }
-}
-
-/// One run to be differentiated.
-#[derive(Debug, Clone)]
-pub struct Walk<'a> {
-    /// The model.
-    pub motion: &'a Motion,
-    /// Parameters and record.
-    pub setting: &'a Setting,
-    /// Its samples.
-    pub range: Range<usize>,
-    /// Its states, from `Setting::run`.
-    pub states: &'a [f64],
-    /// What was added to the inputs.
-    pub shift: &'a [f64],
-}
-
-impl Walk<'_> {
-    fn state(&self, step: usize) -> &[f64] {
-        let n = self.motion.n_states;
-        let place = (step - self.range.start * self.setting.substeps) * n;
-        // Lanes beyond the last step repeat the last state; nothing is taken from them.
-        let place = place.min(self.states.len().saturating_sub(n));
-        &self.states[place..place + n]
-    }
-}
-
-/// Where the derivative of an input by its delay is taken.
-#[derive(Clone, Copy)]
-enum Rate {
-    Step(usize, usize),
-    Sample(usize),
-}
-
-impl Rate {
-    fn of(self, walk: &Walk<'_>, input: usize) -> f64 {
-        let held = &walk.setting.held[input];
-        match self {
-            Self::Step(step, place) => held.steps[step].at(place).1,
-            Self::Sample(sample) => held.samples[sample].1,
-        }
-    }
-}
-
-struct Seeds<'a> {
-    motion: &'a Motion,
-    directions: &'a Directions<'a>,
-    leaf_slopes: &'a [f64],
-    n_groups: usize,
-}
-
-impl Seeds<'_> {
-    fn pattern(&self, entries: &[Entry]) -> Pattern {
-        let motion = self.motion;
-        let (n, n_moving) = (motion.n_states, motion.n_moving());
-        let count = self.directions.parameters.len();
-        let first_shift = count + self.directions.n_initial;
-        let mut pattern = Pattern { forces: vec![Vec::new(); self.n_groups], ..Pattern::default() };
-        for (place, entry) in entries.iter().enumerate() {
-            let link = |from| Link { row: entry.row, from, entry: place };
-            match entry.column {
-                column if column < n => pattern.by_rate.push(link(column)),
-                column if column < 2 * n => pattern.by_state.push(link(column - n)),
-                column if column < n_moving => {
-                    let input = column - 2 * n;
-                    if let Some(k) = self.directions.shift.iter().position(|&s| s == input) {
-                        pattern.force(entry.row, place, first_shift + k, 1.0, None);
-                    }
-                    let delay = motion.n_leaves + input;
-                    self.scatter(&mut pattern, entry.row, place, delay, Some(input));
-                }
-                column => self.scatter(&mut pattern, entry.row, place, column - n_moving, None),
-            }
-        }
-        pattern
-    }
-
-    /// Columns of the parameters on which a leaf or delay depends.
-    fn scatter(
-        &self,
-        pattern: &mut Pattern,
-        row: usize,
-        entry: usize,
-        value: usize,
-        delayed: Option<usize>,
-    ) {
-        let count = self.directions.parameters.len();
-        for (column, &factor) in self.leaf_slopes[value * count..][..count].iter().enumerate() {
-            if factor != 0.0 {
-                pattern.force(row, entry, column, factor, delayed);
-            }
-        }
-    }
-}
-
-impl Pattern {
-    fn force(
-        &mut self,
-        row: usize,
-        entry: usize,
-        column: usize,
-        factor: f64,
-        delayed: Option<usize>,
-    ) {
-        let force = Force { row, lane: column % GROUP, entry, factor, delayed };
-        self.forces[column / GROUP].push(force);
     }
 }

@@ -6,14 +6,14 @@ use crate::tape::{Operation, Tape, apply_binary, apply_unary};
 
 #[derive(Debug, Clone, Copy)]
 enum Step {
-    Negate(usize, usize),
-    Add(usize, usize, usize),
-    Subtract(usize, usize, usize),
-    Multiply(usize, usize, usize),
-    Divide(usize, usize, usize),
-    Integer(usize, usize, i32),
-    Unary(Unary, usize, usize),
-    Binary(Binary, usize, usize, usize),
+    Negate(u32, u32),
+    Add(u32, u32, u32),
+    Subtract(u32, u32, u32),
+    Multiply(u32, u32, u32),
+    Divide(u32, u32, u32),
+    Integer(u32, u32, i32),
+    Unary(Unary, u32, u32),
+    Binary(Binary, u32, u32, u32),
 }
 
 /// Some registers of a tape in the order of their computation.
@@ -117,47 +117,44 @@ impl Program {
 }
 
 fn step(tape: &Tape, register: usize, operation: Operation) -> Option<Step> {
+    // A tape holds at most MAXIMUM_OPERATIONS registers, so their numbers fit.
+    let (to, short) = (register as u32, |place: usize| place as u32);
     Some(match operation {
         Operation::Constant(_) | Operation::Input(_) => return None,
-        Operation::Unary(Unary::Negate, a) => Step::Negate(register, a),
-        Operation::Unary(function, a) => Step::Unary(function, register, a),
-        Operation::Binary(Binary::Add, a, b) => Step::Add(register, a, b),
-        Operation::Binary(Binary::Subtract, a, b) => Step::Subtract(register, a, b),
-        Operation::Binary(Binary::Multiply, a, b) => Step::Multiply(register, a, b),
-        Operation::Binary(Binary::Divide, a, b) => Step::Divide(register, a, b),
+        Operation::Unary(Unary::Negate, a) => Step::Negate(to, short(a)),
+        Operation::Unary(function, a) => Step::Unary(function, to, short(a)),
+        Operation::Binary(Binary::Add, a, b) => Step::Add(to, short(a), short(b)),
+        Operation::Binary(Binary::Subtract, a, b) => Step::Subtract(to, short(a), short(b)),
+        Operation::Binary(Binary::Multiply, a, b) => Step::Multiply(to, short(a), short(b)),
+        Operation::Binary(Binary::Divide, a, b) => Step::Divide(to, short(a), short(b)),
         Operation::Binary(Binary::Power, a, b) => match tape.operations[b] {
-            Operation::Constant(2.0) => Step::Multiply(register, a, a),
+            Operation::Constant(2.0) => Step::Multiply(to, short(a), short(a)),
             Operation::Constant(power) if power.fract() == 0.0 && power.abs() <= 64.0 => {
-                Step::Integer(register, a, power as i32)
+                Step::Integer(to, short(a), power as i32)
             }
-            _ => Step::Binary(Binary::Power, register, a, b),
+            _ => Step::Binary(Binary::Power, to, short(a), short(b)),
         },
-        Operation::Binary(function, a, b) => Step::Binary(function, register, a, b),
+        Operation::Binary(function, a, b) => Step::Binary(function, to, short(a), short(b)),
     })
 }
 
 #[inline(always)]
-fn each<const B: usize>(
-    lanes: &mut [[f64; B]],
-    to: usize,
-    a: usize,
-    function: impl Fn(f64) -> f64,
-) {
-    let a = &lanes[a];
+fn each<const B: usize>(lanes: &mut [[f64; B]], to: u32, a: u32, function: impl Fn(f64) -> f64) {
+    let a = &lanes[a as usize];
     let result = std::array::from_fn(|lane| function(a[lane]));
-    lanes[to] = result;
+    lanes[to as usize] = result;
 }
 
 #[inline(always)]
 fn pair<const B: usize>(
     lanes: &mut [[f64; B]],
-    to: usize,
-    (a, b): (usize, usize),
+    to: u32,
+    (a, b): (u32, u32),
     function: impl Fn(f64, f64) -> f64,
 ) {
-    let (a, b) = (&lanes[a], &lanes[b]);
+    let (a, b) = (&lanes[a as usize], &lanes[b as usize]);
     let result = std::array::from_fn(|lane| function(a[lane], b[lane]));
-    lanes[to] = result;
+    lanes[to as usize] = result;
 }
 
 fn run<const B: usize>(steps: &[Step], lanes: &mut [[f64; B]]) {

@@ -1,9 +1,9 @@
-"""Linear simulation over a record (native side: `linear_simulation.rs`)."""
+"""Simulation over a record (native side: `linear_simulation.rs`, `nonlinear_simulation.rs`)."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from flightid import _native
 from flightid.conventions import Role
 from flightid.errors import ModelError, OptionError, ShapeError
+from flightid.models import StateSpaceModel
 from flightid.record import Channel, Record, Step
+from flightid.simulation.nonlinear import run_equations, start_of
 
 Hold = Literal["zero", "first"]
 Matrices = tuple[
@@ -109,15 +111,18 @@ def simulate(
     data: Record,
     *,
     hold: Hold = "first",
-    initial_state: ArrayLike | None = None,
+    initial_state: ArrayLike | Mapping[str, float] | None = None,
+    substeps: int | None = None,
     input_bias: Mapping[str, float] | None = None,
     output_bias: Mapping[str, float] | None = None,
     units: Mapping[str, str] | None = None,
 ) -> Record:
-    """Drive a linear model with the inputs of a record.
+    """Drive a model with the inputs of a record.
 
-    The discretisation is exact for the chosen hold, fractional delays included. Before the first
-    sample each input is taken to have had the value of that sample.
+    Linear models are discretised exactly for the chosen hold, fractional delays included. A
+    nonlinear `StateSpaceModel` advances by Runge-Kutta steps of fourth order and takes its inputs
+    and states whole, not as departures from a trim. Before the first sample each input is taken
+    to have had the value of that sample.
 
     Assumes: what the inputs do between their samples. ``"first"`` (straight lines) has no phase
     lag and belongs to models whose delay includes the half sample of an autopilot's output hold,
@@ -128,13 +133,18 @@ def simulate(
     ----------
     model : LinearModel
         Anything with ``inputs``, ``outputs`` and ``state_space()`` returning A, B, C, D and the
-        delay of each input in s: a `LinearSystem`, a transfer-function model.
+        delay of each input in s: a `LinearSystem`, a transfer-function model; or a nonlinear
+        `StateSpaceModel`.
     data : Record
         Holds the inputs by name, in the model's units.
     hold : {"first", "zero"}
         What the inputs do between samples.
-    initial_state : array_like, shape (n,), optional
-        State at the first sample; zero when left out.
+    initial_state : array_like, shape (n,), or mapping of str to float, optional
+        State at the first sample. Left out: zero, for a nonlinear model its trim; a mapping by
+        state of a `StateSpaceModel` changes some entries of that.
+    substeps : int, optional
+        Runge-Kutta steps in a sample interval, for a nonlinear model. Left out: enough for the
+        fastest eigenvalue at the trim (step times eigenvalue at most 0.25).
     input_bias : mapping of str to float, optional
         Constant added to an input, in its unit (a reference shift).
     output_bias : mapping of str to float, optional
@@ -152,7 +162,8 @@ def simulate(
     UnknownNameError
         The record lacks an input.
     OptionError
-        Another hold, or a bias for a channel that the model does not have.
+        Another hold, a bias for a channel that the model does not have, or substeps for a model
+        that is discretised exactly.
     ShapeError
         Matrices or the initial state do not fit.
     ModelError
@@ -182,16 +193,43 @@ def simulate(
         )
     if hold not in ("zero", "first"):
         raise OptionError("hold is not known", found=hold, needed="'zero' or 'first'")
-    matrices = tuple(np.ascontiguousarray(m, dtype=np.float64) for m in model.state_space())
-    a, b, c, d, delays_s = matrices
     names, outputs = tuple(model.inputs), tuple(model.outputs)
     driven = data.matrix(names) + _biases(input_bias, names)
-    start = np.zeros(a.shape[0]) if initial_state is None else np.array(initial_state, np.float64)
-    _, computed = _native.simulate_linear(
-        a, b, c, d, delays_s, driven, start, data.sample_time_s, hold == "first"
-    )
+    first = hold == "first"
+    if isinstance(model, StateSpaceModel) and not model.is_linear:
+        _, computed = run_equations(
+            model,
+            driven,
+            data.sample_time_s,
+            first_order_hold=first,
+            initial_state=initial_state,
+            substeps=substeps,
+        )
+    else:
+        if substeps is not None:
+            raise OptionError(
+                "a linear model has no substeps: its discretisation is exact", found=substeps
+            )
+        a, b, c, d, delays_s = (np.ascontiguousarray(m) for m in model.state_space())
+        start = _linear_start(model, initial_state, a.shape[0])
+        _, computed = _native.simulate_linear(
+            a, b, c, d, delays_s, driven, start, data.sample_time_s, first
+        )
     computed += _biases(output_bias, outputs)
     return _as_record(data, names, dict(zip(outputs, computed, strict=True)), units, hold)
+
+
+def _linear_start(
+    model: LinearModel, given: ArrayLike | Mapping[str, float] | None, n: int
+) -> NDArray[np.float64]:
+    """Departure from the trim at the first sample."""
+    if given is None:
+        return np.zeros(n)
+    if not isinstance(given, Mapping):
+        return np.array(given, dtype=np.float64)
+    if not isinstance(model, StateSpaceModel):
+        raise OptionError("states of this model have no names", found=", ".join(given))
+    return start_of(replace(model, trim={}), given)
 
 
 def _biases(biases: Mapping[str, float] | None, names: tuple[str, ...]) -> NDArray[np.float64]:

@@ -2,7 +2,9 @@ use super::*;
 use crate::model_tape::ModelTape;
 use crate::model_tape::ModelText;
 use crate::model_tape::tests::text;
-use crate::tangent::{Directions, Tangent, Walk};
+use crate::tangent::Tangent;
+use crate::tangent_pattern::Directions;
+use crate::walk::Walk;
 
 const VALUES: [f64; 4] = [2.0, 0.3, 5.0, 0.013];
 
@@ -31,7 +33,7 @@ fn outputs(
     setting.prepare(motion, values, course).unwrap();
     let mut outputs = vec![0.0; motion.n_outputs * course.n_samples];
     let range = 0..course.n_samples;
-    setting.run(motion, range, initial, &[shift], &mut Vec::new(), &mut outputs).unwrap();
+    setting.run(motion, range, initial, &[shift], &mut Vec::new(), Some(&mut outputs)).unwrap();
     outputs
 }
 
@@ -76,7 +78,7 @@ fn derivatives(
     let (mut setting, mut states) = (Setting::default(), Vec::new());
     setting.prepare(motion, &VALUES, course).unwrap();
     let mut values = vec![0.0; motion.n_outputs * course.n_samples];
-    setting.run(motion, range.clone(), initial, &[0.1], &mut states, &mut values).unwrap();
+    setting.run(motion, range.clone(), initial, &[0.1], &mut states, Some(&mut values)).unwrap();
     let directions = Directions { parameters: &[3, 0, 1, 2], n_initial: 2, shift: &[0] };
     let mut seeds = vec![0.0; 14];
     (seeds[4], seeds[7 + 5]) = (1.0, 1.0);
@@ -138,10 +140,10 @@ fn part_of_a_record_is_what_the_whole_run_does_there() {
     let mut setting = Setting::default();
     setting.prepare(&motion, &VALUES, &course).unwrap();
     let (mut states, mut whole) = (Vec::new(), vec![0.0; 82]);
-    setting.run(&motion, 0..41, &[0.4, -0.2], &[0.1], &mut states, &mut whole).unwrap();
+    setting.run(&motion, 0..41, &[0.4, -0.2], &[0.1], &mut states, Some(&mut whole)).unwrap();
     let middle = states[17 * 2 * 2..][..2].to_vec();
     let mut part = vec![0.0; 82];
-    setting.run(&motion, 17..30, &middle, &[0.1], &mut states, &mut part).unwrap();
+    setting.run(&motion, 17..30, &middle, &[0.1], &mut states, Some(&mut part)).unwrap();
     assert_eq!(part[17..30], whole[17..30]);
     assert_eq!(states.len(), 2 * (13 * 2 + 1));
 }
@@ -153,18 +155,18 @@ fn what_cannot_run_is_refused() {
     let explosive = motion(&[("x'", "x^2 + f^2"), ("v'", "k*v")], &["x"]);
     setting.prepare(&explosive, &VALUES, &course(&inputs, 0.1, 1)).unwrap();
     let mut y = vec![0.0; 400];
-    let found = setting.run(&explosive, 0..400, &[1.0, 0.0], &[0.0], &mut Vec::new(), &mut y);
+    let found = setting.run(&explosive, 0..400, &[1.0, 0.0], &[0.0], &mut Vec::new(), Some(&mut y));
     assert!(matches!(found, Err(CoreError::Diverged { .. })), "{found:?}");
     let root = motion(&[("x'", "-1"), ("v'", "sqrt(x)")], &["x"]);
     setting.prepare(&root, &VALUES, &course(&inputs, 0.1, 1)).unwrap();
-    let found = setting.run(&root, 0..400, &[1.0, 0.0], &[0.0], &mut Vec::new(), &mut y);
+    let found = setting.run(&root, 0..400, &[1.0, 0.0], &[0.0], &mut Vec::new(), Some(&mut y));
     assert!(matches!(found, Err(CoreError::Diverged { .. })), "{found:?}");
     let singular = motion(&[("x' + v'", "f"), ("2*x' + 2*v'", "k*x")], &["x"]);
     let found = setting.prepare(&singular, &VALUES, &course(&inputs, 0.1, 1));
     assert!(matches!(found, Err(CoreError::Singular { .. })));
     let crossing = motion(&[("x'", "-1"), ("x*v'", "f")], &["x"]);
     setting.prepare(&crossing, &VALUES, &course(&inputs, 0.1, 1)).unwrap();
-    let found = setting.run(&crossing, 0..400, &[0.0, 0.0], &[0.0], &mut Vec::new(), &mut y);
+    let found = setting.run(&crossing, 0..400, &[0.0, 0.0], &[0.0], &mut Vec::new(), Some(&mut y));
     assert!(matches!(found, Err(CoreError::Singular { .. })), "{found:?}");
     let squared = ModelText { ..text(&[("x'", "v"), ("v'*abs(v')", "f")], &["x"]) };
     let found = Motion::new(&ModelTape::new(&squared).unwrap());
