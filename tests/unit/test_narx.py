@@ -305,7 +305,7 @@ REFUSED: list[tuple[type[Exception], str, Callable[[], object]]] = [
     (UnknownNameError, "w", lambda: fid.identify(replace(MODEL, inputs=("w",)), quadratic())),
     (
         OptionError,
-        "takes no options",
+        "no such option",
         lambda: fid.identify(MODEL, quadratic(), n_omega=5),  # type: ignore[call-overload]
     ),
     (

@@ -30,6 +30,50 @@ pub trait Problem {
     fn project(&self, _x: &mut [f64]) {}
 }
 
+/// A sum of squares seen through its value and the triangle of its Jacobian. Its weights may move
+/// with the point of linearisation, as long as a step that lowers the sum for fixed weights is good.
+pub trait Objective {
+    /// Number of variables.
+    fn n_parameters(&self) -> usize;
+    /// Sum of squares at `x`, with the weights of the last linearisation. An error shortens the step.
+    ///
+    /// # Errors
+    /// Where there is no value at `x`.
+    fn cost(&mut self, x: &[f64]) -> Result<f64, CoreError>;
+    /// Called once, at the start, in place of `cost`.
+    ///
+    /// # Errors
+    /// Where there is no value at `x`.
+    fn begin(&mut self, x: &[f64]) -> Result<(), CoreError>;
+    /// Move `x` to where the objective has its values, as `Problem::project`.
+    fn project(&self, _x: &mut [f64]) {}
+    /// Linearise at `x`, for which `begin` or `cost` was called last.
+    ///
+    /// # Errors
+    /// Where there are no derivatives at `x`.
+    fn linearise(&mut self, x: &[f64], point: &mut Point) -> Result<(), CoreError>;
+}
+
+/// An objective linearised at a point.
+#[derive(Debug, Clone, Default)]
+pub struct Point {
+    /// Sum of squares with the weights of this point.
+    pub cost: f64,
+    /// Reduction that is to be had beside the variables, by nuisance that follows them.
+    pub beside: f64,
+    /// Triangle R of the Jacobian (n × n), columns contiguous.
+    pub triangle: Vec<f64>,
+    /// Qᵀr (n).
+    pub projected: Vec<f64>,
+}
+
+impl Point {
+    /// Zeros for `n` variables.
+    pub fn new(n: usize) -> Self {
+        Self { triangle: vec![0.0; n * n], projected: vec![0.0; n], ..Self::default() }
+    }
+}
+
 /// When to stop.
 #[derive(Debug, Clone, Copy)]
 pub struct Options {

@@ -10,7 +10,22 @@
 
 use crate::error::CoreError;
 use crate::householder::{back_substitute, dot, norm, triangularise};
-use crate::least_squares::{Minimum, Options, Problem, Progress, Termination};
+use crate::least_squares::{Minimum, Objective, Options, Point, Problem, Progress, Termination};
+
+/// Where a search ended.
+#[derive(Debug, Clone)]
+pub struct Found {
+    /// Variables.
+    pub x: Vec<f64>,
+    /// Sum of squares there.
+    pub cost: f64,
+    /// Triangle of the Jacobian there, n × n, columns contiguous.
+    pub triangle: Vec<f64>,
+    /// Steps tried.
+    pub iterations: usize,
+    /// Why it ended.
+    pub termination: Termination,
+}
 
 /// Minimise from `start`, which is moved into the bounds first. `proceed` is asked after each step
 /// and ends the iteration by returning false.
@@ -25,10 +40,35 @@ pub fn minimise<P: Problem>(
     options: &Options,
     proceed: &mut dyn FnMut(&Progress) -> bool,
 ) -> Result<Minimum, CoreError> {
-    check(problem.n_parameters(), start, lower, upper)?;
+    let mut dense = Dense::new(problem);
+    let found = search(&mut dense, start, lower, upper, options, proceed)?;
+    Ok(Minimum {
+        x: found.x,
+        cost: found.cost,
+        residuals: dense.residuals,
+        jacobian: dense.jacobian,
+        triangle: found.triangle,
+        iterations: found.iterations,
+        termination: found.termination,
+    })
+}
+
+/// As `minimise`, for an objective that keeps its residuals to itself.
+///
+/// # Errors
+/// As `minimise`.
+pub fn search<O: Objective>(
+    objective: &mut O,
+    start: &[f64],
+    lower: &[f64],
+    upper: &[f64],
+    options: &Options,
+    proceed: &mut dyn FnMut(&Progress) -> bool,
+) -> Result<Found, CoreError> {
+    check(objective.n_parameters(), start, lower, upper)?;
     let mut x: Vec<f64> = (0..start.len()).map(|j| start[j].clamp(lower[j], upper[j])).collect();
-    problem.project(&mut x);
-    let mut search = Search::begin(problem, x, lower, upper)?;
+    objective.project(&mut x);
+    let mut search = Search::begin(objective, x, lower, upper)?;
     let termination = loop {
         if let Some(reason) = search.finished(options) {
             break reason;
@@ -36,7 +76,7 @@ pub fn minimise<P: Problem>(
         if search.iterations >= options.maximum_iterations {
             break Termination::Iterations;
         }
-        let outcome = search.step(problem, options)?;
+        let outcome = search.step(objective, options)?;
         if !proceed(&Progress { iteration: search.iterations, cost: search.cost }) {
             break Termination::Interrupted;
         }
@@ -44,15 +84,8 @@ pub fn minimise<P: Problem>(
             break reason;
         }
     };
-    Ok(Minimum {
-        x: search.x,
-        cost: search.cost,
-        residuals: search.residuals,
-        jacobian: search.jacobian,
-        triangle: search.triangle,
-        iterations: search.iterations,
-        termination,
-    })
+    let (x, cost, iterations) = (search.x, search.cost, search.iterations);
+    Ok(Found { x, cost, triangle: search.point.triangle, iterations, termination })
 }
 
 fn check(n: usize, start: &[f64], lower: &[f64], upper: &[f64]) -> Result<(), CoreError> {
@@ -76,91 +109,73 @@ fn check(n: usize, start: &[f64], lower: &[f64], upper: &[f64]) -> Result<(), Co
     }
 }
 
-struct Search<'a> {
-    lower: &'a [f64],
-    upper: &'a [f64],
-    x: Vec<f64>,
-    cost: f64,
-    first_cost: f64,
+/// A problem whose residuals and Jacobian are held whole.
+struct Dense<'a, P> {
+    problem: &'a mut P,
     residuals: Vec<f64>,
-    jacobian: Vec<f64>,
-    /// Triangle R (n × n) and Qᵀr (n), column-major with n rows.
-    triangle: Vec<f64>,
-    projected: Vec<f64>,
-    gradient: Vec<f64>,
-    scale: Vec<f64>,
-    damping: f64,
-    growth: f64,
-    iterations: usize,
     trial: Vec<f64>,
-    trial_residuals: Vec<f64>,
-    delta: Vec<f64>,
+    jacobian: Vec<f64>,
     work: Vec<f64>,
 }
 
-impl<'a> Search<'a> {
-    fn begin<P: Problem>(
-        problem: &mut P,
-        x: Vec<f64>,
-        lower: &'a [f64],
-        upper: &'a [f64],
-    ) -> Result<Self, CoreError> {
-        let (n, m) = (x.len(), problem.n_residuals());
-        let mut residuals = vec![0.0; m];
-        problem.residuals(&x, &mut residuals)?;
-        if let Some(index) = residuals.iter().position(|value| !value.is_finite()) {
-            return Err(CoreError::NotFinite { what: "the residuals at the start", index });
-        }
-        let cost = dot(&residuals, &residuals);
-        let mut search = Self {
-            lower,
-            upper,
-            trial: x.clone(),
-            delta: vec![0.0; n],
-            gradient: vec![0.0; n],
-            scale: vec![0.0; n],
-            projected: vec![0.0; n],
-            triangle: vec![0.0; n * n],
-            jacobian: Vec::new(),
-            trial_residuals: vec![0.0; m],
-            work: Vec::new(),
-            residuals,
-            x,
-            cost,
-            first_cost: cost,
-            damping: 1e-3,
-            growth: 2.0,
-            iterations: 0,
-        };
-        search.linearise(problem)?;
-        Ok(search)
+impl<'a, P: Problem> Dense<'a, P> {
+    fn new(problem: &'a mut P) -> Self {
+        let m = problem.n_residuals();
+        let (residuals, trial) = (vec![0.0; m], vec![0.0; m]);
+        let jacobian = Vec::new();
+        Self { problem, residuals, trial, jacobian, work: Vec::new() }
+    }
+}
+
+impl<P: Problem> Objective for Dense<'_, P> {
+    fn n_parameters(&self) -> usize {
+        self.problem.n_parameters()
     }
 
-    /// The triangle of the Jacobian at `x`, the gradient and the scales.
-    fn linearise<P: Problem>(&mut self, problem: &mut P) -> Result<(), CoreError> {
-        let n = self.x.len();
+    fn cost(&mut self, x: &[f64]) -> Result<f64, CoreError> {
+        self.problem.residuals(x, &mut self.trial)?;
+        Ok(dot(&self.trial, &self.trial))
+    }
+
+    fn begin(&mut self, x: &[f64]) -> Result<(), CoreError> {
+        self.problem.residuals(x, &mut self.trial)?;
+        match self.trial.iter().position(|value| !value.is_finite()) {
+            Some(index) => Err(CoreError::NotFinite { what: "the residuals at the start", index }),
+            None => Ok(()),
+        }
+    }
+
+    fn project(&self, x: &mut [f64]) {
+        self.problem.project(x);
+    }
+
+    fn linearise(&mut self, x: &[f64], point: &mut Point) -> Result<(), CoreError> {
+        std::mem::swap(&mut self.residuals, &mut self.trial);
+        point.cost = dot(&self.residuals, &self.residuals);
+        point.beside = 0.0;
+        let n = x.len();
         self.work.clear();
         self.work.resize((n + 1) * (n + 1), 0.0);
-        if !problem.triangle(&self.x, &mut self.work)? {
-            return self.triangularise_jacobian(problem);
+        if !self.problem.triangle(x, &mut self.work)? {
+            return self.triangularise_jacobian(x, point);
         }
         if let Some(index) = self.work.iter().position(|value| !value.is_finite()) {
             return Err(CoreError::NotFinite { what: "the triangle of the Jacobian", index });
         }
         for j in 0..n {
             let column = &self.work[j * (n + 1)..j * (n + 1) + n];
-            self.scale[j] = self.scale[j].max(norm(column));
-            self.gradient[j] = dot(column, &self.work[n * (n + 1)..n * (n + 1) + n]);
-            self.triangle[j * n..(j + 1) * n].copy_from_slice(column);
+            point.triangle[j * n..(j + 1) * n].copy_from_slice(column);
         }
-        self.projected.copy_from_slice(&self.work[n * (n + 1)..n * (n + 1) + n]);
+        point.projected.copy_from_slice(&self.work[n * (n + 1)..n * (n + 1) + n]);
         Ok(())
     }
+}
 
-    fn triangularise_jacobian<P: Problem>(&mut self, problem: &mut P) -> Result<(), CoreError> {
-        let (n, m) = (self.x.len(), self.residuals.len());
+impl<P: Problem> Dense<'_, P> {
+    fn triangularise_jacobian(&mut self, x: &[f64], point: &mut Point) -> Result<(), CoreError> {
+        let (n, m) = (x.len(), self.residuals.len());
         self.jacobian.resize(m * n, 0.0);
-        problem.jacobian(&self.x, &mut self.jacobian)?;
+        self.problem.jacobian(x, &mut self.jacobian)?;
         if let Some(index) = self.jacobian.iter().position(|value| !value.is_finite()) {
             return Err(CoreError::NotFinite { what: "the Jacobian", index });
         }
@@ -172,19 +187,75 @@ impl<'a> Search<'a> {
             }
         }
         self.work[m * n..].copy_from_slice(&self.residuals);
-        for j in 0..n {
-            let column = &self.work[j * m..(j + 1) * m];
-            self.scale[j] = self.scale[j].max(norm(column));
-            self.gradient[j] = dot(column, &self.residuals);
-        }
         triangularise(&mut self.work, m, n);
-        self.triangle.fill(0.0);
-        self.projected.fill(0.0);
+        point.triangle.fill(0.0);
+        point.projected.fill(0.0);
         let rows = n.min(m);
         for j in 0..n {
-            self.triangle[j * n..j * n + rows].copy_from_slice(&self.work[j * m..j * m + rows]);
+            point.triangle[j * n..j * n + rows].copy_from_slice(&self.work[j * m..j * m + rows]);
         }
-        self.projected[..rows].copy_from_slice(&self.work[m * n..m * n + rows]);
+        point.projected[..rows].copy_from_slice(&self.work[m * n..m * n + rows]);
+        Ok(())
+    }
+}
+
+struct Search<'a> {
+    lower: &'a [f64],
+    upper: &'a [f64],
+    x: Vec<f64>,
+    cost: f64,
+    first_cost: f64,
+    point: Point,
+    gradient: Vec<f64>,
+    scale: Vec<f64>,
+    damping: f64,
+    growth: f64,
+    iterations: usize,
+    trial: Vec<f64>,
+    delta: Vec<f64>,
+    work: Vec<f64>,
+}
+
+impl<'a> Search<'a> {
+    fn begin<O: Objective>(
+        objective: &mut O,
+        x: Vec<f64>,
+        lower: &'a [f64],
+        upper: &'a [f64],
+    ) -> Result<Self, CoreError> {
+        let n = x.len();
+        objective.begin(&x)?;
+        let mut search = Self {
+            lower,
+            upper,
+            trial: x.clone(),
+            delta: vec![0.0; n],
+            gradient: vec![0.0; n],
+            scale: vec![0.0; n],
+            point: Point::new(n),
+            work: Vec::new(),
+            x,
+            cost: 0.0,
+            first_cost: 0.0,
+            damping: 1e-3,
+            growth: 2.0,
+            iterations: 0,
+        };
+        search.linearise(objective)?;
+        search.first_cost = search.cost;
+        Ok(search)
+    }
+
+    /// Triangle of the Jacobian at `x`, the gradient and the scales.
+    fn linearise<O: Objective>(&mut self, objective: &mut O) -> Result<(), CoreError> {
+        objective.linearise(&self.x, &mut self.point)?;
+        self.cost = self.point.cost;
+        for j in 0..self.x.len() {
+            let column = self.column(j);
+            let (length, slope) = (norm(column), dot(column, &self.point.projected));
+            self.scale[j] = self.scale[j].max(length);
+            self.gradient[j] = slope;
+        }
         Ok(())
     }
 
@@ -195,7 +266,7 @@ impl<'a> Search<'a> {
     }
 
     fn column(&self, j: usize) -> &[f64] {
-        &self.triangle[j * self.x.len()..(j + 1) * self.x.len()]
+        &self.point.triangle[j * self.x.len()..(j + 1) * self.x.len()]
     }
 
     fn finished(&self, options: &Options) -> Option<Termination> {
@@ -204,6 +275,9 @@ impl<'a> Search<'a> {
         }
         let size = self.cost.sqrt();
         let mut any = false;
+        if self.point.beside.sqrt() > options.gradient_tolerance * size {
+            return None;
+        }
         for j in (0..self.x.len()).filter(|&j| !self.is_held(j)) {
             any = true;
             let length = norm(self.column(j));
@@ -215,9 +289,9 @@ impl<'a> Search<'a> {
     }
 
     /// One trial step; a reason where the iteration is over.
-    fn step<P: Problem>(
+    fn step<O: Objective>(
         &mut self,
-        problem: &mut P,
+        objective: &mut O,
         options: &Options,
     ) -> Result<Option<Termination>, CoreError> {
         self.iterations += 1;
@@ -227,16 +301,13 @@ impl<'a> Search<'a> {
             self.trial[j] = (self.x[j] + self.delta[j]).clamp(self.lower[j], self.upper[j]);
             self.delta[j] = self.trial[j] - self.x[j];
         }
-        let predicted = self.predicted_reduction();
-        problem.project(&mut self.trial);
+        let predicted = self.predicted_reduction() + self.point.beside;
+        objective.project(&mut self.trial);
         let scaled = |values: &[f64]| -> f64 {
             values.iter().zip(&self.scale).map(|(v, s)| (v * s).powi(2)).sum::<f64>().sqrt()
         };
         let small = scaled(&self.delta) <= options.step_tolerance * scaled(&self.x);
-        let cost = match problem.residuals(&self.trial, &mut self.trial_residuals) {
-            Ok(()) => dot(&self.trial_residuals, &self.trial_residuals),
-            Err(_) => f64::INFINITY,
-        };
+        let cost = objective.cost(&self.trial).unwrap_or(f64::INFINITY);
         let reduction = self.cost - cost;
         if !(cost.is_finite() && reduction > 0.0 && predicted > 0.0) {
             return Ok(self.refuse(small, predicted, options));
@@ -244,12 +315,10 @@ impl<'a> Search<'a> {
         let ratio = reduction / predicted;
         let flat = reduction.max(predicted) <= options.cost_tolerance * self.cost;
         std::mem::swap(&mut self.x, &mut self.trial);
-        std::mem::swap(&mut self.residuals, &mut self.trial_residuals);
-        self.cost = cost;
         self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 10.0, 2.0);
         self.damping = self.damping.max(1e-20);
         self.growth = 2.0;
-        self.linearise(problem)?;
+        self.linearise(objective)?;
         Ok(if small {
             Some(Termination::Step)
         } else if flat {
@@ -276,8 +345,9 @@ impl<'a> Search<'a> {
         let n = self.x.len();
         let mut reduction = 0.0;
         for row in 0..n {
-            let change: f64 = (row..n).map(|j| self.triangle[j * n + row] * self.delta[j]).sum();
-            reduction -= change * (2.0 * self.projected[row] + change);
+            let change: f64 =
+                (row..n).map(|j| self.point.triangle[j * n + row] * self.delta[j]).sum();
+            reduction -= change * (2.0 * self.point.projected[row] + change);
         }
         reduction
     }
@@ -324,9 +394,9 @@ impl<'a> Search<'a> {
         for (row, entry) in rhs.iter_mut().enumerate().take(n) {
             let moved: f64 = (0..n)
                 .filter(|j| !free.contains(j))
-                .map(|j| self.triangle[j * n + row] * self.delta[j])
+                .map(|j| self.point.triangle[j * n + row] * self.delta[j])
                 .sum();
-            *entry = -(self.projected[row] + moved);
+            *entry = -(self.point.projected[row] + moved);
         }
         triangularise(&mut work, m, f);
         let mut step = vec![0.0; f];

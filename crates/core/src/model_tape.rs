@@ -227,6 +227,20 @@ impl ModelTape {
         parameters: &[f64],
         free: &[usize],
     ) -> Result<Vec<f64>, CoreError> {
+        Ok(self.value_slopes(point, parameters, free)?.split_off(self.height() * free.len()))
+    }
+
+    /// Derivatives of residuals, outputs and delays by some of the parameters, in the order of
+    /// `Linearisation::values`, each with n_free entries.
+    ///
+    /// # Errors
+    /// As `sensitivities`.
+    pub fn value_slopes(
+        &self,
+        point: &[f64],
+        parameters: &[f64],
+        free: &[usize],
+    ) -> Result<Vec<f64>, CoreError> {
         let inputs = self.joined(point, parameters)?;
         self.check_free(free)?;
         let directions: Vec<usize> = free.iter().map(|index| self.width() + index).collect();
@@ -234,7 +248,7 @@ impl ModelTape {
         let mut slopes = vec![0.0; values.len() * free.len()];
         let registers = &mut Registers::default();
         self.tape.jacobian(&inputs, &directions, registers, &mut values, &mut slopes)?;
-        Ok(slopes.split_off(self.height() * free.len()))
+        Ok(slopes)
     }
 
     fn check_free(&self, free: &[usize]) -> Result<(), CoreError> {

@@ -33,11 +33,11 @@ pub struct ResponseText {
 
 /// Places of one response's expressions on the tape.
 #[derive(Debug, Clone)]
-struct Layout {
-    gain: usize,
-    numerator: Vec<Range<usize>>,
-    denominator: Vec<Range<usize>>,
-    delay: usize,
+pub(crate) struct Layout {
+    pub(crate) gain: usize,
+    pub(crate) numerator: Vec<Range<usize>>,
+    pub(crate) denominator: Vec<Range<usize>>,
+    pub(crate) delay: usize,
 }
 
 /// One response with numbers in place of expressions; polynomials in ascending powers of s.
@@ -56,8 +56,8 @@ pub struct Factored {
 /// Several transfer functions of the same parameters.
 #[derive(Debug, Clone)]
 pub struct TransferFunctions {
-    tape: Tape,
-    layouts: Vec<Layout>,
+    pub(crate) tape: Tape,
+    pub(crate) layouts: Vec<Layout>,
 }
 
 fn parse(text: &str) -> Result<Expression, CoreError> {

@@ -19,6 +19,7 @@ pub mod least_squares;
 pub mod linear_simulation;
 pub mod narx;
 pub mod nonlinear_simulation;
+pub mod output_error;
 pub mod polynomial;
 pub mod quadrotor;
 pub mod state_space;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use flightid_core::frequency_fit::ResponseModel;
+use flightid_core::linear_family::TransferFamily;
 use flightid_core::transfer::{FreeTransfer, ResponseText, TransferFunctions as Functions};
 use num_complex::Complex64;
 use numpy::{PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
@@ -10,16 +11,19 @@ use pyo3::prelude::*;
 
 use crate::error::from_core;
 use crate::frequency_fit::{Response, Run, Search, log_gradients, measured, responses, search};
+use crate::output_error::{self, Flown, NoiseArguments, Own, SearchArguments, linear, record_data};
 
 type Text = (String, Vec<String>, Vec<String>, String);
 type Numbers = (f64, Vec<Vec<f64>>, Vec<Vec<f64>>, f64);
 
-/// __init__(self, responses: Sequence[tuple[str, Sequence[str], Sequence[str], str]], names: Sequence[str], definitions: dict[str, str]) -> None
+/// __init__(self, responses: Sequence[tuple[str, Sequence[str], Sequence[str], str]], names: Sequence[str], definitions: dict[str, str], pairs: Sequence[tuple[int, int]]) -> None
 ///
-/// Transfer functions (gain, numerator factors, denominator factors, delay) of the same names.
+/// Transfer functions (gain, numerator factors, denominator factors, delay) of the same names, and
+/// the places of output and input of each.
 #[pyclass(frozen, module = "flightid._native")]
 struct TransferFunctions {
     functions: Functions,
+    pairs: Vec<(usize, usize)>,
 }
 
 #[pymethods]
@@ -29,6 +33,7 @@ impl TransferFunctions {
         responses: Vec<Text>,
         names: Vec<String>,
         definitions: BTreeMap<String, String>,
+        pairs: Vec<(usize, usize)>,
     ) -> PyResult<Self> {
         let responses: Vec<_> = responses
             .into_iter()
@@ -40,7 +45,7 @@ impl TransferFunctions {
             })
             .collect();
         let functions = Functions::new(&responses, &names, &definitions).map_err(from_core)?;
-        Ok(Self { functions })
+        Ok(Self { functions, pairs })
     }
 
     /// factored(self, values: NDArray[np.float64]) -> list[tuple[float, list[list[float]], list[list[float]], float]]
@@ -105,6 +110,54 @@ impl TransferFunctions {
             FreeTransfer::new(&self.functions, values.as_slice()?, &free).map_err(from_core)?;
         let wanted = Search { starts, lower, upper, maximum_iterations };
         search(py, model, &measured(data)?, whitening, &wanted)
+    }
+
+    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int]) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
+    ///
+    /// Output error from each start (θ, objective, noise covariance, each record's own numbers and
+    /// whether they are determined, iterations, termination), or the words of the error that stopped
+    /// it. A record is (inputs, outputs, sample time); its own numbers are (initial state, input
+    /// shifts, output biases, free entries of each); noise is (full, limit of the loss, consistency);
+    /// a search is (starts, lower, upper, most steps).
+    #[allow(clippy::too_many_arguments)]
+    fn fit_records<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'_, f64>,
+        free: Vec<usize>,
+        records: Vec<Flown<'_>>,
+        own: Vec<Own<'_>>,
+        first_order_hold: bool,
+        noise: NoiseArguments,
+        search: SearchArguments<'py>,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let family = TransferFamily::new(&self.functions, &self.pairs, values.as_slice()?, &free);
+        let trajectories = linear(family, &records, first_order_hold)?;
+        output_error::fit(py, &trajectories, &record_data(&records, own)?, noise, search)
+    }
+
+    /// run_record(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]], first_order_hold: bool, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    ///
+    /// Outputs (n_outputs, n_samples) without bias and, if asked, their derivatives by θ, free
+    /// initial states and free shifts (n_outputs, n_samples, columns).
+    #[allow(clippy::too_many_arguments, clippy::type_complexity)]
+    fn run_record<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'_, f64>,
+        free: Vec<usize>,
+        record: Flown<'_>,
+        own: Own<'_>,
+        first_order_hold: bool,
+        with_slopes: bool,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
+        let family = TransferFamily::new(&self.functions, &self.pairs, values.as_slice()?, &free);
+        let records = [record];
+        let trajectories = linear(family, &records, first_order_hold)?;
+        let data = record_data(&records, vec![own])?;
+        let values = values.as_slice()?;
+        let theta: Vec<f64> = free.iter().map(|&place| values[place]).collect();
+        output_error::run(py, &trajectories, &data, 0, &theta, with_slopes)
     }
 }
 

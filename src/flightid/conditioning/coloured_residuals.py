@@ -11,6 +11,7 @@ much that is, draws from the model tell.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,8 @@ LARGEST_ORDER = 20
 SEPARATIONS = 20
 RESTORATIONS = 2
 DRAWS = 32
+MANY = 1_000_000
+"""Samples beyond which a quarter of the draws tells as much."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +41,14 @@ class Autoregression:
         Weights of the past samples.
     n : int
         Number of samples of the residual.
+    length : int
+        Transform length of its periodogram.
     """
 
     lags: Array
     weights: Array
     n: int
+    length: int
 
     def autocovariance(self, n_lags: int) -> Array:
         """Autocovariance at lags 0 to ``n_lags - 1``."""
@@ -77,11 +83,13 @@ class Autoregression:
         """Spectrum at the frequencies of `periodogram`."""
         order = self.weights.size
         innovation = float(self.lags[0] - self.weights @ self.lags[1 : order + 1])
-        gain = fft.rfft(np.concatenate(([1.0], -self.weights)), _length(self.n))
+        gain = fft.rfft(np.concatenate(([1.0], -self.weights)), self.length)
         return np.asarray(max(innovation, 0.0) / np.abs(gain) ** 2)
 
 
-def autoregression(power: Array, n: int, known: Array | None = None) -> Autoregression:
+def autoregression(
+    power: Array, n: int, known: Array | None = None, length: int | None = None
+) -> Autoregression:
     """Autoregressive model of a residual by its `periodogram`.
 
     A part of the residual whose mean periodogram is `known` is left out of the model, by
@@ -95,6 +103,8 @@ def autoregression(power: Array, n: int, known: Array | None = None) -> Autoregr
         Number of samples of the residual.
     known : ndarray, shape (n_bins,), optional
         Mean periodogram of the part to leave out.
+    length : int, optional
+        Transform length of the periodogram; default: that of n samples.
 
     Returns
     -------
@@ -112,23 +122,30 @@ def autoregression(power: Array, n: int, known: Array | None = None) -> Autoregr
     array([1., 0., 0.])
     """
     largest = min(LARGEST_ORDER, n // 20)
-    lags = _lags(power, n, largest)
-    model = Autoregression(lags, _weights(lags, n), n)
+    length = _length(n) if length is None else length
+    lags = _lags(power, length, largest)
+    model = Autoregression(lags, _weights(lags, n), n, length)
     if known is None:
         return model
     for _ in range(SEPARATIONS):
         own = model.spectrum()
         share = own / np.maximum(own + known, np.finfo(float).tiny)
-        lags = _lags(share**2 * power + share * known, n, largest)
-        model = Autoregression(lags, _weights(lags, n), n)
+        lags = _lags(share**2 * power + share * known, length, largest)
+        model = Autoregression(lags, _weights(lags, n), n, length)
     return model
 
 
-def periodogram(columns: Array) -> Array:
+def periodogram(columns: Array, length: int | None = None) -> Array:
     """Mean periodogram of columns (n, k), zero-padded to the next fast length from 2 n."""
     n = columns.shape[0]
-    transform = fft.rfft(columns, _length(n), axis=0)
+    transform = fft.rfft(columns, _length(n) if length is None else length, axis=0)
     return np.asarray(np.mean(np.abs(transform) ** 2, axis=1) / n)
+
+
+def pooled(records: Sequence[Array], length: int) -> Array:
+    """Mean periodogram of records (n, k) of several lengths, by their samples."""
+    total = sum(len(each) for each in records)
+    return np.asarray(sum(len(each) * periodogram(each, length) for each in records) / total)
 
 
 def _length(n: int) -> int:
@@ -136,15 +153,17 @@ def _length(n: int) -> int:
     return int(fft.next_fast_len(2 * n, real=True))
 
 
-def _leaking(spectrum: Array, n: int) -> Array:
-    """Mean periodogram of n samples with this spectrum: lag k is seen n - k times in n."""
-    lags = fft.irfft(spectrum, _length(n))[:n] * (1 - np.arange(n) / n)
-    return np.asarray(2 * fft.rfft(lags, _length(n)).real - lags[0])
+def _leaking(spectrum: Array, lengths: Sequence[int], length: int) -> Array:
+    """Mean periodogram of records with this spectrum: lag k is seen n - k times in n."""
+    k = np.arange(max(lengths))
+    seen = sum(np.maximum(n - k, 0) for n in lengths) / sum(lengths)
+    lags = fft.irfft(spectrum, length)[: k.size] * seen
+    return np.asarray(2 * fft.rfft(lags, length).real - lags[0])
 
 
-def _lags(power: Array, n: int, largest: int) -> Array:
+def _lags(power: Array, length: int, largest: int) -> Array:
     """Autocovariance at lags 0 to `largest` from a zero-padded periodogram."""
-    return np.asarray(fft.irfft(power, _length(n))[: largest + 1])
+    return np.asarray(fft.irfft(power, length)[: largest + 1])
 
 
 def _weights(sample: Array, n: int) -> Array:
@@ -213,7 +232,7 @@ def corrected_covariance(
     total = np.zeros_like(information)
     doubt = np.zeros(len(information))
     for scaled, model in zip(weighed, projection.models(residuals, walks), strict=True):
-        part = inverse @ (scaled.T @ _toeplitz_product(model.autocovariance(n), scaled)) @ inverse
+        part = inverse @ (scaled.T @ toeplitz_product(model.autocovariance(n), scaled)) @ inverse
         total += part
         doubt += np.diag(part) ** 2 / model.freedom()
     if noise is not None:
@@ -246,28 +265,73 @@ class _Projection:
         return np.array([periodogram(walk) for walk in self.left(noise.outputs_of(draws))])
 
     def models(self, residuals: Array, walks: Array | None) -> list[Autoregression]:
-        """Models of the outputs' own noise, in rounds: what the fit took of it is given back."""
-        n_outputs, n = residuals.shape
-        seen = np.array([periodogram(residual[:, None]) for residual in residuals])
-        known = [None] * n_outputs if walks is None else list(walks)
-        random = np.random.default_rng(1)
-        white = fft.rfft(random.standard_normal((n_outputs, _length(n), DRAWS)), axis=1)
-        lost = np.zeros_like(seen)
-        models: list[Autoregression] = []
-        for _ in range(RESTORATIONS + 1):
-            models = [
-                autoregression(power, n, walk)
-                for power, walk in zip(seen + lost, known, strict=True)
+        """Models of the outputs' own noise."""
+        return noise_models([residuals], lambda drawn: [self.left(drawn[0])], walks)
+
+
+def noise_models(
+    residuals: Sequence[Array],
+    left: Callable[[list[Array]], list[Array]],
+    known: Array | None = None,
+) -> list[Autoregression]:
+    """Models of the outputs' noise, in rounds: what the fit took of it is given back.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, shape (n_outputs, n)
+        By record.
+    left : callable
+        What the fit leaves of noise, shape (n_outputs, n, n_draws) by record, in the same shape.
+    known : ndarray, shape (n_outputs, n_bins), optional
+        Mean periodograms of parts to leave out of the models; one record alone.
+
+    Returns
+    -------
+    list of Autoregression
+        By output.
+
+    Example
+    -------
+    >>> white = np.random.default_rng(0).standard_normal((2, 1, 2000))
+    >>> model, = noise_models(list(white), lambda drawn: drawn)
+    >>> model.autocovariance(2).round(1) + 0.0
+    array([1., 0.])
+    """
+    lengths = [each.shape[1] for each in residuals]
+    total, length, n_outputs = sum(lengths), _length(max(lengths)), residuals[0].shape[0]
+    draws = DRAWS if total * n_outputs < MANY else DRAWS // 4
+    outputs = range(n_outputs)
+    seen = np.array([pooled([each[o][:, None] for each in residuals], length) for o in outputs])
+    random = np.random.default_rng(1)
+    white = [
+        fft.rfft(random.standard_normal((n_outputs, length, draws)), axis=1) for _ in residuals
+    ]
+    lost = np.zeros_like(seen)
+    models: list[Autoregression] = []
+    for _ in range(RESTORATIONS + 1):
+        models = [
+            autoregression(power, total, None if known is None else known[o], length)
+            for o, power in enumerate(seen + lost)
+        ]
+        spectra = np.array([model.spectrum() for model in models])
+        shaped = np.sqrt(spectra)[:, :, None]
+        drawn = [
+            fft.irfft(each * shaped, length, axis=1)[:, :n]
+            for each, n in zip(white, lengths, strict=True)
+        ]
+        kept = left(drawn)
+        lost = np.array(
+            [
+                pooled([each[o] for each in drawn], length)
+                - pooled([each[o] for each in kept], length)
+                for o in outputs
             ]
-            spectra = np.array([model.spectrum() for model in models])
-            drawn = fft.irfft(white * np.sqrt(spectra)[:, :, None], _length(n), axis=1)[:, :n]
-            taken = zip(drawn, self.left(drawn), strict=True)
-            lost = np.array([periodogram(before) - periodogram(after) for before, after in taken])
-            lost += [spectrum - _leaking(spectrum, n) for spectrum in spectra]
-        return models
+        )
+        lost += [spectrum - _leaking(spectrum, lengths, length) for spectrum in spectra]
+    return models
 
 
-def _toeplitz_product(first: Array, columns: Array) -> Array:
+def toeplitz_product(first: Array, columns: Array) -> Array:
     """Product of a symmetric Toeplitz matrix with columns, by one circulant of twice the size."""
     n = first.size
     length = _length(n)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flightid.errors import FitError
 from flightid.identification.error_model import UNKNOWN, ErrorModel
 from flightid.identification.fit import FittedParameter
-from flightid.identification.multistart import End
+from flightid.identification.multistart import DenseEnd
 from flightid.identification.selection import SelectedResponse
 from flightid.inference import correlation as correlation_of
 from flightid.inference import cramer_rao, insensitivity, interval95, null_combination, propagate
@@ -51,7 +51,7 @@ def statistics(
     fitted: Model,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
-    end: End,
+    end: DenseEnd,
     *,
     sensitivity: Array | None,
 ) -> Statistics:
@@ -63,26 +63,34 @@ def statistics(
         The data do not see a parameter, or a combination of parameters.
     """
     free = fitted.parameters.free
-    inner = np.array([not _is_at_bound(parameter) for parameter in free], dtype=bool)
+    inner = np.array([not at_bound(parameter) for parameter in free], dtype=bool)
     names = tuple(p.name for p, keep in zip(free, inner, strict=True) if keep)
     jacobian = end.jacobian[:, inner]
-    _require_identifiable(names, jacobian)
+    require_identifiable(names, jacobian)
     covariance = None
     if sensitivity is not None and names:
         covariance = propagate(jacobian, sensitivity, errors.covariance)
     weighted = coherence_jacobian(fitted, selected)[:, inner]
     correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
-    parameters = _parameters(fitted, names, covariance, weighted)
+    parameters = fitted_parameters(fitted, names, covariance, weighted)
     return Statistics(parameters, names, covariance, correlation, errors.source)
 
 
-def _is_at_bound(parameter: Parameter) -> bool:
+def at_bound(parameter: Parameter) -> bool:
+    """Whether a parameter's value lies at one of its bounds."""
     value = parameter.value or 0.0
     margin = _AT_BOUND * max(abs(value), 1e-300)
     return value - parameter.minimum <= margin or parameter.maximum - value <= margin
 
 
-def _require_identifiable(names: tuple[str, ...], jacobian: Array) -> None:
+def require_identifiable(names: tuple[str, ...], jacobian: Array) -> None:
+    """Refuse parameters that the data cannot see.
+
+    Raises
+    ------
+    FitError
+        Some combination of them leaves the residuals as they are.
+    """
     if not names:
         return
     share = null_combination(jacobian)
@@ -94,8 +102,8 @@ def _require_identifiable(names: tuple[str, ...], jacobian: Array) -> None:
         if len(guilty) > 1
         else "the data do not see a parameter",
         found=", ".join(guilty),
-        needed="a different effect of each on the responses in the band",
-        action="fix or tie one of them, or widen the band",
+        needed="a different effect of each on the data",
+        action="fix or tie one of them, widen the band, or excite them apart",
     )
 
 
@@ -113,27 +121,54 @@ def coherence_jacobian(fitted: Model, selected: Sequence[SelectedResponse]) -> A
     return np.vstack(rows)
 
 
-def _parameters(
-    fitted: Model, names: tuple[str, ...], covariance: Array | None, weighted: Array
+def fitted_parameters(
+    fitted: Model,
+    names: tuple[str, ...],
+    covariance: Array | None,
+    weighted: Array,
+    freedom: Array | None = None,
 ) -> dict[str, FittedParameter]:
+    """Every parameter with what is known of it.
+
+    Parameters
+    ----------
+    fitted : TransferFunctionModel or StateSpaceModel
+        At the estimates.
+    names : tuple of str
+        Parameters of the arrays: free and not at a bound.
+    covariance : ndarray, shape (n, n), or None
+        Of the estimates over repeated flights.
+    weighted : ndarray, shape (n_residuals, n)
+        Derivatives of residuals whose squares add up to the cost, for the bounds of CIFER.
+    freedom : ndarray, shape (n,), optional
+        Degrees of freedom of the variances.
+
+    Returns
+    -------
+    dict of str to FittedParameter
+    """
     bounds = dict(zip(names, cramer_rao(weighted), strict=True)) if names else {}
     slack = dict(zip(names, insensitivity(weighted), strict=True)) if names else {}
     errors = _standard_errors(fitted, names, covariance)
+    degrees = {} if freedom is None else dict(zip(names, map(float, freedom), strict=True))
     result = {}
     for name, parameter in fitted.parameters.items():
         value = float(parameter.value or 0.0)
-        at_bound = parameter.free and name not in names
+        bound = parameter.free and name not in names
         stderr = errors.get(name)
+        interval = None
+        if stderr is not None:
+            interval = interval95(value, stderr, degrees_of_freedom=degrees.get(name))
         result[name] = FittedParameter(
             name,
             parameter.unit,
             value,
-            "at bound" if at_bound else parameter.status,
+            "at bound" if bound else parameter.status,
             stderr,
-            None if stderr is None else interval95(value, stderr),
+            interval,
             _percent(bounds.get(name), value),
             _percent(slack.get(name), value),
-            _reason(parameter, at_bound=at_bound, known=covariance is not None, value=value),
+            _reason(parameter, at_bound=bound, known=covariance is not None, value=value),
         )
     return result
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.findings import Finding
+from flightid.identification.fitted_record import FittedRecord
 from flightid.models import Model
 from flightid.responses import PairResponse
 from flightid.table import Cell, Column, Table
@@ -162,9 +163,10 @@ class Fit:
         All parameters, in the model's order.
     cost, average_cost : float
         Σ J_l and its average over the responses; guide: average at most 100, below 50 nearly
-        indistinguishable.
+        indistinguishable. On records: sum and average of the outputs' costs.
     costs : mapping of str to float
-        J_l by response.
+        J_l by response. On records, by output: percent of the output's variance that the model
+        leaves in the residuals.
     names : tuple of str
         Parameters of `covariance` and `correlation`: free and not at a bound.
     covariance : ndarray, shape (n, n), or None
@@ -175,15 +177,21 @@ class Fit:
     minima : tuple of LocalMinimum
         What the starts found, best first.
     objective : float
-        What was minimised: equal to `cost` for ``cost="coherence"``.
+        What was minimised: equal to `cost` for ``cost="coherence"``; on records the negative
+        logarithm of the likelihood, without its constant.
     termination : str
         Why the iteration ended.
     iterations : int
     intervals_from : str
-        ``"response covariance"``, ``"random error"`` (approximate) or ``"nothing"``.
+        ``"response covariance"``, ``"random error"`` (approximate), ``"coloured residuals"`` or
+        ``"nothing"``.
     findings : tuple of Finding
     provenance : mapping
         Hash of the data, options, version of flightid, seed.
+    records : tuple of FittedRecord
+        In the time domain: measured and modelled outputs, initial states and biases.
+    noise_covariance : ndarray, shape (n_outputs, n_outputs), or None
+        R of the residuals, in the time domain.
 
     Example
     -------
@@ -215,14 +223,18 @@ class Fit:
     intervals_from: str
     findings: tuple[Finding, ...] = ()
     provenance: Mapping[str, object] = field(default_factory=dict)
+    records: tuple[FittedRecord, ...] = ()
+    noise_covariance: NDArray[np.float64] | None = None
 
     def __repr__(self) -> str:
         """Size and average cost on one line."""
         free = sum(p.status in ("free", "at bound") for p in self.parameters.values())
-        n = len(self.responses)
+        counts = {"response": len(self.responses), "record": len(self.records)}
+        seen = [f"{n} {word}{'' if n == 1 else 's'}" for word, n in counts.items() if n]
+        unit = "" if self.responses else " %"
         return (
             f"Fit({self.model.name!r}, {free} free of {len(self.parameters)} parameters, "
-            f"{n} response{'' if n == 1 else 's'}, average cost {self.average_cost:.2f})"
+            f"{', '.join(seen)}, average cost {self.average_cost:.2f}{unit})"
         )
 
     def summary(self) -> Table:
@@ -247,10 +259,15 @@ class Fit:
             low, high = p.interval95 if p.interval95 is not None else (None, None)
             bounds = (p.cramer_rao_percent, p.insensitivity_percent)
             rows.append((p.name, p.value, p.unit, low, high, *bounds, p.status))
-        costs = ", ".join(f"{name} {cost:.1f}" for name, cost in self.costs.items())
+        costs = ", ".join(f"{name} {cost:.3g}" for name, cost in self.costs.items())
+        meaning = (
+            "(guide: at most 100)"
+            if self.responses
+            else "% of the outputs' variance left unexplained"
+        )
         notes = (
-            *map(str, self.model.responses),
-            f"Average cost {self.average_cost:.1f} (guide: at most 100); {costs}.",
+            *map(str, self.model.responses if self.responses else ()),
+            f"Average cost {self.average_cost:.3g} {meaning}; {costs}.",
             f"Intervals from: {self.intervals_from}.",
             *map(str, self.findings),
         )
@@ -269,6 +286,10 @@ class Fit:
             "covariance": None if self.covariance is None else self.covariance.tolist(),
             "correlation": self.correlation.tolist(),
             "responses": {each.name: each.to_dict() for each in self.responses},
+            "records": [each.to_dict() for each in self.records],
+            "noise_covariance": (
+                None if self.noise_covariance is None else self.noise_covariance.tolist()
+            ),
             "minima": [
                 {
                     "objective": each.objective,

@@ -112,8 +112,11 @@ def judge_correlation(names: Sequence[str], correlation: NDArray[np.float64]) ->
     ]
 
 
-def judge_search(groups: Sequence[Sequence[End]]) -> list[Finding]:
-    """Verdicts on the iteration and on the minima that the starts found."""
+def judge_search(groups: Sequence[Sequence[End]], near: float | None = None) -> list[Finding]:
+    """Verdicts on the iteration and on the minima that the starts found.
+
+    Minima up to `near` are rivals of the best; default: within ten percent of its cost.
+    """
     best = groups[0][0]
     found = []
     if best.termination not in CONVERGED:
@@ -125,11 +128,8 @@ def judge_search(groups: Sequence[Sequence[End]]) -> list[Finding]:
                 "raise maximum_iterations, use more starts, or simplify the model",
             )
         )
-    rivals = [
-        group
-        for group in groups[1:]
-        if group[0].is_converged and group[0].cost <= _NEAR_COST * best.cost
-    ]
+    near = _NEAR_COST * best.cost if near is None else near
+    rivals = [group for group in groups[1:] if group[0].is_converged and group[0].cost <= near]
     if rivals:
         found.append(
             Finding(

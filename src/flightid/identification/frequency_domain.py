@@ -29,7 +29,7 @@ from flightid.identification.error_model import (
     whitening,
 )
 from flightid.identification.estimates import Statistics, statistics
-from flightid.identification.fit import Fit, FittedResponse, LocalMinimum
+from flightid.identification.fit import Fit, FittedResponse
 from flightid.identification.fit_findings import (
     judge_correlation,
     judge_cost,
@@ -38,7 +38,7 @@ from flightid.identification.fit_findings import (
     judge_search,
 )
 from flightid.identification.model_outputs import HOLDS
-from flightid.identification.multistart import End, cluster, collect, draw_starts
+from flightid.identification.multistart import DenseEnd, cluster, collect, draw_starts, local_minima
 from flightid.identification.selection import Bands, SelectedResponse, select_points
 from flightid.identification.setup_checks import check_setup
 from flightid.models import Model
@@ -125,7 +125,7 @@ def _select(model: Model, data: FrequencyResponse, options: Options) -> list[Sel
     )
 
 
-def _at(model: Model, end: End) -> Model:
+def _at(model: Model, end: DenseEnd) -> Model:
     names = (parameter.name for parameter in model.parameters.free)
     return model.with_values(dict(zip(names, map(float, end.x), strict=True)))
 
@@ -134,7 +134,7 @@ def _statistics(
     fitted: Model,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
-    end: End,
+    end: DenseEnd,
     options: Options,
 ) -> Statistics:
     sensitivity = _sensitivity(fitted, selected, errors, options)
@@ -200,24 +200,23 @@ def _minimise(
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     options: Options,
-) -> list[End]:
+) -> list[DenseEnd]:
     free = model.parameters.free
     measured = [
         (each.omega_rad_s, each.response, np.sqrt(each.weight_db), np.sqrt(each.weight_deg))
         for each in selected
     ]
-    return collect(
-        model.native.fit(
-            model.parameters.independent_values(),
-            model.parameters.free_indices,
-            measured,
-            whitening(errors) if options.cost == "likelihood" else [],
-            draw_starts(free, options.starts, options.seed),
-            np.array([parameter.minimum for parameter in free]),
-            np.array([parameter.maximum for parameter in free]),
-            options.maximum_iterations,
-        )
+    found = model.native.fit(
+        model.parameters.independent_values(),
+        model.parameters.free_indices,
+        measured,
+        whitening(errors) if options.cost == "likelihood" else [],
+        draw_starts(free, options.starts, options.seed),
+        np.array([parameter.minimum for parameter in free]),
+        np.array([parameter.maximum for parameter in free]),
+        options.maximum_iterations,
     )
+    return collect([each if isinstance(each, str) else DenseEnd.of_native(each) for each in found])
 
 
 def _sensitivity(
@@ -256,7 +255,7 @@ def _assemble(
     fitted: Model,
     options: Options,
     data: FrequencyResponse,
-    groups: Sequence[Sequence[End]],
+    groups: Sequence[Sequence[DenseEnd]],
     responses: tuple[FittedResponse, ...],
     found: Statistics,
     setup: list[Finding],
@@ -273,15 +272,7 @@ def _assemble(
         *judge_correlation(found.names, found.correlation),
         *judge_intervals(found.source),
     )
-    minima = tuple(
-        LocalMinimum(
-            group[0].cost,
-            len(group),
-            dict(zip(free, map(float, group[0].x), strict=True)),
-            group[0].termination,
-        )
-        for group in groups
-    )
+    minima = local_minima(groups, free)
     return Fit(
         model=fitted,
         parameters=found.parameters,

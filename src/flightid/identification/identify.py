@@ -1,17 +1,20 @@
-"""The verb: a model and data to a fit, by the kinds of both."""
+"""The verb: a model and data to a fit, by the kinds of both and a method."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
 from typing import Any, overload
 
-from flightid.errors import FitError
+from flightid.errors import FitError, OptionError
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain import Options, fit_responses
 from flightid.identification.narx_fit import NarxFit
 from flightid.identification.orthogonal_least_squares import fit_narx
+from flightid.identification.output_error import fit_output_error
 from flightid.identification.polynomial_fit import PolynomialFit
 from flightid.identification.prediction_error import fit_polynomial
+from flightid.identification.record_options import Freedom, InitialState, RecordOptions
 from flightid.identification.selection import Bands
 from flightid.models import Model, StateSpaceModel, TransferFunctionModel
 from flightid.models.narx import NarxModel
@@ -19,13 +22,92 @@ from flightid.models.polynomial_structure import PolynomialStructure
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 
-# Kind of model, kind of data -> the fit; a new kind adds its line.
-_FITS: dict[tuple[type, type], Callable[..., Any]] = {
-    (TransferFunctionModel, FrequencyResponse): fit_responses,
-    (StateSpaceModel, FrequencyResponse): fit_responses,
-    (NarxModel, Record): fit_narx,
-    (PolynomialStructure, Record): fit_polynomial,
+RESPONSES, RECORDS, BOTH = "responses", "records", "responses and records"
+
+
+@dataclass(frozen=True)
+class NoOptions:
+    """A method without options."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """One way to fit a kind of model to a kind of data.
+
+    Attributes
+    ----------
+    fit : callable
+        ``fit(model, data, options)``.
+    options : type
+        Dataclass of its options; `identify` refuses any other.
+    """
+
+    fit: Callable[..., Any]
+    options: type[Any]
+
+
+# Kind of model, kind of data, name of the method. The first method of a pair is its default; a new
+# method adds its lines.
+METHODS: dict[tuple[type, str, str], Method] = {
+    (TransferFunctionModel, RESPONSES, "frequency_domain"): Method(fit_responses, Options),
+    (StateSpaceModel, RESPONSES, "frequency_domain"): Method(fit_responses, Options),
+    (NarxModel, RECORDS, "orthogonal_least_squares"): Method(
+        lambda model, data, _: fit_narx(model, data), NoOptions
+    ),
+    (PolynomialStructure, RECORDS, "prediction_error"): Method(
+        lambda model, data, _: fit_polynomial(model, data), NoOptions
+    ),
+    (TransferFunctionModel, RECORDS, "output_error"): Method(fit_output_error, RecordOptions),
+    (StateSpaceModel, RECORDS, "output_error"): Method(fit_output_error, RecordOptions),
 }
+
+
+def kind_of(data: object) -> str:
+    """Kind of data: ``"responses"``, ``"records"``, ``"responses and records"``, or its type."""
+    items = data if isinstance(data, list | tuple) and data else (data,)
+    kinds = [
+        RESPONSES if isinstance(item, FrequencyResponse) else RECORDS
+        for item in items
+        if isinstance(item, FrequencyResponse | Record)
+    ]
+    if len(kinds) < len(items):
+        return type(data).__name__
+    return kinds[0] if len(set(kinds)) == 1 else BOTH
+
+
+def _method(model: object, data: object, name: str | None) -> Method:
+    kind = kind_of(data)
+    ways = {
+        way: method for (of, on, way), method in METHODS.items() if (of, on) == (type(model), kind)
+    }
+    if not ways:
+        raise FitError(
+            "there is no fit for this model and these data",
+            found=f"{type(model).__name__} and {type(data).__name__}",
+            needed="TransferFunctionModel or StateSpaceModel and FrequencyResponse or Record, "
+            "or NarxModel or PolynomialStructure and Record",
+        )
+    if name is None:
+        return next(iter(ways.values()))
+    if name not in ways:
+        raise OptionError(
+            f"method is not known for a {type(model).__name__} and {kind}",
+            found=repr(name),
+            needed=" or ".join(map(repr, ways)),
+        )
+    return ways[name]
+
+
+def _options(method: Method, given: dict[str, Any]) -> object:
+    known = [each.name for each in fields(method.options)]
+    for name in given:
+        if name not in known:
+            raise OptionError(
+                "this fit has no such option",
+                found=name,
+                needed=", ".join(known) or "none",
+            )
+    return method.options(**given)
 
 
 @overload
@@ -41,6 +123,7 @@ def identify(
     model: Model,
     data: FrequencyResponse,
     *,
+    method: str | None = ...,
     starts: int = ...,
     seed: int = ...,
     omega_rad_s: Bands = ...,
@@ -55,70 +138,98 @@ def identify(
 ) -> Fit: ...
 
 
+@overload
+def identify(
+    model: Model,
+    data: Record | Sequence[Record],
+    *,
+    method: str | None = ...,
+    starts: int = ...,
+    seed: int = ...,
+    initial_state: InitialState = ...,
+    free_bias: Freedom = ...,
+    free_reference: Freedom = ...,
+    noise_covariance: str = ...,
+    loss: str = ...,
+    loss_limit: float = ...,
+    hold: str = ...,
+    start_from: str = ...,
+    maximum_iterations: int = ...,
+) -> Fit: ...
+
+
 def identify(
     model: Model | NarxModel | PolynomialStructure,
     data: FrequencyResponse | Record | Sequence[Record],
     *,
-    starts: int = 1,
-    seed: int = 0,
-    omega_rad_s: Bands = None,
-    n_omega: int = 20,
-    minimum_coherence: float | None = 0.6,
-    weight_gain: float = 1.0,
-    weight_phase: float = 0.01745,
-    cost: str = "coherence",
-    maximum_iterations: int = 200,
-    correct_bias: bool = True,
-    hold: str = "band_limited",
+    method: str | None = None,
+    **options: Any,
 ) -> Fit | NarxFit | PolynomialFit:
     """Fit the free parameters of a model to data.
 
-    A `NarxModel` is fitted to one record or several by orthogonal least squares, a polynomial
-    structure (`PolynomialModel.arx` … `.general`) by prediction errors; their options are their
-    own and none below applies. For transfer functions each response is fitted at `n_omega` of
-    its measured frequencies, log-spaced over its band. The cost of one response is (20/n) Σ W_γ
-    [W_g (Δ dB)² + W_p (Δ degrees)²] with W_γ = [1.58 (1 − exp(−γ²))]².
+    By the kinds of model and data, the default first:
+
+    - model on a frequency response: ``"frequency_domain"``. Each response is fitted at `n_omega` of
+      its measured frequencies, log-spaced over its band. The cost of one response is (20/n) Σ W_γ
+      [W_g (Δ dB)² + W_p (Δ degrees)²] with W_γ = [1.58 (1 − exp(−γ²))]².
+    - model on records: ``"output_error"``. The model runs free through all records and its
+      parameters, with initial states and biases of each record, maximise the likelihood of
+      measured minus model: ½ Σ vᵀR⁻¹v + (N/2) ln det R with estimated noise covariance R.
+    - `NarxModel` on records: orthogonal least squares; polynomial structure
+      (`PolynomialModel.arx` … `.general`) on records: prediction errors. Options are the model's.
 
     Parameters
     ----------
     model : TransferFunctionModel, StateSpaceModel, NarxModel or PolynomialStructure
-        Structure, start values and bounds; every response in it is fitted.
+        Structure, start values and bounds; everything in it is fitted.
     data : FrequencyResponse, or Record or sequence of Record
-        Measured responses, or for a `NarxModel` records, with the model's channels, in the model's
-        units.
+        Measured, with the model's channels, in the model's units.
+    method : str, optional
+        See above.
     starts : int
         Number of starts: the model's own values, then a Latin hypercube inside the bounds.
     seed : int
         Seed of the hypercube.
-    omega_rad_s : tuple of float, or mapping of str to tuple, optional
-        Band (low, high), rad/s, of all responses or by name ``"output/input"``; default: for each
-        response its widest band with `minimum_coherence`.
-    n_omega : int
-        Frequencies of each response.
-    minimum_coherence : float or None
-        Points with less coherence γ² are left out; None takes all.
-    weight_gain, weight_phase : float
-        Weights W_g of a squared dB and W_p of a squared degree.
-    cost : str
-        ``"coherence"``: the cost above. ``"likelihood"``: generalised least squares on the complex
-        response with the covariance of its errors; smaller intervals, less tolerant of a model
-        that is too simple.
     maximum_iterations : int
         Most steps of each start.
+    hold : str
+        What inputs do between samples. Records: "first" (straight lines, default) or "zero"
+        (steps), as for `flightid.simulate`. Responses, for the correction of bias:
+        "band_limited" (default: smooth, filtered before they were sampled), "first" or "zero".
+        "zero" takes the output hold's half sample out of the model's delay.
+    omega_rad_s : tuple of float, or mapping of str to tuple, optional
+        Responses: band (low, high), rad/s, of all or by name ``"output/input"``; default: for each
+        response its widest band with `minimum_coherence`.
+    n_omega : int
+        Responses: frequencies of each.
+    minimum_coherence : float or None
+        Responses: points with less coherence γ² are left out; None takes all.
+    weight_gain, weight_phase : float
+        Responses: weights W_g of a squared dB and W_p of a squared degree.
+    cost : str
+        Responses: ``"coherence"``: the cost above. ``"likelihood"``: generalised least squares on
+        the complex response with the covariance of its errors; smaller intervals, less tolerant
+        of a model that is too simple.
     correct_bias : bool
-        Take out, in rounds of fit and correction, what windows or local polynomials add by leakage
-        and finite resolution: computed from the fitted model's outputs on the measured inputs.
-        Where that is impossible (a response from a file or from arithmetic, a model that diverges
-        on the records) a finding says so and the fit stays as it is.
-    hold : {"band_limited", "first", "zero"}
-        What the inputs do between their samples, for that correction: smooth (filtered before they
-        were sampled), straight lines, or steps. "zero" takes the output hold's half sample out of
-        the model's delay; the others leave it there.
+        Responses: take out, in rounds of fit and correction, what windows or local polynomials add
+        by leakage and finite resolution. Where that is impossible a finding says so.
+    initial_state : "free", "trim" or mapping
+        Records: state at the first sample of each, estimated or at the model's trim; or by state a
+        number or "free", the others at trim.
+    free_bias, free_reference : bool or sequence of str
+        Records: constants added to outputs (default: all) and to inputs (default: none) of each
+        record, estimated; True for all channels, or names.
+    noise_covariance : {"diagonal", "full"}
+        Records: whether the noise of different outputs may be correlated.
+    loss : {"gaussian", "huber"}, loss_limit : float
+        Records: "huber" counts residuals beyond `loss_limit` deviations less, for outliers.
+    start_from : {"model", "equation_error"}
+        Records: where the first start comes from.
 
     Returns
     -------
     Fit, NarxFit or PolynomialFit
-        Estimates with 95 % intervals that carry the errors of the response through the fit,
+        Estimates with 95 % intervals that carry the errors of the data through the fit,
         Cramér–Rao bounds and insensitivities, costs, correlations, findings.
 
     Raises
@@ -127,26 +238,32 @@ def identify(
         No free parameter; parameters that the data cannot tell apart; a fit that diverged from
         every start; a likelihood without known errors.
     DataError
-        A response without enough coherent points in its band.
+        A response without enough coherent points in its band; a record that is too short or holds
+        a channel that does not change.
     UnitError
         Data and model disagree on the unit of a channel.
     UnknownNameError
         A channel of the model is not in the data.
     OptionError
-        An option outside its range, or one that this kind of model does not have.
+        An option outside its range, or one that this kind of fit does not have.
 
     Assumes
     -------
-    A response whose only bias is its estimator's, and a model that can hold the vehicle: the
-    correction is computed from the model. Without the correction the bias of a windowed response
-    of one short sweep can equal its scatter, which no interval covers. Biased when a loop was
-    closed during the flight and the response was not estimated with the excitation as instrument.
-    Errors of different outputs are taken as independent.
+    Responses: a bias that is the estimator's alone, and a model that can hold the vehicle: the
+    correction is computed from the model. Biased when a loop was closed during the flight and the
+    response was not estimated with the excitation as instrument. Errors of different outputs are
+    taken as independent.
+    Records: noise on the outputs alone, stationary, and measured inputs without noise; intervals
+    allow for coloured noise. Biased in turbulence, which drives the states, and where a loop feeds
+    the noise back into the inputs. An unstable model must be stabilised by its data: keep records
+    short.
 
     Reference
     ---------
     Tischler & Remple, *Aircraft and Rotorcraft System Identification*, 2nd ed., eqs. 11.4, 11.5,
     12.24 to 12.28; intervals: Pintelon & Schoukens, *System Identification*, 2nd ed., §9.7.
+    Output error: Klein & Morelli, *Aircraft System Identification*, §6.1; its intervals: Morelli &
+    Klein (1997), J. Guidance 20(1), eqs. 19 to 25.
     NARX: Chen, Cowan & Grant, IEEE Trans. Neural Networks 2 (1991), section III.
 
     Example
@@ -161,29 +278,13 @@ def identify(
     >>> fit = fid.identify(fid.load_model("rate_first_order"), data)
     >>> round(fit.parameters["Lp"].value, 6), round(fit.parameters["Ltphi"].value, 6)
     (-6.0, 180.0)
+    >>> time_s = np.arange(500) * 0.02
+    >>> sweep = fid.Record.from_arrays(time_s, inputs={"tau_phi": 0.1 * np.sin(0.5 * time_s**2)})
+    >>> fit = fid.identify(fid.load_model("rate_first_order"), fid.simulate(
+    ...     truth, sweep, units={"p": "rad/s"}))
+    >>> round(fit.parameters["Lp"].value, 6), round(fit.parameters["Ltphi"].value, 6)
+    (-6.0, 180.0)
     """
-    options = Options(
-        starts=starts,
-        seed=seed,
-        omega_rad_s=omega_rad_s,
-        n_omega=n_omega,
-        minimum_coherence=minimum_coherence,
-        weight_gain=weight_gain,
-        weight_phase=weight_phase,
-        cost=cost,
-        maximum_iterations=maximum_iterations,
-        correct_bias=correct_bias,
-        hold=hold,
-    )
-    single = data[0] if isinstance(data, list | tuple) and data else data
-    fit = _FITS.get((type(model), type(single)))
-    if fit is None:
-        raise FitError(
-            "there is no fit for this model and these data",
-            found=f"{type(model).__name__} and {type(data).__name__}",
-            needed="TransferFunctionModel or StateSpaceModel and FrequencyResponse, "
-            "or NarxModel or PolynomialStructure and Record",
-            action="estimate a response with flightid.estimate_response",
-        )
-    result: Fit | NarxFit | PolynomialFit = fit(model, data, options)
+    chosen = _method(model, data, method)
+    result: Fit | NarxFit | PolynomialFit = chosen.fit(model, data, _options(chosen, options))
     return result

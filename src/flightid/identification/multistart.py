@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from flightid.errors import FitError, OptionError
+from flightid.identification.fit import LocalMinimum
 from flightid.models import Parameter
 
 Array = NDArray[np.float64]
@@ -24,12 +26,10 @@ _OPEN_FACTOR = 10.0
 
 @dataclass(frozen=True)
 class End:
-    """Where one start ended: values, cost, residuals, Jacobian, iterations, why."""
+    """Where one start ended: values, cost, iterations, why."""
 
     x: Array
     cost: float
-    residuals: Array
-    jacobian: Array
     iterations: int
     termination: str
 
@@ -37,6 +37,23 @@ class End:
     def is_converged(self) -> bool:
         """Whether it is a minimum to the tolerances."""
         return self.termination in CONVERGED
+
+
+@dataclass(frozen=True)
+class DenseEnd(End):
+    """An end with its residuals and Jacobian."""
+
+    residuals: Array
+    jacobian: Array
+
+    @classmethod
+    def of_native(cls, found: NativeEnd) -> DenseEnd:
+        """From the native half's order."""
+        x, cost, residuals, jacobian, iterations, termination = found
+        return cls(x, cost, iterations, termination, residuals, jacobian)
+
+
+E = TypeVar("E", bound=End)
 
 
 def draw_starts(free: Sequence[Parameter], starts: int, seed: int) -> Array:
@@ -92,16 +109,15 @@ def _spread(parameter: Parameter, share: Array) -> Array:
     return np.asarray(low + (high - low) * share)
 
 
-def collect(outcomes: Sequence[NativeEnd | str]) -> list[End]:
-    """Ends of the starts that ended, best first.
+def collect(outcomes: Sequence[E | str]) -> list[E]:
+    """Ends of the starts that ended, best first; a text is why a start did not.
 
     Raises
     ------
     FitError
         No start led anywhere.
     """
-    ends = [End(*outcome) for outcome in outcomes if not isinstance(outcome, str)]
-    ends = [end for end in ends if np.isfinite(end.cost)]
+    ends = [end for end in outcomes if not isinstance(end, str) and np.isfinite(end.cost)]
     if not ends:
         reasons = sorted({outcome for outcome in outcomes if isinstance(outcome, str)})
         raise FitError(
@@ -113,9 +129,9 @@ def collect(outcomes: Sequence[NativeEnd | str]) -> list[End]:
     return sorted(ends, key=lambda end: end.cost)
 
 
-def cluster(ends: Sequence[End]) -> list[list[End]]:
+def cluster(ends: Sequence[E]) -> list[list[E]]:
     """Group ends that are the same minimum, best group first."""
-    groups: list[list[End]] = []
+    groups: list[list[E]] = []
     for end in ends:
         for group in groups:
             if _same(group[0], end):
@@ -129,4 +145,17 @@ def cluster(ends: Sequence[End]) -> list[list[End]]:
 def _same(first: End, second: End) -> bool:
     scale = np.maximum(np.abs(first.x), np.abs(second.x))
     near = np.all(np.abs(first.x - second.x) <= _SAME_VALUE * np.maximum(scale, 1e-12))
-    return bool(near) and second.cost - first.cost <= _SAME_COST * (1.0 + first.cost)
+    return bool(near) and second.cost - first.cost <= _SAME_COST * (1.0 + abs(first.cost))
+
+
+def local_minima(groups: Sequence[Sequence[End]], names: Sequence[str]) -> tuple[LocalMinimum, ...]:
+    """What a fit reports of its groups of ends."""
+    return tuple(
+        LocalMinimum(
+            group[0].cost,
+            len(group),
+            dict(zip(names, map(float, group[0].x), strict=True)),
+            group[0].termination,
+        )
+        for group in groups
+    )

@@ -15,7 +15,6 @@ from flightid import _native
 from flightid.conventions import Light
 from flightid.errors import DataError, FitError, OptionError, SingularError
 from flightid.findings import Finding
-from flightid.identification.frequency_domain import Options
 from flightid.identification.narx_fit import ChosenTerm, NarxFit
 from flightid.models.narx import NarxEquation, NarxModel, Scaling
 from flightid.models.narx_terms import Term, product_term
@@ -27,16 +26,11 @@ MAXIMUM_CANDIDATES = 50_000
 MAXIMUM_BYTES = 1 << 30
 
 
-def fit_narx(model: NarxModel, data: Record | Sequence[Record], options: Options) -> NarxFit:
+def fit_narx(model: NarxModel, data: Record | Sequence[Record]) -> NarxFit:
     """Choose terms by error reduction and fit them; the linear model of the same lags beside it.
 
     Reference: Chen, Cowan & Grant, IEEE Trans. Neural Networks 2 (1991), section III.
     """
-    if options != Options():
-        raise OptionError(
-            "a NARX model takes no options of a frequency-domain fit",
-            action="set stop, goal, kernel and the others on the NarxModel",
-        )
     records = [data] if isinstance(data, Record) else list(data)
     scaling = _scaling(model, records)
     regressors, target = _regressors(model, scaling, records)

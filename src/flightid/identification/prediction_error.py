@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
-from flightid.errors import DataError, FitError, OptionError
+from flightid.errors import DataError, FitError
 from flightid.identification.fit import FittedParameter, LocalMinimum
-from flightid.identification.frequency_domain import Options
 from flightid.identification.information_criteria import criteria
 from flightid.identification.instrumental_variables import four_stage
 from flightid.identification.kernel_regression import kernel_estimate
@@ -51,17 +50,12 @@ class _Found:
 
 
 def fit_polynomial(
-    structure: PolynomialStructure, data: Record | Sequence[Record], options: Options
+    structure: PolynomialStructure, data: Record | Sequence[Record]
 ) -> PolynomialFit:
     """Fit a polynomial structure to records; the structure holds all options.
 
     Reference: Ljung, *System Identification*, 2nd ed., sections 10.2, 10.3, 9.4 and 15.3.
     """
-    if options != Options():
-        raise OptionError(
-            "a polynomial model takes no options of a frequency-domain fit",
-            action="set initial, offsets, starts and the others on the structure",
-        )
     records = (data,) if isinstance(data, Record) else tuple(data)
     channels = gather_channels(records, structure.output, structure.inputs, structure.offsets)
     channels.require_change()

@@ -123,7 +123,8 @@ class TransferFunctionModel(Adjustable):
         self._check()
         texts = [(r.gain, list(r.numerator), list(r.denominator), r.delay) for r in self.responses]
         names = [parameter.name for parameter in self.parameters.independent]
-        compiled = _native.TransferFunctions(texts, names, self.parameters.definitions)
+        pairs = list(zip(*self._places(), strict=True))
+        compiled = _native.TransferFunctions(texts, names, self.parameters.definitions, pairs)
         object.__setattr__(self, "native", compiled)
 
     def _check(self) -> None:

@@ -1,0 +1,369 @@
+//! Maximum-likelihood output error over many records. (Python side: identification/output_error.py)
+//!
+//! Minimises ½ Σ vᵀR⁻¹v + (N/2) ln det R over parameters θ that all records share and, for each
+//! record, initial states, input shifts and output biases. Each record's own numbers are eliminated
+//! from its normal equations before the records meet (the arrow of many records), so the search sees
+//! θ alone. R and robust weights are taken anew at every point of linearisation: by the concavity of
+//! the logarithm a step that lowers the sum of squares for these weights lowers the likelihood too.
+//!
+//! Reference: Klein & Morelli, *Aircraft System Identification*, §6.1; Jategaonkar, *Flight Vehicle
+//! System Identification*, 2nd ed., §4.6 to 4.10; Golub & Pereyra (1973) for the elimination; Huber
+//! (1981), *Robust Statistics*, §7.8, for the robust weights.
+
+use rayon::prelude::*;
+
+use crate::error::CoreError;
+use crate::gram::triangle;
+use crate::least_squares::{Objective, Options, Point, Termination};
+use crate::levenberg_marquardt::search;
+use crate::output_error_weights::{Moments, Noise, Weights};
+use crate::record_pass::{RecordPass, Task};
+
+/// Which derivatives a run must give beside the outputs.
+#[derive(Debug, Clone, Copy)]
+pub struct Wanted<'a> {
+    /// By every free parameter.
+    pub theta: bool,
+    /// By these entries of the initial state.
+    pub initial: &'a [usize],
+    /// By the shifts of these inputs.
+    pub shift: &'a [usize],
+}
+
+/// Columns of one row of a run are a multiple of this; those beyond `Wanted::columns` are zero.
+pub const LANES: usize = 4;
+
+impl Wanted<'_> {
+    /// Columns in use: the output, then its derivatives by θ, initial state and shifts.
+    pub fn columns(&self, n_theta: usize) -> usize {
+        1 + if self.theta { n_theta } else { 0 } + self.initial.len() + self.shift.len()
+    }
+
+    /// Length of a row.
+    pub fn stride(&self, n_theta: usize) -> usize {
+        self.columns(n_theta).next_multiple_of(LANES)
+    }
+}
+
+/// One model on all records, linear or not.
+pub trait Trajectories: Sync {
+    /// What all records share at one θ, for example matrices.
+    type Shared: Send + Sync;
+
+    /// Number of outputs.
+    fn n_outputs(&self) -> usize;
+    /// Number of free parameters θ.
+    fn n_parameters(&self) -> usize;
+    /// Length of the vector of input shifts.
+    fn n_shifts(&self) -> usize;
+    /// Samples of each record.
+    fn record_lengths(&self) -> &[usize];
+    /// Length of the initial state of a record.
+    fn n_initial(&self, record: usize) -> usize;
+    /// Whether outputs are affine in initial state and shifts.
+    fn is_affine(&self) -> bool;
+    /// Prepare a θ for all records, with derivatives if asked.
+    ///
+    /// # Errors
+    /// Where the model has no value at θ.
+    fn share(&self, theta: &[f64], with_slopes: bool) -> Result<Self::Shared, CoreError>;
+    /// Run one record and hand its rows, block by block, to `sink`: first sample of the block, then
+    /// the rows (sample, then output; `Wanted::stride` columns), which the sink may overwrite.
+    /// `scratch` is reused from call to call.
+    ///
+    /// # Errors
+    /// Where the run has no value. Values that are not finite may be handed on as they are.
+    #[allow(clippy::too_many_arguments)]
+    fn run(
+        &self,
+        shared: &Self::Shared,
+        record: usize,
+        initial: &[f64],
+        shift: &[f64],
+        wanted: &Wanted<'_>,
+        scratch: &mut Vec<f64>,
+        sink: &mut dyn FnMut(usize, &mut [f64]),
+    ) -> Result<(), CoreError>;
+}
+
+/// One record's measurements, the start of its own numbers, and which of them are free.
+#[derive(Debug, Clone, Default)]
+pub struct RecordData {
+    /// Measured outputs, sample by sample (n_samples × n_outputs).
+    pub measured: Vec<f64>,
+    /// Initial state.
+    pub initial: Vec<f64>,
+    /// Added to each input.
+    pub shift: Vec<f64>,
+    /// Added to each output.
+    pub bias: Vec<f64>,
+    /// Entries of the initial state that are free.
+    pub free_initial: Vec<usize>,
+    /// Inputs whose shift is free.
+    pub free_shift: Vec<usize>,
+    /// Outputs whose bias is free.
+    pub free_bias: Vec<usize>,
+}
+
+impl RecordData {
+    /// Numbers of this record that are free.
+    pub fn n_free(&self) -> usize {
+        self.free_initial.len() + self.free_shift.len() + self.free_bias.len()
+    }
+
+    /// The values of the free numbers: initial states, shifts, biases.
+    pub fn free_values(&self) -> Vec<f64> {
+        let parts = [
+            (&self.free_initial, &self.initial),
+            (&self.free_shift, &self.shift),
+            (&self.free_bias, &self.bias),
+        ];
+        parts.iter().flat_map(|(places, from)| places.iter().map(|&k| from[k])).collect()
+    }
+
+    /// Initial state, shifts and biases with these values of the free numbers.
+    pub fn moved(&self, values: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+        let (mut initial, mut shift, mut bias) =
+            (self.initial.clone(), self.shift.clone(), self.bias.clone());
+        let mut values = values.iter();
+        let mut place = |places: &[usize], into: &mut [f64]| {
+            for (&k, &value) in places.iter().zip(values.by_ref()) {
+                into[k] = value;
+            }
+        };
+        place(&self.free_initial, &mut initial);
+        place(&self.free_shift, &mut shift);
+        place(&self.free_bias, &mut bias);
+        (initial, shift, bias)
+    }
+}
+
+/// Where a fit ended.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// Parameters θ.
+    pub theta: Vec<f64>,
+    /// ½ Σ vᵀR⁻¹v + (N/2) ln det R.
+    pub objective: f64,
+    /// R, n_outputs × n_outputs.
+    pub noise: Vec<f64>,
+    /// Free numbers of each record: initial states, shifts, biases.
+    pub own: Vec<Vec<f64>>,
+    /// Whether the record tells that number apart from the others.
+    pub determined: Vec<Vec<bool>>,
+    /// Steps tried.
+    pub iterations: usize,
+    /// Why it ended.
+    pub termination: Termination,
+}
+
+/// The fit as an objective of θ alone.
+pub struct OutputError<'a, T: Trajectories> {
+    trajectories: &'a T,
+    data: &'a [RecordData],
+    weights: Weights,
+    passes: Vec<RecordPass>,
+    /// θ of the last linearisation.
+    theta: Vec<f64>,
+    /// Calls of `cost` since then.
+    tried: usize,
+    moments: Option<Moments>,
+}
+
+impl<'a, T: Trajectories> OutputError<'a, T> {
+    /// Take a model, the records and what is assumed of the noise.
+    ///
+    /// # Errors
+    /// `Shape` where records and model do not belong together.
+    pub fn new(
+        trajectories: &'a T,
+        data: &'a [RecordData],
+        noise: &Noise,
+    ) -> Result<Self, CoreError> {
+        let lengths = trajectories.record_lengths();
+        let (p, shifts) = (trajectories.n_outputs(), trajectories.n_shifts());
+        same("records", data.len(), lengths.len())?;
+        for (record, (each, &n)) in data.iter().zip(lengths).enumerate() {
+            let states = trajectories.n_initial(record);
+            same("measured values", each.measured.len(), n * p)?;
+            same("initial state", each.initial.len(), states)?;
+            same("input shifts", each.shift.len(), shifts)?;
+            same("output biases", each.bias.len(), p)?;
+            let limits =
+                [(&each.free_initial, states), (&each.free_shift, shifts), (&each.free_bias, p)];
+            for (places, needed) in limits {
+                if let Some(&found) = places.iter().find(|&&k| k >= needed) {
+                    return Err(CoreError::Shape { what: "index of a free number", found, needed });
+                }
+            }
+        }
+        let weights = Weights::new(noise, data, p)?;
+        let passes = data.iter().map(RecordPass::new).collect();
+        let theta = Vec::new();
+        Ok(Self { trajectories, data, weights, passes, theta, tried: 0, moments: None })
+    }
+
+    /// Run a task on every record, in parallel, the answers in the order of the records.
+    fn all<R: Send>(
+        &mut self,
+        work: impl Fn(&T, &RecordData, usize, &mut RecordPass) -> Result<R, CoreError> + Sync,
+    ) -> Result<Vec<R>, CoreError> {
+        let (trajectories, data) = (self.trajectories, self.data);
+        let one = |(k, pass): (usize, &mut RecordPass)| work(trajectories, &data[k], k, pass);
+        if self.passes.len() == 1 {
+            return self.passes.iter_mut().enumerate().map(one).collect();
+        }
+        self.passes.par_iter_mut().enumerate().map(one).collect()
+    }
+
+    fn take_moments(&mut self, theta: &[f64]) -> Result<Moments, CoreError> {
+        let shared = self.trajectories.share(theta, false)?;
+        let weights = self.weights.clone();
+        let found = self.all(|trajectories, data, k, pass| {
+            let task = Task { trajectories, shared: &shared, data, record: k, weights: &weights };
+            pass.moments(&task)
+        })?;
+        Ok(Moments::total(found))
+    }
+
+    /// Free numbers of the records, before the elimination of the last linearisation.
+    pub fn own(&self) -> Vec<Vec<f64>> {
+        self.passes.iter().map(|pass| pass.own.clone()).collect()
+    }
+
+    fn estimate(
+        mut self,
+        theta: Vec<f64>,
+        iterations: usize,
+        termination: Termination,
+    ) -> Result<Estimate, CoreError> {
+        // What the last linearisation left for the records' own numbers.
+        if self.trajectories.is_affine() {
+            let still = vec![0.0; theta.len()];
+            self.passes.iter_mut().for_each(|pass| pass.follow(&still, 1.0));
+            self.passes.iter_mut().for_each(RecordPass::accept);
+        }
+        let moments = self.take_moments(&theta)?;
+        self.weights.update(&moments)?;
+        let moments = self.take_moments(&theta)?;
+        Ok(Estimate {
+            theta,
+            objective: self.weights.objective(&moments),
+            noise: self.weights.covariance(),
+            own: self.own(),
+            determined: self.passes.iter().map(|pass| pass.elimination.kept.clone()).collect(),
+            iterations,
+            termination,
+        })
+    }
+}
+
+impl<T: Trajectories> Objective for OutputError<'_, T> {
+    fn n_parameters(&self) -> usize {
+        self.trajectories.n_parameters()
+    }
+
+    fn begin(&mut self, x: &[f64]) -> Result<(), CoreError> {
+        for _ in 0..2 {
+            // From the start values of the records' own numbers to their best at this θ.
+            let moments = self.take_moments(x)?;
+            if !moments.is_finite() {
+                return Err(CoreError::NotFinite {
+                    what: "the model's outputs at the start",
+                    index: 0,
+                });
+            }
+            self.weights.update(&moments)?;
+            if !self.trajectories.is_affine() {
+                break;
+            }
+            self.cost(x)?;
+            self.passes.iter_mut().for_each(RecordPass::accept);
+        }
+        Ok(())
+    }
+
+    fn cost(&mut self, x: &[f64]) -> Result<f64, CoreError> {
+        let shared = self.trajectories.share(x, false)?;
+        let change: Vec<f64> = match self.theta.len() {
+            0 => vec![0.0; x.len()],
+            _ => x.iter().zip(&self.theta).map(|(new, old)| new - old).collect(),
+        };
+        // Where damping of θ alone cannot tame the records' own numbers, their step shrinks as well.
+        let share = 0.5_f64.powi(self.tried as i32);
+        let affine = self.trajectories.is_affine();
+        let share = if affine { 1.0 } else { share };
+        self.tried += 1;
+        let weights = self.weights.clone();
+        let found = self.all(|trajectories, data, k, pass| {
+            pass.follow(&change, share);
+            let task = Task { trajectories, shared: &shared, data, record: k, weights: &weights };
+            if affine && data.n_free() > 0 {
+                pass.settle(&task).map(|cost| (cost, None))
+            } else {
+                pass.trial_moments(&task).map(|moments| (moments.cost, Some(moments)))
+            }
+        })?;
+        let cost = found.iter().map(|(cost, _)| cost).sum();
+        let moments: Option<Vec<Moments>> = found.into_iter().map(|(_, each)| each).collect();
+        self.moments = moments.map(Moments::total);
+        Ok(cost)
+    }
+
+    fn linearise(&mut self, x: &[f64], point: &mut Point) -> Result<(), CoreError> {
+        self.passes.iter_mut().for_each(RecordPass::accept);
+        self.tried = 0;
+        self.theta = x.to_vec();
+        let moments = match self.moments.take() {
+            Some(moments) => moments,
+            None => self.take_moments(x)?,
+        };
+        self.weights.update(&moments)?;
+        let shared = self.trajectories.share(x, true)?;
+        let weights = self.weights.clone();
+        let found = self.all(|trajectories, data, k, pass| {
+            let task = Task { trajectories, shared: &shared, data, record: k, weights: &weights };
+            pass.linearise(&task)
+        })?;
+        let n = x.len();
+        let mut gram = vec![0.0; (n + 1) * (n + 1)];
+        (point.beside, point.cost) = (0.0, 0.0);
+        for each in &found {
+            point.beside += each.beside;
+            point.cost += each.cost;
+            gram.iter_mut().zip(&each.rest).for_each(|(sum, part)| *sum += part);
+        }
+        if !gram.iter().all(|value| value.is_finite()) {
+            return Err(CoreError::NotFinite { what: "the derivatives of the outputs", index: 0 });
+        }
+        triangle(&gram, n, &mut point.triangle, &mut point.projected);
+        Ok(())
+    }
+}
+
+/// Fit from several starts, in parallel, until `stop` says true; the answers keep the order of the
+/// starts. One start runs on the calling thread.
+pub fn fit_from<T: Trajectories>(
+    trajectories: &T,
+    data: &[RecordData],
+    noise: &Noise,
+    starts: &[Vec<f64>],
+    bounds: (&[f64], &[f64]),
+    options: &Options,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Vec<Result<Estimate, CoreError>> {
+    let one = |start: &Vec<f64>| {
+        let mut fit = OutputError::new(trajectories, data, noise)?;
+        let proceed = &mut |_: &_| !stop();
+        let found = search(&mut fit, start, bounds.0, bounds.1, options, proceed)?;
+        fit.estimate(found.x, found.iterations, found.termination)
+    };
+    match starts {
+        [only] => vec![one(only)],
+        _ => starts.par_iter().map(one).collect(),
+    }
+}
+
+fn same(what: &'static str, found: usize, needed: usize) -> Result<(), CoreError> {
+    if found == needed { Ok(()) } else { Err(CoreError::Shape { what, found, needed }) }
+}

@@ -1,0 +1,207 @@
+//! Face of `flightid_core::output_error` for every kind of model. (Python side:
+//! identification/output_error.py)
+
+use flightid_core::CoreError;
+use flightid_core::least_squares::Options;
+use flightid_core::linear_output_error::{Driven, LinearFamily, LinearTrajectories};
+use flightid_core::linear_simulation::Hold;
+use flightid_core::output_error::{Estimate, RecordData, Trajectories, Wanted, fit_from};
+use flightid_core::output_error_weights::Noise;
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+};
+use pyo3::prelude::*;
+
+use crate::error::from_core;
+use crate::interrupt;
+
+/// Inputs and outputs (channels × samples) and sample time of one record.
+pub type Flown<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>, f64);
+/// Initial state, input shifts, output biases of one record, and which entries of each are free.
+pub type Own<'py> = (
+    PyReadonlyArray1<'py, f64>,
+    PyReadonlyArray1<'py, f64>,
+    PyReadonlyArray1<'py, f64>,
+    Vec<usize>,
+    Vec<usize>,
+    Vec<usize>,
+);
+/// Rows are starts; lower and upper bounds; most steps.
+pub type SearchArguments<'py> =
+    (PyReadonlyArray2<'py, f64>, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>, usize);
+/// Full covariance, limit of the loss, share of Gaussian variance within it.
+pub type NoiseArguments = (bool, f64, f64);
+/// θ, objective, noise covariance, own numbers, which are determined, iterations, termination.
+type Ending<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    f64,
+    Bound<'py, PyArray2<f64>>,
+    Vec<Bound<'py, PyArray1<f64>>>,
+    Vec<Vec<bool>>,
+    usize,
+    &'static str,
+);
+
+/// Inputs of the records, copied out of NumPy.
+///
+/// # Errors
+/// For arrays that are not contiguous.
+pub fn driven(records: &[Flown<'_>]) -> PyResult<Vec<Driven>> {
+    records
+        .iter()
+        .map(|(inputs, outputs, sample_s)| {
+            let n_samples = outputs.as_array().ncols();
+            Ok(Driven { inputs: inputs.as_slice()?.to_vec(), n_samples, sample_s: *sample_s })
+        })
+        .collect()
+}
+
+/// Hold by its name's meaning.
+pub fn hold(first_order: bool) -> Hold {
+    if first_order { Hold::First } else { Hold::Zero }
+}
+
+/// A linear family on records.
+///
+/// # Errors
+/// Where records and family do not fit.
+pub fn linear<F: LinearFamily>(
+    family: Result<F, CoreError>,
+    records: &[Flown<'_>],
+    first_order: bool,
+) -> PyResult<LinearTrajectories<F>> {
+    let family = family.map_err(from_core)?;
+    LinearTrajectories::new(family, driven(records)?, hold(first_order)).map_err(from_core)
+}
+
+/// Measurements and own numbers of the records.
+///
+/// # Errors
+/// For arrays that are not contiguous.
+pub fn record_data(records: &[Flown<'_>], own: Vec<Own<'_>>) -> PyResult<Vec<RecordData>> {
+    records
+        .iter()
+        .zip(own)
+        .map(|((_, outputs, _), (initial, shift, bias, free_initial, free_shift, free_bias))| {
+            Ok(RecordData {
+                measured: outputs.as_array().t().iter().copied().collect(),
+                initial: initial.as_slice()?.to_vec(),
+                shift: shift.as_slice()?.to_vec(),
+                bias: bias.as_slice()?.to_vec(),
+                free_initial,
+                free_shift,
+                free_bias,
+            })
+        })
+        .collect()
+}
+
+/// Fit from each start, or the words of the error that stopped it.
+///
+/// # Errors
+/// Where records and model do not belong together, or the user interrupts.
+pub fn fit<'py, T: Trajectories>(
+    py: Python<'py>,
+    trajectories: &T,
+    data: &[RecordData],
+    noise: NoiseArguments,
+    search: SearchArguments<'py>,
+) -> PyResult<Vec<Bound<'py, PyAny>>> {
+    let (starts, lower, upper, maximum_iterations) = search;
+    let width = trajectories.n_parameters().max(1);
+    let starts: Vec<_> = starts.as_slice()?.chunks_exact(width).map(<[f64]>::to_vec).collect();
+    let (lower, upper) = (lower.as_slice()?, upper.as_slice()?);
+    let (full, limit, consistency) = noise;
+    let noise = Noise { full, limit, consistency };
+    let options = Options {
+        maximum_iterations,
+        gradient_tolerance: 1e-8,
+        step_tolerance: 1e-10,
+        cost_tolerance: 1e-14,
+    };
+    let work = |stop: interrupt::Stop<'_>| {
+        fit_from(trajectories, data, &noise, &starts, (lower, upper), &options, stop)
+    };
+    let found = if starts.len() == 1 && data.len() == 1 {
+        interrupt::run_here(py, work)?
+    } else {
+        interrupt::run_beside(py, work)?
+    };
+    let p = trajectories.n_outputs();
+    found.into_iter().map(|each| outcome(py, each, p)).collect()
+}
+
+fn outcome<'py>(
+    py: Python<'py>,
+    found: Result<Estimate, CoreError>,
+    p: usize,
+) -> PyResult<Bound<'py, PyAny>> {
+    match found {
+        Ok(found) => {
+            let values: Ending<'py> = (
+                found.theta.into_pyarray(py),
+                found.objective,
+                found.noise.into_pyarray(py).reshape([p, p])?,
+                found.own.into_iter().map(|own| own.into_pyarray(py)).collect(),
+                found.determined,
+                found.iterations,
+                found.termination.name(),
+            );
+            Ok(values.into_pyobject(py)?.into_any())
+        }
+        // A wrong shape is the caller's fault; anything else belongs to this start alone.
+        Err(error @ (CoreError::Shape { .. } | CoreError::Range { .. })) => Err(from_core(error)),
+        Err(error) => Ok(error.to_string().into_pyobject(py)?.into_any()),
+    }
+}
+
+/// Outputs (n_outputs × n_samples) of one record without bias, and their derivatives by θ, free
+/// initial states and free shifts (n_outputs × n_samples × columns).
+///
+/// # Errors
+/// Where the model has no run at θ.
+#[allow(clippy::type_complexity)]
+pub fn run<'py, T: Trajectories>(
+    py: Python<'py>,
+    trajectories: &T,
+    data: &[RecordData],
+    record: usize,
+    theta: &[f64],
+    with_slopes: bool,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
+    let Some(own) = data.get(record) else {
+        let error = CoreError::Shape { what: "records", found: data.len(), needed: record + 1 };
+        return Err(from_core(error));
+    };
+    let (p, n) = (trajectories.n_outputs(), trajectories.record_lengths()[record]);
+    let none: &[usize] = &[];
+    let wanted = Wanted {
+        theta: with_slopes,
+        initial: if with_slopes { &own.free_initial } else { none },
+        shift: if with_slopes { &own.free_shift } else { none },
+    };
+    let columns = wanted.columns(trajectories.n_parameters()) - 1;
+    let stride = wanted.stride(trajectories.n_parameters());
+    let mut outputs = vec![0.0; p * n];
+    let mut slopes = vec![0.0; p * n * columns];
+    let mut sink = |first: usize, rows: &mut [f64]| {
+        for (place, row) in rows.chunks_exact(stride).enumerate() {
+            let (k, o) = (first + place / p, place % p);
+            outputs[o * n + k] = row[0];
+            let start = (o * n + k) * columns;
+            slopes[start..start + columns].copy_from_slice(&row[1..1 + columns]);
+        }
+    };
+    trajectories
+        .share(theta, with_slopes)
+        .and_then(|shared| {
+            let (initial, shift) = (&own.initial, &own.shift);
+            let scratch = &mut Vec::new();
+            trajectories.run(&shared, record, initial, shift, &wanted, scratch, &mut sink)
+        })
+        .map_err(from_core)?;
+    Ok((
+        outputs.into_pyarray(py).reshape([p, n])?,
+        slopes.into_pyarray(py).reshape([p, n, columns])?,
+    ))
+}

@@ -1,0 +1,199 @@
+"""Output error: maximum likelihood of records in the time domain (native: `output_error.rs`).
+
+The model runs free through every record. Minimised is ½ Σ vᵀR⁻¹v + (N/2) ln det R of measured minus
+model v, over the model's parameters and each record's initial state, biases and reference shifts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.findings import Finding
+from flightid.identification.fit import Fit
+from flightid.identification.fit_findings import (
+    judge_correlation,
+    judge_parameters,
+    judge_search,
+)
+from flightid.identification.fitted_record import FittedRecord
+from flightid.identification.multistart import End, cluster, collect, draw_starts, local_minima
+from flightid.identification.record_findings import judge_channels, judge_fit
+from flightid.identification.record_options import RecordOptions
+from flightid.identification.record_setup import OwnNumbers, RecordSet, prepare_records
+from flightid.identification.record_statistics import RecordStatistics, record_statistics
+from flightid.models import Model
+from flightid.record import Channel, Record, Step
+from flightid.version import VERSION
+
+Array = NDArray[np.float64]
+_NEAR = 0.5 * np.log(1.1)
+"""Log-likelihood of a sample whose residual variance is ten percent larger."""
+NativeEnd = tuple[Array, float, Array, list[Array], list[list[bool]], int, str]
+
+
+@dataclass(frozen=True)
+class RecordEnd(End):
+    """Where one start ended: also R, each record's own numbers and which are determined."""
+
+    noise: Array
+    own: list[Array]
+    determined: list[list[bool]]
+
+    @classmethod
+    def of_native(cls, found: NativeEnd) -> RecordEnd:
+        """From the native half's order."""
+        x, cost, noise, own, determined, iterations, termination = found
+        return cls(x, cost, iterations, termination, noise, own, determined)
+
+
+def fit_output_error(model: Model, data: Record | Sequence[Record], options: RecordOptions) -> Fit:
+    """Fit a model to records by output error; see `flightid.identify`."""
+    prepared = prepare_records(model, data, options)
+    setup = judge_channels(prepared)
+    groups = cluster(_minimise(prepared, options))
+    best = groups[0][0]
+    names = [parameter.name for parameter in model.parameters.free]
+    fitted = model.with_values(dict(zip(names, map(float, best.x), strict=True)))
+    own = [start.filled(end) for start, end in zip(prepared.own, best.own, strict=True)]
+    runs = [
+        _run(fitted, prepared, place, numbers, with_slopes=True)
+        for place, numbers in enumerate(own)
+    ]
+    found = record_statistics(
+        fitted, prepared, own, best.determined, runs, best.noise, options.limit
+    )
+    return _assemble(fitted, prepared, options, groups, runs, found, setup)
+
+
+def _minimise(prepared: RecordSet, options: RecordOptions) -> list[RecordEnd]:
+    model = prepared.model
+    free = model.parameters.free
+    found = model.native.fit_records(
+        model.parameters.independent_values(),
+        model.parameters.free_indices,
+        prepared.arrays,
+        [numbers.native for numbers in prepared.own],
+        prepared.first_order_hold,
+        (options.noise_covariance == "full", options.limit, options.consistency),
+        (
+            draw_starts(free, options.starts, options.seed),
+            np.array([parameter.minimum for parameter in free]),
+            np.array([parameter.maximum for parameter in free]),
+            options.maximum_iterations,
+        ),
+    )
+    return collect([each if isinstance(each, str) else RecordEnd.of_native(each) for each in found])
+
+
+def _run(
+    fitted: Model, prepared: RecordSet, place: int, own: OwnNumbers, *, with_slopes: bool
+) -> tuple[Array, Array]:
+    """Outputs with bias, and their derivatives by θ, initial states, shifts and biases."""
+    outputs, slopes = fitted.native.run_record(
+        fitted.parameters.independent_values(),
+        fitted.parameters.free_indices,
+        prepared.arrays[place],
+        own.native,
+        prepared.first_order_hold,
+        with_slopes,
+    )
+    n_outputs, n_samples = outputs.shape
+    biases = np.zeros((n_outputs, n_samples, len(own.free_bias)))
+    for column, output in enumerate(own.free_bias):
+        biases[output, :, column] = 1.0
+    return outputs + own.bias[:, None], np.concatenate([slopes, biases], axis=2)
+
+
+def _fitted_records(
+    prepared: RecordSet,
+    runs: Sequence[tuple[Array, Array]],
+    found: RecordStatistics,
+) -> tuple[FittedRecord, ...]:
+    model = prepared.model
+    result = []
+    for place, record in enumerate(prepared.records):
+        outputs = runs[place][0] + prepared.offsets[place]
+        known = record.channels
+        channels = [known[name] for name in model.inputs]
+        channels += [
+            Channel(name, known[name].unit, known[name].role, "model") for name in model.outputs
+        ]
+        made = record.replace(
+            dict(zip(model.outputs, outputs, strict=True)),
+            channels=channels,
+            step=Step("identify", {"method": "output error"}),
+        )
+        result.append(FittedRecord(record, made, model.outputs, *found.own[place]))
+    return tuple(result)
+
+
+def _assemble(
+    fitted: Model,
+    prepared: RecordSet,
+    options: RecordOptions,
+    groups: Sequence[Sequence[RecordEnd]],
+    runs: Sequence[tuple[Array, Array]],
+    found: RecordStatistics,
+    setup: list[Finding],
+) -> Fit:
+    best = groups[0][0]
+    records = _fitted_records(replace(prepared, model=fitted), runs, found)
+    costs = _costs(records, fitted.outputs)
+    findings = (
+        *setup,
+        *judge_search(groups, best.cost + _NEAR * prepared.n_samples * len(fitted.outputs)),
+        *judge_parameters(found.parameters),
+        *judge_correlation(found.names, found.correlation),
+        *judge_fit(costs, found.inflation),
+    )
+    return Fit(
+        model=fitted,
+        parameters=found.parameters,
+        cost=sum(costs.values()),
+        average_cost=sum(costs.values()) / len(costs),
+        costs=costs,
+        names=found.names,
+        covariance=found.covariance,
+        correlation=found.correlation,
+        responses=(),
+        minima=local_minima(groups, [parameter.name for parameter in fitted.parameters.free]),
+        objective=best.cost,
+        termination=best.termination,
+        iterations=best.iterations,
+        intervals_from="coloured residuals",
+        findings=findings,
+        provenance=_provenance(prepared, options),
+        records=records,
+        noise_covariance=best.noise,
+    )
+
+
+def _costs(records: Sequence[FittedRecord], outputs: Sequence[str]) -> dict[str, float]:
+    """Percent of each output's variance, about the mean of each record, left in the residuals."""
+    result = {}
+    for name in outputs:
+        left = sum(float(np.sum(each.residual(name) ** 2)) for each in records)
+        spread = sum(
+            float(np.sum((each.measured[name] - np.mean(each.measured[name])) ** 2))
+            for each in records
+        )
+        result[name] = 100.0 * left / spread
+    return result
+
+
+def _provenance(prepared: RecordSet, options: RecordOptions) -> dict[str, object]:
+    digest = hashlib.sha256()
+    for inputs, outputs, sample_time_s in prepared.arrays:
+        digest.update(inputs.tobytes() + outputs.tobytes() + str(sample_time_s).encode())
+    return {
+        "method": "output error",
+        "flightid": VERSION,
+        "data_sha256": digest.hexdigest(),
+        "data_history": [[str(step) for step in record.history] for record in prepared.records],
+        "options": options.to_dict(),
+    }
