@@ -9,7 +9,7 @@
 //! each is a tap with its weights.
 
 use crate::error::CoreError;
-use crate::hold_integrals::{HoldIntegrals, Jet};
+use crate::hold_integrals::{HoldIntegrals, Jet, add_product};
 
 /// What an input does between its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -188,21 +188,7 @@ fn weights(
     let count = a.slopes.len();
     let before = late.transition.product(1.0, &early.constant, n);
     let before_ramp = late.transition.product(1.0, &early.ramp, n);
-    // By the delay the early piece grows and the late one shrinks.
-    let product = |x: &[f64], y: &[f64]| {
-        let mut result = vec![0.0; n * n];
-        crate::hold_integrals::add_product(&mut result, 1.0, x, y, n);
-        result
-    };
-    let shrink = product(&a.value, &late.transition.value);
-    let d_before = combine(&[
-        (-1.0, &product(&shrink, &early.constant.value)),
-        (1.0, &product(&late.transition.value, &early.transition.value)),
-    ]);
-    let d_ramp = combine(&[
-        (-1.0, &product(&shrink, &early.ramp.value)),
-        (1.0, &product(&late.transition.value, &early.constant.value)),
-    ]);
+    let (d_before, d_ramp) = by_delay(a, &early, late, n);
     let (late_1, late_2) = (&late.constant, &late.ramp);
     let (d_late_1, d_late_2) = (&late.transition.value, &late.constant.value);
     let s = 1.0 / sample_s;
@@ -248,6 +234,31 @@ fn weights(
         found.remove(0);
     }
     Ok(found)
+}
+
+/// Derivatives by the delay of what the early piece leaves after the late one: the early piece
+/// grows and the late one shrinks.
+fn by_delay(
+    a: &Jet,
+    early: &HoldIntegrals,
+    late: &HoldIntegrals,
+    n: usize,
+) -> (Vec<f64>, Vec<f64>) {
+    let product = |x: &[f64], y: &[f64]| {
+        let mut result = vec![0.0; n * n];
+        add_product(&mut result, 1.0, x, y, n);
+        result
+    };
+    let shrink = product(&a.value, &late.transition.value);
+    let before = combine(&[
+        (-1.0, &product(&shrink, &early.constant.value)),
+        (1.0, &product(&late.transition.value, &early.transition.value)),
+    ]);
+    let ramp = combine(&[
+        (-1.0, &product(&shrink, &early.ramp.value)),
+        (1.0, &product(&late.transition.value, &early.constant.value)),
+    ]);
+    (before, ramp)
 }
 
 fn weight(ahead: isize, state: Jet, by_delay: Vec<f64>, value: f64, slope: f64) -> Weight {

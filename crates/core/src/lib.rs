@@ -12,6 +12,7 @@ mod boundary_system;
 pub mod chirp;
 pub mod closed_loop;
 pub mod complex_lu;
+mod dense_problem;
 pub mod digital_filter;
 pub mod discretisation;
 pub mod dual;

@@ -186,6 +186,8 @@ def identify(
         Measured, with the model's channels, in the model's units.
     method : str, optional
         See above.
+    **options
+        The method's own, any of these:
     starts : int
         Number of starts: the model's own values, then a Latin hypercube inside the bounds.
     seed : int
