@@ -186,14 +186,15 @@ def _driven(modes: Modes, values: Array, sample_time_s: float, hold: str) -> Arr
     first = hold == "first"
     if not modes.backwards:
         return _run(modes, values, start, modes.delays_s, sample_time_s, first=first)
-    # From the end a delay is a lead: whole samples by a shift, less the part of one that is over.
-    lead = np.ceil(modes.delays_s / sample_time_s - 1e-9)
-    rest = np.maximum(lead * sample_time_s - modes.delays_s, 0.0)
+    # From the end a delay is a lead. The run starts so long after the record, whose last samples
+    # last on, that what is left of the lead is a delay again; it starts from a free state anyway.
+    extra = int(np.ceil(np.max(modes.delays_s, initial=0.0) / sample_time_s - 1e-9))
+    rest = np.maximum(extra * sample_time_s - modes.delays_s, 0.0)
+    turned = np.pad(values[:, ::-1], ((0, 0), (0, extra + 1)), mode="edge")
     # A step held after its sample is held before it when time runs backwards.
-    shift = lead.astype(np.intp) + (0 if first else 1)
-    places = np.arange(values.shape[1]) + shift[:, None]
-    turned = np.take_along_axis(values[:, ::-1], np.minimum(places, values.shape[1] - 1), axis=1)
-    return _run(modes, turned, start, rest, sample_time_s, first=first)[:, ::-1]
+    turned = turned[:, :-1] if first else turned[:, 1:]
+    found = _run(modes, turned, start, rest, sample_time_s, first=first)
+    return np.asarray(found[:, extra:][:, ::-1])
 
 
 def _run(

@@ -70,7 +70,7 @@ def predict(
     *,
     freedom: Freedom,
     weights: NDArray[np.float64],
-    first_order_hold: bool,
+    hold: str,
 ) -> tuple[NDArray[np.float64], Shifts]:
     """Free run of a model through one record with the best shifts.
 
@@ -88,30 +88,24 @@ def predict(
         Which shifts are free.
     weights : ndarray, shape (n_outputs,)
         What the square of one unit of error counts.
-    first_order_hold : bool
-        Inputs are straight lines between samples, not steps.
+    hold : {"first", "zero"}
+        What the inputs do between samples.
 
     Returns
     -------
     tuple of ndarray and Shifts
         Prediction, shape (n_outputs, n_samples), and the shifts.
     """
-    run = FreeRun(
-        matrices,
-        driven.shape[1],
-        sample_time_s,
-        first_order_hold=first_order_hold,
-        backward=freedom.initial_state,
-    )
+    n_samples = driven.shape[1]
+    run = FreeRun(matrices, n_samples, sample_time_s, hold, freedom.initial_state)
     plain = run.driven(driven)
     n_outputs = len(plain.outputs)
-    answers = []
-    if freedom.bias:
-        answers += [run.constant(index) for index in range(run.n_states)]
-    if freedom.initial_state:
-        answers += [run.free_state(index) for index in range(run.n_states)]
-    if freedom.reference:
-        answers += _reference_shifts(n_outputs, driven.shape[1], run.n_states)
+    states, biases = run.free() if freedom.bias or freedom.initial_state else ([], [])
+    answers = [
+        *(biases if freedom.bias else ()),
+        *(states if freedom.initial_state else ()),
+        *(_reference_shifts(n_outputs, n_samples, run.n_states) if freedom.reference else ()),
+    ]
     if not answers:
         none = np.zeros(run.n_states)
         return plain.outputs, Shifts(none, np.zeros(n_outputs), none, 0, 0, run.e_folds)

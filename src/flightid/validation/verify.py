@@ -238,7 +238,7 @@ def _predict(
         record.sample_time_s,
         freedom=freedom,
         weights=guide_weights(record, chosen),
-        first_order_hold=hold == "first",
+        hold=hold,
     )
     total = replace(shifts, reference=shifts.reference + offset[:, 0])
     known = record.channels
