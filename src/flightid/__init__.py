@@ -43,7 +43,13 @@ if TYPE_CHECKING:
         load_model,
     )
     from flightid.record import Channel, Record, read_records, write_records
-    from flightid.responses import FrequencyResponse, PairResponse, estimate_response
+    from flightid.responses import (
+        CoherentPairs,
+        FrequencyResponse,
+        PairResponse,
+        coherent_pairs,
+        estimate_response,
+    )
     from flightid.simulation.simulate import LinearSystem, simulate
     from flightid.study import Study, run_study
     from flightid.table import Table
@@ -54,6 +60,7 @@ if TYPE_CHECKING:
 # Name -> the module that holds it (a public module is its own home).
 _HOMES = {
     "Channel": "flightid.record",
+    "CoherentPairs": "flightid.responses",
     "Comparison": "flightid.validation",
     "Finding": "flightid.findings",
     "Fit": "flightid.identification",
@@ -84,6 +91,7 @@ _HOMES = {
     "TransferFunction": "flightid.models",
     "TransferFunctionModel": "flightid.models",
     "compare_structures": "flightid.identification.structures",
+    "coherent_pairs": "flightid.responses",
     "conditioning": "flightid.conditioning",
     "Verification": "flightid.validation",
     "estimate_response": "flightid.responses",
@@ -105,6 +113,7 @@ _HOMES = {
 
 __all__ = [
     "Channel",
+    "CoherentPairs",
     "Comparison",
     "Finding",
     "Fit",
@@ -136,6 +145,7 @@ __all__ = [
     "TransferFunctionModel",
     "Verification",
     "__version__",
+    "coherent_pairs",
     "compare_structures",
     "conditioning",
     "estimate_response",

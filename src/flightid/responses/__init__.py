@@ -1,7 +1,14 @@
 """Frequency responses of records: spectra, conditioning, composite windows, coherence and error."""
 
+from flightid.responses.coherence_test import CoherentPairs, coherent_pairs
 from flightid.responses.estimate import estimate_response
 from flightid.responses.pair import PairResponse
 from flightid.responses.response import FrequencyResponse
 
-__all__ = ["FrequencyResponse", "PairResponse", "estimate_response"]
+__all__ = [
+    "CoherentPairs",
+    "FrequencyResponse",
+    "PairResponse",
+    "coherent_pairs",
+    "estimate_response",
+]
