@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -52,3 +53,25 @@ def test_the_instrument_is_less_biased_than_the_direct_estimate(tmp_path: Path) 
         [float(cell) for cell in rows[key]] for key in ("composite", "instrument")
     )
     assert sum(instrument) < 0.4 * sum(direct)
+
+
+def test_the_unstable_helicopter_is_found_and_beats_its_rival(tmp_path: Path) -> None:
+    run = _script(EXAMPLES / "ah64" / "identify.py", "--short", folder=tmp_path)
+    assert run.returncode == 0, run.stderr[-3000:]
+    said = run.stdout
+    # Six derivatives that the vehicle has not were offered, and all of them go.
+    dropped = re.search(r"dropped ([^;]*);", said)
+    assert dropped is not None
+    assert set(dropped.group(1).split(", ")) == {"Xw", "Yr", "Lr", "Mw", "Nq", "Nlat"}
+    inside = re.search(r"truth inside the 95 % interval: (\d+) of (\d+)", said)
+    assert inside is not None
+    assert int(inside.group(1)) >= 0.8 * int(inside.group(2))
+    costs = [float(cost) for cost in re.findall(r"heave .*average cost ([0-9.]+)", said)]
+    assert costs[1] < 0.5 * costs[0], "inflow explains what a delay cannot"
+    assert re.search(r"'identified' better in [678], worse in 0", said)
+    theil = [
+        float(row.split()[-1]) for row in said.splitlines() if re.match(r"(lon|lat|ped) ", row)
+    ]
+    assert len(theil) == 3
+    assert max(theil) < 0.1, "with rate feedback closed"
+    assert (tmp_path / "ah64-output" / "report.html").stat().st_size > 100_000

@@ -264,3 +264,16 @@ def test_fit_refuses_a_pair_without_path() -> None:
     broken = model.with_fixed(Yped=0.0, Nped=0.0)
     with pytest.raises(FitError, match="no response of phi/ped"):
         fid.identify(broken, data)
+
+
+def test_outputs_that_no_fitted_response_needs_may_be_missing() -> None:
+    model = fid.load_model("ah64_hover").with_responses("az/col")
+    omega = np.geomspace(0.2, 20.0, 40)
+    az = model.frequency_response(omega)[[model.outputs.index("az")]]
+    data = fid.FrequencyResponse.from_values(
+        omega, az, inputs=list(model.inputs), outputs=["az"], units=model.units
+    )
+    others = [p.name for p in model.parameters.free if p.name not in ("Zw", "Zcol")]
+    start = model.with_fixed(**{name: model.parameters[name].value for name in others})
+    fit = fid.identify(start.with_values({"Zw": -0.3, "Zcol": -4.0}), data)
+    assert_close(fit.parameters["Zw"].value, -0.122571, rtol=1e-6, why="without noise")

@@ -50,6 +50,7 @@ template = "rate_motor_lag"
 axis = "roll"
 identify = "sweep"
 verify = "doublet"
+rivals = "rate_integrator"
 band_rad_s = [4.0, 40.0]
 parameters.T_m = { maximum = 0.15 }
 """
@@ -73,6 +74,9 @@ def test_every_stage_left_its_result(study: fid.Study) -> None:
     (item,) = study.identified
     assert list(item.fits) == ["instrument", "composite"]
     assert list(item.verifications) == ["doublet"]
+    beside = item.verifications["doublet"]
+    assert isinstance(beside, fid.Comparison)
+    assert beside.names == ("Roll rate", "rate_integrator")
     assert study.truth is not None
     assert set(study.truth.parameters(item.fit.model)) == {"Ltphi", "Lp", "T_m", "tau"}
     assert set(study.records) == {"sweep", "doublet"}
