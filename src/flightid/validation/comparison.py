@@ -135,16 +135,16 @@ class Comparison:
     def summary(self) -> Table:
         """Table by output: Theil coefficient and error of each model, and which is better."""
         columns = [Column("output"), Column("unit")]
+        columns += [Column(f"better than {name}") for name in self.names[1:]]
         columns += [Column(f"Theil, {name}", digits=3) for name in self.names]
         columns += [Column(f"rms error, {name}", digits=3) for name in self.names]
-        columns += [Column(f"better than {name}") for name in self.names[1:]]
         rows: list[tuple[Cell, ...]] = []
         for output in self.outputs:
             each = self.verifications.values()
             cells: list[Cell] = [output, self.first.measured.unit(output)]
+            cells += [_word(self.contrast(output, rival)) for rival in self.names[1:]]
             cells += [result.theil[output] for result in each]
             cells += [result.rms_error[output] for result in each]
-            cells += [_word(self.contrast(output, rival)) for rival in self.names[1:]]
             rows.append(tuple(cells))
         notes = [
             f"{name}: weighted error J_rms {result.j_rms:.3g} (deg, deg/s, ft/s, ft/s²)."
