@@ -265,8 +265,10 @@ class Fit:
             if self.responses
             else "% of the outputs' variance left unexplained"
         )
+        formulas = map(str, self.model.responses if self.responses else ())
         notes = (
-            *map(str, self.model.responses if self.responses else ()),
+            # Formulas of transfer functions; other responses are named with their costs below.
+            *(text for text in formulas if text not in self.model.response_names),
             f"Average cost {self.average_cost:.3g} {meaning}; {costs}.",
             f"Intervals from: {self.intervals_from}.",
             *map(str, self.findings),
