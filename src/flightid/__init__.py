@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from flightid.identification import (
         Fit,
         FittedParameter,
+        FittedRecord,
         FittedResponse,
         LocalMinimum,
         NarxFit,
@@ -65,6 +66,7 @@ _HOMES = {
     "Finding": "flightid.findings",
     "Fit": "flightid.identification",
     "FittedParameter": "flightid.identification",
+    "FittedRecord": "flightid.identification",
     "FittedResponse": "flightid.identification",
     "FlightidError": "flightid.errors",
     "FrequencyResponse": "flightid.responses",
@@ -118,6 +120,7 @@ __all__ = [
     "Finding",
     "Fit",
     "FittedParameter",
+    "FittedRecord",
     "FittedResponse",
     "FlightidError",
     "FrequencyResponse",

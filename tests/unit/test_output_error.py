@@ -8,6 +8,7 @@ import pytest
 import flightid as fid
 from flightid.errors import DataError, FitError, OptionError, UnitError, UnknownNameError
 from flightid.models import Parameter, Parameters
+from flightid.plot.fitted_record import record_figure
 from tests.closeness import assert_close
 
 UNITS = {"alpha": "rad", "q": "rad/s", "nz": "1"}
@@ -252,3 +253,38 @@ def test_parameters_that_the_records_cannot_tell_apart_are_named() -> None:
     flown = fid.simulate(model, _input(), units=UNITS)
     with pytest.raises(FitError, match=r"do not see|cannot tell"):
         fid.identify(model, flown)
+
+
+def test_a_record_may_have_no_numbers_of_its_own() -> None:
+    fit = fid.identify(_model(), _noisy(_flown(), 7), initial_state="trim", free_bias=False)
+    item = fit.records[0]
+    assert {p.status for p in (*item.initial_state.values(), *item.bias.values())} == {"fixed"}
+    assert max(_errors(fit)) < 0.1
+
+
+def test_residual_tests_and_verification_take_the_fit() -> None:
+    fit = fid.identify(_model(), _noisy(_flown(), 8))
+    tests = fid.residual_tests(fit)
+    assert tests.n_records == 1
+    assert tests.outputs == ("alpha", "q", "nz")
+    with pytest.raises(OptionError, match="is a free run"):
+        fid.residual_tests(fit, horizon="one step ahead")
+    assert fid.verify(fit, _noisy(_flown(1.0), 9), initial="fit").theil["q"] < 0.1
+    omega = np.geomspace(1.0, 20.0, 30)
+    model = fid.load_model("rate_first_order")
+    response = fid.FrequencyResponse.from_values(
+        omega,
+        model.frequency_response(omega),
+        inputs=["tau_phi"],
+        outputs=["p"],
+        units={"p": "rad/s"},
+    )
+    with pytest.raises(DataError, match="no residuals in time"):
+        fid.residual_tests(fid.identify(model, response))
+
+
+def test_the_figure_draws_every_output_and_what_is_left() -> None:
+    fit = fid.identify(_model(), _noisy(_flown(), 8))
+    drawn = [trace.name for trace in record_figure(fit.records[0]).data]
+    assert drawn.count("measured") == drawn.count("model") == 3
+    assert drawn.count("measured minus model") == 3

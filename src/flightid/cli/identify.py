@@ -25,10 +25,11 @@ LOGS = {".bin", ".ulg", ".log"}
 @click.option("--band", nargs=2, type=float, help="Lowest and highest frequency, rad/s.")
 @click.option(
     "--method",
-    type=click.Choice(["composite", "instrument", "local_polynomial"]),
+    type=click.Choice(["composite", "instrument", "local_polynomial", "output_error"]),
     default="composite",
     show_default=True,
-    help="How the response is estimated; with a loop closed: instrument.",
+    help="How the response is estimated; with a loop closed: instrument. output_error: no "
+    "response, the model is fitted to the records themselves.",
 )
 @click.option("--starts", type=click.IntRange(1), default=1, show_default=True)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
@@ -56,15 +57,21 @@ def command(
     with progress(3, "Identifying") as advance:
         records = _records(file, model, span, sid_run)
         advance()
-        response = flightid.estimate_response(
-            records,
-            inputs=model.inputs,
-            outputs=model.outputs,
-            omega_rad_s=None if band is None else (*band, 100),
-            method=method,
-        )
-        advance()
-        fit = flightid.identify(model, response, starts=starts, seed=seed)
+        if method == "output_error":
+            if band is not None:
+                raise click.UsageError("--band belongs to responses")
+            advance()
+            fit = flightid.identify(model, records, starts=starts, seed=seed)
+        else:
+            response = flightid.estimate_response(
+                records,
+                inputs=model.inputs,
+                outputs=model.outputs,
+                omega_rad_s=None if band is None else (*band, 100),
+                method=method,
+            )
+            advance()
+            fit = flightid.identify(model, response, starts=starts, seed=seed)
         advance()
     note(repr(fit))
     emit(fit, as_json=as_json)

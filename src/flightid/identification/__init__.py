@@ -1,6 +1,7 @@
 """Identification: a model and data to a fit (native side: `frequency_fit.rs`)."""
 
 from flightid.identification.fit import Fit, FittedParameter, FittedResponse, LocalMinimum
+from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.identify import identify
 from flightid.identification.narx_fit import ChosenTerm, NarxFit
 from flightid.identification.polynomial_fit import PolynomialFit
@@ -16,6 +17,7 @@ __all__ = [
     "ChosenTerm",
     "Fit",
     "FittedParameter",
+    "FittedRecord",
     "FittedResponse",
     "LocalMinimum",
     "NarxFit",

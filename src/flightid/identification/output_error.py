@@ -55,7 +55,7 @@ def fit_output_error(model: Model, data: Record | Sequence[Record], options: Rec
     """Fit a model to records by output error; see `flightid.identify`."""
     prepared = prepare_records(model, data, options)
     setup = judge_channels(prepared)
-    groups = cluster(_minimise(prepared, options))
+    groups = cluster(search_records(prepared, options))
     best = groups[0][0]
     names = [parameter.name for parameter in model.parameters.free]
     fitted = model.with_values(dict(zip(names, map(float, best.x), strict=True)))
@@ -70,7 +70,8 @@ def fit_output_error(model: Model, data: Record | Sequence[Record], options: Rec
     return _assemble(fitted, prepared, options, groups, runs, found, setup)
 
 
-def _minimise(prepared: RecordSet, options: RecordOptions) -> list[RecordEnd]:
+def search_records(prepared: RecordSet, options: RecordOptions) -> list[RecordEnd]:
+    """Ends of all starts, best first; no statistics."""
     model = prepared.model
     free = model.parameters.free
     found = model.native.fit_records(

@@ -155,7 +155,8 @@ def _inverse(triangle: Array) -> Array:
 
 def _noise_covariance(models: Sequence[Autoregression], columns: Array, n_outputs: int) -> Array:
     """columnsᵀ Ω columns for the noise Ω of one record."""
-    parts = columns.reshape(n_outputs, -1, columns.shape[1])
+    n_samples = len(columns) // n_outputs
+    parts = columns.reshape(n_outputs, n_samples, columns.shape[1])
     total = np.zeros((columns.shape[1], columns.shape[1]))
     for model, part in zip(models, parts, strict=True):
         total += part.T @ toeplitz_product(model.autocovariance(len(part)), part)

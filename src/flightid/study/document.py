@@ -170,11 +170,15 @@ def _interval_figure(study: Study) -> tuple[Figure, ...]:
 
 def _options(study: Study) -> dict[str, Cell]:
     settings, response = study.settings, study.settings.response
-    options: dict[str, Cell] = {
-        "estimator": response.method,
-        "frequencies in a model's band": response.n_frequencies,
-        "windows [s]": ", ".join(f"{value:g}" for value in response.windows_s) or "chosen",
-        "least coherence": response.minimum_coherence,
+    options: dict[str, Cell] = {"fit": settings.method}
+    if not settings.on_records:
+        options |= {
+            "estimator": response.method,
+            "frequencies in a model's band": response.n_frequencies,
+            "windows [s]": ", ".join(f"{value:g}" for value in response.windows_s) or "chosen",
+            "least coherence": response.minimum_coherence,
+        }
+    options |= {
         "starts of a fit": settings.starts,
         "seed of the starts": settings.seed,
     }

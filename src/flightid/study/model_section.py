@@ -9,6 +9,7 @@ from flightid.plot.frequency_response import Curve, bode
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Figure, Lights, Section, TableBlock
 from flightid.report.figures import figure_block
+from flightid.report.fitted_record import record_figures
 from flightid.report.verification import verification_blocks
 from flightid.table import Cell, Column, Table
 
@@ -21,6 +22,7 @@ ESTIMATORS = {
     "composite": "direct estimate",
     "local_polynomial": "local polynomial estimate",
     "instrument": "instrument estimate",
+    "output_error": "output error on the records",
 }
 """Estimators in words, as legends and tables name them."""
 
@@ -39,13 +41,11 @@ def model_section(item: Identified, truth: Truth | None) -> Section:
     -------
     Section
     """
-    blocks: list[Block] = [
-        _bode_figure(item, truth),
-        *result_blocks(item.fit, title="Parameters"),
-    ]
+    figures = [_bode_figure(item, truth)] if item.responses else record_figures(item.fit)
+    blocks: list[Block] = [*figures, *result_blocks(item.fit, title="Parameters")]
     if len(item.fits) > 1:
         blocks.append(TableBlock(_comparison(item, truth)))
-    if item.response.findings:
+    if item.response is not None and item.response.findings:
         blocks.append(Lights(item.response.findings, "Frequency response"))
     parts = tuple(
         Section(f"Prediction of “{name}”", verification_blocks(verification))

@@ -63,7 +63,7 @@ def run_study(
     settings = read_settings(source)
     final = Path(output) if output is not None else source.with_name(f"{source.stem}-output")
     require_replaceable(final)
-    tasks = [load_task(model) for model in settings.models]
+    tasks = [load_task(model, on_records=settings.on_records) for model in settings.models]
     # Reading and cutting, three steps for each model, writing; a flight before all of it.
     steps = 3 + 3 * len(tasks)
     with whole_folder(final) as folder, progress(steps, source.stem) as advance:
@@ -106,7 +106,7 @@ def _identify(
 ) -> Identified:
     responses = estimate(task, records, settings)
     advance()
-    fits = fit(task, responses, settings)
+    fits = fit(task, responses, records, settings)
     advance()
     verifications = check(task, next(iter(fits.values())), records, settings)
     advance()

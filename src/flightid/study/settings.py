@@ -18,6 +18,7 @@ from flightid.study.reading import TOP, TableReader
 
 MAXIMUM_BYTES = 1 << 20
 METHODS = ("composite", "local_polynomial", "instrument")
+FITS = ("frequency_domain", "output_error")
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,8 @@ class ModelSettings:
         Axis of a library model that is written for any.
     identify, verify : tuple of str
         Segments for the fit, and segments kept for verification.
-    band_rad_s : tuple of float
-        Lowest and highest frequency of the fit, rad/s.
+    band_rad_s : tuple of float or None
+        Lowest and highest frequency of the fit, rad/s; None where records are fitted.
     parameters : mapping
         Overrides by parameter: value, min, max, free.
     rivals : mapping of str to str
@@ -69,7 +70,7 @@ class ModelSettings:
     axis: str | None
     identify: tuple[str, ...]
     verify: tuple[str, ...]
-    band_rad_s: tuple[float, float]
+    band_rad_s: tuple[float, float] | None
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     rivals: Mapping[str, str] = field(default_factory=dict)
 
@@ -135,6 +136,9 @@ class Settings:
         What to identify.
     response : ResponseSettings
         How to estimate responses.
+    method : str
+        How models are fitted: ``"frequency_domain"`` to responses, ``"output_error"`` straight to
+        the records.
     starts, seed : int
         Starts of each fit, and the seed they are drawn with.
     initial : {"trim", "fit"}
@@ -153,9 +157,15 @@ class Settings:
     segments: tuple[Segment, ...]
     models: tuple[ModelSettings, ...]
     response: ResponseSettings
+    method: str
     starts: int
     seed: int
     initial: Literal["trim", "fit"]
+
+    @property
+    def on_records(self) -> bool:
+        """Whether models are fitted to records, without responses."""
+        return self.method != FITS[0]
 
     def segment(self, name: str) -> Segment:
         """Segment of this name."""
@@ -196,12 +206,18 @@ def read_settings(path: Path) -> Settings:
     segments = tuple(_segment(reader) for reader in root.tables("segment"))
     response = _response(root.table("response"))
     fit = root.table("fit")
+    identify = root.table("identify")
+    method = identify.choice("method", FITS, FITS[0])
+    identify.finish()
     starts, seed = fit.integer("starts", 1, minimum=1), fit.integer("seed", 0)
     fit.finish()
     check = root.table("verify")
     initial = cast(Literal["trim", "fit"], check.choice("initial", ("trim", "fit"), "trim"))
     check.finish()
-    models = tuple(_model(reader, path.parent) for reader in root.tables("model"))
+    on_records = method != FITS[0]
+    models = tuple(
+        _model(reader, path.parent, on_records=on_records) for reader in root.tables("model")
+    )
     root.finish()
     _require_references(segments, models)
     return Settings(
@@ -215,6 +231,7 @@ def read_settings(path: Path) -> Settings:
         segments,
         models,
         response,
+        method,
         starts,
         seed,
         initial,
@@ -278,10 +295,12 @@ def _response(reader: TableReader) -> ResponseSettings:
     return made
 
 
-def _model(reader: TableReader, folder: Path) -> ModelSettings:
+def _model(reader: TableReader, folder: Path, *, on_records: bool) -> ModelSettings:
     template = reader.text("template")
-    band = reader.interval("band_rad_s")
-    if band[0] <= 0:
+    band = (
+        reader.maybe(reader.interval, "band_rad_s") if on_records else reader.interval("band_rad_s")
+    )
+    if band is not None and band[0] <= 0:
         raise reader.error("band_rad_s", "does not fit", found=band, needed="positive frequencies")
     made = ModelSettings(
         reader.text("name"),

@@ -65,9 +65,9 @@ class Identified:
     verifications: Mapping[str, Verification | Comparison]
 
     @property
-    def response(self) -> FrequencyResponse:
-        """The response that was fitted."""
-        return next(iter(self.responses.values()))
+    def response(self) -> FrequencyResponse | None:
+        """The response that was fitted; None where records were."""
+        return next(iter(self.responses.values()), None)
 
     @property
     def fit(self) -> Fit:
@@ -78,7 +78,8 @@ class Identified:
     def findings(self) -> tuple[Finding, ...]:
         """Verdicts on the response, the fit and each verification that count."""
         checks = (finding for each in self.verifications.values() for finding in each.findings)
-        return (*self.response.findings, *self.fit.findings, *checks)
+        first = () if self.response is None else self.response.findings
+        return (*first, *self.fit.findings, *checks)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values of every result."""
@@ -90,23 +91,24 @@ class Identified:
         }
 
 
-def load_task(settings: ModelSettings) -> Task:
+def load_task(settings: ModelSettings, *, on_records: bool = False) -> Task:
     """Load a model and apply the overrides of the study.
 
     Raises
     ------
     StudyError
-        The model has more than one response.
+        The model has more than one response, which records alone can fit.
     UnknownNameError
         There is no such library model, or no such parameter in it.
     """
     path = settings.template_path
     model = load_model(settings.template if path is None else path, axis=settings.axis)
-    if len(model.responses) != 1:
+    if len(model.responses) != 1 and not on_records:
         raise StudyError(
             f"model {settings.name!r} has several responses",
             found=", ".join(model.response_names),
             needed="one output to one input",
+            action='fit it to the records: [identify] method = "output_error"',
         )
     parameters = model.parameters
     for name, given in settings.parameters.items():
@@ -187,14 +189,16 @@ def estimate(
     task: Task, records: Mapping[str, Record], settings: Settings
 ) -> dict[str, FrequencyResponse]:
     """Frequency responses of one model's segments by each estimator, the one that counts first."""
-    chosen = settings.response
+    chosen, band = settings.response, task.settings.band_rad_s
+    if settings.on_records or band is None:
+        return {}
     return {
         method: estimate_response(
             [records[name] for name in task.settings.identify],
             inputs=task.model.inputs,
             outputs=task.model.outputs,
             excitation=EXCITATION if method == "instrument" else None,
-            omega_rad_s=(*task.settings.band_rad_s, chosen.n_frequencies),
+            omega_rad_s=(*band, chosen.n_frequencies),
             window_s=list(chosen.windows_s) or "auto",
             method=method,
         )
@@ -203,9 +207,17 @@ def estimate(
 
 
 def fit(
-    task: Task, responses: Mapping[str, FrequencyResponse], settings: Settings
+    task: Task,
+    responses: Mapping[str, FrequencyResponse],
+    records: Mapping[str, Record],
+    settings: Settings,
 ) -> dict[str, Fit]:
-    """Fit the model to the response of each estimator."""
+    """Fit the model to the response of each estimator, or to the records."""
+    if settings.on_records:
+        flown = [records[name] for name in task.settings.identify]
+        starts, seed = settings.starts, settings.seed
+        found = identify(task.model, flown, method=settings.method, starts=starts, seed=seed)
+        return {settings.method: found}
     return {
         method: identify(
             task.model,

@@ -9,12 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError, ShapeError
+from flightid.identification import Fit
 from flightid.record import Record
 from flightid.validation.correlation import Series
 from flightid.validation.correlation_test import Horizon
 from flightid.validation.verification import Verification
 
-Residuals = Verification | Record | Sequence[Record] | Mapping[str, ArrayLike] | ArrayLike
+Residuals = Fit | Verification | Record | Sequence[Record] | Mapping[str, ArrayLike] | ArrayLike
 Inputs = Iterable[str] | Mapping[str, ArrayLike] | ArrayLike
 SAME_SAMPLE_TIME = 1e-6
 """Largest relative difference of sample times that still counts as the same."""
@@ -72,6 +73,8 @@ def gather_residuals(
     UnknownNameError
         A record lacks a channel.
     """
+    if isinstance(residuals, Fit):
+        return _of_fit(residuals, _channel_names(inputs), outputs, horizon)
     if isinstance(residuals, Verification):
         return _of_verification(residuals, _channel_names(inputs), outputs, horizon)
     if horizon is None:
@@ -98,6 +101,41 @@ def gather_residuals(
     return _checked(_named(residuals, "e"), named, {}, horizon, predictor)
 
 
+def _of_fit(
+    fit: Fit,
+    inputs: Iterable[str] | None,
+    outputs: Iterable[str] | None,
+    horizon: Horizon | None,
+) -> ResidualData:
+    if not fit.records:
+        raise DataError(
+            "the fit has no residuals in time",
+            found="a fit of frequency responses",
+            needed="a fit of records",
+            action="verify it on records first: flightid.verify",
+        )
+    if horizon is Horizon.ONE_STEP:
+        raise OptionError(
+            "an output-error fit is a free run", found=str(horizon), needed=str(Horizon.FREE_RUN)
+        )
+    names = tuple(fit.records[0].outputs if outputs is None else outputs)
+    driven = tuple(fit.records[0].modelled.inputs if inputs is None else inputs)
+    measured = tuple(item.measured for item in fit.records)
+    _require_one_sample_time(measured)
+    made = {name: tuple(item.residual(name) for item in fit.records) for name in names}
+    return _checked(
+        made, _columns(measured, driven), _sizes(measured, names), Horizon.FREE_RUN, _FREE_RUN
+    )
+
+
+def _sizes(measured: Sequence[Record], names: Iterable[str]) -> dict[str, float]:
+    """Root mean square of each output over all records."""
+    return {
+        name: float(np.sqrt(np.mean(np.concatenate(series) ** 2)))
+        for name, series in _columns(measured, names).items()
+    }
+
+
 def _of_verification(
     verification: Verification,
     inputs: Iterable[str] | None,
@@ -113,12 +151,9 @@ def _of_verification(
     measured = tuple(item.measured for item in verification.predictions)
     _require_one_sample_time(measured)
     made = {name: tuple(item.residual(name) for item in verification.predictions) for name in names}
-    scale = {
-        name: float(np.sqrt(np.mean(np.concatenate(series) ** 2)))
-        for name, series in _columns(measured, names).items()
-    }
     predictor = f"{verification.horizon} {_FREE_RUN}"
-    return _checked(made, _columns(measured, driven), scale, Horizon.FREE_RUN, predictor)
+    sizes = _sizes(measured, names)
+    return _checked(made, _columns(measured, driven), sizes, Horizon.FREE_RUN, predictor)
 
 
 def _channel_names(inputs: Inputs | None) -> tuple[str, ...] | None:

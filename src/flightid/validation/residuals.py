@@ -69,15 +69,15 @@ def residual_tests(
 
     Parameters
     ----------
-    residuals : Verification, Record, sequence of Record, mapping or array_like
-        A verification (measured minus free run), records whose outputs are residuals, or samples,
-        shape (n_samples,) or (n_outputs, n_samples), by name or bare.
+    residuals : Fit, Verification, Record, sequence of Record, mapping or array_like
+        A fit of records or a verification (measured minus free run), records whose outputs are
+        residuals, or samples, shape (n_samples,) or (n_outputs, n_samples), by name or bare.
     inputs : names, mapping or array_like, optional
         With records: channel names; default: their inputs. Else samples as for `residuals`.
     outputs : iterable of str, optional
         Channels of records to test; default: all outputs.
     horizon : {"one step ahead", "free run"}
-        Which predictor made the residuals; a verification knows.
+        Which predictor made the residuals; a fit or verification knows.
     loop : {"open", "closed", "closed within the sample"}
         Whether residuals reach the inputs. Closed: lags τ ≥ 0 are judged; within the sample
         (u(t) already holds y(t)): τ ≥ 1.
