@@ -16,17 +16,21 @@ if TYPE_CHECKING:
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.identification import (
+        Advice,
         Fit,
         FittedParameter,
         FittedRecord,
         FittedResponse,
+        ImpulseResponse,
         LocalMinimum,
         NarxFit,
         PolynomialFit,
         Reduction,
         StructureComparison,
     )
+    from flightid.identification.advice import advise
     from flightid.identification.identify import identify
+    from flightid.identification.impulse_response import impulse_response
     from flightid.identification.reduce import reduce
     from flightid.identification.structures import compare_structures
     from flightid.inspection import Inspection, inspect_log
@@ -54,12 +58,19 @@ if TYPE_CHECKING:
     from flightid.simulation.simulate import LinearSystem, simulate
     from flightid.study import Study, run_study
     from flightid.table import Table
-    from flightid.validation import Comparison, ResidualTests, Verification
+    from flightid.validation import Comparison, OrderScan, ResidualTests, Verification
+    from flightid.validation.order_scan import scan_orders
     from flightid.validation.residuals import residual_tests
     from flightid.validation.verify import verify
 
 # Name -> the module that holds it (a public module is its own home).
 _HOMES = {
+    "Advice": "flightid.identification",
+    "ImpulseResponse": "flightid.identification",
+    "OrderScan": "flightid.validation",
+    "advise": "flightid.identification.advice",
+    "impulse_response": "flightid.identification.impulse_response",
+    "scan_orders": "flightid.validation.order_scan",
     "Channel": "flightid.record",
     "CoherentPairs": "flightid.responses",
     "Comparison": "flightid.validation",
@@ -114,6 +125,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "Advice",
     "Channel",
     "CoherentPairs",
     "Comparison",
@@ -124,6 +136,7 @@ __all__ = [
     "FittedResponse",
     "FlightidError",
     "FrequencyResponse",
+    "ImpulseResponse",
     "Inspection",
     "LinearSystem",
     "LocalMinimum",
@@ -131,6 +144,7 @@ __all__ = [
     "LogTable",
     "NarxFit",
     "NarxModel",
+    "OrderScan",
     "Output",
     "PairResponse",
     "Parameter",
@@ -148,12 +162,14 @@ __all__ = [
     "TransferFunctionModel",
     "Verification",
     "__version__",
+    "advise",
     "coherent_pairs",
     "compare_structures",
     "conditioning",
     "estimate_response",
     "excitation",
     "identify",
+    "impulse_response",
     "inspect_log",
     "library_names",
     "load_model",
@@ -162,6 +178,7 @@ __all__ = [
     "reduce",
     "residual_tests",
     "run_study",
+    "scan_orders",
     "simulate",
     "validation",
     "verify",

@@ -8,7 +8,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+import flightid as fid
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 
@@ -75,3 +78,26 @@ def test_the_unstable_helicopter_is_found_and_beats_its_rival(tmp_path: Path) ->
     assert len(theil) == 3
     assert max(theil) < 0.1, "with rate feedback closed"
     assert (tmp_path / "ah64-output" / "report.html").stat().st_size > 100_000
+
+
+def test_the_dryer_script_checks_a_record_of_the_same_format(tmp_path: Path) -> None:
+    # A stand-in with the noise-free output-error model whose coefficients the script expects.
+    truth = fid.PolynomialModel(
+        "y", ("u",), 0.08, b=[[0.06296, 0.05397]], f=[[1, -1.24108, 0.36682]], nk=(3,)
+    )
+    generator = np.random.default_rng(0)
+    u = 5.0 + np.sign(generator.standard_normal(1000))
+    record = fid.Record.from_arrays(
+        np.arange(1000) * 0.08, inputs={"u": u - 5.0}, outputs={"y": np.zeros(1000)}
+    )
+    y = 4.9 + truth.simulate(record) + 0.01 * generator.standard_normal(1000)
+    np.savetxt(tmp_path / "dryer.dat", np.column_stack([u, y]))
+    run = _script(EXAMPLES / "dryer" / "analyse.py", "dryer.dat", folder=tmp_path)
+    assert run.returncode == 0, run.stderr
+    lines = run.stdout.splitlines()
+    place = next(i for i, line in enumerate(lines) if line.startswith("OE: loss"))
+    for line in lines[place + 1 : place + 5]:
+        name, value, _, expected = line.replace("(", "").split()[:4]
+        assert abs(float(value) - float(expected.rstrip(","))) < 0.05, name
+    assert "nk = 3" in run.stdout
+    assert _script(EXAMPLES / "dryer" / "analyse.py", folder=tmp_path).returncode == 1

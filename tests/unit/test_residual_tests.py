@@ -227,7 +227,7 @@ def test_records_outputs_and_inputs_by_name() -> None:
     ]
     tests = fid.residual_tests(records, horizon=STEP)
     assert (tests.outputs, tests.inputs) == (("p", "q"), ("a", "b"))
-    assert len(tests.tests) == 2 * (1 + 2 * 4)
+    assert len(tests.tests) == 2 * (1 + 1 + 2 * 4)
     assert (tests.n_samples, tests.n_records) == (600, 2)
     one = fid.residual_tests(records[0], ["b"], outputs=["q"], horizon=STEP)
     assert len(one.tests) == 5

@@ -11,6 +11,7 @@ use crate::error::CoreError;
 use crate::householder::{back_substitute, norm, triangularise};
 use crate::least_squares::{Minimum, Options, Problem, Progress};
 use crate::levenberg_marquardt::minimise;
+use crate::polynomial_normal::{add_products, factorise};
 use crate::polynomial_predictor::{Derivatives, Orders, Past, Polynomials, Run, Samples, run};
 use crate::polynomial_roots::reflected;
 use rayon::prelude::*;
@@ -41,6 +42,8 @@ pub struct PredictionError<'a> {
     pub skip: usize,
     /// Keep the roots of A, too, inside the circle.
     pub stable: bool,
+    /// Take normal equations while they have digits enough: to rank many structures.
+    pub fast: bool,
     cache: Option<(Vec<f64>, Vec<Run>, Vec<Past>)>,
 }
 
@@ -83,7 +86,7 @@ impl<'a> PredictionError<'a> {
             let (found, needed) = (rows.len(), records.len());
             return Err(CoreError::Shape { what: "values of the past", found, needed });
         }
-        Ok(Self { orders, records, before, skip, stable, cache: None })
+        Ok(Self { orders, records, before, skip, stable, fast: false, cache: None })
     }
 
     /// Runs of the predictor with the past that counts, and the past's directions.
@@ -176,9 +179,24 @@ impl Problem for PredictionError<'_> {
             _ => self.runs(x)?,
         };
         let p = Polynomials::new(&self.orders, x)?;
-        for (index, (record, run)) in self.records.iter().zip(&runs).enumerate() {
-            let made = Derivatives::new(&self.orders, &p, record, run);
-            self.absorb(triangle, &made, run, pasts.get(index));
+        let made: Vec<Derivatives> = self
+            .records
+            .iter()
+            .zip(&runs)
+            .map(|(record, run)| Derivatives::new(&self.orders, &p, record, run))
+            .collect();
+        if self.fast && pasts.is_empty() {
+            let mut products = vec![0.0; triangle.len()];
+            for (made, run) in made.iter().zip(&runs) {
+                add_products(made, &run.error, self.skip, &mut products);
+            }
+            if let Some(found) = factorise(&products, self.orders.n_parameters() + 1) {
+                triangle.copy_from_slice(&found);
+                return Ok(true);
+            }
+        }
+        for (index, (made, run)) in made.iter().zip(&runs).enumerate() {
+            self.absorb(triangle, made, run, pasts.get(index));
         }
         Ok(true)
     }

@@ -5,6 +5,7 @@ use crate::error::from_core;
 use crate::interrupt;
 use flightid_core::CoreError;
 use flightid_core::least_squares::{Minimum, Options};
+use flightid_core::order_scan::{Scan, scan};
 use flightid_core::polynomial_fit::{Before, PredictionError, fit_from, regress};
 use flightid_core::polynomial_predictor::{Orders, Samples};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
@@ -165,6 +166,48 @@ fn polynomial_errors<'py>(
     Ok(errors.into_pyarray(py))
 }
 
+type Scanned<'py> = (Bound<'py, PyArray1<f64>>, f64, f64, usize, bool);
+
+/// scan_polynomials(output: NDArray[np.float64], inputs: NDArray[np.float64], lengths: list[int], unseen_output: NDArray[np.float64], unseen_inputs: NDArray[np.float64], unseen_lengths: list[int], orders: list[tuple[int, list[int], int, int, list[int], list[int]]], long: int, maximum_iterations: int) -> list[tuple[NDArray[np.float64], float, float, int, bool] | None]
+///
+/// Each ARX or ARMAX structure: coefficients, sum of squared prediction errors, of free-run errors on
+/// the unseen records, iterations, converged; None where its regressors are collinear.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn scan_polynomials<'py>(
+    py: Python<'py>,
+    output: PyReadonlyArray1<'py, f64>,
+    inputs: PyReadonlyArray2<'py, f64>,
+    lengths: Vec<usize>,
+    unseen_output: PyReadonlyArray1<'py, f64>,
+    unseen_inputs: PyReadonlyArray2<'py, f64>,
+    unseen_lengths: Vec<usize>,
+    orders: Vec<OrderTuple>,
+    long: usize,
+    maximum_iterations: usize,
+) -> PyResult<Vec<Option<Scanned<'py>>>> {
+    let n_inputs = inputs.as_array().nrows();
+    let (output, inputs) = (output.as_slice()?, inputs.as_slice()?);
+    let (unseen_output, unseen_inputs) = (unseen_output.as_slice()?, unseen_inputs.as_slice()?);
+    let work = Scan {
+        records: split(output, inputs, n_inputs, &lengths).map_err(from_core)?,
+        unseen: split(unseen_output, unseen_inputs, n_inputs, &unseen_lengths)
+            .map_err(from_core)?,
+        candidates: orders.into_iter().map(orders_of).collect(),
+        long,
+        maximum_iterations,
+    };
+    let found = interrupt::run_beside(py, |stop| scan(&work, stop))?.map_err(from_core)?;
+    Ok(found
+        .into_iter()
+        .map(|each| {
+            each.map(|s| {
+                (s.theta.into_pyarray(py), s.squares, s.free_run, s.iterations, s.converged)
+            })
+        })
+        .collect())
+}
+
 /// polynomial_memory(orders: tuple[int, list[int], int, int, list[int], list[int]]) -> tuple[list[int], int]
 ///
 /// How many values stand for the past of a record: through each F, and through the noise model.
@@ -180,6 +223,7 @@ fn polynomial_memory(orders: OrderTuple) -> (Vec<usize>, usize) {
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(polynomial_regression, module)?)?;
     module.add_function(wrap_pyfunction!(polynomial_fit, module)?)?;
+    module.add_function(wrap_pyfunction!(scan_polynomials, module)?)?;
     module.add_function(wrap_pyfunction!(polynomial_memory, module)?)?;
     module.add_function(wrap_pyfunction!(polynomial_errors, module)?)
 }

@@ -1,8 +1,10 @@
 """Identification: a model and data to a fit (native side: `frequency_fit.rs`)."""
 
+from flightid.identification.advice import Advice, advise
 from flightid.identification.fit import Fit, FittedParameter, FittedResponse, LocalMinimum
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.identify import identify
+from flightid.identification.impulse_response import ImpulseResponse, impulse_response
 from flightid.identification.narx_fit import ChosenTerm, NarxFit
 from flightid.identification.polynomial_fit import PolynomialFit
 from flightid.identification.reduce import reduce
@@ -14,11 +16,13 @@ from flightid.identification.structures import (
 )
 
 __all__ = [
+    "Advice",
     "ChosenTerm",
     "Fit",
     "FittedParameter",
     "FittedRecord",
     "FittedResponse",
+    "ImpulseResponse",
     "LocalMinimum",
     "NarxFit",
     "PolynomialFit",
@@ -26,7 +30,9 @@ __all__ = [
     "ReductionStep",
     "StructureComparison",
     "StructureRow",
+    "advise",
     "compare_structures",
     "identify",
+    "impulse_response",
     "reduce",
 ]

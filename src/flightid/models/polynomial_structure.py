@@ -197,8 +197,9 @@ class PolynomialStructure:
         """Orders as the native half takes them."""
         return self.na, list(self.nb), self.nc, self.nd, list(self.nf), list(self.nk)
 
-    def __repr__(self) -> str:
-        """Kind and orders on one line."""
+    @property
+    def orders_text(self) -> str:
+        """Orders that the kind has, in words: ``"na 2, nb 2, nc 1, nk 1"``."""
 
         def shown(counts: Sequence[int]) -> str:
             return str(counts[0]) if len(counts) == 1 else str(list(counts))
@@ -211,9 +212,12 @@ class PolynomialStructure:
             "nf": shown(self.nf) if any(self.nf) else "",
             "nk": shown(self.nk) if self.inputs else "",
         }
-        text = ", ".join(f"{name} {value}" for name, value in orders.items() if value)
+        return ", ".join(f"{name} {value}" for name, value in orders.items() if value)
+
+    def __repr__(self) -> str:
+        """Kind and orders on one line."""
         source = f" from {', '.join(self.inputs)}" if self.inputs else ""
-        return f"PolynomialStructure({self.kind}, {self.output!r}{source}, {text})"
+        return f"PolynomialStructure({self.kind}, {self.output!r}{source}, {self.orders_text})"
 
 
 def per_input(value: int | Sequence[int], n_inputs: int) -> tuple[int, ...]:

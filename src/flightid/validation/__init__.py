@@ -18,6 +18,8 @@ from flightid.validation.metrics import (
 )
 from flightid.validation.muad import Envelopes, Mismatch, mismatch, muad_envelopes
 from flightid.validation.narx_search import NarxSearch, search_narx
+from flightid.validation.order_scan import scan_orders
+from flightid.validation.order_scan_result import OrderScan, OrderTrial
 from flightid.validation.residual_result import ResidualTests
 from flightid.validation.residuals import residual_tests
 from flightid.validation.shifts import Shifts
@@ -36,6 +38,8 @@ __all__ = [
     "Loop",
     "Mismatch",
     "NarxSearch",
+    "OrderScan",
+    "OrderTrial",
     "Peak",
     "Prediction",
     "ResidualSpectra",
@@ -53,6 +57,7 @@ __all__ = [
     "residual_spectra",
     "residual_tests",
     "rms_error",
+    "scan_orders",
     "search_narx",
     "theil",
     "vaf_percent",

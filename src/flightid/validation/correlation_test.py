@@ -14,6 +14,8 @@ from flightid.validation.correlation import LEVEL
 class Kind(StrEnum):
     """Which correlation function: linear whiteness and independence, then Billings and Voon's.
 
+    `CROSS` asks whether the past of another output's residual foretells this one.
+
     Example
     -------
     >>> Kind("u²ε").name
@@ -25,6 +27,7 @@ class Kind(StrEnum):
     EVEN = "u²ε"
     EVEN_SQUARED = "u²ε²"
     BILINEAR = "ε(εu)"
+    CROSS = "ε′ε"
 
 
 class Horizon(StrEnum):
@@ -71,7 +74,7 @@ class Verdict(StrEnum):
     NOT_TESTABLE = "not testable"
 
 
-NEEDS_ONE_STEP = frozenset({Kind.WHITENESS, Kind.BILINEAR})
+NEEDS_ONE_STEP = frozenset({Kind.WHITENESS, Kind.BILINEAR, Kind.CROSS})
 """Tests that presume white residuals, which no free run promises."""
 
 
@@ -90,7 +93,7 @@ class CorrelationTest:
     output : str
         Output whose residual is tested.
     input : str or None
-        Input it is tested against; None for whiteness.
+        Input it is tested against; None for whiteness, another output for `CROSS`.
     verdict : Verdict
         Outcome.
     counts : bool

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError, ShapeError
 from flightid.identification import Fit
+from flightid.identification.polynomial_fit import PolynomialFit
 from flightid.record import Record
 from flightid.validation.correlation import Series
 from flightid.validation.correlation_test import Horizon
 from flightid.validation.verification import Verification
 
-Residuals = Fit | Verification | Record | Sequence[Record] | Mapping[str, ArrayLike] | ArrayLike
+Residuals = (
+    Fit
+    | Verification
+    | PolynomialFit
+    | Sequence[PolynomialFit]
+    | Record
+    | Sequence[Record]
+    | Mapping[str, ArrayLike]
+    | ArrayLike
+)
 Inputs = Iterable[str] | Mapping[str, ArrayLike] | ArrayLike
 SAME_SAMPLE_TIME = 1e-6
 """Largest relative difference of sample times that still counts as the same."""
@@ -40,6 +50,8 @@ class ResidualData:
     horizon : Horizon
     predictor : str
         Which predictor made the residuals, in words.
+    fitted_noise, fitted_input : int
+        Parameters that were fitted to these samples, as `residual_tests` counts them.
     """
 
     residuals: Mapping[str, Series]
@@ -47,6 +59,8 @@ class ResidualData:
     scale: Mapping[str, float]
     horizon: Horizon
     predictor: str
+    fitted_noise: int = 0
+    fitted_input: int = 0
 
     @property
     def lengths(self) -> tuple[int, ...]:
@@ -77,6 +91,11 @@ def gather_residuals(
         return _of_fit(residuals, _channel_names(inputs), outputs, horizon)
     if isinstance(residuals, Verification):
         return _of_verification(residuals, _channel_names(inputs), outputs, horizon)
+    if isinstance(residuals, PolynomialFit):
+        residuals = (residuals,)
+    if isinstance(residuals, Sequence) and residuals and isinstance(residuals[0], PolynomialFit):
+        fits = tuple(fit for fit in residuals if isinstance(fit, PolynomialFit))
+        return _of_fits(fits, _channel_names(inputs), outputs, horizon)
     if horizon is None:
         raise OptionError(
             "the predictor is not said",
@@ -154,6 +173,60 @@ def _of_verification(
     predictor = f"{verification.horizon} {_FREE_RUN}"
     sizes = _sizes(measured, names)
     return _checked(made, _columns(measured, driven), sizes, Horizon.FREE_RUN, predictor)
+
+
+def _of_fits(
+    fits: Sequence[PolynomialFit],
+    inputs: Iterable[str] | None,
+    outputs: Iterable[str] | None,
+    horizon: Horizon | None,
+) -> ResidualData:
+    """Errors one step ahead of models of one output each, cut to their common samples."""
+    if outputs is not None:
+        fits = [fit for fit in fits if fit.structure.output in tuple(outputs)]
+    records = fits[0].records if fits else ()
+    if any([*fit.records] != [*records] for fit in fits):
+        raise DataError(
+            "fits of different records have no common residuals",
+            found=", ".join(record.name for fit in fits for record in fit.records),
+            needed="the same records",
+            action="fit all outputs to the same records",
+        )
+    # Output error and instruments promise no white residual: what they leave is a free run's.
+    coloured = any(f.structure.kind == "OE" or f.structure.method == "iv4" for f in fits)
+    found = Horizon.FREE_RUN if coloured else Horizon.ONE_STEP
+    if horizon is not None and horizon is not found:
+        raise OptionError(
+            "these fits have another predictor", found=str(horizon), needed=str(found)
+        )
+    skips = [
+        max(record.n_samples - fit.errors[i].size for fit in fits)
+        for i, record in enumerate(records)
+    ]
+    series = {
+        fit.structure.output: tuple(
+            row[skip - (record.n_samples - row.size) :]
+            for row, skip, record in zip(fit.errors, skips, records, strict=True)
+        )
+        for fit in fits
+    }
+    names = dict.fromkeys(name for fit in fits for name in fit.structure.inputs)
+    driven = {
+        name: tuple(record[name][skip:] for record, skip in zip(records, skips, strict=True))
+        for name in (names if inputs is None else inputs)
+    }
+    scale = {
+        name: float(
+            np.sqrt(np.mean(np.concatenate([r[name] - r[name].mean() for r in records]) ** 2))
+        )
+        for name in series
+    }
+    structures = [fit.structure for fit in fits]
+    noise = max((s.na + s.nc + s.nd for s in structures), default=0)
+    spent = max((b + f for s in structures for b, f in zip(s.nb, s.nf, strict=True)), default=0)
+    words = _FREE_RUN if coloured else _ONE_STEP
+    made = _checked(series, driven, scale, found, words)
+    return replace(made, fitted_noise=noise, fitted_input=spent)
 
 
 def _channel_names(inputs: Inputs | None) -> tuple[str, ...] | None:

@@ -13,6 +13,7 @@ _CODES = {
     Kind.EVEN: "residuals-follow-input-squared",
     Kind.EVEN_SQUARED: "residual-power-follows-input",
     Kind.BILINEAR: "residuals-follow-product",
+    Kind.CROSS: "residuals-follow-other-output",
 }
 _ACTIONS = {
     Kind.WHITENESS: "raise the order of the noise model, or of the whole model",
@@ -20,6 +21,8 @@ _ACTIONS = {
     Kind.EVEN: "an even nonlinearity is missing: add terms such as u²",
     Kind.EVEN_SQUARED: "terms in this input are missing, linear or not: see which other test fails",
     Kind.BILINEAR: "products of noise and input are missing: add bilinear terms",
+    Kind.CROSS: "the outputs share noise or dynamics: give the other output as an input, or fit a "
+    "state space with both",
 }
 _FEEDBACK = "the residual comes before the input: a loop is closed; declare loop='closed'"
 

@@ -52,12 +52,13 @@ def residual_tests(
     horizon: Horizon | str | None = None,
     loop: Loop | str = Loop.OPEN,
     maximum_lag: int = 25,
-    fitted_noise: int = 0,
-    fitted_input: int = 0,
+    fitted_noise: int | None = None,
+    fitted_input: int | None = None,
 ) -> ResidualTests:
     """Test residuals for whiteness and independence of the inputs, linear and nonlinear.
 
-    For each output φ_εε, and for each input φ_uε, φ_(u²)'ε, φ_(u²)'ε² and φ_ε(εu), about means, in
+    For each output φ_εε, against each other output φ_ε′ε (whether its past foretells this
+    residual), and for each input φ_uε, φ_(u²)'ε, φ_(u²)'ε² and φ_ε(εu), about means, in
     units of the standard deviations. Whiteness takes the Ljung–Box statistic, independence a
     quadratic form in the inverse of the correlations' own covariance, which knows the colour of
     input and residual. `CorrelationTest` states the pass rule.
@@ -69,9 +70,10 @@ def residual_tests(
 
     Parameters
     ----------
-    residuals : Fit, Verification, Record, sequence of Record, mapping or array_like
-        A fit of records or a verification (measured minus free run), records whose outputs are
-        residuals, or samples, shape (n_samples,) or (n_outputs, n_samples), by name or bare.
+    residuals : Fit, PolynomialFit, Verification, Record, sequence, mapping or array_like
+        A fit of records or a verification (measured minus free run), polynomial fits of one output
+        each to the same records, records whose outputs are residuals, or samples, shape
+        (n_samples,) or (n_outputs, n_samples), by name or bare.
     inputs : names, mapping or array_like, optional
         With records: channel names; default: their inputs. Else samples as for `residuals`.
     outputs : iterable of str, optional
@@ -85,7 +87,8 @@ def residual_tests(
         Largest lag, samples.
     fitted_noise, fitted_input : int
         Parameters fitted to these very samples that whiten the residual (of A, C, D), and that
-        take out the inputs (of B, F, per input); zero on records the fit has not seen.
+        take out the inputs (of B, F, per input); zero on records the fit has not seen. Default:
+        those of a given fit, else zero.
 
     Returns
     -------
@@ -119,10 +122,14 @@ def residual_tests(
     data = gather_residuals(
         residuals, inputs, outputs, None if horizon is None else _choice(Horizon, horizon)
     )
+    fitted_noise = data.fitted_noise if fitted_noise is None else fitted_noise
+    fitted_input = data.fitted_input if fitted_input is None else fitted_input
     setup = _Setup(data, _choice(Loop, loop), maximum_lag, fitted_noise, fitted_input)
     _require_lags(setup)
     tests = tuple(
-        setup.test(kind, output, name) for output in data.residuals for kind, name in _kinds(data)
+        setup.test(kind, output, name)
+        for output in data.residuals
+        for kind, name in _kinds(data, output)
     )
     return ResidualTests(
         tuple(data.residuals),
@@ -140,10 +147,11 @@ def residual_tests(
     )
 
 
-def _kinds(data: ResidualData) -> list[tuple[Kind, str | None]]:
-    with_input = [kind for kind in Kind if kind is not Kind.WHITENESS]
+def _kinds(data: ResidualData, output: str) -> list[tuple[Kind, str | None]]:
+    with_input = [kind for kind in Kind if kind not in (Kind.WHITENESS, Kind.CROSS)]
     pairs = [(kind, name) for name in data.inputs for kind in with_input]
-    return [(Kind.WHITENESS, None), *pairs]
+    others = [(Kind.CROSS, name) for name in data.residuals if name != output]
+    return [(Kind.WHITENESS, None), *others, *pairs]
 
 
 @dataclass(frozen=True)
@@ -165,7 +173,8 @@ class _Setup:
     def test(self, kind: Kind, output: str, name: str | None) -> CorrelationTest:
         """One test, or why it cannot be made."""
         e = self.data.residuals[output]
-        u = e if name is None else self.data.inputs[name]
+        group = self.data.residuals if kind is Kind.CROSS else self.data.inputs
+        u = e if name is None else group[name]
         counts = self.data.horizon is Horizon.ONE_STEP or kind not in NEEDS_ONE_STEP
         reason = self._obstacle(kind, output, e, u)
         if reason:
@@ -178,6 +187,8 @@ class _Setup:
     def _obstacle(self, kind: Kind, output: str, e: Series, u: Series) -> str:
         if _is_constant(e, self.data.scale.get(output, 0.0) * ROUNDING):
             return "the residual does not change beyond rounding"
+        if kind is Kind.CROSS:
+            return "the other residual does not change" if _is_constant(u, 0.0) else ""
         return "" if kind is Kind.WHITENESS else self._obstacle_of_input(kind, e, u)
 
     def _obstacle_of_input(self, kind: Kind, e: Series, u: Series) -> str:
@@ -198,16 +209,19 @@ class _Setup:
     def _white(
         self, kind: Kind, output: str, name: str | None, counts: bool, note: str
     ) -> CorrelationTest:
-        """Whiteness, and φ_ε(εu): values at successive lags are independent for a good model."""
+        """Whiteness, φ_ε′ε and φ_ε(εu): successive lags are independent for a good model."""
         e = self.data.residuals[output]
         lags = np.arange(1, self.maximum_lag + 1)
         first, fitted = e, self.fitted_noise
-        if name is not None:
+        if kind is Kind.CROSS:
+            first, fitted = self.data.residuals[name or ""], 0
+        elif name is not None:
             # φ_ε(εu)(τ) pairs ε(t) with the product at t − 1 − τ: lag τ + 1 of the product.
             lags, fitted = np.arange(self.maximum_lag + 1), 0
             u = centred(self.data.inputs[name])
             first = tuple(x * y for x, y in zip(centred(e), u, strict=True))
         every = cross_correlation(first, e, self.maximum_lag + 1)
+        # Lag one stands there for φ_ε(εu)'s τ = 0 too.
         values = every[self.maximum_lag + 2 :][: lags.size]
         measures = white_portmanteau(values, self.n_samples, fitted)
         judged = np.ones(lags.size, dtype=np.bool_)

@@ -1,0 +1,181 @@
+"""Polynomial models: the scan of orders, poles and zeros with their errors, pulse responses."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+
+from flightid.identification import ImpulseResponse, PolynomialFit
+from flightid.plot import look
+from flightid.validation import OrderScan
+
+CHI2_95_2 = 5.991
+"""95 % point of χ² with two degrees of freedom."""
+HIGHEST = 3.0
+"""Errors beyond this many times the smallest are drawn at the upper edge."""
+
+
+def order_scan(scan: OrderScan) -> go.Figure:
+    """Draw free-run error and BIC of each structure over its number of coefficients.
+
+    Parameters
+    ----------
+    scan : OrderScan
+        Result of `flightid.scan_orders`.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    made = look.figure(2)
+    kept = [t for t in scan.trials if t.free_run_rms is not None and t.criteria is not None]
+    counts = [t.structure.n_parameters for t in kept]
+    rms = np.array([t.free_run_rms for t in kept], dtype=np.float64)
+    bic = np.array([t.criteria.bic if t.criteria else None for t in kept], dtype=np.float64)
+    words = [t.structure.orders_text for t in kept]
+    top = HIGHEST * float(rms.min())
+    for row, values in ((1, np.minimum(rms, top)), (2, bic)):
+        made.add_trace(
+            go.Scatter(
+                x=counts,
+                y=values,
+                text=words,
+                name="structures",
+                legendgroup="structures",
+                showlegend=row == 1,
+                mode="markers",
+                marker={"color": look.MODEL, "size": 6, "opacity": 0.45},
+                hovertemplate="%{text}: %{y:.5g}",
+            ),
+            row=row,
+            col=1,
+        )
+    for name, trial, colour in (
+        ("smallest free-run error", scan.trials[0], look.RIVAL),
+        ("simplest within 2 %", scan.simplest, look.TRUTH),
+    ):
+        if trial not in kept:
+            continue
+        place = kept.index(trial)
+        for row, value in ((1, rms[place]), (2, bic[place])):
+            made.add_trace(
+                go.Scatter(
+                    x=[counts[place]],
+                    y=[value],
+                    name=f"{name}: {trial.structure.orders_text}",
+                    legendgroup=name,
+                    showlegend=row == 1,
+                    mode="markers",
+                    marker={"color": colour, "size": 12, "symbol": "diamond"},
+                ),
+                row=row,
+                col=1,
+            )
+    look.label_axes(made, x="coefficients", y=[look.axis_title("free-run rms", scan.unit), "BIC"])
+    made.update_layout(hovermode="closest")
+    return made
+
+
+def pole_zero(fit: PolynomialFit, response: str | None = None) -> go.Figure:
+    """Draw poles and zeros in the z plane with 95 % ellipses, and the unit circle.
+
+    Parameters
+    ----------
+    fit : PolynomialFit
+    response : str, optional
+        ``"output/input"``; default: the first.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    name = response or f"{fit.structure.output}/{fit.structure.inputs[0]}"
+    made = look.figure(1, height_px=560)
+    angle = np.linspace(0.0, 2 * np.pi, 181)
+    made.add_trace(
+        look.line("unit circle", np.cos(angle), np.sin(angle), colour=look.LINE, width=1.0)
+    )
+    styles = {"pole": ("x", look.MODEL), "zero": ("circle-open", look.RIVAL)}
+    for kind, (symbol, colour) in styles.items():
+        shown = [root for root in fit.roots if root.kind == kind and root.response == name]
+        places = [z for root in shown for z in _both(root.z)]
+        made.add_trace(
+            go.Scatter(
+                x=[z.real for z in places],
+                y=[z.imag for z in places],
+                name=f"{kind}s",
+                legendgroup=kind,
+                mode="markers",
+                marker={"color": colour, "symbol": symbol, "size": 10, "line": {"width": 2}},
+            )
+        )
+        for root in shown:
+            if root.covariance is None:
+                continue
+            for z, sign in zip(_both(root.z), (1.0, -1.0), strict=False):
+                x, y = _ellipse(z, root.covariance, sign)
+                edge = look.line(f"{kind}s", x, y, colour=colour, width=1.0, legend=False)
+                made.add_trace(edge.update(legendgroup=kind, hoverinfo="skip"))
+    look.label_axes(made, x="real", y=["imaginary"])
+    reach = max([1.15, *(abs(r.z) * 1.1 for r in fit.roots if r.response == name)])
+    reach = min(reach, 3.0)
+    made.update_xaxes(range=[-reach, reach])
+    made.update_yaxes(range=[-reach, reach], scaleanchor="x")
+    made.update_layout(hovermode="closest")
+    return made
+
+
+def _both(z: complex) -> list[complex]:
+    return [z, z.conjugate()] if z.imag else [z]
+
+
+def _ellipse(
+    centre: complex, covariance: NDArray[np.float64], sign: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    values, vectors = np.linalg.eigh(covariance)
+    angle = np.linspace(0.0, 2 * np.pi, 61)
+    round_ = np.array([np.cos(angle), np.sin(angle)])
+    x, y = vectors @ (np.sqrt(CHI2_95_2 * np.maximum(values, 0.0))[:, None] * round_)
+    return centre.real + x, centre.imag + sign * y
+
+
+def impulse_response(item: ImpulseResponse, name: str | None = None) -> go.Figure:
+    """Draw pulse and step response of one input with their 95 % bands.
+
+    Parameters
+    ----------
+    item : ImpulseResponse
+        Result of `flightid.impulse_response`.
+    name : str, optional
+        Input; default: the first.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+    """
+    place = 0 if name is None else item.inputs.index(name)
+    name = item.inputs[place]
+    made = look.figure(2)
+    steps, errors = item.step()
+    causal = item.lags >= 0
+    curves = (
+        (item.time_s, item.values[place], item.stderr[place]),
+        (item.time_s[causal], steps[place], errors[place]),
+    )
+    for row, (time, values, wide) in enumerate(curves, start=1):
+        # The band lies about zero for pulses: outside it, chance does not explain a lag.
+        middle = 0.0 * values if row == 1 else values
+        for edge in look.band(
+            "95 %", time, middle - 1.96 * wide, middle + 1.96 * wide, colour=look.TRUTH
+        ):
+            made.add_trace(edge, row=row, col=1)
+        if row == 1:
+            bars = go.Bar(x=time, y=values, name="pulse", marker={"color": look.MODEL})
+            made.add_trace(bars, row=row, col=1)
+        else:
+            made.add_trace(look.line("step", time, values, colour=look.MODEL), row=row, col=1)
+    look.label_axes(
+        made, x="time [s]", y=[f"{item.output} to pulse of {name}", f"{item.output} to step"]
+    )
+    return made

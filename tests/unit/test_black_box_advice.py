@@ -1,0 +1,202 @@
+"""Advice, pulse responses, and residual tests of polynomial fits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import flightid as fid
+from flightid.errors import DataError, OptionError
+from flightid.plot import polynomial as plot
+from tests.closeness import assert_close
+from tests.polynomial_records import ARMAX, TWO_INPUTS, flown
+
+P = fid.PolynomialModel
+
+
+def _codes(item):
+    return {finding.code for finding in item.findings}
+
+
+def test_pulse_responses_recover_the_model_and_its_delays():
+    record = flown(TWO_INPUTS, 0, n=3000, noise=0.1)
+    found = fid.impulse_response(record, n_lags=50)
+    assert found.delays == {"u": 1, "v": 3}
+    pulse = np.eye(1, 50)[0]
+    for i, name in enumerate(TWO_INPUTS.inputs):
+        truth = lfilter(*TWO_INPUTS.transfer(name), pulse)
+        assert np.mean(np.abs(found.values[i] - truth) < 1.96 * found.stderr[i]) > 0.85
+        step, error = found.step()
+        assert np.all(np.abs(step[i] - np.cumsum(truth)) < 5 * error[i])
+    text = found.summary().to_text()
+    assert "delay" in text
+    assert found.to_dict()["schema"] == "flightid.impulse_response/1"
+    assert len(plot.impulse_response(found, "v").data) == 6
+    assert "delay 3" in repr(found)
+
+
+def test_intervals_of_pulse_responses_hold_for_coloured_noise():
+    inside = []
+    truth = lfilter(*ARMAX.transfer("u"), np.eye(1, 40)[0])
+    coloured = P("y", ("u",), 0.1, a=ARMAX.a, b=ARMAX.b, c=np.convolve(ARMAX.a, [1, 0.9]))
+    for seed in range(20):
+        found = fid.impulse_response(flown(coloured, seed, n=900, noise=0.5))
+        inside.append(np.abs(found.values[0] - truth) < 1.96 * found.stderr[0])
+    # 800 values in dependent rows: 95 % ± 3 %.
+    assert 0.92 < np.mean(inside) < 0.98
+
+
+@pytest.mark.parametrize("kernel", ["tc", "dc"])
+def test_a_kernel_smooths_a_short_record(kernel):
+    quick = P("y", ("u",), 0.1, a=[1, -0.6], b=[[0.5]], c=[1, -0.6])
+    truth = lfilter(*quick.transfer("u"), np.eye(1, 40)[0])
+    miss = np.zeros(2)
+    for seed in range(4):
+        record = flown(quick, seed, n=220, noise=0.5)
+        for place, each in enumerate((None, kernel)):
+            found = fid.impulse_response(record, kernel=each)
+            miss[place] += np.linalg.norm(found.values[0] - truth)
+    assert miss[1] < 0.5 * miss[0]
+
+
+def test_advice_on_a_good_record():
+    advice = fid.advise(flown(ARMAX, 2, n=1200, noise=0.3))
+    assert advice.excitation_orders == {"u": 50}
+    assert advice.delays == {"u": 1}
+    assert _codes(advice) == {"delay"}
+    assert "excitation order 50" in repr(advice)
+    assert advice.to_dict()["schema"] == "flightid.advice/1"
+    assert "feedback p" in advice.summary().to_text()
+
+
+def test_advice_sees_poor_related_silent_and_fast_channels():
+    t = np.arange(1500)
+    noise = np.random.default_rng(3).standard_normal((3, 1500))
+
+    def advise(inputs, y):
+        return fid.advise(
+            fid.Record.from_arrays(t / 100, inputs=inputs, outputs={"y": y}), n_lags=20
+        )
+
+    tone = np.sin(0.2 * t)
+    poor = advise({"u": tone}, np.roll(tone, 2) + 0.1 * noise[0])
+    assert poor.excitation_orders["u"] <= 4
+    assert "poor-excitation" in _codes(poor)
+    twins = {"u": noise[0], "v": noise[0] + 0.05 * noise[1]}
+    assert "related-inputs" in _codes(advise(twins, noise[2] + np.roll(noise[0], 1)))
+    assert "no-response" in _codes(advise({"u": noise[0]}, noise[1]))
+    slow = np.sin(0.01 * t) + 1e-3 * noise[1]
+    assert "sampled-fast" in _codes(advise({"u": noise[0]}, slow))
+    two = np.sign(noise[0])
+    assert "two-levels" in _codes(advise({"u": two}, np.roll(two, 1) + noise[1]))
+
+
+def test_feedback_is_seen_and_its_absence_too():
+    rng = np.random.default_rng(4)
+    found = []
+    for gain in (0.0, 0.6):
+        y, u = np.zeros(3000), np.zeros(3000)
+        e, r = rng.standard_normal((2, 3000))
+        for t in range(1, 3000):
+            y[t] = 0.7 * y[t - 1] + 0.5 * u[t - 1] + e[t]
+            u[t] = r[t] - gain * y[t]
+        record = fid.Record.from_arrays(np.arange(3000) / 10, inputs={"u": u}, outputs={"y": y})
+        found.append("feedback" in _codes(fid.advise(record)))
+    assert found == [False, True]
+
+
+def test_advice_on_a_short_record_says_what_it_left_out():
+    advice = fid.advise(flown(ARMAX, 5, n=60, noise=0.3))
+    assert advice.response is None
+    assert "no-pulse-response" in _codes(advice)
+
+
+def test_requests_that_cannot_be_met():
+    record = flown(ARMAX, 6)
+    for verb in (fid.advise, fid.impulse_response):
+        with pytest.raises(DataError, match="there is no record"):
+            verb([])
+        both = fid.Record.from_arrays(
+            record.time_s, inputs={"u": record["u"]}, outputs={"y": record["y"], "z": record["y"]}
+        )
+        with pytest.raises(OptionError, match="output is not said"):
+            verb(both)
+    with pytest.raises(OptionError, match="there is no input"):
+        fid.impulse_response(record, inputs=[])
+    with pytest.raises(OptionError, match="lags are outside"):
+        fid.impulse_response(record, n_lags=0)
+    with pytest.raises(OptionError, match="unknown kernel"):
+        fid.impulse_response(record, kernel="ss")
+    with pytest.raises(OptionError, match="no lags before the pulse"):
+        fid.impulse_response(record, kernel="tc", negative_lags=3)
+    with pytest.raises(DataError, match="too few samples for the lags"):
+        fid.impulse_response(record, n_lags=150)
+    tone = record.replace({"u": np.sin(0.5 * np.arange(400))})
+    with pytest.raises(DataError, match="do not determine the response"):
+        fid.impulse_response(tone)
+
+
+def test_residual_tests_take_a_fit_and_count_its_coefficients():
+    record = flown(ARMAX, 7, n=1500, noise=0.5)
+    good = fid.identify(P.armax("y", "u", na=2, nb=2, nc=2), record)
+    tests = fid.residual_tests(good)
+    assert (tests.fitted_noise, tests.fitted_input) == (4, 2)
+    assert [t.verdict.value for t in tests.tests[:2]] == ["pass", "pass"]
+    assert tests.tests[0].degrees_of_freedom == 25 - 4
+    poor = fid.identify(P.arx("y", "u", na=1, nb=1), record)
+    assert fid.residual_tests(poor).tests[0].verdict.value == "fail"
+
+
+def test_output_error_and_instruments_promise_independence_only():
+    record = flown(ARMAX, 8, n=1500, noise=0.5)
+    for asked in (
+        P.oe("y", "u", nb=2, nf=2),
+        P.arx("y", "u", na=2, nb=2, method="iv4"),
+    ):
+        tests = fid.residual_tests(fid.identify(asked, record))
+        assert not tests.tests[0].counts
+        assert tests.test("uε", "y", "u").verdict.value == "pass"
+        with pytest.raises(OptionError, match="another predictor"):
+            fid.residual_tests(fid.identify(asked, record), horizon="one step ahead")
+
+
+def test_residuals_of_two_outputs_are_tested_against_each_other():
+    rng = np.random.default_rng(9)
+    u, e, w = rng.standard_normal((3, 2000))
+    y = lfilter([0.0, 1.0], [1, -0.5], u) + e
+    z = lfilter([0.0, 0.3], [1, -0.8], u) + w + 0.5 * np.roll(e, 2)
+    record = fid.Record.from_arrays(np.arange(2000) / 10, inputs={"u": u}, outputs={"y": y, "z": z})
+    fits = [fid.identify(P.bj(name, "u", nb=1, nf=1, nc=1, nd=1), record) for name in ("y", "z")]
+    tests = fid.residual_tests(fits)
+    # The noise of y reaches z two samples later, never the other way round.
+    assert tests.test("ε′ε", "z", "y").verdict.value == "fail"
+    assert tests.test("ε′ε", "y", "z").verdict.value == "pass"
+    assert fid.residual_tests(fits, outputs=["y"]).outputs == ("y",)
+    other = fid.identify(P.arx("z", "u", na=1, nb=1), flown(P("z", ("u",), 0.1, b=[[1.0]]), 1))
+    with pytest.raises(DataError, match="fits of different records"):
+        fid.residual_tests([fits[0], other])
+
+
+def test_fits_with_other_lags_share_their_common_samples():
+    record = flown(TWO_INPUTS, 10, n=900, noise=0.3)
+    more = fid.Record.from_arrays(
+        record.time_s,
+        inputs={"u": record["u"], "v": record["v"]},
+        outputs={"y": record["y"], "z": np.roll(record["u"], 1)
+                 + np.random.default_rng(1).standard_normal(900)},
+    )  # fmt: skip
+    fits = [
+        fid.identify(P.arx("y", ["u", "v"], na=4, nb=4, nk=[1, 3]), more),
+        fid.identify(P.arx("z", "u", na=1, nb=1), more),
+    ]
+    tests = fid.residual_tests(fits)
+    assert tests.n_samples == 900 - 6
+    assert_close(tests.fitted_input, 4.0, atol=1e-12, why="a count")
+
+
+def test_the_pole_zero_map_has_ellipses():
+    fit = fid.identify(P.armax("y", "u", na=2, nb=2, nc=2), flown(ARMAX, 11, noise=0.3))
+    figure = plot.pole_zero(fit)
+    # The circle, two clouds, an ellipse for each pole of the pair and for the zero.
+    assert len(figure.data) == 6

@@ -1,0 +1,146 @@
+"""Scan of orders: ranking, agreement with full fits, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.errors import DataError, FitError, OptionError
+from flightid.plot import polynomial as plot
+from tests.closeness import assert_close
+from tests.polynomial_records import ARMAX, flown
+
+P = fid.PolynomialModel
+RANGES = {"na": range(1, 4), "nb": range(1, 4), "nc": range(1, 3), "nk": range(1, 3)}
+
+
+@pytest.fixture(scope="module")
+def scan():
+    return fid.scan_orders(
+        flown(ARMAX, 0, n=1500, noise=0.3), flown(ARMAX, 1, n=800, noise=0.3), **RANGES
+    )
+
+
+def test_the_true_orders_are_found(scan):
+    assert len(scan.trials) == 36
+    assert scan.smallest("bic").structure.orders_text == "na 2, nb 2, nc 2, nk 1"
+    simple = scan.simplest.structure
+    assert (simple.na, simple.nb, simple.nk) == (2, (2,), (1,))
+    errors = [t.free_run_rms for t in scan.trials if t.free_run_rms is not None]
+    assert errors == sorted(errors)
+    assert scan.best.structure.orders_text == scan.trials[0].structure.orders_text
+
+
+def test_scanned_models_agree_with_full_fits(scan):
+    trial = next(t for t in scan.trials if t.structure.orders_text == "na 2, nb 2, nc 2, nk 1")
+    fit = fid.identify(trial.structure, flown(ARMAX, 0, n=1500, noise=0.3))
+    errors = np.array([p.stderr for p in fit.parameters.values()])
+    assert np.all(np.abs(trial.model.theta - fit.model.theta) < 0.3 * errors)
+    assert_close(trial.criteria.loss, fit.criteria.loss, rtol=5e-3, why="other first samples")
+
+
+def test_the_free_run_of_the_scan_is_that_of_the_model(scan):
+    trial = next(t for t in scan.trials if t.structure.orders_text == "na 2, nb 2, nc 1, nk 1")
+    unseen = flown(ARMAX, 1, n=800, noise=0.3)
+    y, u = unseen["y"] - unseen["y"].mean(), unseen["u"] - unseen["u"].mean()
+    start = 5  # The longest lag: 3 coefficients of B from a delay of 2.
+    run = y.copy()
+    a, b = trial.model.a, trial.model.b[0]
+    for t in range(start, 800):
+        run[t] = -a[1] * run[t - 1] - a[2] * run[t - 2] + b[0] * u[t - 1] + b[1] * u[t - 2]
+    rms = np.sqrt(np.mean((y - run)[start:] ** 2))
+    assert_close(trial.free_run_rms, rms, rtol=1e-9, why="the same recursion")
+
+
+def test_the_table_marks_what_each_criterion_takes(scan):
+    text = scan.summary(3).to_text()
+    assert "BIC" in text
+    assert "ranked by free run" in text
+    values = scan.to_dict()
+    assert values["schema"] == "flightid.order_scan/1"
+    assert len(values["trials"]["rows"]) == 36
+    assert "36 structures" in repr(scan)
+    assert "<table" in scan._repr_html_()
+    figure = plot.order_scan(scan)
+    assert len(figure.data) == 6
+
+
+def test_arx_with_two_inputs_and_delays():
+    truth = P("y", ("u", "v"), 0.1, a=[1, -0.8], b=[[1.0], [0.5]], nk=(2, 2))
+    scan = fid.scan_orders(
+        flown(truth, 2, n=900, noise=0.2),
+        flown(truth, 3, n=900, noise=0.2),
+        kind="arx",
+        na=[1, 2],
+        nb=[1, 2],
+        nk=[1, 2, 3],
+    )
+    assert scan.smallest("bic").structure.orders_text == "na 1, nb [1, 1], nk [2, 2]"
+
+
+@pytest.mark.parametrize(("kind", "more"), [("oe", {}), ("bj", {"nc": 1, "nd": 1})])
+def test_output_error_and_box_jenkins_are_scanned_by_full_fits(kind, more):
+    truth = P("y", ("u",), 0.1, b=[[1.0]], f=[[1, -0.8]], c=[1, 0.4], d=[1, -0.7])
+    scan = fid.scan_orders(
+        flown(truth, 4, n=500, noise=0.1),
+        flown(truth, 5, n=500, noise=0.1),
+        kind=kind,
+        nb=[1, 2],
+        nf=[1, 2],
+        **more,
+    )
+    assert len(scan.trials) == 4
+    assert scan.simplest.structure.nf == (1,)
+
+
+def test_edges_simpler_models_and_growth_are_told():
+    scan = fid.scan_orders(
+        flown(ARMAX, 6, n=900, noise=0.3),
+        flown(ARMAX, 7, n=900, noise=0.3),
+        kind="arx",
+        na=[1, 2],
+        nb=[1, 2],
+    )
+    assert "at-edge-of-scan" in {f.code for f in scan.findings}
+    large = fid.scan_orders(
+        flown(ARMAX, 6, n=900, noise=0.01),
+        flown(ARMAX, 7, n=900, noise=0.01),
+        kind="arx",
+        na=[2, 6],
+        nb=[2, 6],
+    )
+    assert large.simplest.structure.n_parameters <= large.trials[0].structure.n_parameters
+
+
+def test_scans_that_cannot_be_made():
+    record, unseen = flown(ARMAX, 8), flown(ARMAX, 9)
+    with pytest.raises(OptionError, match="unknown kind of model"):
+        fid.scan_orders(record, unseen, kind="arma")
+    with pytest.raises(OptionError, match="nothing to try"):
+        fid.scan_orders(record, unseen, na=[])
+    with pytest.raises(OptionError, match="the scan is too large"):
+        fid.scan_orders(record, unseen, na=range(1, 60), nb=range(1, 60), nc=range(1, 20))
+    with pytest.raises(OptionError, match="records to validate on"):
+        fid.scan_orders(record, [])
+    with pytest.raises(DataError, match="too short for the scan"):
+        fid.scan_orders(flown(ARMAX, 8, n=6), unseen)
+    slow = fid.Record.from_arrays(
+        np.arange(400) / 5, inputs={"u": unseen["u"]}, outputs={"y": unseen["y"]},
+        units={"y": "rad"},
+    )  # fmt: skip
+    with pytest.raises(DataError, match="different sample times"):
+        fid.scan_orders(record, slow)
+    twice = fid.Record.from_arrays(
+        record.time_s,
+        inputs={"u": record["u"], "v": record["u"]},
+        outputs={"y": record["y"]},
+        units={"y": "rad"},
+    )
+    with pytest.raises(FitError, match="no structure of the scan could be fitted"):
+        fid.scan_orders(twice, twice, na=1, nb=1, nc=1)
+    both = fid.Record.from_arrays(
+        record.time_s, inputs={"u": record["u"]}, outputs={"y": record["y"], "z": record["y"]}
+    )
+    with pytest.raises(OptionError, match="output to model is not said"):
+        fid.scan_orders(both, both)
