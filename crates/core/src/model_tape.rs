@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use crate::dual::{Dual, Scalar};
 use crate::error::CoreError;
 use crate::expression::{Binary, Expression, Node};
+use crate::lookup_table::LookupTable;
 use crate::tape::{Registers, Tape};
 
 /// Most derivatives of matrix entries by parameters that are kept.
@@ -32,8 +33,10 @@ pub struct ModelText {
     pub delays: Vec<String>,
     /// Names of the parameters.
     pub parameters: Vec<String>,
-    /// Formulas of tied parameters.
+    /// Formulas of tied parameters and of auxiliary quantities.
     pub definitions: BTreeMap<String, String>,
+    /// Tables that formulas may call.
+    pub tables: BTreeMap<String, LookupTable>,
 }
 
 /// A compiled model.
@@ -70,10 +73,9 @@ pub struct Sensitivity {
 fn difference(left: Expression, right: Expression) -> Expression {
     let shift = left.nodes.len();
     let mut nodes = left.nodes;
-    nodes.extend(right.nodes.into_iter().map(|node| match node {
-        Node::Unary(function, a) => Node::Unary(function, a + shift),
-        Node::Binary(function, a, b) => Node::Binary(function, a + shift, b + shift),
-        leaf => leaf,
+    nodes.extend(right.nodes.iter().map(|node| {
+        let places: Vec<usize> = node.children().into_iter().map(|place| place + shift).collect();
+        node.with_children(&places)
     }));
     nodes.push(Node::Binary(Binary::Subtract, left.root, right.root + shift));
     let root = nodes.len() - 1;
@@ -90,21 +92,23 @@ impl ModelTape {
         let (n, m) = (text.states.len(), text.inputs.len());
         expect("equations", text.equations.len(), n)?;
         expect("delays", text.delays.len(), m)?;
+        let callable: Vec<&String> = text.tables.keys().collect();
+        let parse = |formula: &str| Expression::parse_with(formula, &callable);
         let mut expressions = Vec::with_capacity(n + text.outputs.len() + m);
         for (left, right) in &text.equations {
-            expressions.push(difference(Expression::parse(left)?, Expression::parse(right)?));
+            expressions.push(difference(parse(left)?, parse(right)?));
         }
         for formula in text.outputs.iter().chain(&text.delays) {
-            expressions.push(Expression::parse(formula)?);
+            expressions.push(parse(formula)?);
         }
         let mut names: Vec<String> = text.states.iter().map(|name| format!("{name}'")).collect();
         names.extend(text.states.iter().chain(&text.inputs).chain(&text.parameters).cloned());
         let definitions = text
             .definitions
             .iter()
-            .map(|(name, formula)| Ok((name.clone(), Expression::parse(formula)?)))
+            .map(|(name, formula)| Ok((name.clone(), parse(formula)?)))
             .collect::<Result<_, CoreError>>()?;
-        let tape = Tape::compile(&expressions, &names, &definitions)?;
+        let tape = Tape::compile_with(&expressions, &names, &definitions, &text.tables)?;
         Ok(Self { tape, n_states: n, n_inputs: m, n_outputs: text.outputs.len() })
     }
 
@@ -142,7 +146,7 @@ impl ModelTape {
         self.n_states + self.n_outputs
     }
 
-    fn joined(&self, point: &[f64], parameters: &[f64]) -> Result<Vec<f64>, CoreError> {
+    pub(crate) fn joined(&self, point: &[f64], parameters: &[f64]) -> Result<Vec<f64>, CoreError> {
         expect("entries of the point", point.len(), self.width())?;
         expect("parameter values", parameters.len(), self.n_parameters())?;
         Ok([point, parameters].concat())
@@ -251,7 +255,7 @@ impl ModelTape {
         Ok(slopes)
     }
 
-    fn check_free(&self, free: &[usize]) -> Result<(), CoreError> {
+    pub(crate) fn check_free(&self, free: &[usize]) -> Result<(), CoreError> {
         let needed = self.n_parameters();
         match free.iter().find(|&&index| index >= needed) {
             Some(&found) => Err(CoreError::Shape { what: "index of a parameter", found, needed }),

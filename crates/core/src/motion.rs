@@ -196,5 +196,6 @@ fn split(tape: &Tape, n_moving: usize, height: usize) -> Result<(Tape, Tape), Co
     let n_inputs = n_moving + leaves.len();
     leaves.extend(&tape.outputs[height..]);
     let fixed = tape.pruned(&leaves, n_moving)?;
-    Ok((fixed, Tape { operations, outputs, n_inputs }))
+    let tables = tape.tables.clone();
+    Ok((fixed, Tape { operations, outputs, n_inputs, tables }))
 }

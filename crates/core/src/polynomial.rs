@@ -36,6 +36,13 @@ pub fn coefficients(expression: &Expression, variable: &str) -> Result<Vec<Expre
             Node::Binary(function, a, b) => {
                 builder.binary(*function, &collected[*a], &collected[*b], variable)?
             }
+            piecewise => {
+                let mut places = Vec::new();
+                for child in piecewise.children() {
+                    places.push(builder.plain(&collected[child], "a choice or table", variable)?);
+                }
+                vec![Some(builder.push(piecewise.with_children(&places))?)]
+            }
         };
         if next.len() > MAXIMUM_DEGREE + 1 {
             return fault(format!("power of {variable} above {MAXIMUM_DEGREE}"));

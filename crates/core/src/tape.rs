@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, HashMap};
 use crate::dual::{Dual, Scalar};
 use crate::error::CoreError;
 use crate::expression::{Binary, Expression, Node, Unary};
+use crate::lookup_table::{LookupTable, Part};
 
 /// Longest chain of definitions that refer to one another.
 pub const MAXIMUM_CHAIN: usize = 100;
@@ -19,17 +20,22 @@ pub(crate) enum Operation {
     Input(usize),
     Unary(Unary, usize),
     Binary(Binary, usize, usize),
+    /// The second where the first is not zero, else the third.
+    Select(usize, usize, usize),
+    /// Value or slope of a table, by its place among the tape's tables.
+    Table(usize, Part, usize, usize),
 }
 
 impl Operation {
     /// Registers that it reads.
     pub(crate) fn arguments(&self) -> impl Iterator<Item = usize> {
-        let (a, b) = match *self {
-            Self::Constant(_) | Self::Input(_) => (None, None),
-            Self::Unary(_, a) => (Some(a), None),
-            Self::Binary(_, a, b) => (Some(a), Some(b)),
+        let (a, b, c) = match *self {
+            Self::Constant(_) | Self::Input(_) => (None, None, None),
+            Self::Unary(_, a) => (Some(a), None, None),
+            Self::Binary(_, a, b) | Self::Table(.., a, b) => (Some(a), Some(b), None),
+            Self::Select(test, a, b) => (Some(test), Some(a), Some(b)),
         };
-        a.into_iter().chain(b)
+        a.into_iter().chain(b).chain(c)
     }
 
     /// The same operation where its arguments have other places.
@@ -37,6 +43,8 @@ impl Operation {
         match self {
             Self::Unary(function, a) => Self::Unary(function, places[a]),
             Self::Binary(function, a, b) => Self::Binary(function, places[a], places[b]),
+            Self::Select(test, a, b) => Self::Select(places[test], places[a], places[b]),
+            Self::Table(table, part, a, b) => Self::Table(table, part, places[a], places[b]),
             leaf => leaf,
         }
     }
@@ -48,6 +56,8 @@ enum Key {
     Input(usize),
     Unary(Unary, usize),
     Binary(Binary, usize, usize),
+    Select(usize, usize, usize),
+    Table(usize, Part, usize, usize),
 }
 
 /// Several expressions of the same inputs, ready to be evaluated many times.
@@ -56,6 +66,7 @@ pub struct Tape {
     pub(crate) operations: Vec<Operation>,
     pub(crate) outputs: Vec<usize>,
     pub(crate) n_inputs: usize,
+    pub(crate) tables: Vec<LookupTable>,
 }
 
 /// Registers that are reused from call to call.
@@ -77,6 +88,19 @@ impl Tape {
         inputs: &[String],
         definitions: &BTreeMap<String, Expression>,
     ) -> Result<Self, CoreError> {
+        Self::compile_with(expressions, inputs, definitions, &BTreeMap::new())
+    }
+
+    /// As `compile`, with tables that the expressions may call.
+    ///
+    /// # Errors
+    /// As `compile`; also `Shape` for a table called with another number of arguments than its axes.
+    pub fn compile_with(
+        expressions: &[Expression],
+        inputs: &[String],
+        definitions: &BTreeMap<String, Expression>,
+        tables: &BTreeMap<String, LookupTable>,
+    ) -> Result<Self, CoreError> {
         let places = inputs.iter().enumerate().map(|(i, name)| (name.as_str(), i)).collect();
         let mut builder = Builder {
             places,
@@ -84,11 +108,13 @@ impl Tape {
             done: HashMap::new(),
             open: Vec::new(),
             assembler: Assembler::default(),
+            tables,
         };
         let outputs =
             expressions.iter().map(|each| builder.expression(each)).collect::<Result<_, _>>()?;
         let operations = builder.assembler.operations;
-        Ok(Self { operations, outputs, n_inputs: inputs.len() })
+        let tables = tables.values().cloned().collect();
+        Ok(Self { operations, outputs, n_inputs: inputs.len(), tables })
     }
 
     /// Number of expressions.
@@ -111,6 +137,12 @@ impl Tape {
                 Operation::Unary(function, a) => apply_unary(function, registers[a]),
                 Operation::Binary(function, a, b) => {
                     apply_binary(function, registers[a], registers[b])
+                }
+                Operation::Select(test, a, b) => {
+                    registers[if registers[test].real() == 0.0 { b } else { a }]
+                }
+                Operation::Table(table, part, a, b) => {
+                    self.tables[table].part(part, registers[a], registers[b])
                 }
             };
             registers.push(value);
@@ -231,6 +263,8 @@ pub(crate) fn apply_binary<T: Scalar>(function: Binary, a: T, b: T) -> T {
         Binary::Atan2 => a.atan2(b),
         Binary::Minimum => a.minimum(b),
         Binary::Maximum => a.maximum(b),
+        Binary::Less => T::constant(f64::from(a.real() < b.real())),
+        Binary::LessEqual => T::constant(f64::from(a.real() <= b.real())),
     }
 }
 
@@ -250,6 +284,8 @@ impl Assembler {
                 Operation::Input(input) => Key::Input(input),
                 Operation::Unary(function, a) => Key::Unary(function, a),
                 Operation::Binary(function, a, b) => Key::Binary(function, a, b),
+                Operation::Select(test, a, b) => Key::Select(test, a, b),
+                Operation::Table(table, part, a, b) => Key::Table(table, part, a, b),
             };
             (key, place)
         });
@@ -291,6 +327,24 @@ impl Assembler {
         }
     }
 
+    pub(crate) fn select(&mut self, test: usize, a: usize, b: usize) -> Result<usize, CoreError> {
+        match self.value(test) {
+            _ if a == b => Ok(a),
+            Some(value) => Ok(if value == 0.0 { b } else { a }),
+            None => self.push(Key::Select(test, a, b), Operation::Select(test, a, b)),
+        }
+    }
+
+    pub(crate) fn table(
+        &mut self,
+        table: usize,
+        part: Part,
+        a: usize,
+        b: usize,
+    ) -> Result<usize, CoreError> {
+        self.push(Key::Table(table, part, a, b), Operation::Table(table, part, a, b))
+    }
+
     fn push(&mut self, key: Key, operation: Operation) -> Result<usize, CoreError> {
         if let Some(&register) = self.seen.get(&key) {
             return Ok(register);
@@ -312,6 +366,7 @@ struct Builder<'a> {
     done: HashMap<String, usize>,
     open: Vec<String>,
     assembler: Assembler,
+    tables: &'a BTreeMap<String, LookupTable>,
 }
 
 impl Builder<'_> {
@@ -319,10 +374,8 @@ impl Builder<'_> {
         let mut wanted = vec![false; expression.nodes.len()];
         wanted[expression.root] = true;
         for index in (0..=expression.root).rev() {
-            match expression.nodes[index] {
-                Node::Unary(_, a) if wanted[index] => wanted[a] = true,
-                Node::Binary(_, a, b) if wanted[index] => (wanted[a], wanted[b]) = (true, true),
-                _ => {}
+            if wanted[index] {
+                expression.nodes[index].children().into_iter().for_each(|a| wanted[a] = true);
             }
         }
         let mut registers = vec![0; expression.nodes.len()];
@@ -337,9 +390,27 @@ impl Builder<'_> {
                 Node::Binary(function, a, b) => {
                     self.assembler.binary(*function, registers[*a], registers[*b])?
                 }
+                Node::Select(test, a, b) => {
+                    self.assembler.select(registers[*test], registers[*a], registers[*b])?
+                }
+                Node::Table(name, a, b) => {
+                    self.called(name, registers[*a], b.map(|place| registers[place]))?
+                }
             };
         }
         Ok(registers[expression.root])
+    }
+
+    fn called(&mut self, name: &str, a: usize, b: Option<usize>) -> Result<usize, CoreError> {
+        let mut tables = self.tables.iter().enumerate();
+        let Some((place, (_, table))) = tables.find(|(_, (known, _))| *known == name) else {
+            return Err(CoreError::UnknownName { name: name.to_string() });
+        };
+        let (found, needed) = (1 + usize::from(b.is_some()), table.n_axes());
+        if found != needed {
+            return Err(CoreError::Shape { what: "arguments of a table", found, needed });
+        }
+        self.assembler.table(place, Part::Value, a, b.unwrap_or(a))
     }
 
     fn name(&mut self, name: &str) -> Result<usize, CoreError> {

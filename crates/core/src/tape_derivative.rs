@@ -5,6 +5,7 @@
 
 use crate::error::CoreError;
 use crate::expression::{Binary, Unary};
+use crate::lookup_table::Part;
 use crate::tape::{Assembler, Operation, Tape};
 
 /// One derivative of one output.
@@ -55,7 +56,8 @@ impl Tape {
             });
         }
         let outputs = outputs.iter().map(|&register| places[register]).collect();
-        Ok(Tape { operations, outputs, n_inputs: self.n_inputs - skipped })
+        let tables = self.tables.clone();
+        Ok(Tape { operations, outputs, n_inputs: self.n_inputs - skipped, tables })
     }
 
     /// This tape with formulas of the derivatives of its outputs by all inputs appended, and their
@@ -96,6 +98,20 @@ impl Tape {
                     };
                     merged(&mut assembler, left, right)?
                 }
+                Operation::Select(test, a, b) => {
+                    chosen(&mut assembler, test, &gradients[a], &gradients[b])?
+                }
+                Operation::Table(table, _, a, b) => {
+                    let slope = assembler.table(table, Part::First, a, b)?;
+                    let left = scaled(&mut assembler, &gradients[a], slope)?;
+                    if self.tables[table].n_axes() == 1 || gradients[b].is_empty() {
+                        left
+                    } else {
+                        let slope = assembler.table(table, Part::Second, a, b)?;
+                        let right = scaled(&mut assembler, &gradients[b], slope)?;
+                        merged(&mut assembler, left, right)?
+                    }
+                }
             };
         }
         let mut entries = Vec::new();
@@ -105,7 +121,12 @@ impl Tape {
             }
         }
         let operations = assembler.operations;
-        let tape = Tape { operations, outputs: self.outputs.clone(), n_inputs: self.n_inputs };
+        let tape = Tape {
+            operations,
+            outputs: self.outputs.clone(),
+            n_inputs: self.n_inputs,
+            tables: self.tables.clone(),
+        };
         Ok((tape, entries))
     }
 }
@@ -118,6 +139,27 @@ fn scaled(
     let mut found = Vec::with_capacity(gradient.len());
     for &(input, register) in gradient {
         found.push((input, product(assembler, register, slope)?));
+    }
+    Ok(found)
+}
+
+/// Of each derivative, that of the branch taken.
+fn chosen(
+    assembler: &mut Assembler,
+    test: usize,
+    left: &Gradient,
+    right: &Gradient,
+) -> Result<Gradient, CoreError> {
+    let zero = assembler.constant(0.0)?;
+    let mut inputs: Vec<usize> = left.iter().chain(right).map(|entry| entry.0).collect();
+    inputs.sort_unstable();
+    inputs.dedup();
+    let of = |gradient: &Gradient, input: usize| {
+        gradient.iter().find(|entry| entry.0 == input).map_or(zero, |entry| entry.1)
+    };
+    let mut found = Vec::with_capacity(inputs.len());
+    for input in inputs {
+        found.push((input, assembler.select(test, of(left, input), of(right, input))?));
     }
     Ok(found)
 }
@@ -242,6 +284,7 @@ fn binary_slopes(
             let second = to.binary(Binary::Maximum, sign, zero)?;
             slopes = (Some(to.binary(Binary::Subtract, one, second)?), Some(second));
         }
+        Binary::Less | Binary::LessEqual => {}
     }
     Ok((slopes.0.filter(|_| varies.0), slopes.1.filter(|_| varies.1)))
 }

@@ -2,6 +2,7 @@
 //! are left out, and B points are evaluated side by side.
 
 use crate::expression::{Binary, Unary};
+use crate::lookup_table::{LookupTable, Part};
 use crate::tape::{Operation, Tape, apply_binary, apply_unary};
 
 #[derive(Debug, Clone, Copy)]
@@ -14,6 +15,8 @@ enum Step {
     Integer(u32, u32, i32),
     Unary(Unary, u32, u32),
     Binary(Binary, u32, u32, u32),
+    Select(u32, u32, u32, u32),
+    Table(u32, u32, Part, [u32; 2]),
 }
 
 /// Some registers of a tape in the order of their computation.
@@ -28,6 +31,7 @@ pub(crate) struct Program {
     /// Computed at every point.
     moving: Vec<Step>,
     is_moving: Vec<bool>,
+    tables: Vec<LookupTable>,
 }
 
 /// Values of all registers at B points.
@@ -44,6 +48,7 @@ impl Program {
             fixed: Vec::new(),
             moving: Vec::new(),
             is_moving: vec![false; tape.operations.len()],
+            tables: tape.tables.clone(),
         };
         for (register, &operation) in tape.operations.iter().enumerate() {
             if !needed[register] {
@@ -90,7 +95,7 @@ impl Program {
                 lanes[*register] = [value; B];
             }
         }
-        run(&self.fixed, lanes);
+        run(&self.fixed, &self.tables, lanes);
     }
 
     /// Give an input its values at the B points.
@@ -112,7 +117,7 @@ impl Program {
 
     /// Compute all that moves.
     pub(crate) fn run<const B: usize>(&self, lanes: &mut Lanes<B>) {
-        run(&self.moving, lanes);
+        run(&self.moving, &self.tables, lanes);
     }
 }
 
@@ -135,6 +140,10 @@ fn step(tape: &Tape, register: usize, operation: Operation) -> Option<Step> {
             _ => Step::Binary(Binary::Power, to, short(a), short(b)),
         },
         Operation::Binary(function, a, b) => Step::Binary(function, to, short(a), short(b)),
+        Operation::Select(test, a, b) => Step::Select(to, short(test), short(a), short(b)),
+        Operation::Table(table, part, a, b) => {
+            Step::Table(to, short(table), part, [short(a), short(b)])
+        }
     })
 }
 
@@ -157,7 +166,7 @@ fn pair<const B: usize>(
     lanes[to as usize] = result;
 }
 
-fn run<const B: usize>(steps: &[Step], lanes: &mut [[f64; B]]) {
+fn run<const B: usize>(steps: &[Step], tables: &[LookupTable], lanes: &mut [[f64; B]]) {
     for step in steps {
         match *step {
             Step::Negate(to, a) => each(lanes, to, a, |x| -x),
@@ -169,6 +178,15 @@ fn run<const B: usize>(steps: &[Step], lanes: &mut [[f64; B]]) {
             Step::Unary(function, to, a) => each(lanes, to, a, |x| apply_unary(function, x)),
             Step::Binary(function, to, a, b) => {
                 pair(lanes, to, (a, b), |x, y| apply_binary(function, x, y));
+            }
+            Step::Select(to, test, a, b) => {
+                let (test, a, b) = (lanes[test as usize], lanes[a as usize], lanes[b as usize]);
+                lanes[to as usize] =
+                    std::array::from_fn(|lane| if test[lane] == 0.0 { b[lane] } else { a[lane] });
+            }
+            Step::Table(to, table, part, [a, b]) => {
+                let table = &tables[table as usize];
+                pair(lanes, to, (a, b), |x, y| table.part(part, x, y));
             }
         }
     }

@@ -9,32 +9,40 @@ use pyo3::prelude::*;
 
 use crate::error::from_core;
 
-/// expression_names(text: str) -> list[str]
+/// expression_names(text: str, tables: Sequence[str] = ...) -> list[str]
 ///
-/// Names that occur in a formula, in order of first occurrence.
+/// Names that occur in a formula, in order of first occurrence; it may call the tables named.
 #[pyfunction]
-fn expression_names(text: &str) -> PyResult<Vec<String>> {
-    let expression = Expression::parse(text).map_err(from_core)?;
+#[pyo3(signature = (text, tables = vec![]))]
+fn expression_names(text: &str, tables: Vec<String>) -> PyResult<Vec<String>> {
+    let expression = Expression::parse_with(text, &tables).map_err(from_core)?;
     Ok(expression.names().into_iter().map(String::from).collect())
 }
 
 type Printed = (String, String, f64, Vec<usize>);
 
-/// expression_nodes(text: str) -> list[tuple[str, str, float, list[int]]]
+/// expression_nodes(text: str, tables: Sequence[str] = ...) -> list[tuple[str, str, float, list[int]]]
 ///
-/// Parsed formula: kind ("number", "name" or the function), name, number and the places of the
-/// arguments; arguments stand before what uses them and the last node is the whole formula.
+/// Parsed formula: kind ("number", "name", "select", "table" or the function), name, number and the
+/// places of the arguments; arguments stand before what uses them and the last node is the whole
+/// formula.
 #[pyfunction]
-fn expression_nodes(text: &str) -> PyResult<Vec<Printed>> {
-    let expression = Expression::parse(text).map_err(from_core)?;
+#[pyo3(signature = (text, tables = vec![]))]
+fn expression_nodes(text: &str, tables: Vec<String>) -> PyResult<Vec<Printed>> {
+    let expression = Expression::parse_with(text, &tables).map_err(from_core)?;
     let function = |kind: &dyn std::fmt::Debug| format!("{kind:?}").to_lowercase();
     let nodes = expression.nodes.into_iter().take(expression.root + 1);
     Ok(nodes
-        .map(|node| match node {
-            Node::Number(value) => ("number".into(), String::new(), value, vec![]),
-            Node::Name(name) => ("name".into(), name, 0.0, vec![]),
-            Node::Unary(kind, a) => (function(&kind), String::new(), 0.0, vec![a]),
-            Node::Binary(kind, a, b) => (function(&kind), String::new(), 0.0, vec![a, b]),
+        .map(|node| {
+            let places = node.children();
+            match node {
+                Node::Number(value) => ("number".into(), String::new(), value, places),
+                Node::Name(name) => ("name".into(), name, 0.0, places),
+                Node::Unary(kind, _) => (function(&kind), String::new(), 0.0, places),
+                Node::Binary(kind, ..) => (function(&kind), String::new(), 0.0, places),
+                Node::Select(..) => ("select".into(), String::new(), 0.0, places),
+                Node::Table(name, ..) => ("table".into(), name, 0.0, places),
+            }
         })
         .collect())
 }

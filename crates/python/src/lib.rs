@@ -17,6 +17,7 @@ pub mod interrupt;
 pub mod kinematics;
 pub mod least_squares;
 pub mod linear_simulation;
+pub mod lookup_table;
 pub mod narx;
 pub mod nonlinear_simulation;
 pub mod output_error;
@@ -43,6 +44,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     kinematics::register(module)?;
     linear_simulation::register(module)?;
     closed_loop::register(module)?;
+    lookup_table::register(module)?;
     dataflash::register(module)?;
     ulog::register(module)?;
     quadrotor::register(module)?;

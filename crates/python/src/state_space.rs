@@ -15,8 +15,9 @@ use pyo3::prelude::*;
 use crate::error::from_core;
 use crate::frequency_fit::{Response, Run, Search, log_gradients, measured, responses, search};
 use crate::output_error::{self, Flown, NoiseArguments, Own, SearchArguments, linear, record_data};
+use crate::lookup_table::LookupTable;
 
-/// __init__(self, states: Sequence[str], inputs: Sequence[str], equations: Sequence[tuple[str, str]], outputs: Sequence[str], delays: Sequence[str], names: Sequence[str], definitions: dict[str, str], pairs: Sequence[tuple[int, int]], point: Sequence[float]) -> None
+/// __init__(self, states: Sequence[str], inputs: Sequence[str], equations: Sequence[tuple[str, str]], outputs: Sequence[str], delays: Sequence[str], names: Sequence[str], definitions: dict[str, str], pairs: Sequence[tuple[int, int]], point: Sequence[float], tables: dict[str, LookupTable] = ...) -> None
 ///
 /// A state-space model: left and right side of each equation, formulas of outputs and of the delay
 /// of each input, and the (output, input) pairs whose responses are asked for, at the point ẋ, x, u.
@@ -48,6 +49,7 @@ impl StateSpace {
 #[pymethods]
 impl StateSpace {
     #[new]
+    #[pyo3(signature = (states, inputs, equations, outputs, delays, names, definitions, pairs, point, tables = BTreeMap::new()))]
     #[allow(clippy::too_many_arguments)]
     fn new(
         states: Vec<String>,
@@ -59,10 +61,21 @@ impl StateSpace {
         definitions: BTreeMap<String, String>,
         pairs: Vec<(usize, usize)>,
         point: Vec<f64>,
+        tables: BTreeMap<String, Py<LookupTable>>,
     ) -> PyResult<Self> {
         let parameters = names;
-        let text =
-            ModelText { states, inputs, equations, outputs, delays, parameters, definitions };
+        let tables =
+            tables.into_iter().map(|(name, table)| (name, table.get().table.clone())).collect();
+        let text = ModelText {
+            states,
+            inputs,
+            equations,
+            outputs,
+            delays,
+            parameters,
+            definitions,
+            tables,
+        };
         Ok(Self { tape: ModelTape::new(&text).map_err(from_core)?, pairs, point })
     }
 
@@ -104,6 +117,31 @@ impl StateSpace {
             dense[(each.parameter * height + each.row) * width + each.column] = each.value;
         }
         dense.into_pyarray(py).reshape([free.len(), height, width])
+    }
+
+    /// curvatures(self, values: NDArray[np.float64], point: NDArray[np.float64], free: Sequence[int]) -> tuple[NDArray[np.int64], NDArray[np.float64]]
+    ///
+    /// Exact second derivatives, by pairs of values, of what `linearise` returns second and of the
+    /// delays: places (row, column, first, second; delays are the last rows, column 0) and values.
+    #[allow(clippy::type_complexity)]
+    fn curvatures<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'_, f64>,
+        point: PyReadonlyArray1<'_, f64>,
+        free: Vec<usize>,
+    ) -> PyResult<(Bound<'py, PyArray2<i64>>, Bound<'py, PyArray1<f64>>)> {
+        let found = self
+            .tape
+            .curvatures(point.as_slice()?, values.as_slice()?, &free)
+            .map_err(from_core)?;
+        let places: Vec<i64> = found
+            .iter()
+            .flat_map(|each| [each.row, each.column, each.first, each.second])
+            .map(|place| place as i64)
+            .collect();
+        let numbers: Vec<f64> = found.iter().map(|each| each.value).collect();
+        Ok((places.into_pyarray(py).reshape([found.len(), 4])?, numbers.into_pyarray(py)))
     }
 
     /// response(self, values: NDArray[np.float64], omega_rad_s: NDArray[np.float64]) -> NDArray[np.complex128]

@@ -11,6 +11,7 @@ pub(crate) fn text(equations: &[(&str, &str)], outputs: &[&str]) -> ModelText {
         delays: own(&["2*tau"]),
         parameters: own(&["m", "c", "k", "tau"]),
         definitions: BTreeMap::from([("twice".to_string(), "2*c*m".to_string())]),
+        tables: BTreeMap::new(),
     }
 }
 

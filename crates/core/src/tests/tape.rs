@@ -88,3 +88,51 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn choices_take_the_value_and_the_derivative_of_their_branch() {
+    assert_eq!(value("where(a > 2, 10, log(-1))"), 10.0);
+    assert_eq!(value("if(a <= 3, 1, 0) + where(a < 3, 10, 20) + (a >= 3)"), 22.0);
+    assert_eq!(value("clip(a, 0, 2) + saturation(-a, 1) + deadband(a, 0.5)"), 3.5);
+    assert_eq!(value("deadband(-a, 0.5) + deadband(0.2*a, 1)"), -2.5);
+    assert_eq!(value("where(and(a > 1, not(a > 2)), 1, 2) + where(or(a > 9, a > 2), 10, 0)"), 12.0);
+    let tape = tape(&["where(a < b, a^2, b)", "clip(a*b, -1, 1)", "deadband(a, b)"], &["a", "b"]);
+    let (mut values, mut jacobian) = ([0.0; 3], [0.0; 6]);
+    let registers = &mut Registers::default();
+    tape.jacobian(&[2.0, 3.0], &[0, 1], registers, &mut values, &mut jacobian).unwrap();
+    assert_eq!(jacobian, [4.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    tape.jacobian(&[4.0, 0.2], &[0, 1], registers, &mut values, &mut jacobian).unwrap();
+    assert_eq!(values, [0.2, 0.8, 3.8]);
+    assert_eq!(jacobian, [0.0, 1.0, 0.2, 4.0, 1.0, -1.0]);
+}
+
+#[test]
+fn tables_are_called_by_name() {
+    use crate::lookup_table::{Interpolation, Outside};
+    let line = LookupTable::new(
+        vec![vec![0.0, 1.0, 3.0]],
+        vec![1.0, 2.0, 8.0],
+        Interpolation::Linear,
+        Outside::Refuse,
+    )
+    .unwrap();
+    let tables = BTreeMap::from([("lift".to_string(), line)]);
+    let names = ["a".to_string()];
+    let compile = |text: &str| {
+        let parsed = Expression::parse_with(text, &["lift"])?;
+        Tape::compile_with(&[parsed], &names, &BTreeMap::new(), &tables)
+    };
+    let tape = compile("2*lift(a^2)").unwrap();
+    let (mut values, mut jacobian) = ([0.0], [0.0]);
+    let registers = &mut Registers::default();
+    tape.jacobian(&[1.5], &[0], registers, &mut values, &mut jacobian).unwrap();
+    assert_eq!((values, jacobian), ([11.5], [18.0]));
+    let refused = tape.evaluate(&[2.0], registers, &mut values);
+    assert!(matches!(refused, Err(CoreError::NotFinite { .. })));
+    assert!(matches!(compile("lift(a, a)"), Err(CoreError::Shape { .. })));
+    assert!(matches!(compile("lift(a, a, a)"), Err(CoreError::Expression { .. })));
+    assert!(matches!(compile("drag(a)"), Err(CoreError::Expression { .. })));
+    let unknown = Expression::parse_with("drag(a)", &["drag"]).unwrap();
+    let compiled = Tape::compile_with(&[unknown], &names, &BTreeMap::new(), &tables);
+    assert!(matches!(compiled, Err(CoreError::UnknownName { .. })));
+}

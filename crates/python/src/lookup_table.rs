@@ -1,0 +1,70 @@
+//! Face of `flightid_core::lookup_table`. (Python side: models/tables.py)
+
+use flightid_core::CoreError;
+use flightid_core::lookup_table::{Interpolation, LookupTable as CoreTable, Outside};
+use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use crate::error::from_core;
+
+/// __init__(self, axes: Sequence[Sequence[float]], values: Sequence[float], interpolation: str, outside: str) -> None
+///
+/// A table of one or two axes: breakpoints of each axis and values, row-major; interpolation
+/// "linear", "pchip" or "cubic"; beyond the breakpoints "hold", "linear" or "refuse".
+#[pyclass(frozen, module = "flightid._native")]
+pub struct LookupTable {
+    pub(crate) table: CoreTable,
+}
+
+#[pymethods]
+impl LookupTable {
+    #[new]
+    fn new(
+        axes: Vec<Vec<f64>>,
+        values: Vec<f64>,
+        interpolation: &str,
+        outside: &str,
+    ) -> PyResult<Self> {
+        let interpolation = match interpolation {
+            "linear" => Interpolation::Linear,
+            "pchip" => Interpolation::Pchip,
+            "cubic" => Interpolation::Cubic,
+            other => return Err(PyValueError::new_err(format!("interpolation {other:?}"))),
+        };
+        let outside = match outside {
+            "hold" => Outside::Hold,
+            "linear" => Outside::Linear,
+            "refuse" => Outside::Refuse,
+            other => return Err(PyValueError::new_err(format!("outside {other:?}"))),
+        };
+        let table = CoreTable::new(axes, values, interpolation, outside).map_err(from_core)?;
+        Ok(Self { table })
+    }
+
+    /// evaluate(self, first: NDArray[np.float64], second: NDArray[np.float64]) -> NDArray[np.float64]
+    ///
+    /// Values at pairs of places, shape (n,); a table of one axis does not look at the second.
+    fn evaluate<'py>(
+        &self,
+        py: Python<'py>,
+        first: PyReadonlyArray1<'_, f64>,
+        second: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (x, y) = (first.as_slice()?, second.as_slice()?);
+        if x.len() != y.len() {
+            let (found, needed) = (y.len(), x.len());
+            return Err(from_core(CoreError::Shape { what: "places in a table", found, needed }));
+        }
+        let found: Vec<f64> = x.iter().zip(y).map(|(&x, &y)| self.table.at(x, y)).collect();
+        Ok(found.into_pyarray(py))
+    }
+}
+
+/// Add this file's names to the module.
+///
+/// # Errors
+/// Never in practice; PyO3's own.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<LookupTable>()
+}
