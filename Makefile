@@ -57,8 +57,8 @@ test-slow: wheel  ## Monte Carlo calibration of every printed interval, and the 
 bench: wheel  ## speed against peers, same data, one run
 	$(BIN)/python -m benchmarks
 
-fuzz:  ## throw damaged logs and formulas at their readers (needs a nightly toolchain and cargo-fuzz)
-	cd fuzz && for target in dataflash ulog expression; do \
+fuzz:  ## throw damaged logs, formulas and models at their readers (needs a nightly toolchain and cargo-fuzz)
+	cd fuzz && for target in dataflash ulog expression model; do \
 	  mkdir -p corpus/$$target seeds/$$target && cargo +nightly fuzz run -s none $$target \
 	    corpus/$$target seeds/$$target -- -runs=$(FUZZ_RUNS) -max_len=4096 || exit 1; done
 

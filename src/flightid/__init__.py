@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from flightid.inspection import Inspection, inspect_log
     from flightid.logs import Log, LogTable, read_log
     from flightid.models import (
+        ModelBuilder,
         NarxModel,
         Output,
         Parameter,
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
         TransferFunctionModel,
         library_names,
         load_model,
+        write_model,
     )
     from flightid.record import Channel, Record, read_records, write_records
     from flightid.responses import (
@@ -87,6 +89,7 @@ _HOMES = {
     "Log": "flightid.logs",
     "LogTable": "flightid.logs",
     "Output": "flightid.models",
+    "ModelBuilder": "flightid.models",
     "NarxFit": "flightid.identification",
     "NarxModel": "flightid.models",
     "PairResponse": "flightid.responses",
@@ -121,6 +124,7 @@ _HOMES = {
     "simulate": "flightid.simulation.simulate",
     "validation": "flightid.validation",
     "verify": "flightid.validation.verify",
+    "write_model": "flightid.models",
     "write_records": "flightid.record",
 }
 
@@ -142,6 +146,7 @@ __all__ = [
     "LocalMinimum",
     "Log",
     "LogTable",
+    "ModelBuilder",
     "NarxFit",
     "NarxModel",
     "OrderScan",
@@ -182,6 +187,7 @@ __all__ = [
     "simulate",
     "validation",
     "verify",
+    "write_model",
     "write_records",
 ]
 

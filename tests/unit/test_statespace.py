@@ -6,6 +6,7 @@ import copy
 
 import numpy as np
 import pytest
+import sympy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -192,7 +193,6 @@ def test_equations_that_repeat_each_other_cannot_be_simulated() -> None:
 
 
 def test_sums_on_the_left_and_sympy_objects() -> None:
-    sympy = pytest.importorskip("sympy")
     rate, angle, damping = sympy.symbols("p phi Lp")
     content = {
         "states": {"phi": "rad", "p": "rad/s"},

@@ -18,6 +18,7 @@ pub mod discretisation;
 pub mod dual;
 pub mod error;
 pub mod expression;
+mod expression_parser;
 pub mod frequency_fit;
 pub mod gram;
 pub mod gyro_filter;

@@ -8,6 +8,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
+use crate::lookup_table::{LookupTable, shared};
 
 /// expression_names(text: str, tables: Sequence[str] = ...) -> list[str]
 ///
@@ -47,7 +48,7 @@ fn expression_nodes(text: &str, tables: Vec<String>) -> PyResult<Vec<Printed>> {
         .collect())
 }
 
-/// __init__(self, expressions: Sequence[str], names: Sequence[str], definitions: dict[str, str]) -> None
+/// __init__(self, expressions: Sequence[str], names: Sequence[str], definitions: dict[str, str], tables: dict[str, LookupTable] = ...) -> None
 ///
 /// Formulas of the same names, compiled once.
 #[pyclass(frozen, module = "flightid._native")]
@@ -58,18 +59,23 @@ struct Tape {
 #[pymethods]
 impl Tape {
     #[new]
+    #[pyo3(signature = (expressions, names, definitions, tables = BTreeMap::new()))]
     fn new(
         expressions: Vec<String>,
         names: Vec<String>,
         definitions: BTreeMap<String, String>,
+        tables: BTreeMap<String, Py<LookupTable>>,
     ) -> PyResult<Self> {
-        let parse = |text: &String| Expression::parse(text).map_err(from_core);
+        let tables = shared(tables);
+        let callable: Vec<&String> = tables.keys().collect();
+        let parse = |text: &String| Expression::parse_with(text, &callable).map_err(from_core);
         let expressions = expressions.iter().map(parse).collect::<PyResult<Vec<_>>>()?;
         let definitions = definitions
             .iter()
             .map(|(name, text)| Ok((name.clone(), parse(text)?)))
             .collect::<PyResult<_>>()?;
-        let tape = CoreTape::compile(&expressions, &names, &definitions).map_err(from_core)?;
+        let tape = CoreTape::compile_with(&expressions, &names, &definitions, &tables)
+            .map_err(from_core)?;
         Ok(Self { tape })
     }
 

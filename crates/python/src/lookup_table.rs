@@ -1,5 +1,7 @@
 //! Face of `flightid_core::lookup_table`. (Python side: models/tables.py)
 
+use std::collections::BTreeMap;
+
 use flightid_core::CoreError;
 use flightid_core::lookup_table::{Interpolation, LookupTable as CoreTable, Outside};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
@@ -14,7 +16,12 @@ use crate::error::from_core;
 /// "linear", "pchip" or "cubic"; beyond the breakpoints "hold", "linear" or "refuse".
 #[pyclass(frozen, module = "flightid._native")]
 pub struct LookupTable {
-    pub(crate) table: CoreTable,
+    table: CoreTable,
+}
+
+/// Tables by name, as the core takes them; their content is shared.
+pub(crate) fn shared(tables: BTreeMap<String, Py<LookupTable>>) -> BTreeMap<String, CoreTable> {
+    tables.into_iter().map(|(name, table)| (name, table.get().table.clone())).collect()
 }
 
 #[pymethods]

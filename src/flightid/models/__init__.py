@@ -3,6 +3,8 @@
 State space: `model_tape.rs`, `state_space_fit.rs`.
 """
 
+from flightid.models.blocks import Block
+from flightid.models.builder import ModelBuilder
 from flightid.models.description import Model
 from flightid.models.load import library_names, load_model
 from flightid.models.narx import NarxEquation, NarxModel, NarxPrediction
@@ -11,13 +13,19 @@ from flightid.models.parameters import Parameter, Parameters
 from flightid.models.polynomial import PolynomialModel
 from flightid.models.polynomial_prediction import PolynomialPrediction
 from flightid.models.polynomial_structure import PolynomialStructure
+from flightid.models.record_values import RecordValue
+from flightid.models.save import write_model
 from flightid.models.statespace import StateSpaceModel
 from flightid.models.statespace_parts import Output, ResponsePair, StateSpaceMatrices
+from flightid.models.tables import Axis, TableFunction
 from flightid.models.transfer import TransferFunction, TransferFunctionModel
 
 __all__ = [
+    "Axis",
+    "Block",
     "Lag",
     "Model",
+    "ModelBuilder",
     "NarxEquation",
     "NarxModel",
     "NarxPrediction",
@@ -27,12 +35,15 @@ __all__ = [
     "PolynomialModel",
     "PolynomialPrediction",
     "PolynomialStructure",
+    "RecordValue",
     "ResponsePair",
     "StateSpaceMatrices",
     "StateSpaceModel",
+    "TableFunction",
     "Term",
     "TransferFunction",
     "TransferFunctionModel",
     "library_names",
     "load_model",
+    "write_model",
 ]

@@ -7,15 +7,22 @@ not: an angle in degrees clashes with one in radians and may not stand inside a 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from flightid import _native
 from flightid.errors import ModelError
 from flightid.units import canonical, exponents
 
+if TYPE_CHECKING:
+    from flightid.models.tables import TableFunction
+
 Powers = dict[str, float]
+Tables = Mapping[str, "TableFunction"]
+_NO_TABLES: Tables = {}
 _SAME = 1e-9
 _ALIKE = {"add": "adds", "subtract": "subtracts", "minimum": "compares", "maximum": "compares"}
-_ALIKE |= {"atan2": "compares"}
+_ALIKE |= {"atan2": "compares", "less": "compares", "lessequal": "compares"}
+_PLAIN = {"atan2", "less", "lessequal"}
 _KEPT = {"negate", "abs"}
 
 
@@ -23,7 +30,9 @@ class _ClashError(Exception):
     """What a formula does with which units."""
 
 
-def require_unit(text: str, unit: str, units: Mapping[str, str], *, subject: str) -> None:
+def require_unit(
+    text: str, unit: str, units: Mapping[str, str], *, subject: str, tables: Tables = _NO_TABLES
+) -> None:
     """Refuse a formula whose value does not have the unit that it should have.
 
     Parameters
@@ -36,6 +45,8 @@ def require_unit(text: str, unit: str, units: Mapping[str, str], *, subject: str
         Unit by name, of every name in the formula.
     subject : str
         What the formula is, for the message.
+    tables : mapping of str to TableFunction
+        Tables that it may call.
 
     Raises
     ------
@@ -46,7 +57,7 @@ def require_unit(text: str, unit: str, units: Mapping[str, str], *, subject: str
     -------
     >>> require_unit("1/T", "rad/s", {"T": "s"}, subject="tie of omega")
     """
-    found, wanted = _powers(text, units, subject), exponents(unit)
+    found, wanted = _powers(text, units, subject, tables), exponents(unit)
     if found is not None and not _same(found, wanted):
         raise ModelError(
             f"{subject} does not have its unit: {text!r}",
@@ -56,7 +67,30 @@ def require_unit(text: str, unit: str, units: Mapping[str, str], *, subject: str
         )
 
 
-def require_balance(left: str, right: str, units: Mapping[str, str], *, subject: str) -> None:
+def unit_of(text: str, units: Mapping[str, str], *, subject: str) -> str:
+    """Unit of a formula; that of zero is ``"1"``.
+
+    Raises
+    ------
+    ModelError
+        The formula mixes units.
+
+    Example
+    -------
+    >>> unit_of("2*zeta*omega", {"zeta": "1", "omega": "rad/s"}, subject="a coefficient")
+    '1/s'
+    """
+    return _shown(_powers(text, units, subject, _NO_TABLES) or {})
+
+
+def require_balance(
+    left: str,
+    right: str,
+    units: Mapping[str, str],
+    *,
+    subject: str,
+    tables: Tables = _NO_TABLES,
+) -> None:
     """Refuse an equation whose sides have different units.
 
     Parameters
@@ -67,6 +101,8 @@ def require_balance(left: str, right: str, units: Mapping[str, str], *, subject:
         Unit by name, of every name in them.
     subject : str
         Which equation it is, for the message.
+    tables : mapping of str to TableFunction
+        Tables that they may call.
 
     Raises
     ------
@@ -77,7 +113,8 @@ def require_balance(left: str, right: str, units: Mapping[str, str], *, subject:
     -------
     >>> require_balance("T*x'", "-x", {"T": "s", "x": "m", "x'": "m/s"}, subject="equation of x")
     """
-    first, second = _powers(left, units, subject), _powers(right, units, subject)
+    first = _powers(left, units, subject, tables)
+    second = _powers(right, units, subject, tables)
     if first is not None and second is not None and not _same(first, second):
         raise ModelError(
             f"{subject} has different units on its sides: {left} = {right}",
@@ -87,12 +124,12 @@ def require_balance(left: str, right: str, units: Mapping[str, str], *, subject:
         )
 
 
-def _powers(text: str, units: Mapping[str, str], subject: str) -> Powers | None:
+def _powers(text: str, units: Mapping[str, str], subject: str, tables: Tables) -> Powers | None:
     """Powers of the base units of a formula; None for zero, which has any unit."""
     found: list[Powers | None] = []
     numbers: list[float | None] = []
     try:
-        for kind, name, value, places in _native.expression_nodes(text):
+        for kind, name, value, places in _native.expression_nodes(text, list(tables)):
             inner = [found[place] for place in places]
             constants = [numbers[place] for place in places]
             numbers.append(value if kind == "number" else _constant(kind, constants))
@@ -100,6 +137,8 @@ def _powers(text: str, units: Mapping[str, str], subject: str) -> Powers | None:
                 found.append(None if value == 0.0 else {})
             elif kind == "name":
                 found.append(exponents(units[name]))
+            elif kind == "table":
+                found.append(_looked_up(name, tables[name], inner))
             else:
                 found.append(_combine(kind, inner, constants))
     except _ClashError as clash:
@@ -124,10 +163,25 @@ def _constant(kind: str, values: list[float | None]) -> float | None:
     return None
 
 
+def _looked_up(name: str, table: TableFunction, inner: list[Powers | None]) -> Powers:
+    if len(inner) != len(table.axes):
+        raise _ClashError(f"calls table {name} with {len(inner)} values for {len(table.axes)} axes")
+    for powers, axis in zip(inner, table.axes, strict=True):
+        if powers is not None and not _same(powers, exponents(axis.unit)):
+            raise _ClashError(
+                f"calls table {name} with {_shown(powers)!r} along an axis in {axis.unit!r}"
+            )
+    return exponents(table.unit)
+
+
 def _combine(kind: str, inner: list[Powers | None], numbers: list[float | None]) -> Powers | None:
     if kind in _ALIKE:
-        shared = _shared(kind, inner)
-        return {} if kind == "atan2" else shared
+        shared = _shared(_ALIKE[kind], inner)
+        return {} if kind in _PLAIN else shared
+    if kind == "select":
+        if inner[0]:
+            raise _ClashError(f"asks whether {_shown(inner[0])!r} holds, which is no comparison")
+        return _shared("chooses between", inner[1:])
     if kind in _KEPT:
         return inner[0]
     if kind in ("sqrt", "power"):
@@ -142,10 +196,10 @@ def _combine(kind: str, inner: list[Powers | None], numbers: list[float | None])
     return {}
 
 
-def _shared(kind: str, inner: list[Powers | None]) -> Powers | None:
+def _shared(does: str, inner: list[Powers | None]) -> Powers | None:
     known = [powers for powers in inner if powers is not None]
     if len(known) == 2 and not _same(*known):
-        raise _ClashError(f"{_ALIKE[kind]} {_shown(known[0])!r} and {_shown(known[1])!r}")
+        raise _ClashError(f"{does} {_shown(known[0])!r} and {_shown(known[1])!r}")
     return known[0] if known else None
 
 

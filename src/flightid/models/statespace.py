@@ -6,35 +6,31 @@ and need not be linear: the matrices are then those of the linearisation at the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
 from flightid import _native
-from flightid.errors import DataError, ModelError, SingularError, UnknownNameError
+from flightid.errors import ModelError
 from flightid.models import statespace_description
-from flightid.models.adjustable import Adjustable
+from flightid.models.blocks import Block
 from flightid.models.parameters import Parameters
-from flightid.models.realisation import Matrices, one_delay_for_each_input
-from flightid.models.statespace_checks import check_model, point_names
+from flightid.models.record_values import RecordValue
+from flightid.models.statespace_blocks import insert_blocks, split_own
+from flightid.models.statespace_checks import check_model
 from flightid.models.statespace_display import MatrixDisplay, matrices_as_latex
-from flightid.models.statespace_parts import (
-    Output,
-    ResponsePair,
-    StateSpaceMatrices,
-    pair_places,
-)
+from flightid.models.statespace_linear import Linearised
+from flightid.models.statespace_parts import Output, ResponsePair
+from flightid.models.tables import TableFunction
+from flightid.models.trimming import find_trim
 from flightid.table import Table
 from flightid.units import canonical
 
+_COPIED = ("measurements", "equations", "trim", "definitions", "tables", "initial", "biases")
 SCHEMA = "flightid.state_space_model/1"
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
-class StateSpaceModel(Adjustable):
+class StateSpaceModel(Linearised):
     """Equations of motion with named, bounded, tied parameters.
 
     Attributes
@@ -55,6 +51,18 @@ class StateSpaceModel(Adjustable):
         Names ``"output/input"`` of the responses that a fit uses; all pairs when left out.
     name, source, note : str
         What it is, where it comes from, what to know.
+    definitions : mapping of str to Output
+        Auxiliary quantities that formulas may name, such as the dynamic pressure.
+    tables : mapping of str to TableFunction
+        Tables that formulas may call.
+    initial : mapping of str to RecordValue
+        States whose initial values a fit to records frees in each record, or sets.
+    biases : mapping of str to RecordValue
+        Outputs with a bias, or inputs with a reference shift, in each record.
+    blocks : tuple of Block
+        Actuators, sensors and filters that are already written out in states and equations.
+    bare : StateSpaceModel or None
+        The model without its blocks.
 
     Raises
     ------
@@ -98,13 +106,19 @@ class StateSpaceModel(Adjustable):
     name: str = "state space"
     source: str = ""
     note: str = ""
+    definitions: Mapping[str, Output] = field(default_factory=dict)
+    tables: Mapping[str, TableFunction] = field(default_factory=dict)
+    initial: Mapping[str, RecordValue] = field(default_factory=dict)
+    biases: Mapping[str, RecordValue] = field(default_factory=dict)
+    blocks: tuple[Block, ...] = ()
+    bare: StateSpaceModel | None = field(default=None, compare=False)
     native: _native.StateSpace = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
         for kind in ("states", "input_units"):
             listed = {name: canonical(unit) for name, unit in getattr(self, kind).items()}
             object.__setattr__(self, kind, listed)
-        for kind in ("measurements", "equations", "trim"):
+        for kind in _COPIED:
             object.__setattr__(self, kind, dict(getattr(self, kind)))
         stray = set(self.delays) - set(self.inputs)
         if stray:
@@ -115,38 +129,11 @@ class StateSpaceModel(Adjustable):
         object.__setattr__(self, "pairs", tuple(self.pairs) or self._every_pair)
         object.__setattr__(self, "native", self._compiled(self.pairs))
 
-    def _compiled(self, pairs: tuple[str, ...]) -> _native.StateSpace:
-        return _native.StateSpace(
-            list(self.states),
-            self.inputs,
-            list(self.equations.items()),
-            [output.expression for output in self.measurements.values()],
-            list(self.delays.values()),
-            [parameter.name for parameter in self.parameters.independent],
-            self.parameters.definitions,
-            pair_places(pairs, self.outputs, self.inputs),
-            list(self._point(None)),
-        )
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """Names of the inputs."""
-        return tuple(self.input_units)
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """Names of the outputs."""
-        return tuple(self.measurements)
-
     @property
     def units(self) -> dict[str, str]:
         """Unit by channel name: inputs and outputs."""
         measured = {name: output.unit for name, output in self.measurements.items()}
         return {**self.input_units, **measured}
-
-    @property
-    def _every_pair(self) -> tuple[str, ...]:
-        return tuple(f"{output}/{source}" for output in self.outputs for source in self.inputs)
 
     @property
     def responses(self) -> tuple[ResponsePair, ...]:
@@ -183,162 +170,102 @@ class StateSpaceModel(Adjustable):
         """
         return replace(self, trim={**self.trim, **at})
 
-    def _point(self, at: Mapping[str, float] | None) -> Array:
-        names = point_names(self)
-        given = {**self.trim, **(at or {})}
-        for name in given:
-            if name not in names:
-                raise UnknownNameError(
-                    "a point of linearisation has an unknown name",
-                    found=repr(name),
-                    needed=f"one of {', '.join(names)}",
-                )
-        return np.array([float(given.get(name, 0.0)) for name in names])
-
-    def _slopes(
-        self, values: Mapping[str, float] | None, at: Mapping[str, float] | None
-    ) -> tuple[Array, Array]:
-        return self.native.linearise(self.parameters.independent_values(values), self._point(at))
-
-    def matrices(
-        self, values: Mapping[str, float] | None = None, at: Mapping[str, float] | None = None
-    ) -> StateSpaceMatrices:
-        """M, F, G, H0, H1, D and the delays as numbers, exact.
+    def trimmed(
+        self,
+        solve_for: Sequence[str] | None = None,
+        at: Mapping[str, float] | None = None,
+        require: Sequence[str] = (),
+    ) -> StateSpaceModel:
+        """Copy whose trim is an equilibrium: every equation holds there.
 
         Parameters
         ----------
-        values : mapping of str to float, optional
-            Parameter values instead of the model's.
+        solve_for : sequence of str, optional
+            States and inputs to find, starting at the present trim; all states that are not in
+            `at` when left out. What no equation needs, such as a heading, stays as it is.
         at : mapping of str to float, optional
-            Point instead of the trim; a linear model has the same matrices everywhere.
+            States, inputs and state derivatives to hold; a derivative not named is held at the
+            present trim's, zero as a rule.
+        require : sequence of str, optional
+            Formulas that shall be zero too, such as ``"theta - alpha"`` for level flight.
 
         Returns
         -------
-        StateSpaceMatrices
+        StateSpaceModel
 
         Raises
         ------
         UnknownNameError
-            There is no such parameter, state or input.
-        DataError
-            An equation or output has no derivative at this point.
-        """
-        found, slopes = self._slopes(values, at)
-        return StateSpaceMatrices.split(slopes, found, len(self.states), len(self.outputs))
+            There is no such state or input.
+        FitError
+            No equilibrium was found from this start, or nothing tells it from others near it.
 
-    def matrix_derivatives(
-        self, values: Mapping[str, float] | None = None, at: Mapping[str, float] | None = None
-    ) -> dict[str, StateSpaceMatrices]:
-        """Exact derivatives of the matrices by each free parameter.
+        Reference
+        ---------
+        Stevens, Lewis & Johnson, *Aircraft Control and Simulation*, 3rd ed., sec. 3.6.
 
-        Returns
+        Example
         -------
-        dict of str to StateSpaceMatrices
-            By parameter; through ties too. The delays' part is theirs in s per parameter unit.
+        >>> from flightid.models import load_model
+        >>> aeroplane = load_model("fixed_wing_longitudinal_coefficients")
+        >>> slower = aeroplane.trimmed(
+        ...     ["alpha", "theta", "elevator", "thrust"], {"V": 45.0}, ["theta - alpha"])
+        >>> {name: round(value, 3) for name, value in slower.trim.items()}
+        {'V': 45.0, 'alpha': 0.039, 'theta': 0.039, 'elevator': -0.029, 'thrust': 1336.631}
         """
-        numbers, point = self.parameters.independent_values(values), self._point(at)
-        places = self.parameters.free_indices
-        found = self.native.sensitivities(numbers, point, places)
-        late = self.parameters.tape(self.delays.values()).jacobian(numbers, places)
-        n, p = len(self.states), len(self.outputs)
-        return {
-            parameter.name: StateSpaceMatrices.split(slopes, late[:, k], n, p)
-            for k, (parameter, slopes) in enumerate(zip(self.parameters.free, found, strict=True))
-        }
+        return replace(self, trim=find_trim(self, at or {}, solve_for, require))
 
-    def residuals(
-        self, values: Mapping[str, float] | None = None, at: Mapping[str, float] | None = None
-    ) -> dict[str, float]:
-        """Left minus right side of each equation at a point: all zero where it is a trim.
+    def with_block(
+        self, name: str, *, at: str, kind: str, note: str = "", **values: object
+    ) -> StateSpaceModel:
+        """Copy with an actuator at an input, or a sensor or filter at an output.
 
-        Returns
-        -------
-        dict of str to float
-            By left side.
-        """
-        found, _ = self._slopes(values, at)
-        return dict(zip(self.equations, map(float, found), strict=False))
-
-    def state_space(
-        self, values: Mapping[str, float] | None = None, at: Mapping[str, float] | None = None
-    ) -> Matrices:
-        """A, B, C, D and the delay of each input, for simulation.
-
-        Returns
-        -------
-        tuple of ndarray
-            A = M⁻¹F (n, n), B = M⁻¹G (n, n_inputs), C = H0 + H1 A (n_outputs, n),
-            D + H1 B (n_outputs, n_inputs) and the delays (n_inputs,), s.
-
-        Raises
-        ------
-        SingularError
-            The equations do not give every state derivative (M is singular).
-        ModelError
-            A negative delay.
-        """
-        found = self.matrices(values, at)
-        try:
-            forced = np.hstack([found.f, found.g])
-            rates: Array = np.asarray(np.linalg.solve(found.m, forced), dtype=np.float64)
-        except np.linalg.LinAlgError as error:
-            raise SingularError(
-                "the equations do not give every state derivative",
-                found="a singular matrix M of their factors",
-                needed="one independent equation for each state derivative",
-            ) from error
-        a, b = rates[:, : len(rates)], rates[:, len(rates) :]
-        columns = range(len(self.inputs))
-        delays = one_delay_for_each_input(columns, list(found.delays_s), list(self.inputs))
-        return a, b, found.h0 + found.h1 @ a, found.d + found.h1 @ b, delays
-
-    def eigenvalues(
-        self, values: Mapping[str, float] | None = None, at: Mapping[str, float] | None = None
-    ) -> NDArray[np.complex128]:
-        """Eigenvalues of M⁻¹F, rad/s, by real part.
-
-        Returns
-        -------
-        ndarray of complex, shape (n_states,)
-        """
-        found = np.linalg.eigvals(self.state_space(values, at)[0]).astype(np.complex128)
-        order = np.lexsort((found.imag, found.real))
-        return np.asarray(found[order], dtype=np.complex128)
-
-    def frequency_response(
-        self, omega_rad_s: ArrayLike, values: Mapping[str, float] | None = None
-    ) -> NDArray[np.complex128]:
-        """H(jω) = {[H0 + jω H1] [jωM − F]⁻¹ G + D} e^(−jωτ) of all pairs.
+        It stands behind those that are at that place already.
 
         Parameters
         ----------
-        omega_rad_s : array_like, shape (n_freqs,)
-            Frequencies, rad/s.
-        values : mapping of str to float, optional
-            Parameter values instead of the model's.
+        name : str
+            Name of the block, of its output and of its states.
+        at : str
+            Input or output.
+        kind : str
+            One of `flightid.models.blocks.KINDS`.
+        note : str, optional
+        **values
+            What the kind needs: numbers, or formulas of the model's parameters.
 
         Returns
         -------
-        ndarray of complex, shape (n_outputs, n_inputs, n_freqs)
-            In output unit over input unit.
+        StateSpaceModel
 
         Raises
         ------
-        DataError
-            A frequency is a pole of the model, for example an integrator at ω = 0.
+        ModelError
+            The block contradicts itself or the model.
+
+        Example
+        -------
+        >>> from flightid.models import load_model
+        >>> yaw = load_model("quadrotor_yaw").with_block(
+        ...     "motor", at="tau_psi", kind="first_order_lag", T=0.05)
+        >>> print(yaw.blocks[0], list(yaw.states))
+        Block(motor at tau_psi: first_order_lag, T = motor_T) ['r', 'psi', 'motor_1']
         """
-        omega = np.ascontiguousarray(np.atleast_1d(omega_rad_s), dtype=np.float64)
-        every = self._every_pair
-        native = self.native if self.pairs == every else self._compiled(every)
-        try:
-            found = native.response(self.parameters.independent_values(values), omega)
-        except SingularError as error:
-            raise DataError(
-                "the model has no finite response at these frequencies",
-                found=f"{omega.min():g} to {omega.max():g} rad/s",
-                needed="frequencies that are not poles of the model",
-            ) from error
-        return found.reshape(len(self.outputs), len(self.inputs), len(omega))
+        block = Block(name, at, kind, values, note)
+        return self._with_blocks((*self.blocks, block))
+
+    def _with_blocks(self, blocks: tuple[Block, ...]) -> StateSpaceModel:
+        """The structure of the bare model with blocks, and everything else from this one."""
+        trim, own = split_own(self.blocks, self.trim)
+        initial, own_initial = split_own(self.blocks, self.initial)
+        bare = self.bare or self
+        base = replace(
+            bare, parameters=self.parameters, trim=trim, initial=initial, blocks=(), bare=None,
+            biases=self.biases, pairs=self.pairs, name=self.name, source=self.source,
+            note=self.note,
+        )  # fmt: skip
+        found = insert_blocks(base, blocks) if blocks else base
+        return replace(found, trim={**found.trim, **own}, initial={**found.initial, **own_initial})
 
     @property
     def is_linear(self) -> bool:
@@ -384,15 +311,23 @@ class StateSpaceModel(Adjustable):
         ----------
         content : mapping
             Keys ``states``, ``inputs``, ``outputs``, ``parameters``, ``equations`` and, as needed,
-            ``constants``, ``constraints``, ``delays``, ``trim``, ``responses``, ``name``,
-            ``source``, ``note``. Formulas may be SymPy objects.
+            ``definitions``, ``constants``, ``constraints``, ``delays``, ``tables``, ``blocks``,
+            ``trim``, ``initial``, ``biases``, ``responses``, ``name``, ``source``, ``note``.
+            Formulas may be SymPy objects.
 
         Raises
         ------
         ModelError
             A key is missing, unknown or of the wrong type, or the model contradicts itself.
         """
-        return cls(**statespace_description.from_plain(content))
+        described, blocks = statespace_description.from_plain(content)
+        if not blocks:
+            return cls(**described)
+        trim, own = split_own(blocks, described["trim"])
+        initial, own_initial = split_own(blocks, described["initial"])
+        bare = cls(**{**described, "trim": trim, "initial": initial})  # type: ignore[arg-type]
+        found = insert_blocks(bare, blocks)
+        return replace(found, trim={**found.trim, **own}, initial={**found.initial, **own_initial})
 
     def _repr_html_(self) -> str:
         return self.displayed().html() + self.summary()._repr_html_()

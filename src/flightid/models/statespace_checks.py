@@ -10,23 +10,20 @@ from typing import TYPE_CHECKING
 from flightid.errors import ModelError
 from flightid.models.dimensions import require_balance, require_unit
 from flightid.models.formula import RESERVED, formula_names
+from flightid.models.tables import check_tables
 
 if TYPE_CHECKING:
     from flightid.models.statespace import StateSpaceModel
 
 MAXIMUM_STATES = 200
 MAXIMUM_CHANNELS = 100
+MAXIMUM_DEFINITIONS = 1_000
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def derivative(state: str) -> str:
     """Name of the derivative of a state."""
     return f"{state}'"
-
-
-def point_names(model: StateSpaceModel) -> list[str]:
-    """Names of a point of linearisation: derivatives, states, inputs."""
-    return [*map(derivative, model.states), *model.states, *model.inputs]
 
 
 def check_model(model: StateSpaceModel) -> None:
@@ -41,16 +38,26 @@ def check_model(model: StateSpaceModel) -> None:
     ModelError
         Names the equation, output or delay at fault.
     """
+    check_tables(model.tables)
     _check_names(model)
     _check_sizes(model)
     rates = {derivative(name): f"({unit})/(s)" for name, unit in model.states.items()}
     constant = model.parameters.units
-    units = {**constant, **model.states, **model.input_units, **rates}
+    auxiliary = {name: output.unit for name, output in model.definitions.items()}
+    units = {**constant, **model.states, **model.input_units, **rates, **auxiliary}
     mentioned: set[str] = set()
     for left, right in model.equations.items():
         subject = f"equation {left!r}"
-        mentioned |= _defined(left, units, subject) | _defined(right, units, subject)
-        require_balance(left, right, units, subject=subject)
+        mentioned |= _defined(left, units, subject, model) | _defined(right, units, subject, model)
+        require_balance(left, right, units, subject=subject, tables=model.tables)
+    for kind in ("definitions", "measurements"):
+        for name, output in getattr(model, kind).items():
+            subject = f"{'output' if kind == 'measurements' else 'definition'} {name}"
+            found = _defined(output.expression, units, subject, model)
+            mentioned |= found if kind == "definitions" else set()
+            require_unit(
+                output.expression, output.unit, units, subject=subject, tables=model.tables
+            )
     for state in model.states:
         if derivative(state) not in mentioned:
             raise ModelError(
@@ -58,17 +65,30 @@ def check_model(model: StateSpaceModel) -> None:
                 found=", ".join(model.equations),
                 needed=f"an equation with {derivative(state)}",
             )
-    for name, output in model.measurements.items():
-        _defined(output.expression, units, f"output {name}")
-        require_unit(output.expression, output.unit, units, subject=f"output {name}")
     for name, delay in model.delays.items():
         subject = f"delay of input {name}"
-        _defined(delay, constant, subject)
+        _defined(delay, constant, subject, None)
         require_unit(delay, "s", constant, subject=subject)
+    _check_record_values(model)
+
+
+def _check_record_values(model: StateSpaceModel) -> None:
+    for kind, known in (("initial", tuple(model.states)), ("biases", tuple(model.units))):
+        for name in getattr(model, kind):
+            if name not in known:
+                raise ModelError(
+                    f"[{kind}] names what is not there",
+                    found=repr(name),
+                    needed=f"one of {', '.join(known)}",
+                )
 
 
 def _check_sizes(model: StateSpaceModel) -> None:
     limits = {"states": MAXIMUM_STATES, "inputs": MAXIMUM_CHANNELS, "outputs": MAXIMUM_CHANNELS}
+    if len(model.definitions) > MAXIMUM_DEFINITIONS:
+        raise ModelError(
+            "too many definitions", found=len(model.definitions), needed=MAXIMUM_DEFINITIONS
+        )
     for kind, limit in limits.items():
         count = len(getattr(model, kind))
         if not 1 <= count <= limit:
@@ -83,7 +103,7 @@ def _check_sizes(model: StateSpaceModel) -> None:
 
 def _check_names(model: StateSpaceModel) -> None:
     seen: dict[str, str] = {}
-    for kind in ("states", "inputs", "parameters"):
+    for kind in ("states", "inputs", "parameters", "definitions", "tables"):
         for name in getattr(model, kind):
             if not _NAME.fullmatch(name) or name in RESERVED:
                 raise ModelError(
@@ -108,10 +128,12 @@ def _check_names(model: StateSpaceModel) -> None:
             raise ModelError(f"trim value of {name} is not finite", found=value)
 
 
-def _defined(text: str, units: Mapping[str, str], subject: str) -> set[str]:
+def _defined(
+    text: str, units: Mapping[str, str], subject: str, model: StateSpaceModel | None
+) -> set[str]:
     """Names in a formula, all of them known."""
     try:
-        names = formula_names(text)
+        names = formula_names(text, model.tables if model else ())
     except ModelError as error:
         raise ModelError(
             f"{subject} is outside the grammar", found=f"{text[:200]!r}, {error}"

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, TypedDict
 
 from flightid.errors import ModelError
+from flightid.models.blocks import Block, read_block
 from flightid.models.parameters import Parameter, Parameters
 from flightid.models.reading import (
     read_number,
@@ -16,16 +16,19 @@ from flightid.models.reading import (
     read_texts,
     require_keys,
 )
+from flightid.models.record_values import RecordValue, read_record_value
 from flightid.models.statespace_parts import Output
+from flightid.models.sympy_input import is_sympy, sympy_formula
+from flightid.models.tables import TableFunction, read_table_function
 
 if TYPE_CHECKING:
     from flightid.models.statespace import StateSpaceModel
 
 _KEYS = {"schema", "kind", "name", "source", "note", "states", "inputs", "outputs", "parameters"}
-_KEYS |= {"constants", "constraints", "equations", "delays", "trim", "responses"}
+_KEYS |= {"constants", "constraints", "equations", "delays", "trim", "responses", "definitions"}
+_KEYS |= {"tables", "blocks", "initial", "biases"}
 _OUTPUT = {"expression", "unit"}
 _CONSTANT = {"value", "unit", "note"}
-_SYMPY_FUNCTION = re.compile(r"\b(Abs|Min|Max)\(")
 
 
 class Description(TypedDict):
@@ -42,9 +45,13 @@ class Description(TypedDict):
     name: str
     source: str
     note: str
+    definitions: dict[str, Output]
+    tables: dict[str, TableFunction]
+    initial: dict[str, RecordValue]
+    biases: dict[str, RecordValue]
 
 
-def from_plain(content: Mapping[str, object]) -> Description:
+def from_plain(content: Mapping[str, object]) -> tuple[Description, tuple[Block, ...]]:
     """Read the tables of a state-space model.
 
     Parameters
@@ -54,7 +61,8 @@ def from_plain(content: Mapping[str, object]) -> Description:
 
     Returns
     -------
-    Description
+    tuple
+        Arguments of the model without its blocks, and the blocks.
 
     Raises
     ------
@@ -64,7 +72,7 @@ def from_plain(content: Mapping[str, object]) -> Description:
     require_keys(content, _KEYS, "the model")
     states = read_texts(read_table(content, "states"), "states")
     trim = read_table(content, "trim", required=False)
-    return Description(
+    described = Description(
         states=states,
         input_units=read_texts(read_table(content, "inputs"), "inputs"),
         measurements={
@@ -79,13 +87,43 @@ def from_plain(content: Mapping[str, object]) -> Description:
         name=read_text(content.get("name", "state space"), "name"),
         source=read_text(content.get("source", ""), "source"),
         note=read_text(content.get("note", ""), "note"),
+        definitions={
+            name: _definition(name, item) for name, item in _optional(content, "definitions")
+        },
+        tables={
+            name: read_table_function(name, item) for name, item in _optional(content, "tables")
+        },
+        initial=_record_values(content, "initial"),
+        biases=_record_values(content, "biases"),
     )
+    return described, tuple(read_block(name, item) for name, item in _optional(content, "blocks"))
+
+
+def _optional(content: Mapping[str, object], key: str) -> list[tuple[str, object]]:
+    return list(read_table(content, key, required=False).items())
+
+
+def _record_values(content: Mapping[str, object], key: str) -> dict[str, RecordValue]:
+    items = _optional(content, key)
+    return {name: read_record_value(f"{key}.{name}", item) for name, item in items}
+
+
+def _definition(name: str, item: object) -> Output:
+    if not isinstance(item, dict):
+        raise ModelError(
+            f"definition {name} has no unit",
+            found=repr(item)[:80],
+            needed='{ expression = "...", unit = "..." }',
+        )
+    require_keys(item, _OUTPUT, f"definition {name}")
+    expression = _formula(item.get("expression"), f"definitions.{name}.expression")
+    return Output(expression, read_text(item.get("unit", "1"), f"definitions.{name}.unit"))
 
 
 def _formula(item: object, subject: str) -> str:
-    """A formula as text; a SymPy object by its own spelling."""
-    if type(item).__module__.partition(".")[0] == "sympy":
-        return _SYMPY_FUNCTION.sub(lambda match: match.group().lower(), str(item))
+    """A formula as text, or written from a SymPy object."""
+    if is_sympy(item):
+        return sympy_formula(item, subject)
     return read_text(item, subject)
 
 
@@ -143,22 +181,35 @@ def to_plain(model: StateSpaceModel) -> dict[str, object]:
     -------
     dict
     """
-    return {
+    bare = model.bare or model
+    content: dict[str, object] = {
         "kind": "state-space",
         "name": model.name,
-        "states": dict(model.states),
-        "inputs": dict(model.input_units),
-        "outputs": {
-            name: {"expression": output.expression, "unit": output.unit}
-            for name, output in model.measurements.items()
-        },
+        "states": dict(bare.states),
+        "inputs": dict(bare.input_units),
+        "outputs": _plain_outputs(bare.measurements),
         "parameters": {name: _plain(item) for name, item in model.parameters.items()},
-        "equations": dict(model.equations),
-        "delays": {name: delay for name, delay in model.delays.items() if delay != "0"},
+        "equations": dict(bare.equations),
+        "delays": {name: delay for name, delay in bare.delays.items() if delay != "0"},
         "trim": dict(model.trim),
         "responses": list(model.pairs),
         "source": model.source,
         "note": model.note,
+    }
+    further: dict[str, dict[str, object]] = {
+        "definitions": _plain_outputs(bare.definitions),
+        "tables": {name: table.to_dict() for name, table in model.tables.items()},
+        "blocks": {block.name: block.to_dict() for block in model.blocks},
+        "initial": {name: item.to_dict() for name, item in model.initial.items()},
+        "biases": {name: item.to_dict() for name, item in model.biases.items()},
+    }
+    return content | {key: table for key, table in further.items() if table}
+
+
+def _plain_outputs(outputs: Mapping[str, Output]) -> dict[str, object]:
+    return {
+        name: {"expression": output.expression, "unit": output.unit}
+        for name, output in outputs.items()
     }
 
 
@@ -167,7 +218,7 @@ def _plain(parameter: Parameter) -> dict[str, object]:
 
 
 def lines(model: StateSpaceModel) -> list[str]:
-    """Equations, outputs and delays as text, one a line.
+    """Equations, definitions, outputs, delays and blocks as text, one a line.
 
     Parameters
     ----------
@@ -185,7 +236,12 @@ def lines(model: StateSpaceModel) -> list[str]:
     delays = [
         f"{name} acts after {delay} s" for name, delay in model.delays.items() if delay != "0"
     ]
-    return [*equations, *outputs, *delays]
+    definitions = [
+        f"{name} = {output.expression} [{output.unit}]"
+        for name, output in model.definitions.items()
+    ]
+    blocks = [f"block {block.shown()}" for block in model.blocks]
+    return [*equations, *definitions, *outputs, *delays, *blocks]
 
 
 def one_line(model: StateSpaceModel) -> str:

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from html import escape
 from typing import TYPE_CHECKING
 
-from flightid.models.statespace_checks import derivative, point_names
-from flightid.models.symbolic import ZERO, Term, derivatives, latex_name
+from flightid.models.statespace_checks import derivative
+from flightid.models.symbolic import ZERO, Printer, Term, latex_name
 
 if TYPE_CHECKING:
     from flightid.models.statespace import StateSpaceModel
 
+_BREAK = r" \\ "
 Rows = tuple[tuple[Term, ...], ...]
 
 
@@ -26,6 +27,10 @@ class MatrixDisplay:
         Rows of the matrices.
     states, inputs, outputs : tuple of str
         Names along rows and columns.
+    delays : tuple of Term
+        Delay of each input.
+    definitions : tuple of (str, Term)
+        Auxiliary quantities: printed name and formula.
     is_linear : bool
         Whether no entry holds a state, input or state derivative.
     """
@@ -39,29 +44,44 @@ class MatrixDisplay:
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+    delays: tuple[Term, ...]
+    definitions: tuple[tuple[str, Term], ...]
     is_linear: bool
 
     def motion(self) -> str:
         """M ẋ = F x + G u as LaTeX."""
         rates = _column([derivative(name) for name in self.states])
         forced = f"{_matrix(self.f)} {_column(self.states)} + {_matrix(self.g)}"
-        return f"{_matrix(self.m)} {rates} = {forced} {_column(self.inputs)}"
+        return f"{_matrix(self.m)} {rates} = {forced} {self._late_inputs()}"
+
+    def _late_inputs(self) -> str:
+        """Inputs, those with a delay at their earlier time."""
+        if all(delay == ZERO for delay in self.delays):
+            return _column(self.inputs)
+        times = ["t" if delay == ZERO else f"t - {delay.latex}" for delay in self.delays]
+        names = [
+            rf"{latex_name(name)}({time})" for name, time in zip(self.inputs, times, strict=True)
+        ]
+        return rf"\begin{{bmatrix}} {_BREAK.join(names)} \end{{bmatrix}}"
 
     def measurement(self) -> str:
         """Outputs y = H₁ ẋ + H₀ x + D u as LaTeX, without the matrices that are zero."""
         rates = _column([derivative(name) for name in self.states])
-        terms = [(self.h1, rates), (self.h0, _column(self.states)), (self.d, _column(self.inputs))]
+        terms = [(self.h1, rates), (self.h0, _column(self.states)), (self.d, self._late_inputs())]
         shown = " + ".join(f"{_matrix(rows)} {names}" for rows, names in terms if _filled(rows))
         return f"{_column(self.outputs)} = {shown or '0'}"
 
+    def _lines(self) -> list[str]:
+        where = [f"{name} = {term.latex}" for name, term in self.definitions]
+        return [self.motion(), self.measurement(), *where]
+
     def latex(self) -> str:
-        """Both, in an aligned environment."""
-        return rf"\begin{{gathered}} {self.motion()} \\ {self.measurement()} \end{{gathered}}"
+        """Both, with the definitions below, in a gathered environment."""
+        return rf"\begin{{gathered}} {_BREAK.join(self._lines())} \end{{gathered}}"
 
     def html(self) -> str:
-        """Both, for a notebook."""
-        both = (self.motion(), self.measurement())
-        return "".join(f"<div>$${escape(each, quote=False)}$$</div>" for each in both)
+        """Both, with the definitions below, for a notebook."""
+        return "".join(f"<div>$${escape(each, quote=False)}$$</div>" for each in self._lines())
 
 
 def matrices_as_latex(model: StateSpaceModel) -> MatrixDisplay:
@@ -80,14 +100,14 @@ def matrices_as_latex(model: StateSpaceModel) -> MatrixDisplay:
     ModelError
         A derivative is too long to be shown.
     """
-    n, names = len(model.states), point_names(model)
-    equations = [
-        derivatives(f"({left}) - ({right})", names) for left, right in model.equations.items()
-    ]
-    forces = [
-        derivatives(f"({right}) - ({left})", names) for left, right in model.equations.items()
-    ]
-    outputs = [derivatives(output.expression, names) for output in model.measurements.values()]
+    n, names = len(model.states), model.point_names
+    definitions = {name: output.expression for name, output in model.definitions.items()}
+    printer = Printer(names, definitions, list(model.tables))
+    by_names = printer.derivatives
+    sides = model.equations.items()
+    equations = [by_names(f"({left}) - ({right})") for left, right in sides]
+    forces = [by_names(f"({right}) - ({left})") for left, right in sides]
+    outputs = [by_names(output.expression) for output in model.measurements.values()]
     entries = [term for row in (*equations, *outputs) for term in row]
     return MatrixDisplay(
         _part(equations, 0, n),
@@ -99,6 +119,8 @@ def matrices_as_latex(model: StateSpaceModel) -> MatrixDisplay:
         tuple(model.states),
         tuple(model.inputs),
         tuple(model.outputs),
+        tuple(printer.value(delay) for delay in model.delays.values()),
+        tuple((latex_name(name), printer.value(text)) for name, text in definitions.items()),
         not frozenset(names) & frozenset().union(*(term.names for term in entries)),
     )
 
@@ -112,10 +134,10 @@ def _filled(rows: Rows) -> bool:
 
 
 def _matrix(rows: Rows) -> str:
-    body = r" \\ ".join(" & ".join(term.latex for term in row) for row in rows)
+    body = _BREAK.join(" & ".join(term.latex for term in row) for row in rows)
     return rf"\begin{{bmatrix}} {body} \end{{bmatrix}}"
 
 
 def _column(names: Sequence[str]) -> str:
-    body = r" \\ ".join(map(latex_name, names))
+    body = _BREAK.join(map(latex_name, names))
     return rf"\begin{{bmatrix}} {body} \end{{bmatrix}}"

@@ -7,7 +7,7 @@ terms, as dual numbers carry numbers. Nothing recurses and the length of a term 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -16,39 +16,16 @@ from flightid.errors import ModelError
 
 MAXIMUM_TERM = 20_000
 _SUM, _PRODUCT, _ATOM = 0, 1, 2
+_PLAIN_WORD = re.compile(r"[a-z]{4,}")
+_WORD = re.compile(r"\w+")
 _GREEK = frozenset(
-    [
-        "alpha",
-        "beta",
-        "gamma",
-        "delta",
-        "epsilon",
-        "zeta",
-        "eta",
-        "theta",
-        "iota",
-        "kappa",
-        "lambda",
-        "mu",
-        "nu",
-        "xi",
-        "rho",
-        "sigma",
-        "tau",
-        "phi",
-        "chi",
-        "psi",
-        "omega",
-        "Gamma",
-        "Delta",
-        "Theta",
-        "Lambda",
-        "Xi",
-        "Sigma",
-        "Phi",
-        "Psi",
-        "Omega",
-    ]
+    _WORD.findall(
+        "alpha beta gamma delta epsilon zeta eta theta iota kappa lambda mu nu xi rho sigma tau "
+        "phi chi psi omega Gamma Delta Theta Lambda Xi Sigma Phi Psi Omega"
+    )
+)
+_STANDARD = frozenset(
+    _WORD.findall("sin cos tan sinh cosh tanh exp arcsin arccos arctan ln min max")
 )
 _COMMANDS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "log": "ln"}
 
@@ -74,8 +51,101 @@ class Term:
     names: frozenset[str] = frozenset()
 
 
+Slopes = dict[str, Term]
 ZERO = Term("0", number=0.0)
 ONE = Term("1", number=1.0)
+
+
+class Printer:
+    r"""Formulas and their derivatives by some names, as printed terms.
+
+    Parameters
+    ----------
+    variables : sequence of str
+        Names to derive by.
+    definitions : mapping of str to str
+        Formulas of auxiliary quantities: printed by their names, derived through.
+    tables : sequence of str
+        Names of the tables that formulas may call.
+
+    Example
+    -------
+    >>> printer = Printer(["p", "V"], {"qbar": "0.5*rho*V^2"})
+    >>> [term.latex for term in printer.derivatives("qbar*S")]
+    ['0', 'S 0.5 \\rho 2 V']
+    """
+
+    def __init__(
+        self,
+        variables: Sequence[str],
+        definitions: Mapping[str, str] | None = None,
+        tables: Sequence[str] = (),
+    ) -> None:
+        self._variables = list(variables)
+        self._wanted = frozenset(variables)
+        self._definitions = definitions or {}
+        self._tables = list(tables)
+        self._known: dict[str, tuple[Term, Slopes]] = {}
+
+    def value(self, text: str) -> Term:
+        """The formula itself.
+
+        Raises
+        ------
+        ModelError
+            It is outside the grammar, or too long to be shown.
+        """
+        return self._walk(text)[0]
+
+    def derivatives(self, text: str) -> list[Term]:
+        """Derivative by each variable; ``ZERO`` where the formula does not hold it.
+
+        Raises
+        ------
+        ModelError
+            The formula is outside the grammar, or a derivative is too long to be shown.
+        """
+        slopes = self._walk(text)[1]
+        return [slopes.get(variable, ZERO) for variable in self._variables]
+
+    def _name(self, name: str) -> tuple[Term, Slopes]:
+        if name not in self._known:
+            names, slopes = frozenset([name]), {name: ONE} if name in self._wanted else {}
+            if name in self._definitions:
+                # Compiling the model has bounded the chain of definitions and found it open.
+                inner, slopes = self._walk(self._definitions[name])
+                names |= inner.names
+            self._known[name] = Term(latex_name(name), names=names), slopes
+        return self._known[name]
+
+    def _walk(self, text: str) -> tuple[Term, Slopes]:
+        values: list[Term] = []
+        slopes: list[Slopes] = []
+        slope: Slopes
+        for kind, name, number, places in _native.expression_nodes(text, self._tables):
+            inner = [values[place] for place in places]
+            outer = [slopes[place] for place in places]
+            if kind == "number":
+                value, slope = _number(number), {}
+            elif kind == "name":
+                value, slope = self._name(name)
+            elif kind == "select":
+                value, slope = _choice(*inner), _chosen(inner[0], *outer[1:])
+            else:
+                value = _value(kind, inner) if kind != "table" else _looked_up(name, inner)
+                partial = _table_partials if kind == "table" else _partials
+                slope = _chain(partial(kind if kind != "table" else name, inner, value), outer)
+            values.append(value)
+            slopes.append(slope)
+        return values[-1], slopes[-1]
+
+
+def _chain(partials: list[Term], inner: list[Slopes]) -> Slopes:
+    slope: Slopes = {}
+    for factor, slopes in zip(partials, inner, strict=True):
+        for variable, outer in slopes.items():
+            slope[variable] = _add(slope.get(variable, ZERO), _times(factor, outer))
+    return slope
 
 
 def derivatives(text: str, variables: Sequence[str]) -> list[Term]:
@@ -103,27 +173,7 @@ def derivatives(text: str, variables: Sequence[str]) -> list[Term]:
     >>> [term.latex for term in derivatives("-Lp*p + g*sin(phi)", ["p", "phi", "r"])]
     ['-L_{p}', 'g \\cos\\left(\\phi\\right)', '0']
     """
-    values: list[Term] = []
-    slopes: list[dict[str, Term]] = []
-    wanted = set(variables)
-    for kind, name, number, places in _native.expression_nodes(text):
-        inner = [values[place] for place in places]
-        if kind == "number":
-            values.append(_number(number))
-            slopes.append({})
-            continue
-        if kind == "name":
-            values.append(Term(latex_name(name), names=frozenset([name])))
-            slopes.append({name: ONE} if name in wanted else {})
-            continue
-        values.append(_value(kind, inner))
-        partial = _partials(kind, inner, values[-1])
-        slope: dict[str, Term] = {}
-        for factor, place in zip(partial, places, strict=True):
-            for variable, outer in slopes[place].items():
-                slope[variable] = _add(slope.get(variable, ZERO), _times(factor, outer))
-        slopes.append(slope)
-    return [slopes[-1].get(variable, ZERO) for variable in variables]
+    return Printer(variables).derivatives(text)
 
 
 def latex_name(name: str) -> str:
@@ -131,16 +181,17 @@ def latex_name(name: str) -> str:
 
     Example
     -------
-    >>> latex_name("tau_f"), latex_name("Nped"), latex_name("p'")
-    ('\\tau_{f}', 'N_{\\mathrm{ped}}', '\\dot{p}')
+    >>> latex_name("tau_f"), latex_name("Nped"), latex_name("p'"), latex_name("rudder")
+    ('\\tau_{f}', 'N_{\\mathrm{ped}}', '\\dot{p}', '\\mathrm{rudder}')
     """
     if name.endswith("'"):
         return rf"\dot{{{latex_name(name[:-1])}}}"
     head, _, tail = name.partition("_")
-    if not tail and head not in _GREEK and len(head) > 1:
+    if not tail and head not in _GREEK and len(head) > 1 and not _PLAIN_WORD.fullmatch(head):
         head, tail = head[0], head[1:]
-    head = f"\\{head}" if head in _GREEK else head
-    if head and not re.fullmatch(r"\\?[A-Za-z]+", head):
+    if head in _GREEK:
+        head = f"\\{head}"
+    elif len(head) > 1:
         head = rf"\mathrm{{{head}}}"
     index = ",".join(map(_index, filter(None, tail.split("_"))))
     return f"{head}_{{{index}}}" if index else head or r"\_"
@@ -228,20 +279,7 @@ def _power(a: Term, b: Term) -> Term:
 def _call(function: str, *arguments: Term) -> Term:
     shown = ", ".join(argument.latex for argument in arguments)
     command = _COMMANDS.get(function, function)
-    standard = (
-        "sin",
-        "cos",
-        "tan",
-        "sinh",
-        "cosh",
-        "tanh",
-        "exp",
-        "arcsin",
-        "arccos",
-        "arctan",
-        "ln",
-    )
-    command = f"\\{command}" if command in standard else rf"\operatorname{{{command}}}"
+    command = f"\\{command}" if command in _STANDARD else rf"\operatorname{{{command}}}"
     return _made(rf"{command}\left({shown}\right)", _ATOM, *arguments)
 
 
@@ -252,6 +290,8 @@ _VALUES: dict[str, Callable[..., Term]] = {
     "multiply": _times,
     "divide": _divide,
     "power": _power,
+    "less": lambda a, b: _made(f"{a.latex} < {b.latex}", _SUM, a, b),
+    "lessequal": lambda a, b: _made(rf"{a.latex} \le {b.latex}", _SUM, a, b),
     "sqrt": lambda a: _made(rf"\sqrt{{{a.latex}}}", _ATOM, a),
 }
 _NAMES = {"minimum": "min", "maximum": "max"}
@@ -278,8 +318,10 @@ _PARTIALS = {
     "abs": ("sign(a)",),
     "sign": ("0",),
     "atan2": ("b/(a^2 + b^2)", "-a/(a^2 + b^2)"),
-    "minimum": ("0.5*(1 + sign(b - a))", "0.5*(1 - sign(b - a))"),
-    "maximum": ("0.5*(1 + sign(a - b))", "0.5*(1 - sign(a - b))"),
+    "minimum": ("where(a <= b, 1, 0)", "where(a <= b, 0, 1)"),
+    "maximum": ("where(a >= b, 1, 0)", "where(a >= b, 0, 1)"),
+    "less": ("0", "0"),
+    "lessequal": ("0", "0"),
 }
 
 
@@ -304,7 +346,36 @@ def _partials(kind: str, inner: list[Term], value: Term) -> list[Term]:
                 terms.append(_number(number))
             elif function == "name":
                 terms.append(known[name])
+            elif function == "select":
+                terms.append(_choice(*(terms[place] for place in places)))
             else:
                 terms.append(_value(function, [terms[place] for place in places]))
         found.append(terms[-1])
     return found
+
+
+def _choice(test: Term, first: Term, second: Term) -> Term:
+    if first == second:
+        return first
+    rows = rf"{first.latex} & {test.latex} \\ {second.latex} & \text{{otherwise}}"
+    return _made(rf"\begin{{cases}} {rows} \end{{cases}}", _ATOM, test, first, second)
+
+
+def _chosen(test: Term, first: Slopes, second: Slopes) -> Slopes:
+    both = dict.fromkeys([*first, *second])
+    return {name: _choice(test, first.get(name, ZERO), second.get(name, ZERO)) for name in both}
+
+
+def _looked_up(name: str, inner: list[Term], mark: str = "") -> Term:
+    shown = ", ".join(argument.latex for argument in inner)
+    return _made(rf"{mark}\mathrm{{{_plain(name)}}}\left({shown}\right)", _ATOM, *inner)
+
+
+def _table_partials(name: str, inner: list[Term], _value: Term) -> list[Term]:
+    return [
+        _looked_up(name, inner, rf"\partial_{{{place}}} ") for place in range(1, len(inner) + 1)
+    ]
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", r"\_")

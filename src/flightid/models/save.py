@@ -1,0 +1,97 @@
+"""Models to TOML files that `load_model` reads."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from flightid.errors import ModelError
+from flightid.files import write_atomically
+from flightid.models.description import Model
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def write_model(model: Model, path: str | Path) -> Path:
+    """Write a model to a TOML file; `load_model` gives the same model back.
+
+    Parameters
+    ----------
+    model : StateSpaceModel or TransferFunctionModel
+    path : str or Path
+        File ending in ``.toml``; its folder must exist. It is written whole or not at all.
+
+    Returns
+    -------
+    Path
+        `path`.
+
+    Raises
+    ------
+    ModelError
+        The name of the file does not end in ``.toml``.
+    OSError
+        The file cannot be written.
+
+    Reference
+    ---------
+    TOML 1.0, toml.io.
+
+    Example
+    -------
+    >>> import tempfile
+    >>> from flightid.models import load_model
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     model = load_model("short_period").with_values({"Mq": -3.0})
+    ...     load_model(write_model(model, Path(folder) / "mine.toml")) == model
+    True
+    """
+    if Path(path).suffix != ".toml":
+        raise ModelError("a model is written as TOML", found=str(path), needed="a name in .toml")
+    return write_atomically(path, model_as_toml(model))
+
+
+def model_as_toml(model: Model) -> str:
+    """Text of the TOML file.
+
+    Example
+    -------
+    >>> from flightid.models import load_model
+    >>> print(model_as_toml(load_model("quadrotor_yaw")).splitlines()[1])
+    name = "Quadrotor on a rig, yaw"
+    """
+    plain = {key: value for key, value in model.to_dict().items() if key != "schema"}
+    kind = {"kind": plain.pop("kind", "transfer")}
+    single = {k: v for k, v in plain.items() if not isinstance(v, Mapping) and v not in ("", [])}
+    lines = [f"{_key(key)} = {_value(value)}" for key, value in {**kind, **single}.items()]
+    for name, table in plain.items():
+        if isinstance(table, Mapping) and table:
+            lines += ["", f"[{_key(name)}]"]
+            lines += [f"{_key(key)} = {_value(value)}" for key, value in table.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else _text(name)
+
+
+def _text(text: str) -> str:
+    # JSON escapes all that TOML wants escaped, save the delete character.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _value(value: object) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, Mapping):
+        kept = {key: entry for key, entry in value.items() if entry not in (None, "")}
+        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in kept.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    raise ModelError("a model holds what TOML cannot", found=type(value).__name__)
