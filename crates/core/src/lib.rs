@@ -58,6 +58,7 @@ pub mod state_space_fit;
 pub mod tangent;
 pub mod tangent_pattern;
 pub mod tape;
+mod tape_assembly;
 mod tape_derivative;
 mod tape_program;
 pub mod transfer;

@@ -6,7 +6,8 @@
 use crate::error::CoreError;
 use crate::expression::{Binary, Unary};
 use crate::lookup_table::Part;
-use crate::tape::{Assembler, Operation, Tape};
+use crate::tape::{Operation, Tape};
+use crate::tape_assembly::Assembler;
 
 /// One derivative of one output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -101,7 +102,12 @@ impl Tape {
                 Operation::Select(test, a, b) => {
                     chosen(&mut assembler, test, &gradients[a], &gradients[b])?
                 }
-                Operation::Table(table, _, a, b) => {
+                Operation::Table(_, Part::First | Part::Second, ..) => {
+                    let problem =
+                        "the slope of a table has no formula of its derivative".to_string();
+                    return Err(CoreError::Expression { position: 0, problem });
+                }
+                Operation::Table(table, Part::Value, a, b) => {
                     let slope = assembler.table(table, Part::First, a, b)?;
                     let left = scaled(&mut assembler, &gradients[a], slope)?;
                     if self.tables[table].n_axes() == 1 || gradients[b].is_empty() {

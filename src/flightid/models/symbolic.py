@@ -6,6 +6,7 @@ terms, as dual numbers carry numbers. Nothing recurses and the length of a term 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +16,9 @@ from flightid import _native
 from flightid.errors import ModelError
 
 MAXIMUM_TERM = 20_000
+_TURNS = 8
 _SUM, _PRODUCT, _ATOM = 0, 1, 2
+_NUMBERED = re.compile(r"([A-Za-z]+)(\d+)")
 _PLAIN_WORD = re.compile(r"[a-z]{4,}")
 _WORD = re.compile(r"\w+")
 _GREEK = frozenset(
@@ -72,7 +75,7 @@ class Printer:
     -------
     >>> printer = Printer(["p", "V"], {"qbar": "0.5*rho*V^2"})
     >>> [term.latex for term in printer.derivatives("qbar*S")]
-    ['0', 'S 0.5 \\rho 2 V']
+    ['0', '0.5 \\rho 2 V S']
     """
 
     def __init__(
@@ -187,6 +190,9 @@ def latex_name(name: str) -> str:
     if name.endswith("'"):
         return rf"\dot{{{latex_name(name[:-1])}}}"
     head, _, tail = name.partition("_")
+    numbered = _NUMBERED.fullmatch(head)
+    if numbered and numbered[1] in _GREEK:
+        head, tail = numbered[1], "_".join(filter(None, (numbered[2], tail)))
     if not tail and head not in _GREEK and len(head) > 1 and not _PLAIN_WORD.fullmatch(head):
         head, tail = head[0], head[1:]
     if head in _GREEK:
@@ -204,6 +210,9 @@ def _index(text: str) -> str:
 
 
 def _number(value: float) -> Term:
+    turns = value / math.pi
+    if turns == round(turns) and 0.0 < turns <= _TURNS:
+        return Term(r"\pi" if turns == 1.0 else rf"{turns:g} \pi", _PRODUCT, value)
     text = f"{value:.6g}"
     if "e" in text:
         digits, power = text.split("e")
@@ -256,6 +265,8 @@ def _times(a: Term, b: Term) -> Term:
             return _negate(other)
     if b.latex.startswith("-") and b.level == _PRODUCT:
         return _negate(_times(a, _negate(b)))
+    if b.latex[:1].isdigit() and not a.latex[:1].isdigit():
+        a, b = b, a  # a number stands first
     return _made(f"{_bracketed(a, _PRODUCT)} {_bracketed(b, _PRODUCT)}", _PRODUCT, a, b)
 
 

@@ -1,5 +1,6 @@
 use super::*;
 use crate::expression::Expression;
+use crate::lookup_table::{Interpolation, LookupTable, Outside};
 use crate::tape::Registers;
 use proptest::prelude::*;
 use std::collections::BTreeMap;
@@ -7,12 +8,20 @@ use std::collections::BTreeMap;
 const NAMES: [&str; 3] = ["a", "b", "c"];
 
 fn tape(texts: &[&str]) -> Tape {
-    let expressions: Vec<_> = texts.iter().map(|t| Expression::parse(t).unwrap()).collect();
+    let called = ["lift", "polar"];
+    let parse = |text: &&str| Expression::parse_with(text, &called).unwrap();
+    let expressions: Vec<_> = texts.iter().map(parse).collect();
     let names: Vec<_> = NAMES.iter().map(ToString::to_string).collect();
-    Tape::compile(&expressions, &names, &BTreeMap::new()).unwrap()
+    let (points, more) = (vec![0.0, 0.5, 1.2, 3.0], vec![0.0, 1.0, 3.0]);
+    let values: Vec<f64> = (0..12).map(|k| f64::from(k * k % 7)).collect();
+    let new = |axes, values, kind| LookupTable::new(axes, values, kind, Outside::Hold).unwrap();
+    let lift = new(vec![points.clone()], values[..4].to_vec(), Interpolation::Pchip);
+    let polar = new(vec![points, more], values, Interpolation::Cubic);
+    let tables = BTreeMap::from([("lift".to_string(), lift), ("polar".to_string(), polar)]);
+    Tape::compile_with(&expressions, &names, &BTreeMap::new(), &tables).unwrap()
 }
 
-const TEXTS: [&str; 12] = [
+const TEXTS: [&str; 15] = [
     "sin(a)*cos(b) - tan(c)/(1 + a^2)",
     "asin(a/9) + acos(b/9)*atan(c)",
     "sinh(a) + cosh(b)*tanh(a*c)",
@@ -25,6 +34,9 @@ const TEXTS: [&str; 12] = [
     "2*(a + a)*b - a/a",
     "max(1, a)^2 / (b - 7)",
     "7",
+    "where(a < b, a^2*c, b) + where(a >= c, 3, c*b)*clip(a, 0.5, 1.5)",
+    "lift(a)*lift(b^2) + deadband(a, 0.3*c)",
+    "polar(a, b)*c + polar(1, c) + saturation(b, a)",
 ];
 
 proptest! {
@@ -65,4 +77,11 @@ fn ties_go_to_the_first_as_with_dual_numbers() {
     longer.run(&[1.0, 1.0, 0.0], &mut all, &mut [0.0; 2]);
     let slopes: Vec<f64> = entries.iter().map(|e| all[e.register]).collect();
     assert_eq!(slopes, [1.0, 0.0, 1.0, 0.0]);
+}
+
+#[test]
+fn the_slope_of_a_table_is_not_derived_again() {
+    let (once, entries) = tape(&["lift(a)"]).differentiated().unwrap();
+    let slope = Tape { outputs: vec![entries[0].register], ..once };
+    assert!(matches!(slope.differentiated(), Err(CoreError::Expression { .. })));
 }
