@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, FitError
+from flightid.identification.declared_numbers import declared_numbers, with_declared
 from flightid.identification.record_options import (
     RecordOptions,
     chosen,
@@ -166,16 +167,25 @@ def prepare_records(
         values, free_states = initial_values(
             options.initial_state, states, [trim.get(name, 0.0) for name in states]
         )
-        own.append(
-            OwnNumbers(
-                np.array(values),
-                np.zeros(len(model.inputs)),
-                np.zeros(len(model.outputs)),
-                free_states,
-                chosen(options.free_reference, model.inputs, "free_reference"),
-                chosen(options.free_bias, model.outputs, "free_bias"),
+        initial, shift, bias = (
+            with_declared(start, free, names, declared_numbers(model, options, kind, names))
+            for kind, names, start, free in (
+                ("initial", states, np.array(values), free_states),
+                (
+                    "reference",
+                    model.inputs,
+                    np.zeros(len(model.inputs)),
+                    chosen(options.free_reference, model.inputs, "free_reference"),
+                ),
+                (
+                    "bias",
+                    model.outputs,
+                    np.zeros(len(model.outputs)),
+                    chosen(options.free_bias, model.outputs, "free_bias"),
+                ),
             )
         )
+        own.append(OwnNumbers(initial[0], shift[0], bias[0], initial[1], shift[1], bias[1]))
     _require_length(model, records, own)
     return RecordSet(model, records, arrays, offsets, own, states, options.hold == "first")
 
