@@ -14,6 +14,8 @@ from flightid.models.polynomial_data import PolynomialData
 from flightid.models.polynomial_structure import PolynomialStructure
 
 Array = NDArray[np.float64]
+SPARE_LAGS = 8
+ROWS_PER_LAG = 20
 
 
 def four_stage(structure: PolynomialStructure, data: PolynomialData) -> tuple[Array, Array]:
@@ -37,7 +39,9 @@ def four_stage(structure: PolynomialStructure, data: PolynomialData) -> tuple[Ar
     second, _ = _instruments(structure, data, first, np.ones(1))
     left = _left(structure, data, second)
     none = np.empty((0, left.size))
-    degree = structure.na + max(structure.nb, default=0)
+    # Longer than Ljung's na + nb: what a short noise model leaves coloured falsifies the intervals.
+    room = sum(data.lengths) // ROWS_PER_LAG
+    degree = min(structure.na + max(structure.nb, default=0) + SPARE_LAGS, max(room, 1))
     noise = regress(left, none, data.lengths, degree, [], []).shortest
     return _instruments(structure, data, second, np.concatenate([[1.0], noise]))
 

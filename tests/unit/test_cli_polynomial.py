@@ -1,0 +1,53 @@
+"""``flightid polynomial``: a fit and a scan from files."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import flightid as fid
+from flightid.cli import main
+from tests.polynomial_records import ARMAX, flown
+
+
+@pytest.fixture
+def files(tmp_path):
+    paths = []
+    for seed in (0, 1):
+        path = tmp_path / f"run{seed}.parquet"
+        fid.write_records(path, flown(ARMAX, seed, n=600, noise=0.3))
+        paths.append(str(path))
+    return paths
+
+
+def _run(capsys, *arguments):
+    """Exit code and what was written to both streams."""
+    with pytest.raises(SystemExit) as leave:
+        main(["polynomial", *arguments])
+    return (leave.value.code, *capsys.readouterr())
+
+
+def test_a_fit_with_validation(files, capsys):
+    code, out, err = _run(
+        capsys, files[0], "--na", "2", "--nb", "2", "--nc", "2", "--validate", files[1], "--json"
+    )
+    assert code == 0, err
+    values = json.loads(out)
+    assert values["schema"] == "flightid.polynomial_fit/1"
+    assert abs(values["parameters"]["a1"]["value"] + 1.5) < 0.05
+    assert "free run" in err
+
+
+def test_a_scan(files, capsys):
+    code, out, err = _run(
+        capsys, files[0], "--scan", "--na", "2", "--nb", "2", "--nc", "1", "--validate", files[1]
+    )
+    assert code == 0, err
+    assert "ranked by free run" in out
+
+
+def test_what_is_missing_is_said(files, capsys):
+    code, _, err = _run(capsys, files[0], "--scan")
+    assert code == 2
+    assert "--validate" in err
