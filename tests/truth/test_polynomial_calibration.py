@@ -54,4 +54,5 @@ def coverage(case: str, runs: int, n: int = 600) -> dict[str, float]:
 def test_intervals_cover_the_truth(case):
     found = coverage(case, RUNS)
     for key, share in found.items():
-        assert 0.93 <= share <= 0.97, found | {"which": key}
+        # Three standard errors of a share of 500 runs, since 24 shares are judged.
+        assert 0.92 <= share <= 0.98, found | {"which": key}
