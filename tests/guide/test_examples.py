@@ -101,3 +101,16 @@ def test_the_dryer_script_checks_a_record_of_the_same_format(tmp_path: Path) -> 
         assert abs(float(value) - float(expected.rstrip(","))) < 0.05, name
     assert "nk = 3" in run.stdout
     assert _script(EXAMPLES / "dryer" / "analyse.py", folder=tmp_path).returncode == 1
+
+
+def test_the_r50_is_found_from_its_flights(tmp_path: Path) -> None:
+    run = _script(EXAMPLES / "r50" / "study.py", "short", "0", "out", folder=tmp_path)
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    counts = re.findall(r"(\d+) of (\d+) intervals cover the truth", run.stdout)
+    inside, of = (sum(int(pair[place]) for pair in counts) for place in (0, 1))
+    assert len(counts) == 2
+    assert of >= 55
+    # A fixed seed: of 95 % intervals a few miss, but not many.
+    assert inside >= 0.85 * of, run.stdout
+    assert "Table 6, hover: eigenvalues" in run.stdout
+    assert (tmp_path / "out" / "report.html").stat().st_size > 100_000

@@ -78,3 +78,18 @@ def test_cross_couplings_of_the_rig_carry_their_warning() -> None:
     model = fid.load_model("quadrotor_roll_pitch")
     assert abs(model.parameters["Mtphi"].value) > abs(model.parameters["Mttheta"].value)
     assert "implausible" in model.note
+
+
+def test_damping_by_the_bars_time_constant() -> None:
+    v = {name: fid.load_model("r50_hover").parameters[name].value for name in ("tau_s", "Ma", "Lb")}
+    assert_close(0.5 / (v["tau_s"] * np.sqrt(v["Lb"])), 0.11, atol=0.005, why="printed digits")
+    assert_close(0.5 / (v["tau_s"] * np.sqrt(v["Ma"])), 0.16, atol=0.005, why="printed digits")
+
+
+@pytest.mark.parametrize(("name", "across"), [("r50_hover", 0.0), ("r50_cruise", -11.0)])
+def test_accelerometers_stand_where_the_speeds_are_measured(name: str, across: float) -> None:
+    model = fid.load_model(name)
+    omega = np.geomspace(0.5, 30.0, 20)
+    found = dict(zip(model.outputs, model.frequency_response(omega), strict=True))
+    moved = 1j * omega * found["um"] + 32.2 * found["theta"] - across * found["r"]
+    assert_close(moved, found["ax"], rtol=1e-9, atol=1e-9, why="the same sensor position")

@@ -149,3 +149,18 @@ def test_refuses_a_unit_of_another_kind_and_a_meaningless_disturbance() -> None:
         fly_closed_loop(model, CrudePilot({"lat": {"phi": 0.1}}), chirp(unit="rad"))
     with pytest.raises(errors.OptionError, match="a disturbance has no meaning"):
         Disturbance(-1.0, 1.0)
+
+
+def test_a_fit_needs_only_the_outputs_of_its_responses() -> None:
+    model = fid.load_model("quadrotor_yaw")
+    omega = np.geomspace(0.5, 20.0, 30)
+    name = model.response_names[0]
+    output = name.split("/")[0]
+    data = fid.FrequencyResponse.from_values(
+        omega,
+        model.frequency_response(omega)[[list(model.outputs).index(output)]],
+        inputs=model.inputs,
+        outputs=[output],
+        units=model.units,
+    )
+    assert fid.identify(model.with_responses(name), data).average_cost < 1e-9

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from flightid.errors import FitError
 from flightid.identification.selection import SelectedResponse
 from flightid.inference import decibel_phase_sensitivity, window_covariance
 from flightid.responses import FrequencyResponse
+from flightid.responses.uncertainty import Points, covariances
 
 Array = NDArray[np.float64]
 
@@ -64,29 +66,41 @@ def error_model(data: FrequencyResponse, selected: Sequence[SelectedResponse]) -
     """Gather the covariance of the fitted points, output by output."""
     if data.errors is None and all(np.all(s.measured.random_error == 0.0) for s in selected):
         return ErrorModel(UNKNOWN, ())
-    runs, first = [], 0
-    while first < len(selected):
-        output = selected[first].measured.output
-        count = 1
-        while first + count < len(selected) and selected[first + count].measured.output == output:
-            count += 1
-        group = selected[first : first + count]
-        full = _known(data, group) if data.errors is not None else _approximate(data, group)
-        runs.append(Run(first, count, full))
-        first += count
-    return ErrorModel(KNOWN if data.errors is not None else APPROXIMATE, tuple(runs))
+    groups = [list(group) for _, group in groupby(selected, lambda each: each.measured.output)]
+    if data.errors is None:
+        source, full = APPROXIMATE, [_approximate(data, group) for group in groups]
+    else:
+        source, full = KNOWN, _known(data, groups)
+    starts = np.cumsum([0, *map(len, groups)])
+    return ErrorModel(
+        source,
+        tuple(
+            Run(int(first), len(group), matrix)
+            for first, group, matrix in zip(starts, groups, full, strict=False)
+        ),
+    )
 
 
-def _known(data: FrequencyResponse, group: Sequence[SelectedResponse]) -> Array:
+def _known(data: FrequencyResponse, groups: Sequence[Sequence[SelectedResponse]]) -> list[Array]:
     assert data.errors is not None
-    union = np.unique(np.concatenate([each.places for each in group]))
-    inputs = np.array([data.inputs.index(each.measured.input) for each in group])
-    output = data.outputs.index(group[0].measured.output)
-    full = data.errors.covariance(np.array([output]), inputs, union)[0]
-    places = [k * len(union) + np.searchsorted(union, each.places) for k, each in enumerate(group)]
-    real = np.concatenate(places)
-    keep = np.concatenate([real, real + len(group) * len(union)])
-    return np.asarray(full[np.ix_(keep, keep)])
+    wanted = [
+        Points(
+            data.outputs.index(group[0].measured.output),
+            np.array([data.inputs.index(each.measured.input) for each in group]),
+            np.unique(np.concatenate([each.places for each in group])),
+        )
+        for group in groups
+    ]
+    found = []
+    for group, points, full in zip(groups, wanted, covariances(data.errors, wanted), strict=True):
+        union = points.frequencies
+        places = [
+            k * len(union) + np.searchsorted(union, each.places) for k, each in enumerate(group)
+        ]
+        real = np.concatenate(places)
+        keep = np.concatenate([real, real + len(group) * len(union)])
+        found.append(np.asarray(full[np.ix_(keep, keep)]))
+    return found
 
 
 def _approximate(data: FrequencyResponse, group: Sequence[SelectedResponse]) -> Array:

@@ -29,6 +29,7 @@ LARGEST_RESIDUAL = 10.0
 """Largest residual, in multiples of the measured output's rms, before a simulation is not believed:
 a loop may hold an output well below its disturbances, but no model that is right diverges so."""
 _RANK = 1e-9
+TINY = float(np.finfo(float).tiny)
 
 
 def why_unknown(data: FrequencyResponse) -> str:
@@ -114,31 +115,54 @@ def _residuals(
     measured = linear.output_records[record]
     n, step = measured.shape[1], linear.sample_time_s
     rest = measured.copy()
-    unknown: dict[str, list[Array]] = {name: [np.ones((1, n))] for name in fitted}
+    kept = [row for row, name in enumerate(data.outputs) if name in fitted]
+    free = []
     for each in systems:
         modes = split_modes(each, n * step)
         places = [linear.inputs.index(name) for name in each.inputs]
         driven = driven_outputs(modes, linear.input_records[record][places], step, hold)
-        free = free_outputs(modes, n, step)
+        moving = free_outputs(modes, n, step)
+        wide = np.zeros((len(moving), len(rest), n))
         for place, name in enumerate(each.outputs):
             if name in fitted:
-                rest[data.outputs.index(name)] -= driven[place]
-                unknown[name].append(free[:, place])
-    for name, rows in unknown.items():
-        row = data.outputs.index(name)
-        rest[row] = _less_unknown(name, rest[row], np.concatenate(rows), measured[row])
+                row = data.outputs.index(name)
+                rest[row] -= driven[place]
+                wide[:, row] = moving[:, place]
+        free.append(wide[:, kept])
+    names = tuple(data.outputs[row] for row in kept)
+    rest[kept] = _less_unknown(names, rest[kept], np.concatenate(free), measured[kept])
     return rest
 
 
-def _less_unknown(name: str, rest: Array, unknown: Array, measured: Array) -> Array:
-    if not (np.all(np.isfinite(rest)) and np.all(np.isfinite(unknown))):
-        raise _diverges(name, "a simulation without bounds")
-    basis = unknown.T / np.maximum(np.linalg.norm(unknown, axis=1), np.finfo(float).tiny)
-    left = rest - basis @ np.linalg.lstsq(basis, rest, rcond=_RANK)[0]
-    if np.std(left) > LARGEST_RESIDUAL * np.std(measured):
-        ratio = float(np.std(left) / max(np.std(measured), np.finfo(float).tiny))
-        raise _diverges(name, f"a residual {ratio:.0f} times the measured output")
+def _less_unknown(names: tuple[str, ...], rest: Array, free: Array, measured: Array) -> Array:
+    """Take out unknown initial states and trims, which all outputs share, and each one's mean.
+
+    Fitted to each output by itself, so many unknowns would take what little a record says of its
+    lowest frequencies with them. Outputs count by what they leave in such a fit of their own.
+    """
+    if not (np.all(np.isfinite(rest)) and np.all(np.isfinite(free))):
+        raise _diverges(", ".join(names), "a simulation without bounds")
+    rest = rest - rest.mean(axis=1, keepdims=True)
+    free = free - free.mean(axis=2, keepdims=True)
+    free = free / np.maximum(np.linalg.norm(free, axis=(1, 2), keepdims=True), TINY)
+    alone = [
+        each - free[:, row].T @ _coefficients(free[:, row].T, each) for row, each in enumerate(rest)
+    ]
+    scale = np.maximum(np.std(alone, axis=1)[:, None], TINY)
+    together = np.reshape(free / scale, (len(free), -1)).T
+    found = _coefficients(together, (rest / scale).ravel())
+    left = rest - np.tensordot(found, free, axes=1)
+    for name, each, whole in zip(names, left, measured, strict=True):
+        if np.std(each) > LARGEST_RESIDUAL * np.std(whole):
+            ratio = float(np.std(each) / max(np.std(whole), TINY))
+            raise _diverges(name, f"a residual {ratio:.0f} times the measured output")
     return np.asarray(left)
+
+
+def _coefficients(basis: Array, target: Array) -> Array:
+    """Least squares by way of the triangular factor, which leaves few rows to the rest."""
+    factor: Array = np.asarray(np.linalg.qr(np.column_stack([basis, target]), mode="r"))
+    return np.asarray(np.linalg.lstsq(factor[:, :-1], factor[:, -1], rcond=_RANK)[0])
 
 
 def _diverges(output: str, found: str) -> DataError:

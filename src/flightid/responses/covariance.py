@@ -18,14 +18,16 @@ from scipy.fft import next_fast_len
 
 from flightid.responses.noise import NoiseSpectrum
 from flightid.responses.transform import FoldedBasis, WindowPlan, transform
+from flightid.responses.uncertainty import Points
 
-COLUMNS = 512
+COLUMNS = 128
 """Frequencies of the noise that are worked on at a time: bounds memory, and suits caches."""
 SIDE_LOBES = 40.0
 """Bins of the shortest window beyond the highest frequency, past which noise does not reach the
 estimate: a Hann window's side lobes are down by 1e-9 in power there."""
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+Places = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -73,9 +75,15 @@ class WindowedErrors:
         self, outputs: NDArray[np.intp], inputs: NDArray[np.intp], frequencies: NDArray[np.intp]
     ) -> Real:
         """See `CovarianceSource`."""
-        size = 2 * len(inputs) * len(frequencies)
-        total = np.zeros((len(outputs), size, size))
-        sensitivity = self.sensitivity[:, :, :, outputs][:, :, :, :, inputs][..., frequencies]
+        return np.stack(
+            self.covariances([Points(int(output), inputs, frequencies) for output in outputs])
+        )
+
+    def covariances(self, wanted: Sequence[Points]) -> list[Real]:
+        """See `SharedWork`: the kernels of the noise do not depend on the output."""
+        inputs = np.unique(np.concatenate([each.inputs for each in wanted]))
+        frequencies = np.unique(np.concatenate([each.frequencies for each in wanted]))
+        parts = [self._part(each, inputs, frequencies) for each in wanted]
         for n_samples in sorted({record.shape[1] for record in self.instruments}):
             weights = [
                 [self.weights(record, share, inputs, frequencies) for share in self.shares]
@@ -84,8 +92,19 @@ class WindowedErrors:
             ]
             length, bins = self._noise_bins(n_samples, frequencies)
             for columns in np.array_split(bins, -(-len(bins) // COLUMNS)):
-                self._add(total, columns, length, weights, sensitivity, outputs, frequencies)
-        return total
+                self._add(parts, columns, length, weights, frequencies)
+        return [part.total for part in parts]
+
+    def _part(self, wanted: Points, inputs: Places, frequencies: Places) -> _Part:
+        turns = self.sensitivity[:, :, :, wanted.output][:, :, :, wanted.inputs]
+        size = 2 * len(wanted.inputs) * len(wanted.frequencies)
+        return _Part(
+            wanted.output,
+            np.searchsorted(inputs, wanted.inputs),
+            np.searchsorted(frequencies, wanted.frequencies),
+            _mixing(turns[..., wanted.frequencies]),
+            np.zeros((size, size)),
+        )
 
     def _noise_bins(
         self, n_samples: int, frequencies: NDArray[np.intp]
@@ -116,19 +135,17 @@ class WindowedErrors:
 
     def _add(
         self,
-        total: Real,
+        parts: Sequence[_Part],
         columns: NDArray[np.intp],
         length: int,
         records: Sequence[Sequence[Complex]],
-        sensitivity: Real,
-        outputs: NDArray[np.intp],
-        frequencies: NDArray[np.intp],
+        frequencies: Places,
     ) -> None:
         """Add what some bins of the noise contribute, for all records of one length."""
         angle = 2.0 * np.pi * columns / length
         density = self.noise.at(angle / self.sample_time_s) / (2.0 * self.sample_time_s)
         twice = np.where((columns == 0) | (2 * columns == length), 1.0, 2.0) / length
-        level = np.sqrt(twice * density[outputs])
+        level = np.repeat(np.sqrt(twice * density), 2, axis=1)
         omega = self.omega[frequencies]
         near = np.flatnonzero(omega + self._reach() >= angle[0])
         bases = [
@@ -139,50 +156,66 @@ class WindowedErrors:
             for share in self.shares
         ]
         turns = [_turns(*one, angle) for one in zip(self.shares, records[0], strict=True)]
-        mixing = _mixing(sensitivity[..., near])
-        gram = np.zeros((len(outputs), *[2 * mixing.shape[0] * mixing.shape[1]] * 2))
         for weights in records:
             kernels = []
             for weight, turn, (above, below) in zip(weights, turns, bases, strict=True):
                 ahead = (weight[:, near] @ turn) * above
                 mirrored = ((weight[:, near] @ turn.conj()) * below).conj()
                 kernels += [(ahead + mirrored) / 2.0, (ahead - mirrored) / 2.0j]
-            _add_gram(gram, np.stack(kernels, axis=2), mixing, level)
-        rows = np.add.outer(np.arange(2 * mixing.shape[0]) * len(omega), near).ravel()
-        total[:, rows[:, None], rows] += gram
+            stacked = np.stack(kernels, axis=2)
+            for part in parts:
+                part.add(stacked, near, level[part.output])
+
+
+@dataclass(frozen=True)
+class _Part:
+    """The covariance of one output in the making.
+
+    Attributes
+    ----------
+    output : int
+    inputs, frequencies : ndarray of int
+        Places among those that the kernels are made for.
+    mixing : ndarray, shape (n_in, n_f, 2, 2 · n_windows)
+        Sensitivities of real and imaginary part of the estimate to those of the windows' responses.
+    total : ndarray, shape (2 n_in n_f, 2 n_in n_f)
+        Added to.
+    """
+
+    output: int
+    inputs: Places
+    frequencies: Places
+    mixing: Real
+    total: Real
+
+    def add(self, kernels: Complex, near: Places, level: Real) -> None:
+        """Add the Gram matrix of the weighted kernels.
+
+        Parameters
+        ----------
+        kernels : ndarray of complex, shape (all inputs, n_near, 2 · n_windows, n_bins)
+            Of real and imaginary part for each window length.
+        near : ndarray of int
+            Frequencies, among all, that the kernels are for.
+        level : ndarray, shape (2 · n_bins,)
+            Root of the noise power at each bin, for real and imaginary part.
+        """
+        here = np.flatnonzero(np.isin(self.frequencies, near))
+        if not here.size:
+            return
+        columns = np.searchsorted(near, self.frequencies[here])
+        mine = kernels[self.inputs[:, None], columns]
+        mixed = self.mixing[:, here] @ mine.view(np.float64)
+        flat = (mixed.transpose(2, 0, 1, 3) * level).reshape(-1, len(level))
+        places = np.add.outer(np.arange(2 * len(self.inputs)) * len(self.frequencies), here).ravel()
+        self.total[places[:, None], places] += flat @ flat.T
 
 
 def _mixing(sensitivity: Real) -> Real:
-    """Sensitivities as one matrix for each input and frequency.
-
-    Shape (n_in, n_f, 2 · n_out, 2 · n_windows): parts and outputs of the estimate from parts of
-    the windows' responses.
-    """
-    windows, _, _, outputs, inputs, count = sensitivity.shape
-    ordered = sensitivity.transpose(4, 5, 1, 3, 0, 2)
-    return np.ascontiguousarray(ordered).reshape(inputs, count, 2 * outputs, 2 * windows)
-
-
-def _add_gram(total: Real, kernels: Complex, mixing: Real, level: Real) -> None:
-    """Add the Gram matrix of the weighted kernels of each output.
-
-    Parameters
-    ----------
-    total : ndarray, shape (n_out, rows, rows)
-        Added to.
-    kernels : ndarray of complex, shape (n_in, n_f, 2 · n_windows, n_bins)
-        Of real and imaginary part for each window length.
-    mixing : ndarray, shape (n_in, n_f, 2 · n_out, 2 · n_windows)
-    level : ndarray, shape (n_out, n_bins)
-        Root of the noise power at each bin.
-    """
-    n_in, n_f, _, n_bins = kernels.shape
-    n_out = len(total)
-    mixed = (mixing @ kernels.view(np.float64)).reshape(n_in, n_f, 2, n_out, 2 * n_bins)
-    for place, root in enumerate(np.repeat(level, 2, axis=1)):
-        rows = np.multiply(mixed[:, :, :, place].transpose(2, 0, 1, 3), root, order="C")
-        flat = rows.reshape(-1, 2 * n_bins)
-        total[place] += flat @ flat.T
+    """Sensitivities (n_windows, 2, 2, n_in, n_f) as one matrix for each input and frequency."""
+    windows, _, _, inputs, count = sensitivity.shape
+    ordered = sensitivity.transpose(3, 4, 1, 0, 2)
+    return np.ascontiguousarray(ordered).reshape(inputs, count, 2, 2 * windows)
 
 
 def _turns(share: WindowShare, weight: Complex, angle: Real) -> Complex:

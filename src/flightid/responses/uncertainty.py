@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,43 @@ class CovarianceSource(Protocol):
         ...
 
 
+class Points(NamedTuple):
+    """Points of one output whose errors are wanted together: places of all inputs × frequencies."""
+
+    output: int
+    inputs: NDArray[np.intp]
+    frequencies: NDArray[np.intp]
+
+
+@runtime_checkable
+class SharedWork(Protocol):
+    """A source that does what several outputs have in common once."""
+
+    def covariances(self, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
+        """One matrix for each, shaped as by `CovarianceSource.covariance`."""
+        ...
+
+
+def covariances(errors: CovarianceSource, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
+    """Covariances of the points of several outputs, what they share being worked out once.
+
+    Parameters
+    ----------
+    errors : CovarianceSource
+    wanted : sequence of Points
+
+    Returns
+    -------
+    list of ndarray, each shape (2 n_in n_f, 2 n_in n_f)
+    """
+    if isinstance(errors, SharedWork):
+        return errors.covariances(wanted)
+    return [
+        errors.covariance(np.array([each.output]), each.inputs, each.frequencies)[0]
+        for each in wanted
+    ]
+
+
 @dataclass(frozen=True)
 class Selected:
     """Errors of some outputs, inputs and frequencies of a response."""
@@ -44,6 +82,18 @@ class Selected:
         return self.errors.covariance(
             self.outputs[outputs], self.inputs[inputs], self.frequencies[frequencies]
         )
+
+    def covariances(self, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
+        """See `SharedWork`."""
+        there = [
+            Points(
+                int(self.outputs[each.output]),
+                self.inputs[each.inputs],
+                self.frequencies[each.frequencies],
+            )
+            for each in wanted
+        ]
+        return covariances(self.errors, there)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,179 @@
+"""The paper's tables 2 to 7 with what the flights gave beside the published figures."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from flights import LIBRARY
+from identification import Identified
+
+import flightid as fid
+from flightid.dynamics import eigenvalues_of
+from flightid.table import Cell, Column, Table
+
+PUBLISHED = tomllib.loads(Path(__file__).with_name("published.toml").read_text(encoding="utf-8"))
+
+
+def of_condition(condition: str, found: Identified) -> list[Table]:
+    """Tables 2 to 7 of one flight condition."""
+    return [
+        responses(condition, found.fit),
+        parameters(condition, found.fit),
+        eigenvalues(condition, found.fit),
+    ]
+
+
+def responses(condition: str, fit: fid.Fit) -> Table:
+    """Tables 2 and 3: the bands that coherence selected, and the costs."""
+    published = PUBLISHED[condition]
+    rows: list[tuple[Cell, ...]] = []
+    for each in fit.responses:
+        theirs = published["ranges"].get(each.name, (None, None))
+        rows.append((each.name, *each.band_rad_s, *theirs, each.cost))
+    columns = (
+        Column("response"),
+        Column("from", "rad/s", 3),
+        Column("to", "rad/s", 3),
+        Column("published from", "rad/s"),
+        Column("to", "rad/s"),
+        Column("cost", digits=3),
+    )
+    unused = sorted(set(published["ranges"]) - set(fit.costs))
+    notes = (
+        f"Average cost {fit.average_cost:.1f}; published {published['average_cost']}, from flights "
+        "with whatever a linear model lacks.",
+        "Published, not coherent enough here: " + (", ".join(unused) or "none") + ".",
+    )
+    return Table(f"Tables 2 and 3, {condition}: responses and costs", columns, tuple(rows), notes)
+
+
+def parameters(condition: str, fit: fid.Fit) -> Table:
+    """Tables 4 and 5: estimates beside the published values, which are the truth here."""
+    truth = fid.load_model(LIBRARY[condition]).parameters
+    columns = (
+        Column("parameter"),
+        Column("unit"),
+        Column("published = truth"),
+        Column("estimate"),
+        Column("95 % low", digits=3),
+        Column("95 % high", digits=3),
+        Column("covers"),
+        Column("CR", "%", 3),
+        Column("published CR", "%"),
+        Column("I", "%", 3),
+        Column("published I", "%"),
+    )
+    rows: list[tuple[Cell, ...]] = []
+    for name, (bound, insensitivity) in PUBLISHED[condition]["parameters"].items():
+        p, value = fit.parameters[name], truth[name].value
+        low, high = p.interval95 or (None, None)
+        covers = None if low is None or high is None or value is None else low <= value <= high
+        rows.append(
+            (
+                *(name, p.unit, value, p.value, low, high, covers),
+                *(p.cramer_rao_percent, bound, p.insensitivity_percent, insensitivity),
+            )
+        )
+    inside, of = covered(condition, fit)
+    note = f"{inside} of {of} intervals cover the truth; about {0.95 * of:.0f} should."
+    return Table(f"Tables 4 and 5, {condition}: parameters", columns, tuple(rows), (note,))
+
+
+def covered(condition: str, fit: fid.Fit) -> tuple[int, int]:
+    """How many 95 % intervals of free parameters cover the published value, and of how many."""
+    truth = fid.load_model(LIBRARY[condition]).parameters
+    inside = [
+        p.interval95[0] <= (truth[name].value or 0.0) <= p.interval95[1]
+        for name, p in fit.parameters.items()
+        if p.status == "free" and p.interval95 is not None
+    ]
+    return sum(inside), len(inside)
+
+
+def eigenvalues(condition: str, fit: fid.Fit) -> Table:
+    """Tables 6 and 7: modes of the identified model beside the published ones."""
+    left = list(eigenvalues_of(fit))
+    rows: list[tuple[Cell, ...]] = []
+    for real, imaginary, description in PUBLISHED[condition]["eigenvalues"]:
+        mode = complex(real, imaginary)
+        nearest = min(left, key=lambda each: abs(each.value - mode))
+        left.remove(nearest)
+        half = nearest.half_widths or (None, None, None, None)
+        rows.append(
+            (
+                *(real, imaginary, nearest.value.real, half[0], nearest.value.imag, half[1]),
+                *(nearest.natural_rad_s, nearest.damping, description),
+            )
+        )
+    columns = (
+        Column("published real", "rad/s"),
+        Column("imaginary", "rad/s"),
+        Column("real", "rad/s"),
+        Column("±", "rad/s", 2),
+        Column("imaginary", "rad/s"),
+        Column("±", "rad/s", 2),
+        Column("natural frequency", "rad/s"),
+        Column("damping ratio", digits=3),
+        Column("mode"),
+    )
+    number = 6 if condition == "hover" else 7
+    others = ", ".join(f"{each.value.real:.2g}" for each in left) or "none"
+    notes = ("± is half a 95 % interval, from the parameters' covariance.", f"Others: {others}.")
+    return Table(f"Table {number}, {condition}: eigenvalues", columns, tuple(rows), notes)
+
+
+def of_both(both: Mapping[str, Identified]) -> list[Table]:
+    """Ratios of cruise to hover, and the physics."""
+    return [ratios(both), physics(both)]
+
+
+def ratios(both: Mapping[str, Identified]) -> Table:
+    """Last column of tables 4 and 5: what changes from hover to cruise."""
+    truths = {name: fid.load_model(LIBRARY[name]).parameters for name in both}
+    hover, cruise = (both[name].fit.parameters for name in ("hover", "cruise"))
+    rows: list[tuple[Cell, ...]] = []
+    for name in PUBLISHED["hover"]["parameters"]:
+        if name in cruise:
+            published = (truths["cruise"][name].value or 0.0) / (truths["hover"][name].value or 1.0)
+            rows.append((name, published, cruise[name].value / hover[name].value))
+    columns = (Column("parameter"), Column("published", digits=3), Column("identified", digits=3))
+    return Table("Cruise over hover", columns, tuple(rows))
+
+
+def physics(both: Mapping[str, Identified]) -> Table:
+    """Time constants, Lock numbers, flapping frequencies and gearing, as the paper does."""
+    facts = PUBLISHED["physics"]
+    speed = facts["rotor_speed_rpm"] * 2.0 * np.pi / 60.0
+    rows: list[tuple[Cell, ...]] = []
+    for condition, found in both.items():
+        mine = _physics(condition, {n: p.value for n, p in found.fit.parameters.items()}, speed)
+        rows += [(condition, *row) for row in mine]
+    note = (
+        "Theory for the time constants in hover, the blade's Lock number corrected for inflow; "
+        f"measured gearing {facts['gearing']}; rotor speed {speed:.1f} rad/s."
+    )
+    columns = (Column("condition"), Column("quantity"), Column("identified"), Column("paper"))
+    return Table("Physics", columns, tuple(rows), (note,))
+
+
+def _physics(condition: str, v: Mapping[str, float], speed: float) -> list[tuple[Cell, ...]]:
+    """Quantity, value from the identified model, value in the paper (theory where it has one)."""
+    facts, published = PUBLISHED["physics"], PUBLISHED[condition]
+    hover = condition == "hover"
+    rows: list[tuple[Cell, ...]] = []
+    for name, what in (("tau_s", "bar"), ("tau_f", "rotor")):
+        theory = facts[f"theory_{name}"] if hover else None
+        lock = 16.0 / (theory * speed) if theory else None
+        rows.append((f"{what} time constant, s (theory)", v[name], theory))
+        rows.append((f"Lock number of the {what}, 16/(tau Omega)", 16.0 / (v[name] * speed), lock))
+    rows.append(("Bell mixer Kd = Bd/Blat", v["Bd"] / v["Blat"], published["gearing"]["Kd"]))
+    rows.append(("Bell mixer Kc = Ac/Alon", abs(v["Ac"] / v["Alon"]), published["gearing"]["Kc"]))
+    for axis, stiffness in (("pitch", v["Ma"]), ("roll", v["Lb"])):
+        root = float(np.sqrt(stiffness))
+        natural, damping = (published.get(k, {}).get(axis) for k in ("natural_rad_s", "damping"))
+        rows.append((f"{axis} flapping frequency, rad/s", root, natural))
+        rows.append((f"{axis} damping ratio 1/(2 tau_s omega)", 0.5 / (v["tau_s"] * root), damping))
+    return rows
