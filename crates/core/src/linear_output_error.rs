@@ -196,8 +196,10 @@ struct Layout {
     matrix: Vec<f64>,
     /// By chunk, row and source.
     forcing: Vec<Lanes>,
-    /// Whether a chunk has forcing at all.
-    forced: Vec<bool>,
+    /// By row: columns of `matrix` that are not zero.
+    coupled: Vec<Vec<(usize, f64)>>,
+    /// By chunk and row: sources that act, with their weights.
+    acting: Vec<Vec<(usize, Lanes)>>,
     /// Measured input and samples ahead of each tap; None for a constant 1.
     taps: Vec<(Option<usize>, isize)>,
 }
@@ -238,7 +240,8 @@ impl Layout {
             n_sources,
             matrix: [discrete.transition.as_slice(), &continuous.c].concat(),
             forcing: vec![[0.0; LANES]; stride / LANES * rows * n_sources],
-            forced: vec![false; stride / LANES],
+            coupled: Vec::new(),
+            acting: Vec::new(),
             taps,
         };
         for (place, &t) in used.iter().enumerate() {
@@ -262,7 +265,25 @@ impl Layout {
                 }
             }
         }
+        layout.keep_what_acts();
         layout
+    }
+
+    /// Most weights of a model are zero: the recursion passes over the others alone.
+    fn keep_what_acts(&mut self) {
+        let lines = self.matrix.chunks_exact(self.n.max(1)).take(self.n + self.p);
+        self.coupled = lines
+            .map(|row| row.iter().copied().enumerate().filter(|&(_, each)| each != 0.0).collect())
+            .collect();
+        self.coupled.resize(self.n + self.p, Vec::new());
+        self.acting = self
+            .forcing
+            .chunks_exact(self.n_sources)
+            .map(|row| {
+                let all = row.iter().copied().enumerate();
+                all.filter(|(_, weights)| weights.iter().any(|&each| each != 0.0)).collect()
+            })
+            .collect();
     }
 
     fn add_tap(&mut self, discrete: &Sampled, tap: usize, source: usize, column: usize) {
@@ -276,7 +297,6 @@ impl Layout {
         let (chunk, lane) = (column / LANES, column % LANES);
         let rows = self.n + self.p;
         self.forcing[(chunk * rows + row) * self.n_sources + source][lane] += weight;
-        self.forced[chunk] |= weight != 0.0;
     }
 
     /// S at the first sample, chunk by chunk.
@@ -329,7 +349,7 @@ impl Layout {
         let (n, p) = (self.n, self.p);
         let state = &mut state[chunk * n..(chunk + 1) * n];
         let all = n + p;
-        let forcing = &self.forcing[chunk * all * self.n_sources..][..all * self.n_sources];
+        let acting = &self.acting[chunk * all..(chunk + 1) * all];
         let mut next = vec![[0.0; LANES]; n];
         let lines =
             sources.chunks_exact_mut(self.n_sources).zip(rows.chunks_exact_mut(p * self.stride));
@@ -337,18 +357,13 @@ impl Layout {
             if chunk == 0 {
                 line.iter_mut().zip(state.iter()).for_each(|(source, column)| *source = column[0]);
             }
-            for row in 0..all {
+            for (row, (coupled, acting)) in self.coupled.iter().zip(acting).enumerate() {
                 let mut sum = [0.0; LANES];
-                for (&factor, column) in
-                    self.matrix[row * n..(row + 1) * n].iter().zip(state.iter())
-                {
-                    add(&mut sum, factor, column);
+                for &(column, factor) in coupled {
+                    add(&mut sum, factor, &state[column]);
                 }
-                if self.forced[chunk] {
-                    let weights = &forcing[row * self.n_sources..(row + 1) * self.n_sources];
-                    for (&factor, weight) in line.iter().zip(weights) {
-                        add(&mut sum, factor, weight);
-                    }
+                for &(source, ref weights) in acting {
+                    add(&mut sum, line[source], weights);
                 }
                 if row < n {
                     next[row] = sum;
