@@ -37,6 +37,7 @@ pub mod model_curvature;
 pub mod model_tape;
 pub mod motion;
 pub mod narx;
+pub mod nonlinear_output_error;
 pub mod order_scan;
 pub mod orthogonal_least_squares;
 pub mod output_error;

@@ -8,6 +8,7 @@ use pyo3::prelude::*;
 pub mod chirp;
 pub mod closed_loop;
 pub mod dataflash;
+pub mod equation_records;
 pub mod error;
 pub mod expression;
 pub mod file_bytes;
@@ -48,6 +49,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     dataflash::register(module)?;
     ulog::register(module)?;
     quadrotor::register(module)?;
+    equation_records::register(module)?;
     expression::register(module)?;
     least_squares::register(module)?;
     narx::register(module)?;

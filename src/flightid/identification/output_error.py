@@ -14,6 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.findings import Finding
+from flightid.identification.equation_records import (
+    EquationRuns,
+    equation_runs,
+    judge_runs,
+    segmented_starts,
+)
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
     judge_correlation,
@@ -33,6 +39,8 @@ from flightid.version import VERSION
 Array = NDArray[np.float64]
 _NEAR = 0.5 * np.log(1.1)
 """Log-likelihood of a sample whose residual variance is ten percent larger."""
+ROUNDS = 3
+"""Most searches with a new choice of the modes that are set at the end of a record."""
 NativeEnd = tuple[Array, float, Array, list[Array], list[list[bool]], int, str]
 
 
@@ -55,26 +63,58 @@ def fit_output_error(model: Model, data: Record | Sequence[Record], options: Rec
     """Fit a model to records by output error; see `flightid.identify`."""
     prepared = prepare_records(model, data, options)
     setup = judge_channels(prepared)
-    groups = cluster(search_records(prepared, options))
+    model, prepared, runs_of, groups = _searched(model, prepared, options)
     best = groups[0][0]
-    names = [parameter.name for parameter in model.parameters.free]
-    fitted = model.with_values(dict(zip(names, map(float, best.x), strict=True)))
+    fitted = _with_estimates(model, best)
     own = [start.filled(end) for start, end in zip(prepared.own, best.own, strict=True)]
     runs = [
-        _run(fitted, prepared, place, numbers, with_slopes=True)
+        _run(fitted, prepared, runs_of, place, numbers, with_slopes=True)
         for place, numbers in enumerate(own)
     ]
+    if runs_of is not None:
+        own = [runs_of.start(fitted, prepared, k, numbers) for k, numbers in enumerate(own)]
+        setup += judge_runs(runs_of)
     found = record_statistics(
         fitted, prepared, own, best.determined, runs, best.noise, options.limit
     )
     return _assemble(fitted, prepared, options, groups, runs, found, setup)
 
 
-def search_records(prepared: RecordSet, options: RecordOptions) -> list[RecordEnd]:
+def _searched(
+    model: Model, prepared: RecordSet, options: RecordOptions
+) -> tuple[Model, RecordSet, EquationRuns | None, list[list[RecordEnd]]]:
+    """Search, again where the estimates have other growing modes than their start."""
+    starts = options
+    for _ in range(ROUNDS):
+        runs_of = equation_runs(model, prepared)
+        placed = prepared if runs_of is None else segmented_starts(prepared, runs_of)
+        placed = replace(placed, model=model)
+        groups = cluster(search_records(placed, starts, runs_of))
+        fitted = _with_estimates(model, groups[0][0])
+        after = equation_runs(fitted, prepared)
+        if _growing(after) == _growing(runs_of):
+            break
+        model, starts = fitted, replace(options, starts=1)
+    return model, placed, runs_of, groups
+
+
+def _growing(runs: EquationRuns | None) -> list[int]:
+    return [] if runs is None or not runs.is_segmented else runs.n_growing
+
+
+def _with_estimates(model: Model, end: RecordEnd) -> Model:
+    names = [parameter.name for parameter in model.parameters.free]
+    return model.with_values(dict(zip(names, map(float, end.x), strict=True)))
+
+
+def search_records(
+    prepared: RecordSet, options: RecordOptions, runs_of: EquationRuns | None = None
+) -> list[RecordEnd]:
     """Ends of all starts, best first; no statistics."""
     model = prepared.model
     free = model.parameters.free
-    found = model.native.fit_records(
+    native = model.native if runs_of is None else runs_of.native
+    found = native.fit_records(
         model.parameters.independent_values(),
         model.parameters.free_indices,
         prepared.arrays,
@@ -92,16 +132,27 @@ def search_records(prepared: RecordSet, options: RecordOptions) -> list[RecordEn
 
 
 def _run(
-    fitted: Model, prepared: RecordSet, place: int, own: OwnNumbers, *, with_slopes: bool
+    fitted: Model,
+    prepared: RecordSet,
+    runs_of: EquationRuns | None,
+    place: int,
+    own: OwnNumbers,
+    *,
+    with_slopes: bool,
 ) -> tuple[Array, Array]:
     """Outputs with bias, and their derivatives by θ, initial states, shifts and biases."""
-    outputs, slopes = fitted.native.run_record(
+    asked = (
         fitted.parameters.independent_values(),
         fitted.parameters.free_indices,
         prepared.arrays[place],
         own.native,
         prepared.first_order_hold,
         with_slopes,
+    )
+    outputs, slopes = (
+        fitted.native.run_record(*asked)
+        if runs_of is None
+        else runs_of.native.run_record(place, *asked)
     )
     n_outputs, n_samples = outputs.shape
     biases = np.zeros((n_outputs, n_samples, len(own.free_bias)))

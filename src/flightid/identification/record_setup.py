@@ -33,6 +33,10 @@ class OwnNumbers:
     initial, shift, bias : ndarray
         Initial state, input shifts, output biases.
     free_initial, free_shift, free_bias : list of int
+    start : tuple of ndarray, optional
+        Where `initial` is no initial state but conditions at both ends: the state at the first
+        sample, shape (n_states,), and its derivatives by the free parameters, initial numbers and
+        shifts, shape (n_states, columns).
     """
 
     initial: Array
@@ -41,6 +45,7 @@ class OwnNumbers:
     free_initial: list[int]
     free_shift: list[int]
     free_bias: list[int]
+    start: tuple[Array, Array] | None = None
 
     @property
     def native(self) -> NativeOwn:
@@ -148,6 +153,8 @@ def prepare_records(
             action="free a parameter with model.with_free(name)",
         )
     states = state_names(model)
+    # A nonlinear model takes its channels whole: no point stands for another.
+    whole = isinstance(model, StateSpaceModel) and not model.is_linear
     trim = dict(model.trim) if isinstance(model, StateSpaceModel) else {}
     points = ((model.inputs, trim), (model.outputs, _output_trim(model)))
     arrays, offsets, own = [], [], []
@@ -156,7 +163,10 @@ def prepare_records(
             require_match(record.unit(name), model.units[name], subject=f"channel {name}")
         shift_in, shift_out = (
             np.array(
-                [[record.trim[n] - point.get(n, 0.0) if n in record.trim else 0.0] for n in names]
+                [
+                    [record.trim[n] - point.get(n, 0.0) if n in record.trim and not whole else 0.0]
+                    for n in names
+                ]
             )
             for names, point in points
         )

@@ -115,7 +115,7 @@ def record_statistics(
         blocks.append(_Block.of(shared, rest[:, :, np.array(kept, dtype=bool)], residual))
     triangle = _triangle(blocks)
     require_identifiable(names, triangle)
-    covariance, own_covariances, models = _covariances(blocks, triangle)
+    covariance, own_covariances, crossed, models = _covariances(blocks, triangle)
     plain = _inverse(triangle)
     freedom = _freedom(blocks, models, triangle)
     parameters = fitted_parameters(fitted, names, covariance, triangle / np.sqrt(2.0), freedom)
@@ -126,8 +126,19 @@ def record_statistics(
         covariance,
         correlation_of(plain) if names else np.zeros((0, 0)),
         [
-            _own_numbers(fitted, prepared, numbers, kept, found)
-            for numbers, kept, found in zip(own, determined, own_covariances, strict=True)
+            _own_numbers(
+                fitted, prepared, numbers, kept, found, start_errors(numbers, kept, inner, joint)
+            )
+            for numbers, kept, found, joint in zip(
+                own,
+                determined,
+                own_covariances,
+                (
+                    np.block([[covariance, cross.T], [cross, each]])
+                    for cross, each in zip(crossed, own_covariances, strict=True)
+                ),
+                strict=True,
+            )
         ],
         float(np.max(ratio)),
     )
@@ -165,8 +176,8 @@ def _noise_covariance(models: Sequence[Autoregression], columns: Array, n_output
 
 def _covariances(
     blocks: Sequence[_Block], triangle: Array
-) -> tuple[Array, list[Array], list[Autoregression]]:
-    """Covariance of the shared parameters, of each record's own numbers, and the noise models."""
+) -> tuple[Array, list[Array], list[Array], list[Autoregression]]:
+    """Covariance of the shared parameters, of each record's own, between the two; noise models."""
     plain = _inverse(triangle)
     n_outputs = blocks[0].residual.shape[0]
 
@@ -188,7 +199,7 @@ def _covariances(
     gains = [block.projected @ plain for block in blocks]
     parts = [_noise_covariance(models, gain, n_outputs) for gain in gains]
     shared = np.asarray(sum(parts))
-    own = []
+    own, crossed = [], []
     for block, gain, part in zip(blocks, gains, parts, strict=True):
         # Own numbers answer the record's own noise and, through the parameters, everybody's.
         back = np.linalg.inv(block.triangle)
@@ -197,7 +208,44 @@ def _covariances(
         own.append(
             _noise_covariance(models, direct, n_outputs) + through @ (shared - part) @ through.T
         )
-    return shared, own, models
+        both = _noise_covariance(models, np.hstack([direct, gain]), n_outputs)
+        crossed.append(both[: direct.shape[1], direct.shape[1] :] - through @ (shared - part))
+    return shared, own, crossed, models
+
+
+def start_errors(
+    numbers: OwnNumbers, kept: Sequence[bool], inner: NDArray[np.bool_], joint: Array
+) -> Array | None:
+    """Standard errors of an initial state that follows from conditions at both ends of a record.
+
+    Parameters
+    ----------
+    numbers : OwnNumbers
+        With `start`, or None comes back.
+    kept : sequence of bool
+        Own numbers that the record determines.
+    inner : ndarray of bool
+        Free parameters that are not at a bound.
+    joint : ndarray
+        Covariance of those parameters and the determined own numbers.
+
+    Returns
+    -------
+    ndarray, shape (n_states,), or None
+        NaN where a number that it depends on is not determined.
+    """
+    if numbers.start is None:
+        return None
+    slopes = numbers.start[1]
+    n_free = len(inner)
+    n_moving = slopes.shape[1] - n_free
+    seen = np.array(kept[:n_moving], dtype=bool)
+    if not np.all(seen):
+        return np.full(len(slopes), np.nan)
+    shared, own = slopes[:, :n_free][:, inner], slopes[:, n_free:]
+    biases = np.zeros((len(slopes), joint.shape[0] - shared.shape[1] - n_moving))
+    whole = np.hstack([shared, own, biases])
+    return np.sqrt(np.einsum("ij,jk,ik->i", whole, joint, whole))
 
 
 def _freedom(blocks: Sequence[_Block], models: Sequence[Autoregression], triangle: Array) -> Array:
@@ -222,12 +270,17 @@ def _own_numbers(
     numbers: OwnNumbers,
     kept: Sequence[bool],
     covariance: Array,
+    of_start: Array | None,
 ) -> Own:
     errors = np.full(numbers.n_free, np.nan)
     errors[np.array(kept, dtype=bool)] = np.sqrt(np.diag(covariance))
+    initial = numbers.initial
+    if numbers.start is not None and of_start is not None:
+        initial = numbers.start[0]
+        errors[: len(initial)] = of_start
     units = dict(fitted.states) if isinstance(fitted, StateSpaceModel) else {}
     kinds = (
-        (prepared.states, numbers.initial, numbers.free_initial, units),
+        (prepared.states, initial, numbers.free_initial, units),
         (fitted.inputs, numbers.shift, numbers.free_shift, fitted.units),
         (fitted.outputs, numbers.bias, numbers.free_bias, fitted.units),
     )

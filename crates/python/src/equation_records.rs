@@ -1,0 +1,150 @@
+//! Face of `flightid_core::nonlinear_output_error`. (Python side: identification/equation_records.py)
+
+use flightid_core::linear_output_error::Driven;
+use flightid_core::motion::Motion;
+use flightid_core::nonlinear_output_error::{EquationTrajectories, Passage};
+use flightid_core::output_error::{RecordData, Wanted};
+use flightid_core::shooting::Plan;
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+};
+use pyo3::prelude::*;
+
+use crate::error::from_core;
+use crate::output_error::{
+    Flown, NoiseArguments, Own, SearchArguments, driven, fit, hold, record_data, run,
+};
+use crate::state_space::StateSpace;
+
+/// Cuts, conditions at the ends, how many of them at the end, guesses of the nodes.
+type Segments<'py> = (Vec<usize>, PyReadonlyArray2<'py, f64>, usize, PyReadonlyArray2<'py, f64>);
+
+/// __init__(self, model: StateSpace, substeps: Sequence[int], segments: Sequence[tuple[Sequence[int], NDArray[np.float64], int, NDArray[np.float64]]]) -> None
+///
+/// A model's equations on records: Runge-Kutta steps in a sample interval and segments of each. A
+/// record without cuts and without conditions at its end is run whole from its initial state.
+#[pyclass(frozen, module = "flightid._native")]
+struct EquationRecords {
+    motion: Motion,
+    substeps: Vec<usize>,
+    plans: Vec<Plan>,
+}
+
+impl EquationRecords {
+    fn on(
+        &self,
+        places: std::ops::Range<usize>,
+        values: &[f64],
+        free: &[usize],
+        records: &[Flown<'_>],
+        first_order_hold: bool,
+    ) -> PyResult<EquationTrajectories> {
+        let known = self.substeps.iter().zip(&self.plans).skip(places.start);
+        let passages = driven(records)?
+            .into_iter()
+            .zip(known)
+            .map(|(driven, (&substeps, plan)): (Driven, _)| Passage {
+                driven,
+                substeps,
+                plan: plan.clone(),
+            })
+            .collect();
+        let motion = self.motion.clone();
+        EquationTrajectories::new(motion, values, free, hold(first_order_hold), passages)
+            .map_err(from_core)
+    }
+}
+
+#[pymethods]
+impl EquationRecords {
+    #[new]
+    fn new(
+        model: &StateSpace,
+        substeps: Vec<usize>,
+        segments: Vec<Segments<'_>>,
+    ) -> PyResult<Self> {
+        let plans = segments
+            .into_iter()
+            .map(|(cuts, ends, n_growing, guesses)| {
+                let (ends, guesses) = (ends.as_slice()?.to_vec(), guesses.as_slice()?.to_vec());
+                Ok(Plan { cuts, ends, n_growing, guesses })
+            })
+            .collect::<PyResult<_>>()?;
+        Ok(Self { motion: Motion::new(&model.tape).map_err(from_core)?, substeps, plans })
+    }
+
+    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int]) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
+    ///
+    /// As `StateSpace.fit_records`.
+    #[allow(clippy::too_many_arguments)]
+    fn fit_records<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'py, f64>,
+        free: Vec<usize>,
+        records: Vec<Flown<'py>>,
+        own: Vec<Own<'py>>,
+        first_order_hold: bool,
+        noise: NoiseArguments,
+        search: SearchArguments<'py>,
+    ) -> PyResult<Vec<Bound<'py, PyAny>>> {
+        let places = 0..records.len();
+        let model = self.on(places, values.as_slice()?, &free, &records, first_order_hold)?;
+        fit(py, &model, &record_data(&records, own)?, noise, search)
+    }
+
+    /// run_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]], first_order_hold: bool, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    ///
+    /// As `StateSpace.run_record`, for the record at a place.
+    #[allow(clippy::too_many_arguments, clippy::type_complexity)]
+    fn run_record<'py>(
+        &self,
+        py: Python<'py>,
+        place: usize,
+        values: PyReadonlyArray1<'py, f64>,
+        free: Vec<usize>,
+        record: Flown<'py>,
+        own: Own<'py>,
+        first_order_hold: bool,
+        with_slopes: bool,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
+        let (values, records) = (values.as_slice()?, [record]);
+        let model = self.on(place..place + 1, values, &free, &records, first_order_hold)?;
+        let theta: Vec<f64> = free.iter().map(|&index| values[index]).collect();
+        run(py, &model, &record_data(&records, vec![own])?, 0, &theta, with_slopes)
+    }
+
+    /// start_of_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]], first_order_hold: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    ///
+    /// State at the first sample, and its derivatives by the free values, the record's free initial
+    /// numbers and its free shifts, shape (n_states, columns).
+    #[allow(clippy::too_many_arguments, clippy::type_complexity)]
+    fn start_of_record<'py>(
+        &self,
+        py: Python<'py>,
+        place: usize,
+        values: PyReadonlyArray1<'py, f64>,
+        free: Vec<usize>,
+        record: Flown<'py>,
+        own: Own<'py>,
+        first_order_hold: bool,
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
+        let (values, records) = (values.as_slice()?, [record]);
+        let model = self.on(place..place + 1, values, &free, &records, first_order_hold)?;
+        let theta: Vec<f64> = free.iter().map(|&index| values[index]).collect();
+        let data = record_data(&records, vec![own])?;
+        let RecordData { initial, shift, free_initial, free_shift, .. } = &data[0];
+        let wanted = Wanted { theta: true, initial: free_initial, shift: free_shift };
+        let (state, slopes) = model.start(0, &theta, initial, shift, &wanted).map_err(from_core)?;
+        let shape = [state.len(), slopes.len() / state.len().max(1)];
+        Ok((state.into_pyarray(py), slopes.into_pyarray(py).reshape(shape)?))
+    }
+}
+
+/// Add this file's names to the module.
+///
+/// # Errors
+/// Never in practice; PyO3's own.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<EquationRecords>()
+}
