@@ -245,7 +245,7 @@ def start_errors(
     shared, own = slopes[:, :n_free][:, inner], slopes[:, n_free:]
     biases = np.zeros((len(slopes), joint.shape[0] - shared.shape[1] - n_moving))
     whole = np.hstack([shared, own, biases])
-    return np.sqrt(np.einsum("ij,jk,ik->i", whole, joint, whole))
+    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", whole, joint, whole)))
 
 
 def _freedom(blocks: Sequence[_Block], models: Sequence[Autoregression], triangle: Array) -> Array:
