@@ -112,7 +112,8 @@ impl ModelTape {
         Ok(Self { tape, n_states: n, n_inputs: m, n_outputs: text.outputs.len() })
     }
 
-    pub(crate) fn tape(&self) -> &Tape {
+    /// Equations, outputs and delays as one tape of ẋ, x, u and the parameters.
+    pub fn tape(&self) -> &Tape {
         &self.tape
     }
 

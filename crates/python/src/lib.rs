@@ -17,6 +17,7 @@ pub mod group;
 pub mod interrupt;
 pub mod kinematics;
 pub mod least_squares;
+pub mod linear_recursion;
 pub mod linear_simulation;
 pub mod lookup_table;
 pub mod narx;
@@ -43,6 +44,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(version, module)?)?;
     chirp::register(module)?;
     kinematics::register(module)?;
+    linear_recursion::register(module)?;
     linear_simulation::register(module)?;
     closed_loop::register(module)?;
     lookup_table::register(module)?;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use flightid_core::frequency_fit::ResponseModel;
 use flightid_core::linear_family::StateSpaceFamily;
+use flightid_core::model_samples::sample;
 use flightid_core::model_tape::{ModelTape, ModelText};
 use flightid_core::state_space_fit::FreeStateSpace;
 use num_complex::Complex64;
@@ -141,6 +142,30 @@ impl StateSpace {
             .collect();
         let numbers: Vec<f64> = found.iter().map(|each| each.value).collect();
         Ok((places.into_pyarray(py).reshape([found.len(), 4])?, numbers.into_pyarray(py)))
+    }
+
+    /// sample(self, values: NDArray[np.float64], points: NDArray[np.float64], directions: Sequence[int]) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    ///
+    /// Residuals and outputs at points ẋ, x, u, shape (n_samples, 2 n_states + n_inputs), and their
+    /// derivatives, shape (n_samples, n_states + n_outputs, n_directions); a direction is a place
+    /// among the entries of a point and the values.
+    #[allow(clippy::type_complexity)]
+    fn sample<'py>(
+        &self,
+        py: Python<'py>,
+        values: PyReadonlyArray1<'_, f64>,
+        points: PyReadonlyArray2<'_, f64>,
+        directions: Vec<usize>,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
+        let count = points.as_array().nrows();
+        let (points, values) = (points.as_slice()?, values.as_slice()?);
+        let found =
+            py.detach(|| sample(&self.tape, points, values, &directions)).map_err(from_core)?;
+        let shape = [count, self.tape.height(), directions.len()];
+        Ok((
+            found.values.into_pyarray(py).reshape([shape[0], shape[1]])?,
+            found.slopes.into_pyarray(py).reshape(shape)?,
+        ))
     }
 
     /// response(self, values: NDArray[np.float64], omega_rad_s: NDArray[np.float64]) -> NDArray[np.complex128]

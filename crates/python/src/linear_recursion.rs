@@ -1,0 +1,32 @@
+//! Face of `flightid_core::linear_recursion`. (Python side: identification/filter_error.py)
+
+use flightid_core::linear_recursion::recurse;
+use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::prelude::*;
+
+use crate::error::from_core;
+
+/// linear_recursion(transition: NDArray[np.float64], forcing: NDArray[np.float64], initial: NDArray[np.float64]) -> NDArray[np.float64]
+///
+/// States (n_runs, n_samples, n) of x(k+1) = A x(k) + f(k), forced by (n_runs, n_samples, n) from
+/// (n_runs, n).
+#[pyfunction]
+fn linear_recursion<'py>(
+    py: Python<'py>,
+    transition: PyReadonlyArray2<'_, f64>,
+    forcing: PyReadonlyArray3<'_, f64>,
+    initial: PyReadonlyArray2<'_, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let shape = forcing.as_array().dim();
+    let (a, f, x0) = (transition.as_slice()?, forcing.as_slice()?, initial.as_slice()?);
+    let states = py.detach(|| recurse(a, f, x0, shape.1)).map_err(from_core)?;
+    states.into_pyarray(py).reshape([shape.0, shape.1, shape.2])
+}
+
+/// Add this file's names to the module.
+///
+/// # Errors
+/// Never in practice; PyO3's own.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(linear_recursion, module)?)
+}

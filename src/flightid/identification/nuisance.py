@@ -1,0 +1,62 @@
+"""Unknown constants of one record that enter its residuals linearly, taken out exactly.
+
+Initial states, biases and what the ends of a record add are estimated for any value of the
+parameters by linear least squares, and the slopes by the parameters lose what a change of those
+constants would follow: separable least squares.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+_RANK = 1e-9
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """Best constants of one record.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n_constants,)
+        Combinations that the residuals do not show are zero.
+    space : ndarray, shape (n_rows, rank)
+        Orthonormal directions that the constants can follow.
+
+    Reference
+    ---------
+    Golub & Pereyra (1973), SIAM J. Numerical Analysis 10; Kaufman (1975), BIT 15 (slopes).
+
+    Example
+    -------
+    >>> found = Nuisance.best(np.ones((4, 1)), np.array([1.0, 2.0, 3.0, 4.0]))
+    >>> found.values, found.removed_from(np.array([1.0, 2.0, 3.0, 4.0]))
+    (array([2.5]), array([-1.5, -0.5,  0.5,  1.5]))
+    """
+
+    values: Array
+    space: Array
+
+    @classmethod
+    def best(cls, directions: Array, rows: Array) -> Nuisance:
+        """Least squares of weighted rows on weighted directions.
+
+        Parameters
+        ----------
+        directions : ndarray, shape (n_rows, n_constants)
+        rows : ndarray, shape (n_rows,)
+        """
+        size = np.linalg.norm(directions, axis=0)
+        size[size == 0.0] = 1.0
+        left, values, right = np.linalg.svd(directions / size, full_matrices=False)
+        kept = values > _RANK * max(float(values.max(initial=0.0)), 1e-300)
+        space = left[:, kept]
+        return cls((right[kept].T @ (space.T @ rows / values[kept])) / size, space)
+
+    def removed_from(self, rows: Array) -> Array:
+        """Rows (n_rows, …) less their part along the directions."""
+        return np.asarray(rows - self.space @ (self.space.T @ rows))

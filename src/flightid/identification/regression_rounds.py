@@ -1,0 +1,151 @@
+"""Weighted least squares in rounds: parameters for the weights, weights from the residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid import _native
+from flightid.identification.multistart import DenseEnd
+
+Array = NDArray[np.float64]
+Weigh = Callable[[Sequence[Array]], list[Array]]
+ROUNDS = 25
+SETTLED = 1e-3
+_EXACT = 1e-9
+_LINEAR = 1e-10
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Residuals of one record and their slopes.
+
+    Attributes
+    ----------
+    residuals : ndarray, shape (n_equations, n_rows)
+        Measured minus computed, in the unit of the equation.
+    slopes : ndarray, shape (n_equations, n_rows, n_free)
+        Derivatives of the residuals.
+    """
+
+    residuals: Array
+    slopes: Array
+
+
+class Regression(Protocol):
+    """Residuals of several records as functions of the free parameters."""
+
+    def rows(self, theta: Array, weights: Sequence[Array]) -> list[Rows]:
+        """Residuals and slopes of each record; nuisances are taken out under the weights."""
+
+    def left(self, place: int) -> Array:
+        """What is measured of one record, (n_equations, n_rows)."""
+
+    def reach(self) -> Array:
+        """Size of each equation's measured side over all records, (n_equations,)."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Bounds of the free parameters and the most iterations."""
+
+    lower: Array
+    upper: Array
+    maximum_iterations: int
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Where the rounds ended.
+
+    Attributes
+    ----------
+    end : DenseEnd
+        Of the last weighted least squares.
+    rows : list of Rows
+        Residuals and slopes there, by record, not weighed.
+    weights : list of ndarray, shape (n_equations, n_rows)
+    rounds : int
+    """
+
+    end: DenseEnd
+    rows: list[Rows]
+    weights: list[Array]
+    rounds: int
+
+
+def stack(slopes: Sequence[Array]) -> Array:
+    """Slopes (n_equations, n_rows, n) of all records as one Jacobian."""
+    return np.concatenate([each.reshape(-1, each.shape[2]) for each in slopes])
+
+
+def solve(problem: Regression, start: Array, weights: Sequence[Array], limits: Limits) -> DenseEnd:
+    """Best parameters under these weights: in one step where they enter linearly."""
+    kept: dict[bytes, tuple[Array, Array]] = {}
+
+    def stacked(theta: Array) -> tuple[Array, Array]:
+        key = theta.tobytes()
+        if key not in kept:
+            kept.clear()
+            pairs = list(zip(problem.rows(theta, weights), weights, strict=True))
+            residuals = [(each.residuals * weight).ravel() for each, weight in pairs]
+            slopes = stack([each.slopes * weight[:, :, None] for each, weight in pairs])
+            kept[key] = np.concatenate(residuals), slopes
+        return kept[key]
+
+    residuals, slopes = stacked(start)
+    step = np.linalg.lstsq(slopes, -residuals, rcond=None)[0]
+    direct = start + step
+    if np.all((direct >= limits.lower) & (direct <= limits.upper)):
+        after, jacobian = stacked(direct)
+        size = np.linalg.norm(residuals) + np.linalg.norm(slopes @ step)
+        if np.linalg.norm(after - residuals - slopes @ step) <= _LINEAR * size:
+            return DenseEnd(direct, float(after @ after), 1, "gradient", after, jacobian)
+    ending = _native.least_squares(
+        lambda theta: stacked(theta)[0],
+        lambda theta: stacked(theta)[1],
+        start,
+        limits.lower,
+        limits.upper,
+        len(residuals),
+        limits.maximum_iterations,
+    )
+    return DenseEnd.of_native(ending)
+
+
+def settle(problem: Regression, start: Array, weigh: Weigh, limits: Limits, count: int) -> Settled:
+    """Alternate weights and parameters until the weights stay.
+
+    Parameters
+    ----------
+    problem : Regression
+    start : ndarray, shape (n_free,)
+    weigh : callable
+        Residuals by record to weights (inverse standard deviations) of the same shapes.
+    limits : Limits
+    count : int
+        Number of records.
+    """
+    reach = problem.reach()[:, None]
+    weights = [np.ones(problem.left(place).shape) / reach for place in range(count)]
+    end = solve(problem, start, weights, limits)
+    rows = problem.rows(end.x, weights)
+    used = 0
+    for used in range(1, ROUNDS + 1):
+        # The floor keeps an equation that fits to rounding from taking all the weight.
+        fresh = [
+            np.minimum(weight, 1.0 / (_EXACT * reach))
+            for weight in weigh([each.residuals for each in rows])
+        ]
+        pairs = zip(weights, fresh, strict=True)
+        change = max(float(np.max(np.abs(after / before - 1.0))) for before, after in pairs)
+        weights = fresh
+        end = solve(problem, end.x, weights, limits)
+        rows = problem.rows(end.x, weights)
+        if change < SETTLED:
+            break
+    return Settled(end, rows, weights, used)

@@ -1,0 +1,213 @@
+"""The steady Kalman filter of a linear model with process noise, and its exact derivatives.
+
+ẋ = A x + B u + w, y = C x + D u + v, sampled. The predicted covariance P solves the discrete
+Riccati equation; its derivative solves a Lyapunov equation of the closed filter, since at its
+optimum the gain does not move P to first order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm, expm_frechet
+
+from flightid.errors import FitError
+
+Array = NDArray[np.float64]
+_DOUBLINGS = 60
+_SETTLED = 1e-14
+
+
+@dataclass(frozen=True)
+class ContinuousPoint:
+    """A linear model with its noise at one point, or the derivative of all by one parameter.
+
+    Attributes
+    ----------
+    a, b, c, d : ndarray
+        State space, (n, n), (n, m), (p, n), (p, m).
+    process : ndarray, shape (n, n)
+        Spectral density W of the process noise, two-sided, state unit² / s³ per unit of ẋ².
+    measurement : ndarray, shape (p, p)
+        Covariance R of the measurement noise.
+    """
+
+    a: Array
+    b: Array
+    c: Array
+    d: Array
+    process: Array
+    measurement: Array
+
+
+@dataclass(frozen=True)
+class SteadyFilter:
+    """One-step predictor x⁺ = Ā x + Γ₀ u + Γ₁ u⁺ + L z with z = y − D u and ε = z − C x.
+
+    Attributes
+    ----------
+    closed : ndarray, shape (n, n)
+        Ā = Φ − L C.
+    early, late : ndarray, shape (n, m)
+        Γ₀ and Γ₁, of the input at this sample and at the next.
+    gain : ndarray, shape (n, p)
+        L.
+    c, d : ndarray
+    innovation : ndarray, shape (p, p)
+        Covariance B of ε.
+    predicted : ndarray, shape (n, n)
+        Covariance P of the predicted state.
+    """
+
+    closed: Array
+    early: Array
+    late: Array
+    gain: Array
+    c: Array
+    d: Array
+    innovation: Array
+    predicted: Array
+
+
+def steady_filter(
+    point: ContinuousPoint, slopes: list[ContinuousPoint], sample_time_s: float
+) -> tuple[SteadyFilter, list[SteadyFilter]]:
+    """Filter at a point and its derivative by each parameter.
+
+    Parameters
+    ----------
+    point : ContinuousPoint
+    slopes : list of ContinuousPoint
+        Derivatives of every matrix by each parameter.
+    sample_time_s : float
+
+    Returns
+    -------
+    tuple of SteadyFilter and list of SteadyFilter
+
+    Raises
+    ------
+    FitError
+        There is no steady filter: an unstable part that no output sees.
+
+    Reference
+    ---------
+    Maine & Iliff, NASA RP 1168, §7; Jategaonkar, *Flight Vehicle System Identification*, §5.3
+    (innovations form); Van Loan (1978), IEEE Trans. Automatic Control 23 (integrals); Chu, Fan,
+    Lin & Wang (2004), Int. J. Control 77 (doubling for the Riccati equation).
+
+    Example
+    -------
+    >>> one, none = np.eye(1), np.zeros((1, 0))
+    >>> walk = ContinuousPoint(0 * one, none, one, none, one, 2 * one)
+    >>> steady_filter(walk, [], 1.0)[0].predicted
+    array([[2.]])
+    """
+    n, m = point.b.shape
+    forced, noisy = _forced(point, sample_time_s, ramp=1.0), _noisy(point, sample_time_s)
+    whole, spread = expm(forced), expm(noisy)
+    phi = whole[:n, :n]
+    q = _symmetric(phi @ spread[:n, n:])
+    predicted = _riccati(phi, point.c, q, point.measurement)
+    innovation = point.c @ predicted @ point.c.T + point.measurement
+    weight = np.linalg.solve(innovation, point.c @ predicted).T
+    keep = np.eye(n) - weight @ point.c
+    filtered = _symmetric(keep @ predicted)
+    ramp = whole[:n, n + m :]
+    gain = phi @ weight
+    found = SteadyFilter(
+        phi @ keep, whole[:n, n : n + m] - ramp, ramp, gain, point.c, point.d, innovation, predicted
+    )
+    derived = []
+    for slope in slopes:
+        # The ramp itself depends on no parameter.
+        moving = _forced(slope, sample_time_s, ramp=0.0)
+        moved = expm_frechet(forced, moving, compute_expm=False)
+        widened = expm_frechet(noisy, _noisy(slope, sample_time_s), compute_expm=False)
+        d_phi = moved[:n, :n]
+        d_q = _symmetric(d_phi @ spread[:n, n:] + phi @ widened[:n, n:])
+        turned = weight @ slope.c @ predicted @ keep.T
+        kept = weight @ slope.measurement @ weight.T - turned - turned.T
+        carried = d_phi @ filtered @ phi.T
+        source = phi @ kept @ phi.T + carried + carried.T + d_q
+        d_predicted = _lyapunov(found.closed, source)
+        cross = slope.c @ predicted @ point.c.T
+        d_innovation = point.c @ d_predicted @ point.c.T + cross + cross.T + slope.measurement
+        d_product = d_predicted @ point.c.T + predicted @ slope.c.T
+        d_weight = np.linalg.solve(innovation, (d_product - weight @ d_innovation).T).T
+        d_gain = d_phi @ weight + phi @ d_weight
+        d_ramp = moved[:n, n + m :]
+        d_closed = d_phi - d_gain @ point.c - gain @ slope.c
+        derived.append(
+            SteadyFilter(
+                d_closed,
+                moved[:n, n : n + m] - d_ramp,
+                d_ramp,
+                d_gain,
+                slope.c,
+                slope.d,
+                d_innovation,
+                d_predicted,
+            )
+        )
+    return found, derived
+
+
+def _symmetric(matrix: Array) -> Array:
+    return 0.5 * (matrix + matrix.T)
+
+
+def _forced(point: ContinuousPoint, step: float, *, ramp: float) -> Array:
+    """Exponent whose exponential holds Φ, the response to a constant and to a ramp of one step."""
+    n, m = point.b.shape
+    result = np.zeros((n + 2 * m, n + 2 * m))
+    result[:n, :n] = point.a * step
+    result[:n, n : n + m] = point.b * step
+    result[n : n + m, n + m :] = ramp * np.eye(m)
+    return result
+
+
+def _noisy(point: ContinuousPoint, step: float) -> Array:
+    n = len(point.a)
+    result = np.zeros((2 * n, 2 * n))
+    result[:n, :n], result[n:, n:] = -point.a * step, point.a.T * step
+    result[:n, n:] = point.process * step
+    return result
+
+
+def _riccati(phi: Array, c: Array, q: Array, r: Array) -> Array:
+    """Stabilising P = Φ (P − P Cᵀ (C P Cᵀ + R)⁻¹ C P) Φᵀ + Q by doubling."""
+    n = len(phi)
+    a, g, h = phi.T.copy(), c.T @ np.linalg.solve(r, c), q.copy()
+    for _ in range(_DOUBLINGS):
+        both = np.linalg.solve(np.eye(n) + g @ h, np.hstack([a, g]))
+        turned, shared = both[:, :n], both[:, n:]
+        change = a.T @ h @ turned
+        g = _symmetric(g + a @ shared @ a.T)
+        h = _symmetric(h + change)
+        a = a @ turned
+        size = float(np.abs(h).max(initial=0.0))
+        if not np.isfinite(size):
+            break
+        if float(np.abs(change).max(initial=0.0)) <= _SETTLED * max(size, 1e-300):
+            return h
+    raise FitError(
+        "the model has no steady filter",
+        found="a Riccati equation that does not settle",
+        needed="outputs that see every unstable part of the model",
+        action="measure more outputs, or drop the states that no output shows",
+    )
+
+
+def _lyapunov(closed: Array, source: Array) -> Array:
+    """X = Ā X Āᵀ + S by doubling."""
+    result, power = _symmetric(source), closed
+    for _ in range(_DOUBLINGS):
+        change = power @ result @ power.T
+        result = result + change
+        if np.abs(change).max(initial=0.0) <= _SETTLED * np.abs(result).max(initial=1e-300):
+            break
+        power = power @ power
+    return np.asarray(result)
