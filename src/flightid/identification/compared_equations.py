@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Role
-from flightid.identification.equation_operators import LocalMeans
 from flightid.identification.equation_regression import EquationRegression
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.regression_rounds import Rows, Settled
@@ -45,25 +44,21 @@ def equation_unit(model: StateSpaceModel, name: str) -> str:
 def compared_records(
     problem: EquationRegression, settled: Settled, records: Sequence[Record]
 ) -> list[FittedRecord]:
-    """Measured and computed sides in time; none for Fourier integrals, which have no time."""
-    model = problem.right.model
+    """Measured and computed sides of the equations in time; of Fourier rows, the band's content."""
     names = problem.names()
+    units = {name: equation_unit(problem.right.model, name) for name in names}
+    labels = [Channel(name, unit, Role.OUTPUT, "equation") for name, unit in units.items()]
     found = []
     for place, (operator, record) in enumerate(zip(problem.operators, records, strict=True)):
-        if not isinstance(operator, LocalMeans):
-            continue
         measured = problem.left(place)
-        computed = measured - settled.rows[place].residuals
-        cut = operator.half_width + 1
-        units = {name: equation_unit(model, name) for name in names}
-        channels = [Channel(name, unit, Role.OUTPUT, "equation") for name, unit in units.items()]
-        base = record.select(model.inputs).segment(
-            float(record.time_s[cut]), float(record.time_s[-cut])
+        sides = [operator.in_time(s) for s in (measured, measured - settled.rows[place].residuals)]
+        cut = (record.n_samples - sides[0].shape[1]) // 2
+        base = record.select(problem.right.model.inputs)
+        if cut:
+            base = base.segment(float(record.time_s[cut]), float(record.time_s[-cut]))
+        channels = [*base.channels.values(), *labels]
+        measured_side, computed_side = (
+            base.replace(dict(zip(names, side, strict=True)), channels=channels) for side in sides
         )
-        channels = [*base.channels.values(), *channels]
-        pair = [
-            base.replace(dict(zip(names, side, strict=True)), channels=channels)
-            for side in (measured, computed)
-        ]
-        found.append(FittedRecord(pair[0], pair[1], names, {}, {}, {}))
+        found.append(FittedRecord(measured_side, computed_side, names, {}, {}, {}))
     return found

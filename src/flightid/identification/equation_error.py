@@ -18,7 +18,7 @@ from flightid.identification.equation_operators import FourierRows, LocalMeans, 
 from flightid.identification.compared_equations import compared_costs, compared_records
 from flightid.identification.equation_regression import EquationRegression
 from flightid.identification.fit import Fit
-from flightid.identification.record_statistics import coloured_covariance
+from flightid.identification.coloured_regression import coloured_covariance
 from flightid.identification.regression_fit import (
     Inner,
     Knowledge,
@@ -145,7 +145,7 @@ def _finish(
             for each, motion in zip(problem.operators, motions, strict=True)
         ]
         noisier = replace(problem, motions=tuple(motions), operators=tuple(operators))
-        return solve(noisier, end.x, settled.weights, limits).x
+        return solve(noisier, end.x, settled.weights, limits)[0].x
 
     moved = attenuation(problem.motions, refit, end.x)[inner.mask]
     bias = dict(zip(inner.names, map(float, moved), strict=True))

@@ -32,6 +32,9 @@ class Operator(Protocol):
     def nuisance(self, *, is_state: bool) -> Array | None:
         """Direction of one unknown constant in each row, (n_rows,), or None."""
 
+    def in_time(self, rows: Array) -> Array:
+        """Rows as samples of time, (n_equations, n_times)."""
+
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,10 @@ class LocalMeans:
         """A constant, where biases are free."""
         count = self.motion.n_samples - 2 * self.half_width - 2
         return np.ones(count) if self.free_bias else None
+
+    def in_time(self, rows: Array) -> Array:
+        """The rows themselves."""
+        return rows
 
 
 
@@ -118,3 +125,8 @@ class FourierRows:
             return None
         count = len(self.grid.numbers)
         return np.repeat([1.0, 0.0], count)
+
+    def in_time(self, rows: Array) -> Array:
+        """What the band holds."""
+        real, imaginary = np.split(rows, 2, axis=1)
+        return self.grid.in_time((real + 1j * imaginary) / self._scale())

@@ -136,6 +136,21 @@ def _levels(data: FilteredData) -> Array:
     return np.array([row.noise for row in rows])
 
 
+class _LastPoint:
+    """Residuals and Jacobian, computed once where both are asked for at one point."""
+
+    def __init__(self, problem: InnovationsProblem) -> None:
+        self._problem = problem
+        self._x = np.empty(0)
+        self._found = (np.empty(0), np.empty((0, 0)))
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        if not np.array_equal(x, self._x):
+            self._found = self._problem.residuals(x, with_slopes=True)
+            self._x = x.copy()
+        return self._found
+
+
 def _search(problem: InnovationsProblem, options: FilterErrorOptions) -> list[DenseEnd]:
     model = problem.model
     _, limits = limits_of(model, options.maximum_iterations)
@@ -148,9 +163,10 @@ def _search(problem: InnovationsProblem, options: FilterErrorOptions) -> list[De
         if not np.all(np.isfinite(problem.residuals(whole, with_slopes=False)[0])):
             found.append("no steady filter at the start")
             continue
+        point = _LastPoint(problem)
         ending = _native.least_squares(
-            lambda x: problem.residuals(x, with_slopes=False)[0],
-            lambda x: problem.residuals(x, with_slopes=True)[1],
+            lambda x, at=point: at(x)[0],
+            lambda x, at=point: at(x)[1],
             whole,
             np.concatenate([limits.lower, -reach]),
             np.concatenate([limits.upper, reach]),

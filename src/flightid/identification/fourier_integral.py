@@ -119,6 +119,25 @@ class Harmonics:
         edges = np.concatenate([samples[..., :4], samples[..., -4:]], axis=-1)
         return np.asarray(self.sample_time_s * (inner * summed + edges @ ends.T))
 
+    def in_time(self, integrals: Complex) -> Array:
+        """Sum of these harmonics at the samples' times, without mean.
+
+        Parameters
+        ----------
+        integrals : ndarray of complex, shape (n, n_f)
+            Such as `integral` gives.
+
+        Returns
+        -------
+        ndarray, shape (n, n_samples)
+        """
+        # One period is one sample less than the record: its first and last sample are the same.
+        period = self.n_samples - 1
+        spectrum = np.zeros((len(integrals), period // 2 + 1), dtype=np.complex128)
+        spectrum[:, self.numbers] = integrals / self.sample_time_s
+        samples = fft.irfft(spectrum, period, axis=1)
+        return np.concatenate([samples, samples[:, :1]], axis=1)
+
 
 def _weights(angle: Array, n: int) -> tuple[Complex, Complex]:
     """Weight of the plain sum, and what the four samples at either end need besides.

@@ -76,28 +76,6 @@ def _split(values: Complex) -> Array:
     return np.concatenate([values.real, values.imag], axis=-1)
 
 
-def in_time(grid: Harmonics, rows: Array) -> Array:
-    """Sum of a record's harmonics in time, from rows such as `FourierOutputError.left` gives.
-
-    Parameters
-    ----------
-    grid : Harmonics
-    rows : ndarray, shape (n_outputs, 2 n_f)
-
-    Returns
-    -------
-    ndarray, shape (n_outputs, n_samples)
-    """
-    real, imaginary = np.split(rows, 2, axis=1)
-    # One period is one sample less than the record; its first and last sample are the same.
-    period = grid.n_samples - 1
-    spectrum = np.zeros((len(rows), period // 2 + 1), dtype=np.complex128)
-    length = period * grid.sample_time_s
-    spectrum[:, grid.numbers] = (real + 1j * imaginary) / (_scale(grid) * length) * period
-    samples = np.fft.irfft(spectrum, period, axis=1)
-    return np.concatenate([samples, samples[:, :1]], axis=1)
-
-
 @dataclass(frozen=True)
 class FourierOutputError:
     """Residuals of all outputs at all harmonics of all records.
@@ -116,6 +94,12 @@ class FourierOutputError:
     def left(self, place: int) -> Array:
         """Measured transforms of one record."""
         return _split(self.records[place].outputs)
+
+    def in_time(self, place: int, rows: Array) -> Array:
+        """What the band holds of one record, back in time, (n_outputs, n_samples)."""
+        grid = self.records[place].grid
+        real, imaginary = np.split(rows, 2, axis=1)
+        return grid.in_time((real + 1j * imaginary) / _scale(grid))
 
     def reach(self) -> Array:
         """Root mean square of each output's transform."""

@@ -11,11 +11,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError, FlightidError
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
-from flightid.identification.fourier_output_error import (
-    FourierOutputError,
-    TransformedRecord,
-    in_time,
-)
+from flightid.identification.fourier_output_error import FourierOutputError, TransformedRecord
 from flightid.identification.multistart import cluster, collect, draw_starts
 from flightid.identification.regression_fit import (
     Inner,
@@ -103,7 +99,7 @@ def _compared(problem: FourierOutputError, rows: Sequence[Rows]) -> list[FittedR
     outputs = problem.model.outputs
     for place, (data, each) in enumerate(zip(problem.records, rows, strict=True)):
         measured = problem.left(place)
-        sides = (in_time(data.grid, measured), in_time(data.grid, measured - each.residuals))
+        sides = [problem.in_time(place, s) for s in (measured, measured - each.residuals)]
         names = [*problem.model.inputs, *outputs]
         base = data.record.select(names)
         step = Step("identify", {"method": "Fourier output error, content of the band"})

@@ -83,38 +83,42 @@ def stack(slopes: Sequence[Array]) -> Array:
     return np.concatenate([each.reshape(-1, each.shape[2]) for each in slopes])
 
 
-def solve(problem: Regression, start: Array, weights: Sequence[Array], limits: Limits) -> DenseEnd:
-    """Best parameters under these weights: in one step where they enter linearly."""
-    kept: dict[bytes, tuple[Array, Array]] = {}
+def solve(
+    problem: Regression, start: Array, weights: Sequence[Array], limits: Limits
+) -> tuple[DenseEnd, list[Rows]]:
+    """Best parameters under these weights, and the rows there: in one step where all is linear."""
+    kept: dict[bytes, tuple[list[Rows], Array, Array]] = {}
 
-    def stacked(theta: Array) -> tuple[Array, Array]:
+    def stacked(theta: Array) -> tuple[list[Rows], Array, Array]:
         key = theta.tobytes()
         if key not in kept:
             kept.clear()
-            pairs = list(zip(problem.rows(theta, weights), weights, strict=True))
+            rows = problem.rows(theta, weights)
+            pairs = list(zip(rows, weights, strict=True))
             residuals = [(each.residuals * weight).ravel() for each, weight in pairs]
             slopes = stack([each.slopes * weight[:, :, None] for each, weight in pairs])
-            kept[key] = np.concatenate(residuals), slopes
+            kept[key] = rows, np.concatenate(residuals), slopes
         return kept[key]
 
-    residuals, slopes = stacked(start)
+    _, residuals, slopes = stacked(start)
     step = np.linalg.lstsq(slopes, -residuals, rcond=None)[0]
     direct = start + step
     if np.all((direct >= limits.lower) & (direct <= limits.upper)):
-        after, jacobian = stacked(direct)
+        rows, after, jacobian = stacked(direct)
         size = np.linalg.norm(residuals) + np.linalg.norm(slopes @ step)
         if np.linalg.norm(after - residuals - slopes @ step) <= _LINEAR * size:
-            return DenseEnd(direct, float(after @ after), 1, "gradient", after, jacobian)
+            return DenseEnd(direct, float(after @ after), 1, "gradient", after, jacobian), rows
     ending = _native.least_squares(
-        lambda theta: stacked(theta)[0],
         lambda theta: stacked(theta)[1],
+        lambda theta: stacked(theta)[2],
         start,
         limits.lower,
         limits.upper,
         len(residuals),
         limits.maximum_iterations,
     )
-    return DenseEnd.of_native(ending)
+    end = DenseEnd.of_native(ending)
+    return end, stacked(end.x)[0]
 
 
 def settle(problem: Regression, start: Array, weigh: Weigh, limits: Limits, count: int) -> Settled:
@@ -132,8 +136,7 @@ def settle(problem: Regression, start: Array, weigh: Weigh, limits: Limits, coun
     """
     reach = problem.reach()[:, None]
     weights = [np.ones(problem.left(place).shape) / reach for place in range(count)]
-    end = solve(problem, start, weights, limits)
-    rows = problem.rows(end.x, weights)
+    end, rows = solve(problem, start, weights, limits)
     used = 0
     for used in range(1, ROUNDS + 1):
         # The floor keeps an equation that fits to rounding from taking all the weight.
@@ -144,8 +147,7 @@ def settle(problem: Regression, start: Array, weigh: Weigh, limits: Limits, coun
         pairs = zip(weights, fresh, strict=True)
         change = max(float(np.max(np.abs(after / before - 1.0))) for before, after in pairs)
         weights = fresh
-        end = solve(problem, end.x, weights, limits)
-        rows = problem.rows(end.x, weights)
+        end, rows = solve(problem, end.x, weights, limits)
         if change < SETTLED:
             break
     return Settled(end, rows, weights, used)
