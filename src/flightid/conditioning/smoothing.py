@@ -165,7 +165,9 @@ def _mean_kernel(half_width: int) -> NDArray[np.float64]:
     place = np.arange(-half_width, half_width + 1)
     slope = place / np.sum(place**2)
     # The parabola's slope counts the change over each interval by the samples beyond it.
-    interval = np.concatenate((-np.cumsum(slope[:half_width]), np.cumsum(slope[:half_width:-1])[::-1]))
+    interval = np.concatenate(
+        (-np.cumsum(slope[:half_width]), np.cumsum(slope[:half_width:-1])[::-1])
+    )
     return np.convolve(interval, np.array([-1.0, 13.0, 13.0, -1.0]) / 24.0)
 
 

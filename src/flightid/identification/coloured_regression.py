@@ -48,7 +48,7 @@ def coloured_covariance(
         flat = np.ascontiguousarray(slopes.reshape(-1, n))
         blocks.append(Block(flat, np.zeros((k, n)), basis, np.eye(k), residuals))
     triangle = triangle_of(blocks)
-    covariance, _, models = covariances(blocks, triangle)
+    covariance, _, _, models = covariances(blocks, triangle)
     plain = information_inverse(triangle)
     inflation = float(np.max(np.sqrt(np.diag(covariance) / np.diag(plain)), initial=1.0))
     return covariance, freedom_of(blocks, models, triangle), inflation

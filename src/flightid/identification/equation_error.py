@@ -13,12 +13,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.errors import OptionError
 from flightid.identification.attenuation import attenuation, judge_attenuation
+from flightid.identification.coloured_regression import coloured_covariance
 from flightid.identification.equation_operators import FourierRows, LocalMeans, Operator
 from flightid.identification.compared_equations import compared_costs, compared_records
 from flightid.identification.equation_regression import EquationRegression
 from flightid.identification.fit import Fit
-from flightid.identification.coloured_regression import coloured_covariance
 from flightid.identification.regression_fit import (
     Inner,
     Knowledge,
@@ -39,7 +40,7 @@ from flightid.identification.regression_weights import (
     spectral_weights,
 )
 from flightid.identification.sampled_equations import MeasuredMotion, Reconstruction, RightSide
-from flightid.models import StateSpaceModel
+from flightid.models import Model, StateSpaceModel
 from flightid.record import Record
 
 Array = NDArray[np.float64]
@@ -78,9 +79,7 @@ def fit_fourier_regression(
         return FourierRows(motion, options.omega_rad_s)
 
     problem, start, limits = _problem(model, data, options, operator)
-    omegas = [
-        each.grid.omega_rad_s for each in problem.operators if isinstance(each, FourierRows)
-    ]
+    omegas = [each.grid.omega_rad_s for each in problem.operators if isinstance(each, FourierRows)]
     count = len(problem.motions)
     settled = settle(problem, start, lambda rows: spectral_weights(rows, omegas), limits, count)
     inner = Inner.of(model, settled.end.x)
@@ -96,14 +95,23 @@ def fit_fourier_regression(
     return _finish("Fourier regression", problem, data, options, settled, limits, inner, known)
 
 
-def equation_error_start(model: StateSpaceModel, data: Record | Sequence[Record]) -> StateSpaceModel:
+def equation_error_start(model: Model, data: Record | Sequence[Record]) -> Model:
     """Copy of a model with the values that equation error finds, as a start for output error.
 
     Raises
     ------
+    OptionError
+        The model has no equations of motion.
     FitError
         Some states are not measured.
     """
+    if not isinstance(model, StateSpaceModel):
+        raise OptionError(
+            "start_from='equation_error' needs equations of motion",
+            found=type(model).__name__,
+            needed="a StateSpaceModel",
+            action="start from the model, or raise starts",
+        )
     problem, start, limits = _problem(
         model, data, EquationErrorOptions(), lambda motion: LocalMeans(motion, 2)
     )

@@ -36,7 +36,6 @@ class Operator(Protocol):
         """Rows as samples of time, (n_equations, n_times)."""
 
 
-
 @dataclass(frozen=True)
 class LocalMeans:
     """Time domain: derivatives of local parabolas, and the means that belong to them.
@@ -75,7 +74,6 @@ class LocalMeans:
     def in_time(self, rows: Array) -> Array:
         """The rows themselves."""
         return rows
-
 
 
 @dataclass(frozen=True)

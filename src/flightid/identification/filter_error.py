@@ -85,7 +85,10 @@ def fit_filter_error(
         _fitted_records(problem, records, filtered),
         options,
         findings=_judge(problem, bounded),
-        extra={"process_noise": dict(noise.process), "innovation_covariance": noise.innovation.tolist()},
+        extra={
+            "process_noise": dict(noise.process),
+            "innovation_covariance": noise.innovation.tolist(),
+        },
         noise_covariance=noise.measurement,
     )
 
@@ -94,12 +97,21 @@ def _problem(
     model: StateSpaceModel, records: Sequence[Record], options: FilterErrorOptions
 ) -> InnovationsProblem:
     data = tuple(
-        FilteredData(record.matrix(model.inputs), record.matrix(model.outputs), record.sample_time_s)
+        FilteredData(
+            record.matrix(model.inputs), record.matrix(model.outputs), record.sample_time_s
+        )
         for record in records
     )
     p, n = len(model.outputs), len(model.states)
     blank = InnovationsProblem(
-        model, data, (), np.zeros(0), np.ones(p), options.free_bias, options.free_reference, options.hold
+        model,
+        data,
+        (),
+        np.zeros(0),
+        np.ones(p),
+        options.free_bias,
+        options.free_reference,
+        options.hold,
     )
     start, _ = limits_of(model, options.maximum_iterations)
     point, slopes = blank.points(np.concatenate([start, np.zeros(p - 1)]))

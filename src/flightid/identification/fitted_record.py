@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,6 +30,8 @@ class FittedRecord:
     initial_state, bias, reference_shift : mapping of str to FittedParameter
         By state, output and input: what was estimated or held in this record. A bias is added to
         the model's output, a reference shift to its input.
+    states : mapping of str to ndarray, shape (n_samples,)
+        Filter error: states predicted one sample ahead; empty for other methods.
 
     Example
     -------
@@ -49,6 +51,7 @@ class FittedRecord:
     initial_state: Mapping[str, FittedParameter]
     bias: Mapping[str, FittedParameter]
     reference_shift: Mapping[str, FittedParameter]
+    states: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def residual(self, name: str) -> NDArray[np.float64]:
         """Measured minus model of one output, shape (n_samples,)."""

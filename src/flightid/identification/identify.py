@@ -7,7 +7,10 @@ from dataclasses import dataclass, fields
 from typing import Any, overload
 
 from flightid.errors import FitError, OptionError
+from flightid.identification.equation_error import fit_equation_error, fit_fourier_regression
+from flightid.identification.filter_error import fit_filter_error
 from flightid.identification.fit import Fit
+from flightid.identification.fourier_output_error_fit import fit_fourier_output_error
 from flightid.identification.frequency_domain import Options, fit_responses
 from flightid.identification.narx_fit import NarxFit
 from flightid.identification.orthogonal_least_squares import fit_narx
@@ -15,6 +18,12 @@ from flightid.identification.output_error import fit_output_error
 from flightid.identification.polynomial_fit import PolynomialFit
 from flightid.identification.prediction_error import fit_polynomial
 from flightid.identification.record_options import Freedom, InitialState, RecordOptions
+from flightid.identification.regression_options import (
+    EquationErrorOptions,
+    FilterErrorOptions,
+    FourierOptions,
+    FourierOutputErrorOptions,
+)
 from flightid.identification.selection import Bands
 from flightid.models import Model, StateSpaceModel, TransferFunctionModel
 from flightid.models.narx import NarxModel
@@ -59,6 +68,14 @@ METHODS: dict[tuple[type, str, str], Method] = {
     ),
     (TransferFunctionModel, RECORDS, "output_error"): Method(fit_output_error, RecordOptions),
     (StateSpaceModel, RECORDS, "output_error"): Method(fit_output_error, RecordOptions),
+    (StateSpaceModel, RECORDS, "equation_error"): Method(fit_equation_error, EquationErrorOptions),
+    (StateSpaceModel, RECORDS, "fourier_regression"): Method(
+        fit_fourier_regression, FourierOptions
+    ),
+    (StateSpaceModel, RECORDS, "fourier_output_error"): Method(
+        fit_fourier_output_error, FourierOutputErrorOptions
+    ),
+    (StateSpaceModel, RECORDS, "filter_error"): Method(fit_filter_error, FilterErrorOptions),
 }
 
 
@@ -154,6 +171,9 @@ def identify(
     loss_limit: float = ...,
     hold: str = ...,
     start_from: str = ...,
+    omega_rad_s: tuple[float, float] | None = ...,
+    half_width: int = ...,
+    process_noise: Sequence[str] | None = ...,
     maximum_iterations: int = ...,
 ) -> Fit: ...
 
@@ -175,6 +195,11 @@ def identify(
     - model on records: ``"output_error"``. The model runs free through all records and its
       parameters, with initial states and biases of each record, maximise the likelihood of
       measured minus model: ½ Σ vᵀR⁻¹v + (N/2) ln det R with estimated noise covariance R.
+    - state-space model on records, all states measured: ``"equation_error"`` (least squares on
+      local derivatives) and ``"fourier_regression"`` (on Fourier integrals of the equations).
+    - state-space model on records: ``"fourier_output_error"`` (outputs at the records' harmonics;
+      biases drop out, unstable models are no special case) and ``"filter_error"`` (a Kalman filter
+      with estimated process noise, for turbulence).
     - `NarxModel` on records: orthogonal least squares; polynomial structure
       (`PolynomialModel.arx` … `.general`) on records: prediction errors. Options are the model's.
 
@@ -202,6 +227,7 @@ def identify(
     omega_rad_s : tuple of float, or mapping of str to tuple, optional
         Responses: band (low, high), rad/s, of all or by name ``"output/input"``; default: for each
         response its widest band with `minimum_coherence`.
+        Fourier methods on records: band of the harmonics; default: to two fifths of Nyquist.
     n_omega : int
         Responses: frequencies of each.
     minimum_coherence : float or None
@@ -225,6 +251,10 @@ def identify(
         Records: whether the noise of different outputs may be correlated.
     loss : {"gaussian", "huber"}, loss_limit : float
         Records: "huber" counts residuals beyond `loss_limit` deviations less, for outliers.
+    half_width : int
+        Equation error: neighbours on each side of a local derivative.
+    process_noise : sequence of str, optional
+        Filter error: states driven by noise; default: those whose equations hold free parameters.
     start_from : {"model", "equation_error"}
         Records: where the first start comes from.
 
@@ -265,7 +295,8 @@ def identify(
     Tischler & Remple, *Aircraft and Rotorcraft System Identification*, 2nd ed., eqs. 11.4, 11.5,
     12.24 to 12.28; intervals: Pintelon & Schoukens, *System Identification*, 2nd ed., §9.7.
     Output error: Klein & Morelli, *Aircraft System Identification*, §6.1; its intervals: Morelli &
-    Klein (1997), J. Guidance 20(1), eqs. 19 to 25.
+    Klein (1997), J. Guidance 20(1), eqs. 19 to 25. Regression and filter error: the same book,
+    chapters 5 to 7, and Jategaonkar, *Flight Vehicle System Identification*, chapters 5 and 6.
     NARX: Chen, Cowan & Grant, IEEE Trans. Neural Networks 2 (1991), section III.
 
     Example

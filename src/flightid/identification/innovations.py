@@ -266,7 +266,11 @@ class InnovationsProblem:
         white = np.concatenate(rows)
         jacobian = np.concatenate(jacobians) + np.multiply.outer(white, rise / total)
         still = np.zeros(size - total)
-        curvature = np.array(widened).reshape(len(found), count, len(still) // len(found)).transpose(0, 2, 1)
+        curvature = (
+            np.array(widened)
+            .reshape(len(found), count, len(still) // len(found))
+            .transpose(0, 2, 1)
+        )
         curvature = np.sqrt(np.mean(white**2)) * curvature.reshape(len(still), count)
         whole = np.concatenate([jacobian, curvature])
         return factor * np.concatenate([white, still]), np.ascontiguousarray(factor * whole)
@@ -278,7 +282,7 @@ def _lower(matrix: Array) -> Array:
 
 
 def _seen(found: SteadyFilter, outputs: Array, inputs: Array) -> Array:
-    """z = y − D u."""
+    """Z = y − D u."""
     return np.asarray(outputs - inputs @ found.d.T)
 
 
@@ -317,9 +321,7 @@ def _slopes(
     return np.moveaxis(np.array(direct) - paths @ found.c.T, 0, 2)
 
 
-def _run(
-    found: SteadyFilter, runs: Sequence[tuple[Array, Array, Array]], n_samples: int
-) -> Array:
+def _run(found: SteadyFilter, runs: Sequence[tuple[Array, Array, Array]], n_samples: int) -> Array:
     forcing = [
         np.broadcast_to(
             _seen(found, y, u) @ found.gain.T + u @ found.early.T + _next(u) @ found.late.T,

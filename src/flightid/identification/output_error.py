@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.findings import Finding
+from flightid.identification.equation_error import equation_error_start
 from flightid.identification.equation_records import (
     EquationRuns,
     equation_runs,
@@ -61,6 +62,8 @@ class RecordEnd(End):
 
 def fit_output_error(model: Model, data: Record | Sequence[Record], options: RecordOptions) -> Fit:
     """Fit a model to records by output error; see `flightid.identify`."""
+    if options.start_from == "equation_error":
+        model = equation_error_start(model, data)
     prepared = prepare_records(model, data, options)
     setup = judge_channels(prepared)
     model, prepared, runs_of, groups = _searched(model, prepared, options)

@@ -58,7 +58,7 @@ class RecordStatistics:
 
 
 @dataclass(frozen=True)
-class _Block:
+class Block:
     """One record, whitened; rows are outputs after outputs.
 
     Sensitivities with own numbers taken out, and an orthonormal basis and triangle of the own
@@ -72,7 +72,7 @@ class _Block:
     residual: Array
 
     @classmethod
-    def of(cls, shared: Array, own: Array, residual: Array) -> _Block:
+    def of(cls, shared: Array, own: Array, residual: Array) -> Block:
         rows = residual.size
         shared, own = shared.reshape(rows, -1), own.reshape(rows, -1)
         basis, triangle = np.linalg.qr(own)
@@ -112,12 +112,12 @@ def record_statistics(
         white = np.tensordot(whitener, slopes, axes=1)
         residual = _limited(whitener @ (measured - outputs), limit)
         shared, rest = white[:, :, : len(free)][:, :, inner], white[:, :, len(free) :]
-        blocks.append(_Block.of(shared, rest[:, :, np.array(kept, dtype=bool)], residual))
-    triangle = _triangle(blocks)
+        blocks.append(Block.of(shared, rest[:, :, np.array(kept, dtype=bool)], residual))
+    triangle = triangle_of(blocks)
     require_identifiable(names, triangle)
-    covariance, own_covariances, crossed, models = _covariances(blocks, triangle)
-    plain = _inverse(triangle)
-    freedom = _freedom(blocks, models, triangle)
+    covariance, own_covariances, crossed, models = covariances(blocks, triangle)
+    plain = information_inverse(triangle)
+    freedom = freedom_of(blocks, models, triangle)
     parameters = fitted_parameters(fitted, names, covariance, triangle / np.sqrt(2.0), freedom)
     ratio = np.sqrt(np.diag(covariance) / np.diag(plain)) if names else np.ones(1)
     return RecordStatistics(
@@ -152,13 +152,13 @@ def _limited(residual: Array, limit: float) -> Array:
     return np.asarray(np.clip(residual, -limit, limit) / inside)
 
 
-def _triangle(blocks: Sequence[_Block]) -> Array:
+def triangle_of(blocks: Sequence[Block]) -> Array:
     """Triangle of the sensitivities of all records together."""
     parts = [np.linalg.qr(block.projected, mode="r") for block in blocks]
     return np.asarray(np.linalg.qr(np.vstack(parts), mode="r"))
 
 
-def _inverse(triangle: Array) -> Array:
+def information_inverse(triangle: Array) -> Array:
     size = np.linalg.norm(triangle, axis=0)
     root = solve_triangular(triangle / size, np.eye(len(size))) / size[:, None]
     return np.asarray(root @ root.T)
@@ -174,11 +174,11 @@ def _noise_covariance(models: Sequence[Autoregression], columns: Array, n_output
     return total
 
 
-def _covariances(
-    blocks: Sequence[_Block], triangle: Array
+def covariances(
+    blocks: Sequence[Block], triangle: Array
 ) -> tuple[Array, list[Array], list[Array], list[Autoregression]]:
     """Covariance of the shared parameters, of each record's own, between the two; noise models."""
-    plain = _inverse(triangle)
+    plain = information_inverse(triangle)
     n_outputs = blocks[0].residual.shape[0]
 
     def left(drawn: list[Array]) -> list[Array]:
@@ -248,9 +248,9 @@ def start_errors(
     return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", whole, joint, whole)))
 
 
-def _freedom(blocks: Sequence[_Block], models: Sequence[Autoregression], triangle: Array) -> Array:
+def freedom_of(blocks: Sequence[Block], models: Sequence[Autoregression], triangle: Array) -> Array:
     """Degrees of freedom of each variance: noise models are themselves estimates."""
-    plain = _inverse(triangle)
+    plain = information_inverse(triangle)
     n_outputs = blocks[0].residual.shape[0]
     variances = np.zeros((n_outputs, len(plain)))
     for block in blocks:
