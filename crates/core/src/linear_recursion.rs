@@ -23,7 +23,7 @@ pub fn recurse(
     if n == 0 {
         return Ok(Vec::new());
     }
-    if initial.len() % n != 0 {
+    if !initial.len().is_multiple_of(n) {
         return shape("initial states", initial.len(), n);
     }
     if forcing.len() != initial.len() * n_samples {

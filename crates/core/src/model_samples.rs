@@ -33,7 +33,7 @@ pub fn sample(
         let (found, needed) = (parameters.len(), model.n_parameters());
         return Err(CoreError::Shape { what: "parameter values", found, needed });
     }
-    if points.len() % width != 0 {
+    if !points.len().is_multiple_of(width) {
         let (found, needed) = (points.len(), width);
         return Err(CoreError::Shape { what: "entries of the points", found, needed });
     }
@@ -41,14 +41,14 @@ pub fn sample(
         return Err(CoreError::Shape { what: "direction of a derivative", found, needed });
     }
     let n = directions.len();
-    let count = points.len() / width;
+    let count = points.len() / width.max(1);
     let mut values = Vec::with_capacity(count * height);
     let mut slopes = Vec::with_capacity(count * height * n);
     let mut registers = Registers::default();
     let mut joined = [vec![0.0; width], parameters.to_vec()].concat();
     let mut each = vec![0.0; tape.n_outputs()];
     let mut gradient = vec![0.0; tape.n_outputs() * n];
-    for (index, point) in points.chunks_exact(width).enumerate() {
+    for (index, point) in points.chunks_exact(width.max(1)).enumerate() {
         joined[..width].copy_from_slice(point);
         tape.jacobian(&joined, directions, &mut registers, &mut each, &mut gradient)
             .map_err(|_| CoreError::NotFinite { what: "a sample of the equations", index })?;

@@ -27,6 +27,7 @@ from flightid.conditioning.smoothing import (
     differentiate,
     fourier_smooth,
     local_derivative,
+    local_mean,
 )
 from flightid.record import GapPolicy, Interpolation, StampPolicy, UniformBase, to_uniform
 
@@ -56,6 +57,7 @@ __all__ = [
     "flip_sign",
     "fourier_smooth",
     "local_derivative",
+    "local_mean",
     "resample",
     "split",
     "split_by_mode",

@@ -16,6 +16,7 @@ from flightid.identification.record_statistics import (
 )
 
 Array = NDArray[np.float64]
+_ROUNDING = 1e-9
 
 
 def coloured_covariance(
@@ -49,6 +50,9 @@ def coloured_covariance(
         blocks.append(Block(flat, np.zeros((k, n)), basis, np.eye(k), residuals))
     triangle = triangle_of(blocks)
     covariance, _, _, models = covariances(blocks, triangle)
-    plain = information_inverse(triangle)
-    inflation = float(np.max(np.sqrt(np.diag(covariance) / np.diag(plain)), initial=1.0))
+    plain = np.diag(information_inverse(triangle))
+    # Of data without noise, rounding alone is left, and that may be negative.
+    lift = np.maximum(_ROUNDING * plain - np.diag(covariance), 0.0)
+    covariance = covariance + np.diag(lift)
+    inflation = float(np.max(np.sqrt(np.diag(covariance) / plain), initial=1.0))
     return covariance, freedom_of(blocks, models, triangle), inflation

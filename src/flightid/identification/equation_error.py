@@ -149,7 +149,7 @@ def _finish(
 
     def refit(motions: Sequence[MeasuredMotion]) -> Array:
         operators = [
-            replace(each, motion=motion)
+            each.with_motion(motion)
             for each, motion in zip(problem.operators, motions, strict=True)
         ]
         noisier = replace(problem, motions=tuple(motions), operators=tuple(operators))
@@ -157,14 +157,15 @@ def _finish(
 
     moved = attenuation(problem.motions, refit, end.x)[inner.mask]
     bias = dict(zip(inner.names, map(float, moved), strict=True))
+    records = (data,) if isinstance(data, Record) else tuple(data)
     fit = assemble(
         method,
         inner,
         [[end]],
         known,
         compared_costs(problem, settled.rows),
-        check_records(inner.fitted, data),
-        compared_records(problem, settled, check_records(inner.fitted, data)),
+        records,
+        compared_records(problem, settled, records),
         options,
         extra={"attenuation": bias, "rounds": settled.rounds},
     )

@@ -7,7 +7,7 @@ equation (a bias, a trim) or the ends of the record add is a known direction, ta
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -34,6 +34,9 @@ class Operator(Protocol):
 
     def in_time(self, rows: Array) -> Array:
         """Rows as samples of time, (n_equations, n_times)."""
+
+    def with_motion(self, motion: MeasuredMotion) -> Operator:
+        """The same operator on another motion of the same length."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +77,10 @@ class LocalMeans:
     def in_time(self, rows: Array) -> Array:
         """The rows themselves."""
         return rows
+
+    def with_motion(self, motion: MeasuredMotion) -> LocalMeans:
+        """The same operator on another motion."""
+        return replace(self, motion=motion)
 
 
 @dataclass(frozen=True)
@@ -127,4 +134,9 @@ class FourierRows:
     def in_time(self, rows: Array) -> Array:
         """What the band holds."""
         real, imaginary = np.split(rows, 2, axis=1)
-        return self.grid.in_time((real + 1j * imaginary) / self._scale())
+        whole = (real + 1j * imaginary) / self._scale()
+        return self.grid.in_time(np.asarray(whole, dtype=np.complex128))
+
+    def with_motion(self, motion: MeasuredMotion) -> FourierRows:
+        """The same operator on another motion."""
+        return replace(self, motion=motion)

@@ -156,7 +156,13 @@ class _LastPoint:
         self._x = np.empty(0)
         self._found = (np.empty(0), np.empty((0, 0)))
 
-    def __call__(self, x: Array) -> tuple[Array, Array]:
+    def residuals(self, x: Array) -> Array:
+        return self._at(x)[0]
+
+    def jacobian(self, x: Array) -> Array:
+        return self._at(x)[1]
+
+    def _at(self, x: Array) -> tuple[Array, Array]:
         if not np.array_equal(x, self._x):
             self._found = self._problem.residuals(x, with_slopes=True)
             self._x = x.copy()
@@ -177,8 +183,8 @@ def _search(problem: InnovationsProblem, options: FilterErrorOptions) -> list[De
             continue
         point = _LastPoint(problem)
         ending = _native.least_squares(
-            lambda x, at=point: at(x)[0],
-            lambda x, at=point: at(x)[1],
+            point.residuals,
+            point.jacobian,
             whole,
             np.concatenate([limits.lower, -reach]),
             np.concatenate([limits.upper, reach]),

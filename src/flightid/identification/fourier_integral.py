@@ -113,7 +113,7 @@ class Harmonics:
         Identification*, §10.1 (finite Fourier transform).
         """
         angle = self.omega_rad_s * self.sample_time_s
-        inner, ends = _weights(angle, self.n_samples)
+        inner, ends = _weights(angle)
         # The last sample lies one whole period after the first.
         summed = fft.fft(samples[..., :-1], axis=-1)[..., self.numbers] + samples[..., -1:]
         edges = np.concatenate([samples[..., :4], samples[..., -4:]], axis=-1)
@@ -139,7 +139,7 @@ class Harmonics:
         return np.concatenate([samples, samples[:, :1]], axis=1)
 
 
-def _weights(angle: Array, n: int) -> tuple[Complex, Complex]:
+def _weights(angle: Array) -> tuple[Complex, Complex]:
     """Weight of the plain sum, and what the four samples at either end need besides.
 
     Inside, the cubic through four samples stands for the middle interval; at the ends the outer

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +100,7 @@ class FourierOutputError:
         """What the band holds of one record, back in time, (n_outputs, n_samples)."""
         grid = self.records[place].grid
         real, imaginary = np.split(rows, 2, axis=1)
-        return grid.in_time((real + 1j * imaginary) / _scale(grid))
+        return grid.in_time(np.asarray((real + 1j * imaginary) / _scale(grid), np.complex128))
 
     def reach(self) -> Array:
         """Root mean square of each output's transform."""
@@ -131,7 +132,7 @@ class FourierOutputError:
     def _record(
         self, values: Array, slopes: Array, moved: Array, data: TransformedRecord, weight: Array
     ) -> Rows:
-        n, m = len(self.model.states), len(self.model.inputs)
+        n = len(self.model.states)
         grid, scale = data.grid, _scale(data.grid)
         delayed, rates, late = delayed_inputs(
             self.model, values, data.inputs, grid.sample_time_s, self.hold
@@ -168,7 +169,7 @@ class FourierOutputError:
         return Rows(residuals, kept / weight[:, :, None])
 
 
-def _solve(matrix: Complex, right: Complex) -> Complex:
+def _solve(matrix: NDArray[Any], right: NDArray[Any]) -> Complex:
     try:
         return np.asarray(np.linalg.solve(matrix, right))
     except np.linalg.LinAlgError as error:

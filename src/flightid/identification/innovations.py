@@ -127,7 +127,7 @@ class InnovationsProblem:
         n, m, p = len(self.model.states), len(self.model.inputs), len(self.model.outputs)
         rows = self.model.native.linearise(values, trim)[1]
         moved = self.model.native.sensitivities(values, trim, free)
-        rates = -np.linalg.solve(rows[:n, :n], rows[:n, n:])
+        rates: Array = np.asarray(-np.linalg.solve(rows[:n, :n], rows[:n, n:]), dtype=np.float64)
         whole = np.vstack([rates, np.eye(n + m)])
         measured = rows[n:] @ whole
         d_rates = -np.linalg.solve(rows[:n, :n], moved[:, :n] @ whole)

@@ -73,6 +73,7 @@ class Block:
 
     @classmethod
     def of(cls, shared: Array, own: Array, residual: Array) -> Block:
+        """From whitened sensitivities by shared parameters and by own numbers."""
         rows = residual.size
         shared, own = shared.reshape(rows, -1), own.reshape(rows, -1)
         basis, triangle = np.linalg.qr(own)
@@ -159,6 +160,7 @@ def triangle_of(blocks: Sequence[Block]) -> Array:
 
 
 def information_inverse(triangle: Array) -> Array:
+    """(RᵀR)⁻¹ of a triangle R: the covariance for white residuals of unit variance."""
     size = np.linalg.norm(triangle, axis=0)
     root = solve_triangular(triangle / size, np.eye(len(size))) / size[:, None]
     return np.asarray(root @ root.T)

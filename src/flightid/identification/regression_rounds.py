@@ -138,7 +138,8 @@ def settle(problem: Regression, start: Array, weigh: Weigh, limits: Limits, coun
     weights = [np.ones(problem.left(place).shape) / reach for place in range(count)]
     end, rows = solve(problem, start, weights, limits)
     used = 0
-    for used in range(1, ROUNDS + 1):
+    while used < ROUNDS:
+        used += 1
         # The floor keeps an equation that fits to rounding from taking all the weight.
         fresh = [
             np.minimum(weight, 1.0 / (_EXACT * reach))

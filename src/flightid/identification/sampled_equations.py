@@ -46,7 +46,7 @@ class MeasuredMotion:
     @property
     def n_samples(self) -> int:
         """Number of samples."""
-        return self.states.shape[1]
+        return int(self.states.shape[1])
 
 
 @dataclass(frozen=True)

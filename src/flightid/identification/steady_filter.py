@@ -18,6 +18,7 @@ from flightid.errors import FitError
 Array = NDArray[np.float64]
 _DOUBLINGS = 60
 _SETTLED = 1e-14
+_LARGEST = 1e60
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ def steady_filter(
     """
     n, m = point.b.shape
     forced, noisy = _forced(point, sample_time_s, ramp=1.0), _noisy(point, sample_time_s)
-    whole, spread = expm(forced), expm(noisy)
+    whole, spread = np.asarray(expm(forced)), np.asarray(expm(noisy))
     phi = whole[:n, :n]
     q = _symmetric(phi @ spread[:n, n:])
     predicted = _riccati(phi, point.c, q, point.measurement)
@@ -124,8 +125,8 @@ def steady_filter(
     for slope in slopes:
         # The ramp itself depends on no parameter.
         moving = _forced(slope, sample_time_s, ramp=0.0)
-        moved = expm_frechet(forced, moving, compute_expm=False)
-        widened = expm_frechet(noisy, _noisy(slope, sample_time_s), compute_expm=False)
+        moved = _moved(forced, moving)
+        widened = _moved(noisy, _noisy(slope, sample_time_s))
         d_phi = moved[:n, :n]
         d_q = _symmetric(d_phi @ spread[:n, n:] + phi @ widened[:n, n:])
         turned = weight @ slope.c @ predicted @ keep.T
@@ -155,6 +156,11 @@ def steady_filter(
     return found, derived
 
 
+def _moved(exponent: Array, direction: Array) -> Array:
+    """Derivative of an exponential along a direction."""
+    return np.asarray(expm_frechet(exponent, direction, compute_expm=False), dtype=np.float64)
+
+
 def _symmetric(matrix: Array) -> Array:
     return 0.5 * (matrix + matrix.T)
 
@@ -182,6 +188,8 @@ def _riccati(phi: Array, c: Array, q: Array, r: Array) -> Array:
     n = len(phi)
     a, g, h = phi.T.copy(), c.T @ np.linalg.solve(r, c), q.copy()
     for _ in range(_DOUBLINGS):
+        if not float(np.abs(h).max(initial=0.0)) < _LARGEST:
+            break
         both = np.linalg.solve(np.eye(n) + g @ h, np.hstack([a, g]))
         turned, shared = both[:, :n], both[:, n:]
         change = a.T @ h @ turned
@@ -189,8 +197,6 @@ def _riccati(phi: Array, c: Array, q: Array, r: Array) -> Array:
         h = _symmetric(h + change)
         a = a @ turned
         size = float(np.abs(h).max(initial=0.0))
-        if not np.isfinite(size):
-            break
         if float(np.abs(change).max(initial=0.0)) <= _SETTLED * max(size, 1e-300):
             return h
     raise FitError(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,7 +33,7 @@ def neighbours(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return np.maximum(place - side, 0), np.minimum(place + side + 1, count)
 
 
-def averaged(values: NDArray[np.generic]) -> NDArray[np.generic]:
+def averaged(values: NDArray[Any]) -> NDArray[Any]:
     """Mean over neighbouring frequencies, frequency last; see `neighbours`.
 
     Example

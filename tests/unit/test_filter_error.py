@@ -1,0 +1,101 @@
+"""The steady filter, its slopes, the likelihood of innovations, and filter error as a fit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_discrete_are
+
+import flightid as fid
+from flightid import _native
+from flightid.errors import FitError
+from flightid.identification.innovations import FilteredData, InnovationsProblem
+from flightid.identification.steady_filter import ContinuousPoint, steady_filter
+from tests.closeness import assert_close
+from tests.regression_flights import fly, noisy, short_period, values
+
+
+def test_steady_filter_is_the_textbook_one() -> None:
+    a = np.array([[-1.0, 0.5], [-3.0, 0.2]])
+    c, w = np.array([[1.0, 0.0]]), np.diag([0.3, 0.8])
+    none = np.zeros((2, 0))
+    point = ContinuousPoint(a, none, c, np.zeros((1, 0)), w, np.array([[0.1]]))
+    found = steady_filter(point, [], 0.05)[0]
+    phi = _native.matrix_exponential(a * 0.05)
+    grid = (np.arange(2000) + 0.5) / 2000 * 0.05
+    turned = np.array([_native.matrix_exponential(a * s) for s in grid])
+    q = np.mean(turned @ w @ turned.transpose(0, 2, 1), axis=0) * 0.05
+    wanted = solve_discrete_are(phi.T, c.T, q, np.array([[0.1]]))
+    assert_close(found.predicted, wanted, rtol=1e-6, why="midpoint rule for the integral")
+
+
+def test_an_unstable_part_that_no_output_sees_has_no_filter() -> None:
+    a, none = np.diag([-1.0, 2.0]), np.zeros((2, 0))
+    point = ContinuousPoint(
+        a, none, np.array([[1.0, 0.0]]), np.zeros((1, 0)), np.eye(2), np.array([[0.1]])
+    )
+    with pytest.raises(FitError, match="no steady filter"):
+        steady_filter(point, [], 0.1)
+
+
+def _problem(model: fid.StateSpaceModel) -> tuple[InnovationsProblem, np.ndarray]:
+    generator = np.random.default_rng(0)
+    walk = np.cumsum(generator.standard_normal((4, 240)), axis=1)
+    data = (
+        FilteredData(0.01 * walk[:1], 0.05 * walk[1:], 0.02),
+        FilteredData(0.01 * walk[:1, :150] + 0.1, 0.05 * walk[1:, 50:200], 0.03),
+    )
+    scales = np.array([0.1, 0.2]), np.array([0.01, 0.02, 0.1])
+    problem = InnovationsProblem(
+        model, data, (0, 1), *scales, free_bias=True, free_reference=True, hold="first"
+    )
+    start = np.array([*values(model).values(), -1.0, 0.5, 0.2, -0.3])
+    start[5] = 0.013
+    return problem, start
+
+
+def test_slopes_of_the_likelihood_are_exact() -> None:
+    problem, start = _problem(short_period())
+    residuals, jacobian = problem.residuals(start, with_slopes=True)
+    gradient = 2.0 * jacobian.T @ residuals
+
+    def cost(x: np.ndarray) -> float:
+        return float(np.sum(problem.residuals(x, with_slopes=False)[0] ** 2))
+
+    for place, value in enumerate(start):
+        step = 1e-5 * max(abs(value), 0.1)
+        around = [start + sign * step * np.eye(len(start))[place] for sign in (1.0, -1.0)]
+        central = (cost(around[0]) - cost(around[1])) / (2.0 * step)
+        assert_close(gradient[place], central, rtol=2e-6, atol=1e-6, why="central differences")
+
+
+def test_sum_of_squares_is_the_likelihood_with_its_best_scale() -> None:
+    problem, start = _problem(short_period())
+    residuals, _ = problem.residuals(start, with_slopes=False)
+    total = sum(each.outputs.size for each in problem.data)
+    logs = squares = 0.0
+    for found, _ in problem.records(start, with_slopes=False):
+        b = found.filter.innovation
+        logs += len(found.innovations) * np.linalg.slogdet(b)[1]
+        squares += float(np.sum(found.innovations * np.linalg.solve(b, found.innovations.T).T))
+    wanted = logs + total * np.log(squares / total)
+    found_log = total * np.log(np.sum(residuals**2) / total)
+    assert_close(found_log, wanted, rtol=1e-12, why="the same number")
+
+
+def test_without_turbulence_it_agrees_with_output_error() -> None:
+    model = short_period()
+    flight = noisy(fly(model), 2, factor=3.0)
+    filtered = fid.identify(model, flight, method="filter_error")
+    output = fid.identify(model, flight)
+    for name in values(model):
+        one, other = filtered.parameters[name], output.parameters[name]
+        assert other.stderr is not None
+        assert abs(one.value - other.value) < 0.7 * other.stderr, name
+    noise = filtered.noise_covariance
+    assert noise is not None
+    assert_close(np.sqrt(np.diag(noise)), [0.0018, 0.0036, 0.03], rtol=0.1, why="1001 samples")
+    record = filtered.records[0]
+    assert set(record.states) == {"alpha", "q"}
+    assert record.states["q"].shape == (flight.n_samples,)
+    assert filtered.to_dict()["schema"] == "flightid.fit/1"
