@@ -22,7 +22,6 @@ from flightid.identification.fourier_integral import Harmonics
 from flightid.identification.nuisance import Nuisance
 from flightid.identification.regression_rounds import Rows
 from flightid.models import StateSpaceModel
-from flightid.models.statespace_checks import point_names
 from flightid.record import Record
 
 Array = NDArray[np.float64]
@@ -121,7 +120,7 @@ class FourierOutputError:
         values = self.model.parameters.independent_values()
         free = self.model.parameters.free_indices
         values[free] = theta
-        point = np.array([self.model.trim.get(name, 0.0) for name in point_names(self.model)])
+        point = np.array([self.model.trim.get(name, 0.0) for name in self.model.point_names])
         slopes = self.model.native.linearise(values, point)[1]
         moved = self.model.native.sensitivities(values, point, free)
         return [

@@ -19,7 +19,6 @@ from flightid.identification.delayed_inputs import delayed_inputs
 from flightid.identification.nuisance import Nuisance
 from flightid.identification.steady_filter import ContinuousPoint, SteadyFilter, steady_filter
 from flightid.models import StateSpaceModel
-from flightid.models.statespace_checks import point_names
 
 Array = NDArray[np.float64]
 
@@ -123,7 +122,7 @@ class InnovationsProblem:
     def points(self, unknowns: Array) -> tuple[ContinuousPoint, list[ContinuousPoint]]:
         """State space with noise, and its derivatives by all unknowns."""
         values, free = self._values(unknowns)
-        trim = np.array([self.model.trim.get(name, 0.0) for name in point_names(self.model)])
+        trim = np.array([self.model.trim.get(name, 0.0) for name in self.model.point_names])
         n, m, p = len(self.model.states), len(self.model.inputs), len(self.model.outputs)
         rows = self.model.native.linearise(values, trim)[1]
         moved = self.model.native.sensitivities(values, trim, free)

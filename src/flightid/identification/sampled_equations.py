@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from flightid.errors import DataError, FitError, ModelError, SingularError
 from flightid.identification.delayed_inputs import delayed_inputs
 from flightid.models import StateSpaceModel
-from flightid.models.statespace_checks import point_names
 from flightid.record import Record
 
 Array = NDArray[np.float64]
@@ -114,7 +113,7 @@ class Reconstruction:
 def _probes(model: StateSpaceModel, width: int) -> Array:
     """Points near the trim at which a linear output shows the same slopes."""
     n = len(model.states)
-    trim = np.array([model.trim.get(name, 0.0) for name in point_names(model)])
+    trim = np.array([model.trim.get(name, 0.0) for name in model.point_names])
     shifts = np.random.default_rng(0).uniform(0.05, 0.15, (_PROBES, width))
     shifts[:, :n] *= 2.0
     return np.asarray(trim + shifts)
