@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from flightid.errors import OptionError
 from flightid.identification.attenuation import attenuation, judge_attenuation
 from flightid.identification.coloured_regression import coloured_covariance
-from flightid.identification.equation_operators import FourierRows, LocalMeans, Operator
 from flightid.identification.compared_equations import compared_costs, compared_records
+from flightid.identification.equation_operators import FourierRows, LocalMeans, Operator
 from flightid.identification.equation_regression import EquationRegression
 from flightid.identification.fit import Fit
 from flightid.identification.regression_fit import (
