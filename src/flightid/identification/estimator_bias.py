@@ -22,6 +22,7 @@ from flightid.identification.model_outputs import (
 )
 from flightid.models import Model
 from flightid.responses import FrequencyResponse
+from flightid.responses.uncertainty import CovarianceSource
 
 Array = NDArray[np.float64]
 
@@ -83,13 +84,7 @@ def remove_bias(model: Model, data: FrequencyResponse, hold: str) -> FrequencyRe
     linear = data.linear
     if linear is None:
         raise DataError("the estimator's weights are not known", found=why_unknown(data))
-    systems = systems_of(model)
-    outputs = {each.output for each in model.responses}
-    residuals = [
-        _residuals(systems, data, outputs, record, hold)
-        for record in range(len(linear.output_records))
-    ]
-    left = linear.apply(residuals)
+    left = linear.apply(_all_residuals(model, data, hold))
     values = np.array(data.response)
     curves = model.frequency_response(data.omega_rad_s)
     for each in model.responses:
@@ -97,6 +92,37 @@ def remove_bias(model: Model, data: FrequencyResponse, hold: str) -> FrequencyRe
         place = model.outputs.index(each.output), model.inputs.index(each.input)
         values[row, column] = curves[place] + left[row, column]
     return replace(data, response=values)
+
+
+def errors_without_bias(
+    model: Model, data: FrequencyResponse, hold: str
+) -> CovarianceSource | None:
+    """Errors of a response whose bias has been taken out: their noise is what the model leaves.
+
+    The noise of the estimate itself holds the leakage that the correction has removed.
+
+    Parameters
+    ----------
+    model : Model
+    data : FrequencyResponse
+        As it was measured, with `linear`.
+    hold : str
+
+    Returns
+    -------
+    CovarianceSource or None
+        None where the errors of the response stand as they are.
+    """
+    if data.linear is None or data.errors is None:
+        return None
+    return data.linear.errors_of(_all_residuals(model, data, hold))
+
+
+def _all_residuals(model: Model, data: FrequencyResponse, hold: str) -> list[Array]:
+    assert data.linear is not None
+    systems, outputs = systems_of(model), {each.output for each in model.responses}
+    records = range(len(data.linear.output_records))
+    return [_residuals(systems, data, outputs, record, hold) for record in records]
 
 
 def _residuals(

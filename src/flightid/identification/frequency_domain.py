@@ -29,6 +29,7 @@ from flightid.identification.error_model import (
     whitening,
 )
 from flightid.identification.estimates import Statistics, statistics
+from flightid.identification.estimator_bias import errors_without_bias
 from flightid.identification.fit import Fit, FittedResponse
 from flightid.identification.fit_findings import (
     judge_correlation,
@@ -100,6 +101,8 @@ def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fi
     if options.correct_bias:
         done = _without_bias(fitted, data, errors, found, options)
         after = _select(model, done.data, options)
+        if done.applied:
+            errors = _errors_without_bias(done, data, after, options) or errors
         changes = sizes(selected, after, errors) if done.applied else {}
         setup += judge_bias(done, changes)
         correction = provenance(done, changes, options.hold)
@@ -156,6 +159,16 @@ def _without_bias(
 
     scales = {p.name: p.stderr for p in found.parameters.values() if p.stderr}
     return iterate(fitted, data, scales, refit, options.hold)
+
+
+def _errors_without_bias(
+    done: BiasRounds,
+    data: FrequencyResponse,
+    after: Sequence[SelectedResponse],
+    options: Options,
+) -> ErrorModel | None:
+    found = errors_without_bias(done.model, data, options.hold)
+    return None if found is None else error_model(replace(done.data, errors=found), after)
 
 
 def _check_model(model: Model, data: FrequencyResponse) -> None:

@@ -17,12 +17,17 @@ from numpy.typing import NDArray
 from flightid.errors import ShapeError
 from flightid.responses.covariance import WindowedErrors
 from flightid.responses.local_fit import Bins, LocalFit
+from flightid.responses.noise import noise_of_residuals
 from flightid.responses.samples import Samples
 from flightid.responses.transform import FoldedBasis, transform
+from flightid.responses.uncertainty import CovarianceSource, Selected
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Places = NDArray[np.intp]
+
+LEAST_NOISE = 1e-12
+"""Share of its first estimate below which noise is rounding."""
 
 
 class OutputWeights(Protocol):
@@ -34,6 +39,13 @@ class OutputWeights(Protocol):
         """Change of the response for changes of the outputs, shape (n_out, n_in, n_f).
 
         `changes` holds one array for each record, shape (len(outputs), n_samples).
+        """
+        ...
+
+    def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
+        """Errors of the whole estimate with the noise of a model's residuals in some outputs.
+
+        None where the estimate's own noise is as good.
         """
         ...
 
@@ -70,6 +82,17 @@ class WindowedWeights:
             total += np.einsum("aboif,boif->aoif", turn, parts)
         return np.asarray(total[0] + 1j * total[1])
 
+    def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
+        """See `OutputWeights`."""
+        errors, before = self.errors, self.errors.noise
+        step = errors.sample_time_s
+        highest = float(errors.omega[-1]) / step
+        found = noise_of_residuals(residuals, errors.instruments, step, highest)
+        density = before.density.copy()
+        least = LEAST_NOISE * before.density[outputs]
+        density[outputs] = np.maximum(found.at(before.omega_rad_s), least)
+        return replace(errors, noise=replace(before, density=density))
+
 
 @dataclass(frozen=True)
 class LocalWeights:
@@ -96,6 +119,11 @@ class LocalWeights:
                 bins = values[:, fit.places[index]]
                 found[:, :, place] += bins @ fit.weights[index][inputs].T
         return found
+
+    def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
+        """None: local polynomials have taken the leakage out of their noise already."""
+        del residuals, outputs
+        return None
 
 
 @dataclass(frozen=True)
@@ -177,3 +205,19 @@ class LinearEstimate:
         if found != needed:
             raise ShapeError("changes do not fit the records", found=found, needed=needed)
         return self.weights.apply(changes, *self.places)
+
+    def errors_of(self, residuals: Sequence[Real]) -> CovarianceSource | None:
+        """Errors of the response with the noise that a model's residuals show.
+
+        Parameters
+        ----------
+        residuals : sequence of ndarray, each shape (n_out, n_samples)
+            Measured less modelled outputs of each record.
+
+        Returns
+        -------
+        CovarianceSource or None
+            None where the estimate's own noise is as good.
+        """
+        found = self.weights.errors_of(residuals, self.places[0])
+        return None if found is None else Selected(found, *self.places)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -72,6 +73,52 @@ def estimate_noise(
     rows = np.concatenate([np.arange(len(samples.records[0]))[samples.rows(k)] for k in order])
     n_regressors = len(samples.excitations if joint else samples.inputs)
     records = [Bins.of(record[rows], samples.sample_time_s) for record in samples.records]
+    found = [
+        (centre, _of_outputs(residual, joint, centre, omega, response))
+        for centre, residual in _groups(records, n_regressors, float(omega[-1]))
+    ]
+    return NoiseSpectrum(np.array([one for one, _ in found]), np.array([d for _, d in found]).T)
+
+
+def noise_of_residuals(
+    residuals: Sequence[NDArray[np.float64]],
+    regressors: Sequence[NDArray[np.float64]],
+    sample_time_s: float,
+    highest_rad_s: float,
+) -> NoiseSpectrum:
+    """Noise spectra from what a model leaves of the outputs.
+
+    A model takes out the motion whose leakage no local polynomial follows: modes narrower than a
+    few bins, and vehicles that only a loop holds. What the regressors still explain, the model's
+    own errors, is fitted locally and counts as no noise.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, each shape (n_out, n_samples)
+        Measured less modelled outputs of each record.
+    regressors : sequence of ndarray, each shape (n_regressors, n_samples)
+        Inputs, or excitations of a closed loop.
+    sample_time_s : float
+    highest_rad_s : float
+        Highest frequency of the response.
+
+    Returns
+    -------
+    NoiseSpectrum
+    """
+    records = [
+        Bins.of(np.concatenate([given, left]), sample_time_s)
+        for given, left in zip(regressors, residuals, strict=True)
+    ]
+    found = list(_groups(records, len(regressors[0]), highest_rad_s))
+    densities = [np.real(np.diag(residual)) for _, residual in found]
+    return NoiseSpectrum(np.array([centre for centre, _ in found]), np.array(densities).T)
+
+
+def _groups(
+    records: Sequence[Bins], n_regressors: int, highest_rad_s: float
+) -> Iterator[tuple[float, NDArray[np.complex128]]]:
+    """Centre of each group of neighbouring bins, and the residual of its local fit."""
     count = bins_needed(n_regressors, len(records))
     size = min(len(bins.omega) for bins in records)
     if size < count:
@@ -86,9 +133,8 @@ def estimate_noise(
     # A window's side lobes beyond this are far below its main lobe; the last density is held there.
     stride = max(count, len(longest.omega) * count // size)
     edges = np.append(longest.omega[::stride], np.inf)
-    inside_band = int(np.searchsorted(edges, BEYOND_BAND * float(omega[-1])))
+    inside_band = int(np.searchsorted(edges, BEYOND_BAND * highest_rad_s))
     edges = edges[: max(inside_band + 1, 2)]
-    centres, densities = [], []
     for low, high in pairwise(edges):
         places = [
             slice(*np.searchsorted(bins.omega, [low * (1 - 1e-12), high * (1 - 1e-12)]))
@@ -98,10 +144,7 @@ def estimate_noise(
             continue
         inside = longest.omega[places[at_longest]]
         centre = float(0.5 * (inside[0] + inside[-1]))
-        residual = fit_locally(records, places, centre, n_regressors).residual
-        densities.append(_of_outputs(residual, joint, centre, omega, response))
-        centres.append(centre)
-    return NoiseSpectrum(np.array(centres), np.array(densities).T)
+        yield centre, fit_locally(records, places, centre, n_regressors).residual
 
 
 def _of_outputs(
