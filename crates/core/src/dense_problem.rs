@@ -2,8 +2,9 @@
 //! (Python side: identification/)
 
 use crate::error::CoreError;
-use crate::householder::{dot, triangularise};
+use crate::householder::dot;
 use crate::least_squares::{Objective, Point, Problem};
+use crate::normal_triangle::triangle_of;
 
 /// A problem whose residuals and Jacobian are held whole.
 pub(crate) struct Dense<'a, P> {
@@ -75,22 +76,8 @@ impl<P: Problem> Dense<'_, P> {
         if let Some(index) = self.jacobian.iter().position(|value| !value.is_finite()) {
             return Err(CoreError::NotFinite { what: "the Jacobian", index });
         }
-        self.work.clear();
-        self.work.resize(m * (n + 1), 0.0);
-        for (row, entries) in self.jacobian.chunks_exact(n.max(1)).enumerate() {
-            for (column, &entry) in entries.iter().enumerate() {
-                self.work[column * m + row] = entry;
-            }
-        }
-        self.work[m * n..].copy_from_slice(&self.residuals);
-        triangularise(&mut self.work, m, n);
-        point.triangle.fill(0.0);
-        point.projected.fill(0.0);
-        let rows = n.min(m);
-        for j in 0..n {
-            point.triangle[j * n..j * n + rows].copy_from_slice(&self.work[j * m..j * m + rows]);
-        }
-        point.projected[..rows].copy_from_slice(&self.work[m * n..m * n + rows]);
+        let (triangle, projected) = (&mut point.triangle, &mut point.projected);
+        triangle_of(&self.jacobian, &self.residuals, n, &mut self.work, triangle, projected);
         Ok(())
     }
 }

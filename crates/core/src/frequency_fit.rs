@@ -33,6 +33,29 @@ pub trait ResponseModel {
         omega: f64,
         gradient: Option<&mut [Complex64]>,
     ) -> Complex64;
+    /// H(jω) of one response at several frequencies; the gradients of log H (n_omega × n_free) are
+    /// written where asked for.
+    fn responses(
+        &self,
+        response: usize,
+        omega: &[f64],
+        values: &mut [Complex64],
+        gradients: Option<&mut [Complex64]>,
+    ) {
+        match gradients {
+            Some(gradients) if self.n_free() > 0 => {
+                let rows = gradients.chunks_exact_mut(self.n_free());
+                for ((value, &each), row) in values.iter_mut().zip(omega).zip(rows) {
+                    *value = self.response(response, each, Some(row));
+                }
+            }
+            _ => {
+                for (value, &each) in values.iter_mut().zip(omega) {
+                    *value = self.response(response, each, None);
+                }
+            }
+        }
+    }
 }
 
 /// One measured response on the frequencies of the fit.
@@ -77,7 +100,8 @@ pub struct FrequencyFit<'a, M> {
     cost: &'a Cost,
     errors: Vec<f64>,
     slopes: Vec<f64>,
-    gradient: Vec<Complex64>,
+    values: Vec<Complex64>,
+    gradients: Vec<Complex64>,
 }
 
 impl<'a, M: ResponseModel> FrequencyFit<'a, M> {
@@ -108,8 +132,19 @@ impl<'a, M: ResponseModel> FrequencyFit<'a, M> {
             }
             same("whitened responses", next, data.len())?;
         }
-        let gradient = vec![Complex64::default(); model.n_free()];
-        Ok(Self { model, data, cost, errors: Vec::new(), slopes: Vec::new(), gradient })
+        let (errors, slopes) = (Vec::new(), Vec::new());
+        let most = data.iter().map(|each| each.omega.len()).max().unwrap_or(0);
+        let values = vec![Complex64::default(); most];
+        let gradients = vec![Complex64::default(); most * model.n_free()];
+        Ok(Self { model, data, cost, errors, slopes, values, gradients })
+    }
+
+    /// Values of one response at its frequencies, and gradients where wanted.
+    fn evaluate(&mut self, index: usize, with_gradient: bool) {
+        let omega = &self.data[index].omega;
+        let values = &mut self.values[..omega.len()];
+        let gradients = &mut self.gradients[..omega.len() * self.model.n_free()];
+        self.model.responses(index, omega, values, with_gradient.then_some(gradients));
     }
 
     fn decibel_phase(&mut self, residuals: Option<&mut [f64]>, jacobian: Option<&mut [f64]>) {
@@ -117,20 +152,20 @@ impl<'a, M: ResponseModel> FrequencyFit<'a, M> {
         let mut residuals = residuals.unwrap_or_default().chunks_exact_mut(2);
         let mut jacobian = jacobian.unwrap_or_default().chunks_exact_mut((2 * n).max(1));
         for (index, each) in self.data.iter().enumerate() {
+            self.evaluate(index, jacobian.len() > 0);
             for k in 0..each.omega.len() {
-                let rows = jacobian.next();
-                let gradient = rows.is_some().then_some(self.gradient.as_mut_slice());
-                let ratio = self.model.response(index, each.omega[k], gradient) / each.response[k];
+                let ratio = self.values[k] / each.response[k];
                 let (db, deg) = (each.weight_db[k] * DECIBEL, each.weight_deg[k] * DEGREE);
                 if let Some(pair) = residuals.next() {
                     // The angle of the ratio is the phase difference, already wrapped to ±180°.
                     pair[0] = db * ratio.norm().ln();
                     pair[1] = deg * ratio.arg();
                 }
-                if let Some(rows) = rows {
-                    for (column, slope) in self.gradient.iter().enumerate() {
-                        rows[column] = db * slope.re;
-                        rows[n + column] = deg * slope.im;
+                if let Some(rows) = jacobian.next() {
+                    let (above, below) = rows.split_at_mut(n);
+                    let slopes = &self.gradients[k * n..(k + 1) * n];
+                    for ((gain, phase), slope) in above.iter_mut().zip(below).zip(slopes) {
+                        (*gain, *phase) = (db * slope.re, deg * slope.im);
                     }
                 }
             }
@@ -152,13 +187,14 @@ impl<'a, M: ResponseModel> FrequencyFit<'a, M> {
         self.slopes.resize(2 * half * n, 0.0);
         let mut place = 0;
         for (offset, each) in data.iter().enumerate() {
+            self.evaluate(run.first + offset, wants_slopes);
             for k in 0..each.omega.len() {
-                let gradient = wants_slopes.then_some(self.gradient.as_mut_slice());
-                let value = self.model.response(run.first + offset, each.omega[k], gradient);
+                let value = self.values[k];
                 let error = value - each.response[k];
                 (self.errors[place], self.errors[half + place]) = (error.re, error.im);
                 if wants_slopes {
-                    for (column, slope) in self.gradient.iter().enumerate() {
+                    let gradient = &self.gradients[k * n..(k + 1) * n];
+                    for (column, slope) in gradient.iter().enumerate() {
                         let slope = value * slope;
                         self.slopes[place * n + column] = slope.re;
                         self.slopes[(half + place) * n + column] = slope.im;

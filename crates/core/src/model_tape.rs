@@ -46,6 +46,7 @@ pub struct ModelTape {
     n_states: usize,
     n_inputs: usize,
     n_outputs: usize,
+    bilinear: bool,
 }
 
 /// A model linearised at a point.
@@ -109,7 +110,8 @@ impl ModelTape {
             .map(|(name, formula)| Ok((name.clone(), parse(formula)?)))
             .collect::<Result<_, CoreError>>()?;
         let tape = Tape::compile_with(&expressions, &names, &definitions, &text.tables)?;
-        Ok(Self { tape, n_states: n, n_inputs: m, n_outputs: text.outputs.len() })
+        let bilinear = tape.is_quadratic();
+        Ok(Self { tape, n_states: n, n_inputs: m, n_outputs: text.outputs.len(), bilinear })
     }
 
     /// Equations, outputs and delays as one tape of ẋ, x, u and the parameters.
@@ -145,6 +147,12 @@ impl ModelTape {
     /// Equations and outputs.
     pub fn height(&self) -> usize {
         self.n_states + self.n_outputs
+    }
+
+    /// Whether all second derivatives are constants, as those of linear models are whose entries
+    /// are parameters or sums of them.
+    pub fn is_bilinear(&self) -> bool {
+        self.bilinear
     }
 
     pub(crate) fn joined(&self, point: &[f64], parameters: &[f64]) -> Result<Vec<f64>, CoreError> {

@@ -4,21 +4,23 @@
 //! H(jω) = {[H₀ + jω H₁] [jωM − F]⁻¹ G + D} e^{−jωτ}. With X = [jωM − F]⁻¹ G and the adjoint
 //! Λ = [jωM − F]⁻ᵀ [H₀ + jω H₁]ᵀ the derivative of each pair is a sum over those few entries of the
 //! matrices that depend on a parameter: one factorisation for each frequency serves all pairs.
+//! Pivots and fill of the sparse matrix are planned once; eight frequencies are worked on at a time.
 
 use num_complex::Complex64;
 
 use crate::complex_lu::ComplexLu;
 use crate::error::CoreError;
 use crate::frequency_fit::ResponseModel;
+use crate::lanes::{LANES, Lanes};
 use crate::model_tape::{Linearisation, ModelTape, Sensitivity};
+use crate::sparse_lu::{Factors, Plan};
 
-/// States and adjoints at one frequency.
+/// How eight frequencies were factored.
 #[derive(Debug, Clone)]
-struct Solved {
-    /// X, n_inputs × n_states.
-    states: Vec<Complex64>,
-    /// Λ, n_outputs × n_states.
-    adjoints: Vec<Complex64>,
+enum Block {
+    Planned(Factors),
+    /// One by one with pivots of their own, where the plan's do not serve.
+    Pivoted(Vec<ComplexLu>),
 }
 
 /// A state-space model seen by a fit: some parameters vary, the others stay.
@@ -30,12 +32,32 @@ pub struct FreeStateSpace<'a> {
     point: &'a [f64],
     values: Vec<f64>,
     free: Vec<usize>,
+    /// Inputs and outputs that a pair has.
+    inputs: Vec<usize>,
+    outputs: Vec<usize>,
     /// Frequencies to be solved in advance, ascending.
     omega: Vec<f64>,
     linear: Linearisation,
     sensitivities: Vec<Sensitivity>,
     delay_slopes: Vec<f64>,
-    solved: Vec<Solved>,
+    plan: Option<Plan>,
+    blocks: Vec<Block>,
+    /// Free parameters for which `states` hold, and whether the adjoints hold too.
+    solved_at: Option<Vec<f64>>,
+    has_adjoints: bool,
+    /// X and Λ at each frequency: frequency, input or output, state.
+    states: Vec<Complex64>,
+    adjoints: Vec<Complex64>,
+    right: Vec<Lanes>,
+    solution: Vec<Lanes>,
+}
+
+/// Places of the distinct values of one part of the pairs.
+fn used(values: impl Iterator<Item = usize>) -> Vec<usize> {
+    let mut found: Vec<usize> = values.collect();
+    found.sort_unstable();
+    found.dedup();
+    found
 }
 
 impl<'a> FreeStateSpace<'a> {
@@ -71,69 +93,248 @@ impl<'a> FreeStateSpace<'a> {
             point,
             values: values.to_vec(),
             free: free.to_vec(),
+            inputs: used(pairs.iter().map(|pair| pair.1)),
+            outputs: used(pairs.iter().map(|pair| pair.0)),
             omega,
             linear: tape.linearise(point, values)?,
             sensitivities: Vec::new(),
             delay_slopes: Vec::new(),
-            solved: Vec::new(),
+            plan: None,
+            blocks: Vec::new(),
+            solved_at: None,
+            has_adjoints: false,
+            states: Vec::new(),
+            adjoints: Vec::new(),
+            right: vec![Lanes::ZERO; tape.n_states()],
+            solution: vec![Lanes::ZERO; tape.n_states()],
         })
     }
 
-    /// Entry of ∂(r, y)/∂z, derivative and state together: jω ∂/∂ẋ + ∂/∂x.
-    fn dynamic(&self, row: usize, state: usize, s: Complex64) -> Complex64 {
+    /// Entries of ∂(r, y)/∂z, of derivative and of state.
+    fn entry(&self, row: usize, state: usize) -> (f64, f64) {
         let start = row * self.tape.width() + state;
-        s * self.linear.slopes[start] + self.linear.slopes[start + self.tape.n_states()]
+        (self.linear.slopes[start], self.linear.slopes[start + self.tape.n_states()])
     }
 
-    fn solve(&self, omega: f64) -> Result<Solved, CoreError> {
-        let (n, m, p) = (self.tape.n_states(), self.tape.n_inputs(), self.tape.n_outputs());
-        let s = Complex64::new(0.0, omega);
-        let matrix = (0..n * n).map(|place| self.dynamic(place / n, place % n, s)).collect();
-        let factors = ComplexLu::new(matrix, n)?;
-        let slopes = &self.linear.slopes;
-        // The rows hold left − right: ∂r/∂u is −G.
-        let input = |place: usize| -slopes[(place % n) * self.tape.width() + 2 * n + place / n];
-        let mut states: Vec<_> = (0..m * n).map(|k| Complex64::new(input(k), 0.0)).collect();
-        let mut adjoints: Vec<_> = (0..p * n).map(|k| self.dynamic(n + k / n, k % n, s)).collect();
-        states.chunks_exact_mut(n).for_each(|column| factors.solve(column));
-        adjoints.chunks_exact_mut(n).for_each(|row| factors.solve_transposed(row));
-        Ok(Solved { states, adjoints })
+    /// Both together at one frequency: jω ∂/∂ẋ + ∂/∂x.
+    fn dynamic(&self, row: usize, state: usize, omega: f64) -> Complex64 {
+        let (rate, value) = self.entry(row, state);
+        Complex64::new(value, omega * rate)
     }
 
-    /// H without delay, and its derivatives added to `gradient`.
-    fn undelayed(
-        &self,
-        pair: (usize, usize),
-        s: Complex64,
-        solved: &Solved,
-        gradient: Option<&mut [Complex64]>,
-    ) -> Complex64 {
-        let (output, input) = pair;
-        let (n, width) = (self.tape.n_states(), self.tape.width());
-        let states = &solved.states[input * n..(input + 1) * n];
-        let adjoint = &solved.adjoints[output * n..(output + 1) * n];
-        let row = n + output;
-        let through = self.linear.slopes[row * width + 2 * n + input];
-        let value = (0..n).map(|k| self.dynamic(row, k, s) * states[k]).sum::<Complex64>();
-        if let Some(gradient) = gradient {
-            for each in &self.sensitivities {
-                let outer = if each.row < n {
-                    -adjoint[each.row]
-                } else if each.row == row {
-                    Complex64::new(1.0, 0.0)
-                } else {
-                    continue;
-                };
-                let inner = match each.column {
-                    column if column < n => s * states[column],
-                    column if column < 2 * n => states[column - n],
-                    column if column == 2 * n + input => Complex64::new(1.0, 0.0),
-                    _ => continue,
-                };
-                gradient[each.parameter] += outer * inner * each.value;
+    /// The rows hold left − right: ∂r/∂u is −G.
+    fn forcing(&self, state: usize, input: usize) -> f64 {
+        -self.linear.slopes[state * self.tape.width() + 2 * self.tape.n_states() + input]
+    }
+
+    /// Frequencies of a block; the last is repeated where there are no more.
+    fn frequencies(&self, block: usize) -> [f64; LANES] {
+        let last = self.omega.len() - 1;
+        std::array::from_fn(|lane| self.omega[(block * LANES + lane).min(last)])
+    }
+
+    /// A plan that holds every entry of jωM − F that is not zero now.
+    fn update_plan(&mut self) {
+        let n = self.tape.n_states();
+        let is_used = |row: usize, column: usize| self.entry(row, column) != (0.0, 0.0);
+        let mut known = vec![false; n * n];
+        if let Some(plan) = &self.plan {
+            plan.entries().iter().for_each(|&(row, column)| known[row * n + column] = true);
+            if (0..n * n).all(|k| known[k] || !is_used(k / n, k % n)) {
+                return;
             }
         }
-        value + through
+        let entries: Vec<(usize, usize)> = (0..n * n)
+            .filter(|&k| known[k] || is_used(k / n, k % n))
+            .map(|k| (k / n, k % n))
+            .collect();
+        let middle = self.omega[self.omega.len() / 2];
+        let typical: Vec<Complex64> =
+            entries.iter().map(|&(row, column)| self.dynamic(row, column, middle)).collect();
+        self.plan = Plan::new(n, &entries, &typical);
+    }
+
+    fn factor(&self, block: usize, reused: Option<Block>) -> Result<Block, CoreError> {
+        let omega = self.frequencies(block);
+        if let Some(plan) = &self.plan {
+            let mut factors = match reused {
+                Some(Block::Planned(factors)) => factors,
+                _ => Factors::default(),
+            };
+            let entry = |row: usize, column: usize| {
+                let (rate, value) = self.entry(row, column);
+                Lanes::along(value, rate, &omega)
+            };
+            if plan.factor(entry, &mut factors) {
+                return Ok(Block::Planned(factors));
+            }
+        }
+        omega.iter().map(|&each| self.pivoted(each)).collect::<Result<_, _>>().map(Block::Pivoted)
+    }
+
+    fn pivoted(&self, omega: f64) -> Result<ComplexLu, CoreError> {
+        let n = self.tape.n_states();
+        ComplexLu::new((0..n * n).map(|k| self.dynamic(k / n, k % n, omega)).collect(), n)
+    }
+
+    /// Solve for the right side in `right`, transposed or not, into `solution`.
+    fn back_solve(&mut self, block: usize, transposed: bool) {
+        let (right, solution) = (&mut self.right, &mut self.solution);
+        match (&self.blocks[block], &self.plan) {
+            (Block::Planned(factors), Some(plan)) if transposed => {
+                plan.solve_transposed(factors, right, solution);
+            }
+            (Block::Planned(factors), Some(plan)) => plan.solve(factors, right, solution),
+            (Block::Pivoted(each), _) => {
+                for (lane, factors) in each.iter().enumerate() {
+                    let mut one: Vec<Complex64> = right.iter().map(|v| v.get(lane)).collect();
+                    if transposed {
+                        factors.solve_transposed(&mut one);
+                    } else {
+                        factors.solve(&mut one);
+                    }
+                    solution.iter_mut().zip(one).for_each(|(out, v)| out.set(lane, v));
+                }
+            }
+            (Block::Planned(_), None) => {}
+        }
+    }
+
+    fn solve_states(&mut self) -> Result<(), CoreError> {
+        let (n, m) = (self.tape.n_states(), self.inputs.len());
+        self.has_adjoints = false;
+        if self.omega.is_empty() {
+            return Ok(());
+        }
+        self.update_plan();
+        let mut old = std::mem::take(&mut self.blocks).into_iter();
+        for block in 0..self.omega.len().div_ceil(LANES) {
+            let made = self.factor(block, old.next())?;
+            self.blocks.push(made);
+        }
+        self.states.resize(self.omega.len() * m * n, Complex64::default());
+        for block in 0..self.blocks.len() {
+            for column in 0..m {
+                for state in 0..n {
+                    self.right[state] = Lanes::real(self.forcing(state, self.inputs[column]));
+                }
+                self.back_solve(block, false);
+                let first = block * LANES;
+                for (lane, place) in (first..self.omega.len().min(first + LANES)).enumerate() {
+                    let out = &mut self.states[(place * m + column) * n..][..n];
+                    out.iter_mut().zip(&self.solution).for_each(|(to, v)| *to = v.get(lane));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn solve_adjoints(&mut self) {
+        let (n, p) = (self.tape.n_states(), self.outputs.len());
+        self.adjoints.resize(self.omega.len() * p * n, Complex64::default());
+        for block in 0..self.blocks.len() {
+            let omega = self.frequencies(block);
+            for row in 0..p {
+                for state in 0..n {
+                    let (rate, value) = self.entry(n + self.outputs[row], state);
+                    self.right[state] = Lanes::along(value, rate, &omega);
+                }
+                self.back_solve(block, true);
+                let first = block * LANES;
+                for (lane, place) in (first..self.omega.len().min(first + LANES)).enumerate() {
+                    let out = &mut self.adjoints[(place * p + row) * n..][..n];
+                    out.iter_mut().zip(&self.solution).for_each(|(to, v)| *to = v.get(lane));
+                }
+            }
+        }
+        self.has_adjoints = true;
+    }
+
+    /// Place of an input or output among those that pairs have.
+    fn place(list: &[usize], wanted: usize) -> usize {
+        list.partition_point(|&each| each < wanted)
+    }
+
+    /// Responses at up to eight frequencies that were solved in advance, and derivatives of log H.
+    fn eight(
+        &self,
+        pair: (usize, usize),
+        places: &[usize],
+        gradient: Option<&mut [Lanes]>,
+    ) -> Lanes {
+        let (output, input) = pair;
+        let (n, width) = (self.tape.n_states(), self.tape.width());
+        let row = n + output;
+        let at = |lane: usize| places[lane.min(places.len() - 1)];
+        let omega: [f64; LANES] = std::array::from_fn(|lane| self.omega[at(lane)]);
+        let gather = |from: &[Complex64], count: usize, which: usize| -> Vec<Lanes> {
+            let mut found = vec![Lanes::ZERO; n];
+            for lane in 0..LANES {
+                let start = (at(lane) * count + which) * n;
+                found.iter_mut().zip(&from[start..start + n]).for_each(|(to, &v)| to.set(lane, v));
+            }
+            found
+        };
+        let states = gather(&self.states, self.inputs.len(), Self::place(&self.inputs, input));
+        let mut value = Lanes::real(self.linear.slopes[row * width + 2 * n + input]);
+        for (state, solved) in states.iter().enumerate() {
+            let (rate, plain) = self.entry(row, state);
+            if (rate, plain) != (0.0, 0.0) {
+                value.add_product(&Lanes::along(plain, rate, &omega), solved);
+            }
+        }
+        if let Some(gradient) = gradient {
+            let mut adjoints =
+                gather(&self.adjoints, self.outputs.len(), Self::place(&self.outputs, output));
+            let inverse = value.inverse();
+            adjoints.iter_mut().for_each(|each| *each = each.times(&inverse));
+            self.add_entries(pair, &omega, &states, &adjoints, &inverse, gradient);
+        }
+        let late = self.linear.values[self.tape.height() + input];
+        if late == 0.0 {
+            return value;
+        }
+        let mut turn = Lanes::ZERO;
+        (0..LANES).for_each(|lane| turn.set(lane, Complex64::cis(-omega[lane] * late)));
+        value.times(&turn)
+    }
+
+    /// Derivatives of log H: one term for each entry of the matrices that depends on a parameter.
+    fn add_entries(
+        &self,
+        (output, input): (usize, usize),
+        omega: &[f64; LANES],
+        states: &[Lanes],
+        adjoints: &[Lanes],
+        inverse: &Lanes,
+        gradient: &mut [Lanes],
+    ) {
+        let n = states.len();
+        let rates: Vec<Lanes> =
+            states.iter().map(|each| each.times(&Lanes::along(0.0, 1.0, omega))).collect();
+        gradient.fill(Lanes::ZERO);
+        for each in &self.sensitivities {
+            let (outer, sign) = if each.row < n {
+                (&adjoints[each.row], -each.value)
+            } else if each.row == n + output {
+                (inverse, each.value)
+            } else {
+                continue;
+            };
+            let slope = &mut gradient[each.parameter];
+            match each.column {
+                column if column < n => slope.add_scaled(sign, &outer.times(&rates[column])),
+                column if column < 2 * n => {
+                    slope.add_scaled(sign, &outer.times(&states[column - n]));
+                }
+                column if column == 2 * n + input => slope.add_scaled(sign, outer),
+                _ => {}
+            }
+        }
+        let n_free = self.free.len();
+        for (slope, late) in gradient.iter_mut().zip(&self.delay_slopes[input * n_free..]) {
+            (0..LANES).for_each(|lane| slope.im[lane] -= omega[lane] * late);
+        }
     }
 }
 
@@ -147,17 +348,23 @@ impl ResponseModel for FreeStateSpace<'_> {
     }
 
     fn prepare(&mut self, free: &[f64], with_gradient: bool) -> Result<(), CoreError> {
-        for (&place, &value) in self.free.iter().zip(free) {
-            self.values[place] = value;
+        if self.solved_at.as_deref() != Some(free) {
+            self.solved_at = None;
+            for (&place, &value) in self.free.iter().zip(free) {
+                self.values[place] = value;
+            }
+            self.linear = self.tape.linearise(self.point, &self.values)?;
+            self.solve_states()?;
+            self.solved_at = Some(free.to_vec());
         }
-        self.linear = self.tape.linearise(self.point, &self.values)?;
-        if with_gradient {
+        if with_gradient && !self.has_adjoints {
             let (point, values) = (self.point, &self.values);
-            self.sensitivities = self.tape.sensitivities(point, values, &self.free)?;
+            if self.sensitivities.is_empty() || !self.tape.is_bilinear() {
+                self.sensitivities = self.tape.sensitivities(point, values, &self.free)?;
+            }
             self.delay_slopes = self.tape.delay_slopes(point, values, &self.free)?;
+            self.solve_adjoints();
         }
-        let solved = self.omega.iter().map(|&omega| self.solve(omega)).collect::<Result<_, _>>()?;
-        self.solved = solved;
         Ok(())
     }
 
@@ -165,30 +372,40 @@ impl ResponseModel for FreeStateSpace<'_> {
         &self,
         response: usize,
         omega: f64,
-        mut gradient: Option<&mut [Complex64]>,
+        gradient: Option<&mut [Complex64]>,
     ) -> Complex64 {
-        let pair = self.pairs[response];
-        let s = Complex64::new(0.0, omega);
-        if let Some(gradient) = gradient.as_deref_mut() {
-            gradient.fill(Complex64::default());
-        }
-        let known = self.omega.binary_search_by(|each| each.total_cmp(&omega)).ok();
-        let value = match known.and_then(|place| self.solved.get(place)) {
-            Some(solved) => self.undelayed(pair, s, solved, gradient.as_deref_mut()),
-            None => match self.solve(omega) {
-                Ok(solved) => self.undelayed(pair, s, &solved, gradient.as_deref_mut()),
-                Err(_) => return Complex64::new(f64::NAN, f64::NAN),
-            },
-        };
+        let mut value = [Complex64::default()];
+        self.responses(response, &[omega], &mut value, gradient);
+        value[0]
+    }
+
+    fn responses(
+        &self,
+        response: usize,
+        omega: &[f64],
+        values: &mut [Complex64],
+        mut gradients: Option<&mut [Complex64]>,
+    ) {
         let n_free = self.free.len();
-        if let Some(gradient) = gradient {
-            let delays = &self.delay_slopes[pair.1 * n_free..(pair.1 + 1) * n_free];
-            for (entry, delay) in gradient.iter_mut().zip(delays) {
-                *entry = *entry / value - s * delay;
+        let mut slopes = vec![Lanes::ZERO; n_free];
+        for (chunk, frequencies) in omega.chunks(LANES).enumerate() {
+            let find = |each: &f64| self.omega.binary_search_by(|known| known.total_cmp(each));
+            let places: Result<Vec<usize>, usize> = frequencies.iter().map(find).collect();
+            let Ok(places) = places else {
+                values.fill(Complex64::new(f64::NAN, f64::NAN));
+                return;
+            };
+            let wanted = gradients.is_some().then_some(slopes.as_mut_slice());
+            let found = self.eight(self.pairs[response], &places, wanted);
+            for lane in 0..places.len() {
+                let place = chunk * LANES + lane;
+                values[place] = found.get(lane);
+                if let Some(gradients) = gradients.as_deref_mut() {
+                    let row = &mut gradients[place * n_free..(place + 1) * n_free];
+                    row.iter_mut().zip(&slopes).for_each(|(to, slope)| *to = slope.get(lane));
+                }
             }
         }
-        let delay = self.linear.values[self.tape.height() + pair.1];
-        value * Complex64::cis(-omega * delay)
     }
 }
 
@@ -208,7 +425,8 @@ mod tests {
     #[test]
     fn value_is_the_formula() {
         let tape = example();
-        let mut model = FreeStateSpace::new(&tape, &PAIRS, &[0.0; 5], &VALUES, &[], [7.0]).unwrap();
+        let mut model =
+            FreeStateSpace::new(&tape, &PAIRS, &[0.0; 5], &VALUES, &[], [7.0, 3.0]).unwrap();
         model.prepare(&[], false).unwrap();
         for omega in [7.0, 3.0] {
             let s = Complex64::new(0.0, omega);
@@ -225,7 +443,8 @@ mod tests {
     fn gradient_of_log_matches_differences() {
         let tape = example();
         let free = [3, 0, 1, 2];
-        let make = || FreeStateSpace::new(&tape, &PAIRS, &[0.0; 5], &VALUES, &free, [7.0]).unwrap();
+        let make =
+            || FreeStateSpace::new(&tape, &PAIRS, &[0.0; 5], &VALUES, &free, [7.0, 2.0]).unwrap();
         let start = free.map(|place| VALUES[place]);
         let mut model = make();
         model.prepare(&start, true).unwrap();

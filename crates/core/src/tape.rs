@@ -118,6 +118,27 @@ impl Tape {
         self.n_inputs
     }
 
+    /// Whether every expression is a polynomial of degree two at most in all inputs together, so
+    /// that its second derivatives are constants.
+    pub fn is_quadratic(&self) -> bool {
+        let mut degrees: Vec<usize> = Vec::with_capacity(self.operations.len());
+        for operation in &self.operations {
+            let degree = match *operation {
+                Operation::Constant(_) => 0,
+                Operation::Input(_) => 1,
+                Operation::Unary(Unary::Negate, a) => degrees[a],
+                Operation::Binary(Binary::Add | Binary::Subtract, a, b) => {
+                    degrees[a].max(degrees[b])
+                }
+                Operation::Binary(Binary::Multiply, a, b) => degrees[a] + degrees[b],
+                Operation::Binary(Binary::Divide, a, b) if degrees[b] == 0 => degrees[a],
+                _ => usize::MAX / 4,
+            };
+            degrees.push(degree.min(usize::MAX / 4));
+        }
+        self.outputs.iter().all(|&place| degrees[place] <= 2)
+    }
+
     /// Evaluate on any scalar; `registers` is scratch.
     pub fn run<T: Scalar>(&self, inputs: &[T], registers: &mut Vec<T>, outputs: &mut [T]) {
         registers.clear();

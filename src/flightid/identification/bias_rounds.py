@@ -63,6 +63,9 @@ class BiasRounds:
         Largest move of a parameter in the last round, in standard errors.
     reason : str
         Why nothing was corrected; empty where it was.
+    contraction : float
+        Move of the second round over that of the first: how much the correction itself
+        follows the parameters.
     """
 
     model: Model
@@ -70,6 +73,7 @@ class BiasRounds:
     rounds: int
     move: float
     reason: str = ""
+    contraction: float = 0.0
 
     @property
     def applied(self) -> bool:
@@ -113,6 +117,7 @@ def iterate(
         return BiasRounds(first, data, 0, 0.0, reason)
     model, corrected, move, rounds = first, data, np.inf, 0
     moved, before = first, None
+    moves: list[float] = []
     try:
         while move > ENOUGH and rounds < MOST_ROUNDS:
             corrected = remove_bias(model, data, hold)
@@ -120,12 +125,15 @@ def iterate(
             move, rounds = _move(model, moved, scales), rounds + 1
             here = (_scaled(model, scales), _scaled(moved, scales))
             model, before = _ahead(moved, before, here, scales), here
+            moves.append(move)
     except (DataError, ModelError, FitError, SingularError) as error:
         return BiasRounds(first, data, rounds, move, str(error))
     if move > TOLERABLE:
         reason = f"the rounds did not settle: {move:.2g} standard errors in the last of {rounds}"
         return BiasRounds(first, data, rounds, move, reason)
-    return BiasRounds(moved, corrected, rounds, move)
+    # The first two rounds are plain: later ones are led ahead of what they would have done.
+    contraction = moves[1] / moves[0] if len(moves) > 1 else 0.0
+    return BiasRounds(moved, corrected, rounds, move, contraction=contraction)
 
 
 def _scaled(model: Model, scales: Mapping[str, float]) -> Array:

@@ -54,8 +54,12 @@ def statistics(
     end: DenseEnd,
     *,
     sensitivity: Array | None,
+    following: Array | None = None,
 ) -> Statistics:
     """Standard errors, bounds and correlations at the end of a search.
+
+    `following` holds the derivatives of the data by the free parameters, where a correction makes
+    the data follow them.
 
     Raises
     ------
@@ -69,7 +73,8 @@ def statistics(
     require_identifiable(names, jacobian)
     covariance = None
     if sensitivity is not None and names:
-        covariance = propagate(jacobian, sensitivity, errors.covariance)
+        total = None if following is None else jacobian + sensitivity @ following[:, inner]
+        covariance = propagate(jacobian, sensitivity, errors.covariance, total=total)
     weighted = coherence_jacobian(fitted, selected)[:, inner]
     correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
     parameters = fitted_parameters(fitted, names, covariance, weighted)

@@ -22,6 +22,7 @@ from flightid.identification.bias_rounds import (
     provenance,
     sizes,
 )
+from flightid.identification.bias_statistics import errors_after, points_follow
 from flightid.identification.error_model import (
     ErrorModel,
     coherence_sensitivity,
@@ -29,7 +30,6 @@ from flightid.identification.error_model import (
     whitening,
 )
 from flightid.identification.estimates import Statistics, statistics
-from flightid.identification.estimator_bias import errors_without_bias
 from flightid.identification.fit import Fit, FittedResponse
 from flightid.identification.fit_findings import (
     judge_correlation,
@@ -102,7 +102,7 @@ def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fi
         done = _without_bias(fitted, data, errors, found, options)
         after = _select(model, done.data, options)
         if done.applied:
-            errors = _errors_without_bias(done, data, after, options) or errors
+            errors = errors_after(done, data, after, options.hold) or errors
         changes = sizes(selected, after, errors) if done.applied else {}
         setup += judge_bias(done, changes)
         correction = provenance(done, changes, options.hold)
@@ -110,7 +110,8 @@ def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fi
             best = _minimise(done.model, after, errors, replace(options, starts=1))[0]
             groups[0] = [best, *groups[0][1:]]
             selected, fitted = after, _at(model, best)
-            found = _statistics(fitted, selected, errors, best, options)
+            following = points_follow(done, fitted, data, selected, errors, options.hold)
+            found = _statistics(fitted, selected, errors, best, options, following)
     responses = _compare(fitted, selected)
     fit = _assemble(fitted, options, data, groups, responses, found, setup)
     return replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
@@ -139,9 +140,10 @@ def _statistics(
     errors: ErrorModel,
     end: DenseEnd,
     options: Options,
+    following: Array | None = None,
 ) -> Statistics:
     sensitivity = _sensitivity(fitted, selected, errors, options)
-    return statistics(fitted, selected, errors, end, sensitivity=sensitivity)
+    return statistics(fitted, selected, errors, end, sensitivity=sensitivity, following=following)
 
 
 def _without_bias(
@@ -159,16 +161,6 @@ def _without_bias(
 
     scales = {p.name: p.stderr for p in found.parameters.values() if p.stderr}
     return iterate(fitted, data, scales, refit, options.hold)
-
-
-def _errors_without_bias(
-    done: BiasRounds,
-    data: FrequencyResponse,
-    after: Sequence[SelectedResponse],
-    options: Options,
-) -> ErrorModel | None:
-    found = errors_without_bias(done.model, data, options.hold)
-    return None if found is None else error_model(replace(done.data, errors=found), after)
 
 
 def _check_model(model: Model, data: FrequencyResponse) -> None:

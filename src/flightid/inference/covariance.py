@@ -18,7 +18,9 @@ _DECIBEL = 20.0 / np.log(10.0)
 _DEGREE = 180.0 / np.pi
 
 
-def propagate(jacobian: Array, sensitivity: Array, covariance: Array) -> Array:
+def propagate(
+    jacobian: Array, sensitivity: Array, covariance: Array, *, total: Array | None = None
+) -> Array:
     """Covariance of the estimates from that of the data (a sandwich).
 
     Parameters
@@ -29,11 +31,14 @@ def propagate(jacobian: Array, sensitivity: Array, covariance: Array) -> Array:
         Derivatives B of the weighted residuals with respect to the data.
     covariance : ndarray, shape (n_data, n_data)
         Covariance Σ of the data's errors.
+    total : ndarray, shape (n_residuals, n_parameters), optional
+        Derivatives T of the residuals where the data follow the parameters too, as a corrected
+        response does that is fitted again and again; default: J.
 
     Returns
     -------
     ndarray, shape (n_parameters, n_parameters)
-        A Σ Aᵀ with A = (JᵀJ)⁻¹ JᵀB.
+        A Σ Aᵀ with A = (JᵀT)⁻¹ JᵀB.
 
     Raises
     ------
@@ -62,7 +67,8 @@ def propagate(jacobian: Array, sensitivity: Array, covariance: Array) -> Array:
     diagonal = np.abs(np.diag(triangle))
     if np.any(diagonal <= 1e-14 * diagonal.max(initial=0.0)):
         raise SingularError("the Hessian of the cost is singular to working precision")
-    gain = np.linalg.solve(triangle, q.T @ sensitivity) / scale[:, None]
+    moved = triangle if total is None else q.T @ (total / scale)
+    gain = np.linalg.solve(moved, q.T @ sensitivity) / scale[:, None]
     result = gain @ covariance @ gain.T
     return np.asarray(0.5 * (result + result.T))
 
