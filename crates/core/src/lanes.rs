@@ -48,11 +48,7 @@ impl Lanes {
     /// a + jωb with real a and b.
     #[inline(always)]
     pub fn along(a: f64, b: f64, omega: &[f64; LANES]) -> Self {
-        let mut result = Self::real(a);
-        for k in 0..LANES {
-            result.im[k] = b * omega[k];
-        }
-        result
+        Self { re: [a; LANES], im: omega.map(|each| b * each) }
     }
 
     /// Add a · b.

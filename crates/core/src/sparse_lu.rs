@@ -6,6 +6,7 @@
 
 use num_complex::Complex64;
 
+use crate::complex_lu::ComplexLu;
 use crate::lanes::Lanes;
 
 /// Smallest share of the largest entry of its column that a pivot may have when it is planned.
@@ -41,6 +42,45 @@ struct Step {
 pub struct Factors {
     slots: Vec<Lanes>,
     inverses: Vec<Lanes>,
+}
+
+/// How the frequencies of one set of lanes were factored.
+#[derive(Debug, Clone)]
+pub enum Block {
+    /// With the planned pivots.
+    Planned(Factors),
+    /// One by one with pivots of their own, where the plan's do not serve.
+    Pivoted(Vec<ComplexLu>),
+}
+
+impl Block {
+    /// Solve for a right side, transposed or not; it is overwritten. `plan` is the one that factored.
+    pub fn solve(
+        &self,
+        plan: Option<&Plan>,
+        right: &mut [Lanes],
+        solution: &mut [Lanes],
+        transposed: bool,
+    ) {
+        match (self, plan) {
+            (Self::Planned(factors), Some(plan)) if transposed => {
+                plan.solve_transposed(factors, right, solution);
+            }
+            (Self::Planned(factors), Some(plan)) => plan.solve(factors, right, solution),
+            (Self::Pivoted(each), _) => {
+                for (lane, factors) in each.iter().enumerate() {
+                    let mut one: Vec<Complex64> = right.iter().map(|v| v.get(lane)).collect();
+                    if transposed {
+                        factors.solve_transposed(&mut one);
+                    } else {
+                        factors.solve(&mut one);
+                    }
+                    solution.iter_mut().zip(one).for_each(|(out, v)| out.set(lane, v));
+                }
+            }
+            (Self::Planned(_), None) => {}
+        }
+    }
 }
 
 fn size(value: Complex64) -> f64 {
@@ -210,7 +250,6 @@ fn choose(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::complex_lu::ComplexLu;
     use crate::lanes::LANES;
     use proptest::prelude::*;
 

@@ -39,7 +39,8 @@ from flightid.identification.fit_findings import (
     judge_search,
 )
 from flightid.identification.model_outputs import HOLDS
-from flightid.identification.multistart import DenseEnd, cluster, collect, draw_starts, local_minima
+from flightid.identification.multistart import DenseEnd, cluster, local_minima
+from flightid.identification.search import minimise
 from flightid.identification.selection import Bands, SelectedResponse, select_points
 from flightid.identification.setup_checks import check_setup
 from flightid.models import Model
@@ -208,22 +209,15 @@ def _minimise(
     errors: ErrorModel,
     options: Options,
 ) -> list[DenseEnd]:
-    free = model.parameters.free
-    measured = [
-        (each.omega_rad_s, each.response, np.sqrt(each.weight_db), np.sqrt(each.weight_deg))
-        for each in selected
-    ]
-    found = model.native.fit(
-        model.parameters.independent_values(),
-        model.parameters.free_indices,
-        measured,
-        whitening(errors) if options.cost == "likelihood" else [],
-        draw_starts(free, options.starts, options.seed),
-        np.array([parameter.minimum for parameter in free]),
-        np.array([parameter.maximum for parameter in free]),
-        options.maximum_iterations,
+    return minimise(
+        model,
+        selected,
+        errors,
+        starts=options.starts,
+        seed=options.seed,
+        cost=options.cost,
+        maximum_iterations=options.maximum_iterations,
     )
-    return collect([each if isinstance(each, str) else DenseEnd.of_native(each) for each in found])
 
 
 def _sensitivity(

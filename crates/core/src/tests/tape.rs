@@ -136,3 +136,14 @@ fn tables_are_called_by_name() {
     let compiled = Tape::compile_with(&[unknown], &names, &BTreeMap::new(), &tables);
     assert!(matches!(compiled, Err(CoreError::UnknownName { .. })));
 }
+
+#[test]
+fn quadratic_is_what_has_constant_second_derivatives() {
+    let names = ["a", "b", "c"];
+    for text in ["a*b - 2*(b + c)/3", "-(a + b)*(a - c)", "7", "a^2*0 + b"] {
+        assert_eq!(tape(&[text], &names).is_quadratic(), !text.contains('^'), "{text}");
+    }
+    for text in ["a*b*c", "a/b", "sin(a)", "b + a*(b*c - 1)", "max(a, b)"] {
+        assert!(!tape(&["a", text], &names).is_quadratic(), "{text}");
+    }
+}
