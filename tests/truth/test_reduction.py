@@ -214,7 +214,7 @@ def test_refusals(fit: fid.Fit, data: fid.FrequencyResponse) -> None:
         fid.reduce(fit, data, maximum_correlation=0.0)
     with pytest.raises(UnknownNameError, match="no such parameter"):
         fid.reduce(fit, data, keep=["Lq"])
-    with pytest.raises(OptionError, match="identify has no such option"):
+    with pytest.raises(OptionError, match="this fit has no such option"):
         fid.reduce(fit, data, n_frequencies=7)
     with pytest.raises(DataError, match="the fit was made from other data"):
         fid.reduce(fit, measured(seed=9))

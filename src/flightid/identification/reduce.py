@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -128,13 +127,11 @@ def reduce(
 
 def _options(fit: Fit, given: Mapping[str, object]) -> dict[str, Any]:
     """Options of the fit as `identify` takes them, one start from where it stands."""
-    taken = inspect.signature(identify).parameters
-    for name in given:
-        if name not in taken:
-            raise OptionError("identify has no such option", found=name, needed=", ".join(taken))
     before = fit.provenance.get("options")
     used = dict(before) if isinstance(before, Mapping) else {}
-    return {name: value for name, value in used.items() if name in taken} | {"starts": 1, **given}
+    if not fit.responses:
+        used["method"] = str(fit.provenance.get("method")).replace(" ", "_")
+    return used | {"starts": 1, **given}
 
 
 @dataclass
