@@ -15,7 +15,7 @@ import flightid as fid
 from flightid import excitation as ex
 from flightid.errors import DataError, ModelError, OptionError, ShapeError
 from flightid.identification import bias_rounds
-from flightid.identification.estimator_bias import remove_bias
+from flightid.identification.estimator_bias import Correction
 from flightid.identification.model_outputs import systems_of
 from flightid.responses.arithmetic import add_delay
 from flightid.responses.store import read_response, write_response
@@ -211,7 +211,7 @@ def test_where_nothing_is_known_the_fit_says_why(tmp_path: Path) -> None:
         plain = fid.identify(START, data, correct_bias=False)
         assert fit.parameters["Ltphi"].value == plain.parameters["Ltphi"].value
     with pytest.raises(DataError, match="weights are not known"):
-        remove_bias(START, cases["result of arithmetic"], "first")
+        Correction(cases["result of arithmetic"], "first").apply(START)
 
 
 def test_a_model_that_diverges_leaves_the_fit_as_it_was() -> None:
@@ -223,7 +223,7 @@ def test_a_model_that_diverges_leaves_the_fit_as_it_was() -> None:
         ),
     )
     with pytest.raises(DataError, match=r"a residual .* times the measured output"):
-        remove_bias(MODEL, quiet, "first")
+        Correction(quiet, "first").apply(MODEL)
     fit = fid.identify(MODEL, quiet)
     assert any(f.code == "estimator-bias-not-corrected" for f in fit.findings)
 

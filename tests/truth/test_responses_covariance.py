@@ -84,7 +84,8 @@ def _predicted(response: FrequencyResponse, kind: str) -> np.ndarray:
     errors = response.errors
     noise = NoiseSpectrum(GRID, _density(kind)[None])
     if isinstance(errors, LocalErrors):
-        errors = replace(errors, noise=noise.at(response.omega_rad_s))
+        here = response.omega_rad_s
+        errors = replace(errors, noise=NoiseSpectrum(here, noise.at(here)))
     else:
         errors = replace(errors, noise=noise)
     return replace(response, errors=errors).covariance_at(response.omega_rad_s)[0]

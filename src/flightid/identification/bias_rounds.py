@@ -12,7 +12,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError, FitError, ModelError, SingularError
 from flightid.findings import Finding
 from flightid.identification.error_model import ErrorModel
-from flightid.identification.estimator_bias import remove_bias, why_unknown
+from flightid.identification.estimator_bias import Correction, why_unknown
 from flightid.identification.selection import SelectedResponse
 from flightid.models import Model
 from flightid.responses import FrequencyResponse
@@ -88,10 +88,9 @@ class BiasRounds:
 
 def iterate(
     first: Model,
-    data: FrequencyResponse,
+    correction: Correction,
     scales: Mapping[str, float],
     refit: Callable[[Model, FrequencyResponse], Model],
-    hold: str,
 ) -> BiasRounds:
     """Correct by the fitted model and fit again, until the parameters stand still.
 
@@ -99,19 +98,19 @@ def iterate(
     ----------
     first : Model
         Fitted to the response as it was measured.
-    data : FrequencyResponse
-        As measured.
+    correction : Correction
+        Of the response as measured.
     scales : mapping of str to float
         Standard errors by parameter.
     refit : callable
         Fits the model, from its values, to a corrected response.
-    hold : str
 
     Returns
     -------
     BiasRounds
-        With `first` and `data` themselves where nothing could be corrected.
+        With `first` and the measured response themselves where nothing could be corrected.
     """
+    data = correction.data
     reason = why_unknown(data)
     if reason:
         return BiasRounds(first, data, 0, 0.0, reason)
@@ -120,7 +119,7 @@ def iterate(
     moves: list[float] = []
     try:
         while move > ENOUGH and rounds < MOST_ROUNDS:
-            corrected = remove_bias(model, data, hold)
+            corrected = correction.apply(model)
             moved = refit(model, corrected)
             move, rounds = _move(model, moved, scales), rounds + 1
             here = (_scaled(model, scales), _scaled(moved, scales))
@@ -205,8 +204,8 @@ def sizes(
 def _variances(selected: Sequence[SelectedResponse], errors: ErrorModel) -> list[Array | None]:
     """Variance of each complex point, by response."""
     result: list[Array | None] = []
-    for run in errors.runs:
-        diagonal = np.diag(run.covariance)
+    for run, covariance in zip(errors.runs, errors.covariances, strict=True):
+        diagonal = np.diag(covariance)
         both = diagonal[: len(diagonal) // 2] + diagonal[len(diagonal) // 2 :]
         counts = [len(each.places) for each in selected[run.first : run.first + run.count]]
         result += np.split(both, np.cumsum(counts)[:-1])

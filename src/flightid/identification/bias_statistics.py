@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.identification.bias_rounds import BiasRounds
 from flightid.identification.error_model import ErrorModel, error_model
-from flightid.identification.estimator_bias import errors_without_bias, remove_bias
+from flightid.identification.estimator_bias import Correction
 from flightid.identification.selection import SelectedResponse
 from flightid.models import Model
 from flightid.responses import FrequencyResponse
@@ -24,35 +24,32 @@ DIFFERENCE = 1e-4
 
 
 def errors_after(
-    done: BiasRounds, data: FrequencyResponse, selected: Sequence[SelectedResponse], hold: str
+    done: BiasRounds, correction: Correction, selected: Sequence[SelectedResponse]
 ) -> ErrorModel | None:
     """Errors of the corrected points, their noise being what the model leaves of the outputs.
 
     Parameters
     ----------
     done : BiasRounds
-    data : FrequencyResponse
-        As it was measured.
+    correction : Correction
     selected : sequence of SelectedResponse
         Corrected points.
-    hold : str
 
     Returns
     -------
     ErrorModel or None
         None where the errors stand as they were.
     """
-    found = errors_without_bias(done.model, data, hold)
+    found = correction.errors(done.model)
     return None if found is None else error_model(replace(done.data, errors=found), selected)
 
 
 def points_follow(
     done: BiasRounds,
     fitted: Model,
-    data: FrequencyResponse,
+    correction: Correction,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
-    hold: str,
 ) -> Array | None:
     """Derivatives of the corrected points by the free parameters, by differences.
 
@@ -64,11 +61,9 @@ def points_follow(
     done : BiasRounds
     fitted : Model
         After the last fit.
-    data : FrequencyResponse
-        As it was measured.
+    correction : Correction
     selected : sequence of SelectedResponse
     errors : ErrorModel
-    hold : str
 
     Returns
     -------
@@ -78,7 +73,7 @@ def points_follow(
     """
     if not errors.runs or done.contraction <= NEGLIGIBLE_CONTRACTION:
         return None
-    here = _points(selected, remove_bias(fitted, data, hold), errors)
+    here = _points(selected, correction.apply(fitted), errors)
     columns = []
     for parameter in fitted.parameters.free:
         value = parameter.value or 0.0
@@ -86,7 +81,7 @@ def points_follow(
         if value + step > parameter.maximum:
             step = -step
         moved = fitted.with_values({parameter.name: value + step})
-        there = _points(selected, remove_bias(moved, data, hold), errors)
+        there = _points(selected, correction.apply(moved), errors)
         columns.append((there - here) / step)
     return np.column_stack(columns)
 

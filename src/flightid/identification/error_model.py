@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import groupby
 
 import numpy as np
@@ -14,7 +15,7 @@ from flightid.errors import FitError
 from flightid.identification.selection import SelectedResponse
 from flightid.inference import decibel_phase_sensitivity, window_covariance
 from flightid.responses import FrequencyResponse
-from flightid.responses.uncertainty import Points, covariances
+from flightid.responses.uncertainty import CovarianceSource, Points, combined, covariances
 
 Array = NDArray[np.float64]
 
@@ -26,19 +27,23 @@ _ROUNDING = 1e-10
 
 @dataclass(frozen=True)
 class Run:
-    """Consecutive responses of one output, whose errors hang together.
+    """Consecutive responses of one output.
 
     Attributes
     ----------
     first, count : int
         Places of the responses in the fit.
-    covariance : ndarray, shape (2 m, 2 m)
-        Of all real parts of the run's points, then all imaginary parts.
+    points : Points
+        The output, its inputs and all frequencies of its responses.
+    kept : ndarray of int, shape (2 m,)
+        Which real and imaginary parts of those points are fitted: all real parts of the run's
+        points, then all imaginary parts.
     """
 
     first: int
     count: int
-    covariance: Array
+    points: Points
+    kept: NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -51,56 +56,82 @@ class ErrorModel:
         ``"response covariance"``, ``"random error"`` or ``"nothing"``.
     runs : tuple of Run
         Empty where nothing is known.
+    known : CovarianceSource or None
+        Errors of the response.
+    approximate : tuple of ndarray
+        Covariance of the points of each run from their random errors, where nothing else is known.
     """
 
     source: str
     runs: tuple[Run, ...]
+    known: CovarianceSource | None = None
+    approximate: tuple[Array, ...] = ()
 
-    @property
-    def covariance(self) -> Array:
-        """Of all runs together; errors of different outputs are taken as independent."""
-        return np.asarray(block_diag(*(run.covariance for run in self.runs)))
+    @cached_property
+    def covariances(self) -> tuple[Array, ...]:
+        """Of the points of each run, shape (2 m, 2 m): one output at a time."""
+        if self.known is None:
+            return self.approximate
+        full = covariances(self.known, [run.points for run in self.runs])
+        return tuple(
+            np.asarray(matrix[np.ix_(run.kept, run.kept)])
+            for run, matrix in zip(self.runs, full, strict=True)
+        )
+
+    def propagated(self, gain: Array) -> Array:
+        """Covariance of a gain times the errors of all points, across outputs.
+
+        A gust moves all outputs at once: where the errors of the response know it, so does this.
+
+        Parameters
+        ----------
+        gain : ndarray, shape (n_rows, n_points)
+            Columns in the order of the runs, and within one of `Run.kept`.
+
+        Returns
+        -------
+        ndarray, shape (n_rows, n_rows)
+        """
+        sizes = [len(run.kept) for run in self.runs]
+        parts = np.split(gain, np.cumsum(sizes)[:-1], axis=1)
+        if self.known is None:
+            blocks = zip(parts, self.approximate, strict=True)
+            return np.asarray(sum(part @ block @ part.T for part, block in blocks))
+        wide = []
+        for run, part in zip(self.runs, parts, strict=True):
+            size = 2 * len(run.points.inputs) * len(run.points.frequencies)
+            one = np.zeros((len(gain), size))
+            one[:, run.kept] = part
+            wide.append(one)
+        found = combined(self.known, [run.points for run in self.runs], wide)
+        return np.asarray(0.5 * (found + found.T))
 
 
 def error_model(data: FrequencyResponse, selected: Sequence[SelectedResponse]) -> ErrorModel:
-    """Gather the covariance of the fitted points, output by output."""
+    """Gather what is known of the errors of the fitted points, output by output."""
     if data.errors is None and all(np.all(s.measured.random_error == 0.0) for s in selected):
         return ErrorModel(UNKNOWN, ())
     groups = [list(group) for _, group in groupby(selected, lambda each: each.measured.output)]
-    if data.errors is None:
-        source, full = APPROXIMATE, [_approximate(data, group) for group in groups]
-    else:
-        source, full = KNOWN, _known(data, groups)
     starts = np.cumsum([0, *map(len, groups)])
-    return ErrorModel(
-        source,
-        tuple(
-            Run(int(first), len(group), matrix)
-            for first, group, matrix in zip(starts, groups, full, strict=False)
-        ),
+    runs = tuple(
+        _run(data, int(first), group) for first, group in zip(starts, groups, strict=False)
     )
+    if data.errors is None:
+        return ErrorModel(APPROXIMATE, runs, None, tuple(_approximate(data, g) for g in groups))
+    return ErrorModel(KNOWN, runs, data.errors)
 
 
-def _known(data: FrequencyResponse, groups: Sequence[Sequence[SelectedResponse]]) -> list[Array]:
-    assert data.errors is not None
-    wanted = [
-        Points(
-            data.outputs.index(group[0].measured.output),
-            np.array([data.inputs.index(each.measured.input) for each in group]),
-            np.unique(np.concatenate([each.places for each in group])),
-        )
-        for group in groups
-    ]
-    found = []
-    for group, points, full in zip(groups, wanted, covariances(data.errors, wanted), strict=True):
-        union = points.frequencies
-        places = [
-            k * len(union) + np.searchsorted(union, each.places) for k, each in enumerate(group)
-        ]
-        real = np.concatenate(places)
-        keep = np.concatenate([real, real + len(group) * len(union)])
-        found.append(np.asarray(full[np.ix_(keep, keep)]))
-    return found
+def _run(data: FrequencyResponse, first: int, group: Sequence[SelectedResponse]) -> Run:
+    points = Points(
+        data.outputs.index(group[0].measured.output),
+        np.array([data.inputs.index(each.measured.input) for each in group]),
+        np.unique(np.concatenate([each.places for each in group])),
+    )
+    union = points.frequencies
+    real = np.concatenate(
+        [k * len(union) + np.searchsorted(union, each.places) for k, each in enumerate(group)]
+    )
+    return Run(first, len(group), points, np.concatenate([real, real + len(group) * len(union)]))
 
 
 def _approximate(data: FrequencyResponse, group: Sequence[SelectedResponse]) -> Array:
@@ -125,6 +156,9 @@ def _approximate(data: FrequencyResponse, group: Sequence[SelectedResponse]) -> 
 def whitening(model: ErrorModel) -> list[tuple[int, int, Array]]:
     """Matrices that turn the errors of each run into independent ones of variance one.
 
+    Outputs are weighted one by one, whatever they share: a covariance between outputs that is
+    estimated from few flights is too rough to divide by, and the intervals know of it anyway.
+
     Raises
     ------
     FitError
@@ -138,11 +172,11 @@ def whitening(model: ErrorModel) -> list[tuple[int, int, Array]]:
             action="estimate it with covariance=True, or use cost='coherence'",
         )
     result = []
-    for run in model.runs:
-        deviation = np.sqrt(np.diag(run.covariance))
+    for run, covariance in zip(model.runs, model.covariances, strict=True):
+        deviation = np.sqrt(np.diag(covariance))
         if not np.all(deviation > 0.0):
             raise FitError("some points have no random error", needed="errors above zero")
-        scaled = run.covariance / np.outer(deviation, deviation)
+        scaled = covariance / np.outer(deviation, deviation)
         scaled[np.diag_indices_from(scaled)] += _ROUNDING
         try:
             lower = np.linalg.cholesky(scaled)

@@ -14,7 +14,13 @@ from flightid.identification.fit import FittedParameter
 from flightid.identification.multistart import DenseEnd
 from flightid.identification.selection import SelectedResponse
 from flightid.inference import correlation as correlation_of
-from flightid.inference import cramer_rao, insensitivity, interval95, null_combination, propagate
+from flightid.inference import (
+    cramer_rao,
+    estimator_gain,
+    insensitivity,
+    interval95,
+    null_combination,
+)
 from flightid.inference.cramer_rao import inverse_hessian
 from flightid.models import Model, Parameter
 
@@ -74,7 +80,7 @@ def statistics(
     covariance = None
     if sensitivity is not None and names:
         total = None if following is None else jacobian + sensitivity @ following[:, inner]
-        covariance = propagate(jacobian, sensitivity, errors.covariance, total=total)
+        covariance = errors.propagated(estimator_gain(jacobian, sensitivity, total=total))
     weighted = coherence_jacobian(fitted, selected)[:, inner]
     correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
     parameters = fitted_parameters(fitted, names, covariance, weighted)

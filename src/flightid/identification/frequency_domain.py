@@ -30,6 +30,7 @@ from flightid.identification.error_model import (
     whitening,
 )
 from flightid.identification.estimates import Statistics, statistics
+from flightid.identification.estimator_bias import Correction
 from flightid.identification.fit import Fit, FittedResponse
 from flightid.identification.fit_findings import (
     judge_correlation,
@@ -100,10 +101,11 @@ def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fi
     found = _statistics(fitted, selected, errors, groups[0][0], options)
     correction: dict[str, object] = {"applied": False, "reason": "correct_bias=False"}
     if options.correct_bias:
-        done = _without_bias(fitted, data, errors, found, options)
+        without = Correction(data, options.hold)
+        done = _without_bias(fitted, without, errors, found, options)
         after = _select(model, done.data, options)
         if done.applied:
-            errors = errors_after(done, data, after, options.hold) or errors
+            errors = errors_after(done, without, after) or errors
         changes = sizes(selected, after, errors) if done.applied else {}
         setup += judge_bias(done, changes)
         correction = provenance(done, changes, options.hold)
@@ -111,7 +113,7 @@ def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fi
             best = _minimise(done.model, after, errors, replace(options, starts=1))[0]
             groups[0] = [best, *groups[0][1:]]
             selected, fitted = after, _at(model, best)
-            following = points_follow(done, fitted, data, selected, errors, options.hold)
+            following = points_follow(done, fitted, without, selected, errors)
             found = _statistics(fitted, selected, errors, best, options, following)
     responses = _compare(fitted, selected)
     fit = _assemble(fitted, options, data, groups, responses, found, setup)
@@ -149,7 +151,7 @@ def _statistics(
 
 def _without_bias(
     fitted: Model,
-    data: FrequencyResponse,
+    correction: Correction,
     errors: ErrorModel,
     found: Statistics,
     options: Options,
@@ -161,7 +163,7 @@ def _without_bias(
         return _at(model, _minimise(model, selected, errors, once)[0])
 
     scales = {p.name: p.stderr for p in found.parameters.values() if p.stderr}
-    return iterate(fitted, data, scales, refit, options.hold)
+    return iterate(fitted, correction, scales, refit)
 
 
 def _check_model(model: Model, data: FrequencyResponse) -> None:

@@ -125,23 +125,19 @@ def split_modes(system: System, duration_s: float) -> list[Modes]:
     ]
 
 
-def driven_outputs(
-    modes: list[Modes], values: Array, sample_time_s: float, hold: str
-) -> NDArray[np.float64]:
-    """Outputs that the inputs drive, from rest at the end from which each mode is followed.
+def between_samples(values: Array, hold: str) -> Array:
+    """Inputs as `driven_outputs` takes them: where band-limited, at finer steps.
 
     Parameters
     ----------
-    modes : list of Modes
     values : ndarray, shape (m, n_samples)
         The measured inputs.
-    sample_time_s : float
     hold : {"band_limited", "first", "zero"}
         What the inputs do between their samples.
 
     Returns
     -------
-    ndarray, shape (p, n_samples)
+    ndarray, shape (m, n_samples) or (m, FINER (n_samples − 1) + 1)
 
     Reference
     ---------
@@ -149,15 +145,38 @@ def driven_outputs(
     Magazine* 16 (1999): an interpolating spline tends to the band-limited interpolation.
     """
     if hold != "band_limited":
-        return np.asarray(sum(_driven(each, values, sample_time_s, hold) for each in modes))
+        return values
     n = values.shape[1]
     fine = np.arange(FINER * (n - 1) + 1) / FINER
     spline = make_interp_spline(np.arange(n), values, k=min(SPLINE_DEGREE, n - 1), axis=1)
     dense = np.array(spline(fine))
     # Straight lines between points weaken ω by sinc²(ωT/2) = 1 − (ωT)²/12 + …: given back here.
     dense[:, 1:-1] -= np.diff(dense, 2, axis=1) / 12.0
+    return dense
+
+
+def driven_outputs(
+    modes: list[Modes], between: Array, sample_time_s: float, hold: str
+) -> NDArray[np.float64]:
+    """Outputs that the inputs drive, from rest at the end from which each mode is followed.
+
+    Parameters
+    ----------
+    modes : list of Modes
+    between : ndarray
+        The measured inputs from `between_samples`.
+    sample_time_s : float
+    hold : {"band_limited", "first", "zero"}
+        What the inputs do between their samples.
+
+    Returns
+    -------
+    ndarray, shape (p, n_samples)
+    """
+    if hold != "band_limited":
+        return np.asarray(sum(_driven(each, between, sample_time_s, hold) for each in modes))
     step = sample_time_s / FINER
-    return np.asarray(sum(_driven(each, dense, step, "first")[:, ::FINER] for each in modes))
+    return np.asarray(sum(_driven(each, between, step, "first")[:, ::FINER] for each in modes))
 
 
 def free_outputs(modes: list[Modes], n_samples: int, sample_time_s: float) -> Array:

@@ -2,6 +2,7 @@
 
 from flightid.inference.covariance import (
     decibel_phase_sensitivity,
+    estimator_gain,
     interval95,
     propagate,
     window_covariance,
@@ -13,6 +14,7 @@ __all__ = [
     "correlation",
     "cramer_rao",
     "decibel_phase_sensitivity",
+    "estimator_gain",
     "gauss_newton_hessian",
     "insensitivity",
     "interval95",

@@ -18,27 +18,20 @@ _DECIBEL = 20.0 / np.log(10.0)
 _DEGREE = 180.0 / np.pi
 
 
-def propagate(
-    jacobian: Array, sensitivity: Array, covariance: Array, *, total: Array | None = None
-) -> Array:
+def propagate(jacobian: Array, sensitivity: Array, covariance: Array) -> Array:
     """Covariance of the estimates from that of the data (a sandwich).
 
     Parameters
     ----------
-    jacobian : ndarray, shape (n_residuals, n_parameters)
-        Derivatives J of the weighted residuals with respect to the parameters.
-    sensitivity : ndarray, shape (n_residuals, n_data)
-        Derivatives B of the weighted residuals with respect to the data.
+    jacobian, sensitivity
+        As for `estimator_gain`.
     covariance : ndarray, shape (n_data, n_data)
         Covariance Σ of the data's errors.
-    total : ndarray, shape (n_residuals, n_parameters), optional
-        Derivatives T of the residuals where the data follow the parameters too, as a corrected
-        response does that is fitted again and again; default: J.
 
     Returns
     -------
     ndarray, shape (n_parameters, n_parameters)
-        A Σ Aᵀ with A = (JᵀT)⁻¹ JᵀB.
+        A Σ Aᵀ with the gain A.
 
     Raises
     ------
@@ -60,6 +53,43 @@ def propagate(
     >>> propagate(np.array([[1.0], [1.0]]), np.eye(2), 4.0 * np.eye(2))
     array([[2.]])
     """
+    gain = estimator_gain(jacobian, sensitivity)
+    result = gain @ covariance @ gain.T
+    return np.asarray(0.5 * (result + result.T))
+
+
+def estimator_gain(jacobian: Array, sensitivity: Array, *, total: Array | None = None) -> Array:
+    """How far the estimates move with the data, but for the sign.
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (n_residuals, n_parameters)
+        Derivatives J of the weighted residuals with respect to the parameters.
+    sensitivity : ndarray, shape (n_residuals, n_data)
+        Derivatives B of the weighted residuals with respect to the data.
+    total : ndarray, shape (n_residuals, n_parameters), optional
+        Derivatives T of the residuals where the data follow the parameters too, as a corrected
+        response does that is fitted again and again; default: J.
+
+    Returns
+    -------
+    ndarray, shape (n_parameters, n_data)
+        A = (JᵀT)⁻¹ JᵀB.
+
+    Raises
+    ------
+    SingularError
+        Some combination of the parameters has no influence on the residuals.
+
+    Reference
+    ---------
+    Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., §9.7.
+
+    Example
+    -------
+    >>> estimator_gain(np.array([[1.0], [1.0]]), np.eye(2))
+    array([[0.5, 0.5]])
+    """
     scale = np.linalg.norm(jacobian, axis=0)
     if np.any(scale == 0.0):
         raise SingularError("a parameter has no influence on the residuals")
@@ -68,9 +98,7 @@ def propagate(
     if np.any(diagonal <= 1e-14 * diagonal.max(initial=0.0)):
         raise SingularError("the Hessian of the cost is singular to working precision")
     moved = triangle if total is None else q.T @ (total / scale)
-    gain = np.linalg.solve(moved, q.T @ sensitivity) / scale[:, None]
-    result = gain @ covariance @ gain.T
-    return np.asarray(0.5 * (result + result.T))
+    return np.asarray(np.linalg.solve(moved, q.T @ sensitivity) / scale[:, None])
 
 
 def decibel_phase_sensitivity(

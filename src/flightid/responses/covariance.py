@@ -4,21 +4,22 @@ Every estimate of this stage is, to first order, linear in the output noise v: a
 ``δH(ω) = Σ_t g(t; ω) v(t)``, with g known from the inputs, the windows and the conditioning. The
 covariance is then the Gram matrix of the g under the noise spectrum. It holds for overlapped
 windows, for neighbouring frequencies inside one window's bandwidth, and for sweeps, whose power
-passes a frequency once: none of which coherence and a count of windows can know.
+passes a frequency once: none of which coherence and a count of windows can know. The g do not know
+the output, so the cross-spectra of the noise give the covariance between outputs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from flightid.responses.noise import NoiseSpectrum
-from flightid.responses.transform import FoldedBasis, WindowPlan, transform
-from flightid.responses.uncertainty import Points
+from flightid.responses.uncertainty import Points, union
+from flightid.responses.window_weights import WindowShare, WindowWeights
 
 COLUMNS = 128
 """Frequencies of the noise that are worked on at a time: bounds memory, and suits caches."""
@@ -31,43 +32,20 @@ Places = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class WindowShare:
-    """What one window length adds to the errors.
-
-    Attributes
-    ----------
-    plan : WindowPlan
-    projection : ndarray of complex, shape (n_f, n_in, n_instruments)
-        Takes a window's conjugate instrument transforms to the weight of its output transform.
-    """
-
-    plan: WindowPlan
-    projection: Complex
-
-
-@dataclass(frozen=True)
 class WindowedErrors:
     """Errors of a composite (or single-window) estimate; the covariance is made when asked for.
 
     Attributes
     ----------
-    instruments : tuple of ndarray, each shape (n_instruments, n_samples)
-        Inputs, or excitations of a closed loop, of each record.
-    omega : ndarray, shape (n_f,)
-        Frequencies, rad per sample.
+    windows : WindowWeights
     sample_time_s : float
-    detrend : str
-    shares : tuple of WindowShare
     sensitivity : ndarray, shape (n_windows, 2, 2, n_out, n_in, n_f)
         From real and imaginary part of a window's response to those of the estimate.
     noise : NoiseSpectrum
     """
 
-    instruments: tuple[Real, ...]
-    omega: Real
+    windows: WindowWeights
     sample_time_s: float
-    detrend: str
-    shares: tuple[WindowShare, ...]
     sensitivity: Real
     noise: NoiseSpectrum
 
@@ -80,116 +58,146 @@ class WindowedErrors:
         )
 
     def covariances(self, wanted: Sequence[Points]) -> list[Real]:
-        """See `SharedWork`: the kernels of the noise do not depend on the output."""
-        inputs = np.unique(np.concatenate([each.inputs for each in wanted]))
-        frequencies = np.unique(np.concatenate([each.frequencies for each in wanted]))
+        """See `JointErrors`: the kernels of the noise do not depend on the output."""
+        inputs, frequencies = union(wanted)
         parts = [self._part(each, inputs, frequencies) for each in wanted]
-        for n_samples in sorted({record.shape[1] for record in self.instruments}):
-            weights = [
-                [self.weights(record, share, inputs, frequencies) for share in self.shares]
-                for record in self.instruments
-                if record.shape[1] == n_samples
-            ]
+        totals = [np.zeros(2 * (2 * len(each.inputs) * len(each.frequencies),)) for each in wanted]
+        for noise, kernels, near in self._kernels(inputs, frequencies):
+            for part, total in zip(parts, totals, strict=True):
+                part.add(kernels, near, noise.level[part.output], total)
+        return totals
+
+    def combined(self, wanted: Sequence[Points], gains: Sequence[Real]) -> Real:
+        """See `JointErrors`."""
+        inputs, frequencies = union(wanted)
+        parts = [
+            self._part(each, inputs, frequencies).through(gain)
+            for each, gain in zip(wanted, gains, strict=True)
+        ]
+        total = np.zeros(2 * (len(gains[0]),))
+        for noise, kernels, near in self._kernels(inputs, frequencies):
+            moved = [part.combine(kernels, near) * noise.level[part.output] for part in parts]
+            for place, (part, row) in enumerate(zip(parts, moved, strict=True)):
+                for other, column in zip(parts[: place + 1], moved[: place + 1], strict=True):
+                    turn = noise.coherency[:, part.output, other.output]
+                    block = np.real((row * turn) @ column.conj().T)
+                    total += block if part is other else block + block.T
+        return total
+
+    def _kernels(
+        self, inputs: Places, frequencies: Places
+    ) -> Iterator[tuple[_Noise, Complex, Places]]:
+        """Kernels of all records, some bins of the noise at a time, with the noise there."""
+        chosen = self.windows.weights_at(inputs, frequencies)
+        lengths = [record.shape[1] for record in self.windows.instruments]
+        for n_samples in sorted(set(lengths)):
+            weights = [each for each, n in zip(chosen, lengths, strict=True) if n == n_samples]
             length, bins = self._noise_bins(n_samples, frequencies)
             for columns in np.array_split(bins, -(-len(bins) // COLUMNS)):
-                self._add(parts, columns, length, weights, frequencies)
-        return [part.total for part in parts]
+                yield from self._of_bins(columns, length, weights, frequencies)
 
     def _part(self, wanted: Points, inputs: Places, frequencies: Places) -> _Part:
         turns = self.sensitivity[:, :, :, wanted.output][:, :, :, wanted.inputs]
-        size = 2 * len(wanted.inputs) * len(wanted.frequencies)
         return _Part(
             wanted.output,
             np.searchsorted(inputs, wanted.inputs),
             np.searchsorted(frequencies, wanted.frequencies),
             _mixing(turns[..., wanted.frequencies]),
-            np.zeros((size, size)),
         )
 
     def _noise_bins(
         self, n_samples: int, frequencies: NDArray[np.intp]
     ) -> tuple[int, NDArray[np.intp]]:
         """Length of the noise's Fourier transform, and its bins that reach the estimate."""
-        longest = max(share.plan.length for share in self.shares)
+        longest = max(share.plan.length for share in self.windows.shares)
         length = int(next_fast_len(n_samples + longest // 2, real=True))
-        highest = float(self.omega[frequencies].max()) + self._reach()
+        highest = float(self.windows.omega[frequencies].max()) + self._reach()
         last = min(length // 2, int(highest * length / (2.0 * np.pi)) + 1)
         return length, np.arange(last + 1)
 
     def _reach(self) -> float:
         """How far above a frequency noise reaches its estimate, rad per sample."""
-        return SIDE_LOBES * 2.0 * np.pi / min(share.plan.length for share in self.shares)
+        return SIDE_LOBES * 2.0 * np.pi / min(share.plan.length for share in self.windows.shares)
 
-    def weights(
+    def _of_bins(
         self,
-        record: Real,
-        share: WindowShare,
-        inputs: NDArray[np.intp],
-        frequencies: NDArray[np.intp],
-    ) -> Complex:
-        """Weight of each window's output transform, shape (n_in, n_f, n_windows)."""
-        basis = FoldedBasis.of(share.plan, self.omega[frequencies])
-        real, imaginary = transform(record, basis, self.detrend)
-        projection = share.projection[frequencies][:, inputs]
-        return np.asarray((projection @ (real - 1j * imaginary)).transpose(1, 0, 2))
-
-    def _add(
-        self,
-        parts: Sequence[_Part],
-        columns: NDArray[np.intp],
+        columns: Places,
         length: int,
         records: Sequence[Sequence[Complex]],
         frequencies: Places,
-    ) -> None:
-        """Add what some bins of the noise contribute, for all records of one length."""
+    ) -> Iterator[tuple[_Noise, Complex, Places]]:
+        """Noise and kernels at some bins, for all records of one length."""
         angle = 2.0 * np.pi * columns / length
-        density = self.noise.at(angle / self.sample_time_s) / (2.0 * self.sample_time_s)
-        twice = np.where((columns == 0) | (2 * columns == length), 1.0, 2.0) / length
-        level = np.repeat(np.sqrt(twice * density), 2, axis=1)
-        omega = self.omega[frequencies]
+        noise = self._noise_at(columns, length)
+        omega = self.windows.omega[frequencies]
         near = np.flatnonzero(omega + self._reach() >= angle[0])
+        shares, detrend = self.windows.shares, self.windows.detrend
         bases = [
             tuple(
-                basis_transform(share.plan.length, omega[near], sign * angle, self.detrend)
+                basis_transform(share.plan.length, omega[near], sign * angle, detrend)
                 for sign in (1.0, -1.0)
             )
-            for share in self.shares
+            for share in shares
         ]
-        turns = [_turns(*one, angle) for one in zip(self.shares, records[0], strict=True)]
+        turns = [_turns(*one, angle) for one in zip(shares, records[0], strict=True)]
         for weights in records:
             kernels = []
             for weight, turn, (above, below) in zip(weights, turns, bases, strict=True):
                 ahead = (weight[:, near] @ turn) * above
                 mirrored = ((weight[:, near] @ turn.conj()) * below).conj()
                 kernels += [(ahead + mirrored) / 2.0, (ahead - mirrored) / 2.0j]
-            stacked = np.stack(kernels, axis=2)
-            for part in parts:
-                part.add(stacked, near, level[part.output])
+            yield noise, np.stack(kernels, axis=2), near
+
+    def _noise_at(self, columns: Places, length: int) -> _Noise:
+        omega: Real = np.asarray(2.0 * np.pi * columns / (length * self.sample_time_s))
+        density = self.noise.at(omega) / (2.0 * self.sample_time_s)
+        twice = np.where((columns == 0) | (2 * columns == length), 1.0, 2.0) / length
+        return _Noise(np.sqrt(twice * density), self.noise.coherency_at(omega))
+
+
+@dataclass(frozen=True)
+class _Noise:
+    """Noise at some bins.
+
+    Attributes
+    ----------
+    level : ndarray, shape (n_out, n_bins)
+        Root of the noise power at each bin.
+    coherency : ndarray of complex, shape (n_bins, n_out, n_out)
+        Conjugate on the first index.
+    """
+
+    level: Real
+    coherency: Complex
 
 
 @dataclass(frozen=True)
 class _Part:
-    """The covariance of one output in the making.
+    """Errors of one output at chosen points, as combinations of the kernels.
 
     Attributes
     ----------
     output : int
     inputs, frequencies : ndarray of int
         Places among those that the kernels are made for.
-    mixing : ndarray, shape (n_in, n_f, 2, 2 · n_windows)
-        Sensitivities of real and imaginary part of the estimate to those of the windows' responses.
-    total : ndarray, shape (2 n_in n_f, 2 n_in n_f)
-        Added to.
+    mixing : ndarray, shape (n_in, n_f, n_rows, 2 · n_windows)
+        Weights of the windows' kernels at each point: for its real and imaginary part, or for
+        each row of a gain.
     """
 
     output: int
     inputs: Places
     frequencies: Places
     mixing: Real
-    total: Real
 
-    def add(self, kernels: Complex, near: Places, level: Real) -> None:
-        """Add the Gram matrix of the weighted kernels.
+    def through(self, gain: Real) -> _Part:
+        """The same errors after a gain, shape (n_rows, 2 n_in n_f)."""
+        n_in, n_f = self.mixing.shape[:2]
+        split = gain.reshape(len(gain), 2, n_in, n_f)
+        return replace(self, mixing=np.einsum("paif,ifak->ifpk", split, self.mixing))
+
+    def combine(self, kernels: Complex, near: Places) -> Complex:
+        """Sum of the mixed kernels over all points, shape (n_rows, n_bins).
 
         Parameters
         ----------
@@ -197,18 +205,26 @@ class _Part:
             Of real and imaginary part for each window length.
         near : ndarray of int
             Frequencies, among all, that the kernels are for.
-        level : ndarray, shape (2 · n_bins,)
-            Root of the noise power at each bin, for real and imaginary part.
         """
-        here = np.flatnonzero(np.isin(self.frequencies, near))
-        if not here.size:
-            return
-        columns = np.searchsorted(near, self.frequencies[here])
-        mine = kernels[self.inputs[:, None], columns]
+        here, mine = self._mine(kernels, near)
+        rows = self.mixing[:, here].transpose(2, 0, 1, 3).reshape(self.mixing.shape[2], -1)
+        flat = mine.view(np.float64).reshape(rows.shape[1], 2 * kernels.shape[-1])
+        return np.asarray((rows @ flat).view(np.complex128))
+
+    def add(self, kernels: Complex, near: Places, level: Real, total: Real) -> None:
+        """Add the Gram matrix of the weighted kernels of all points to `total`."""
+        here, mine = self._mine(kernels, near)
         mixed = self.mixing[:, here] @ mine.view(np.float64)
-        flat = (mixed.transpose(2, 0, 1, 3) * level).reshape(-1, len(level))
+        both = np.repeat(level, 2)
+        flat = (mixed.transpose(2, 0, 1, 3) * both).reshape(-1, len(both))
         places = np.add.outer(np.arange(2 * len(self.inputs)) * len(self.frequencies), here).ravel()
-        self.total[places[:, None], places] += flat @ flat.T
+        total[places[:, None], places] += flat @ flat.T
+
+    def _mine(self, kernels: Complex, near: Places) -> tuple[Places, Complex]:
+        """Which of the frequencies the kernels reach, and the kernels there."""
+        here = np.flatnonzero(np.isin(self.frequencies, near))
+        columns = np.searchsorted(near, self.frequencies[here])
+        return here, kernels[self.inputs[:, None], columns]
 
 
 def _mixing(sensitivity: Real) -> Real:

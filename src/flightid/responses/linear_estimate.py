@@ -7,7 +7,7 @@ model's response but this functional of the model's outputs. The difference is t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from flightid.errors import ShapeError
 from flightid.responses.covariance import WindowedErrors
 from flightid.responses.local_fit import Bins, LocalFit
-from flightid.responses.noise import noise_of_residuals
+from flightid.responses.noise import NoiseSpectrum, noise_of_residuals
 from flightid.responses.samples import Samples
-from flightid.responses.transform import FoldedBasis, transform
+from flightid.responses.transform import transform
 from flightid.responses.uncertainty import CovarianceSource, Selected
 
 Complex = NDArray[np.complex128]
@@ -30,16 +30,16 @@ LEAST_NOISE = 1e-12
 """Share of its first estimate below which noise is rounding."""
 
 
+Functional = Callable[[Sequence[Real]], Complex]
+"""From changes of the outputs, one array (n_out, n_samples) for each record, to the change of the
+response, shape (n_out, n_in, n_f)."""
+
+
 class OutputWeights(Protocol):
     """The weights of an estimate on its outputs."""
 
-    def apply(
-        self, changes: Sequence[Real], outputs: Places, inputs: Places, frequencies: Places
-    ) -> Complex:
-        """Change of the response for changes of the outputs, shape (n_out, n_in, n_f).
-
-        `changes` holds one array for each record, shape (len(outputs), n_samples).
-        """
+    def functional(self, outputs: Places, inputs: Places, frequencies: Places) -> Functional:
+        """The weights at some places, made ready to be applied again and again."""
         ...
 
     def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
@@ -61,37 +61,42 @@ class WindowedWeights:
 
     errors: WindowedErrors
 
-    def apply(
-        self, changes: Sequence[Real], outputs: Places, inputs: Places, frequencies: Places
-    ) -> Complex:
+    def functional(self, outputs: Places, inputs: Places, frequencies: Places) -> Functional:
         """See `OutputWeights`."""
-        errors = self.errors
+        windows = self.errors.windows
+        bases = windows.bases(frequencies)
+        weights = windows.weights_by(bases, inputs, frequencies)
+        turns = self.errors.sensitivity[:, :, :, outputs][:, :, :, :, inputs][..., frequencies]
         shape = (len(outputs), len(inputs), len(frequencies))
-        total = np.zeros((2, *shape))
-        turns = errors.sensitivity[:, :, :, outputs][:, :, :, :, inputs][..., frequencies]
-        for share, turn in zip(errors.shares, turns, strict=True):
-            basis = FoldedBasis.of(share.plan, errors.omega[frequencies])
-            moved = np.zeros(shape, dtype=np.complex128)
-            for record, change in zip(errors.instruments, changes, strict=True):
-                if not share.plan.count(change.shape[1]):
-                    continue
-                weights = errors.weights(record, share, inputs, frequencies)
-                real, imaginary = transform(change, basis, errors.detrend)
-                moved += np.einsum("ifw,fow->oif", weights, real + 1j * imaginary, optimize=True)
-            parts = np.stack([moved.real, moved.imag])
-            total += np.einsum("aboif,boif->aoif", turn, parts)
-        return np.asarray(total[0] + 1j * total[1])
+
+        def apply(changes: Sequence[Real]) -> Complex:
+            total = np.zeros((2, *shape))
+            for place, (basis, turn) in enumerate(zip(bases, turns, strict=True)):
+                moved = np.zeros(shape, dtype=np.complex128)
+                for each, change in zip(weights, changes, strict=True):
+                    if not basis.plan.count(change.shape[1]):
+                        continue
+                    real, imaginary = transform(change, basis, windows.detrend)
+                    window = (real + 1j * imaginary).transpose(0, 2, 1)
+                    moved += (each[place].transpose(1, 0, 2) @ window).transpose(2, 1, 0)
+                parts = np.stack([moved.real, moved.imag])
+                total += np.einsum("aboif,boif->aoif", turn, parts)
+            return np.asarray(total[0] + 1j * total[1])
+
+        return apply
 
     def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
-        """See `OutputWeights`."""
+        """See `OutputWeights`; outputs without a residual keep their noise, as independent."""
         errors, before = self.errors, self.errors.noise
         step = errors.sample_time_s
-        highest = float(errors.omega[-1]) / step
-        found = noise_of_residuals(residuals, errors.instruments, step, highest)
+        highest = float(errors.windows.omega[-1]) / step
+        found = noise_of_residuals(residuals, errors.windows.instruments, step, highest)
         density = before.density.copy()
         least = LEAST_NOISE * before.density[outputs]
         density[outputs] = np.maximum(found.at(before.omega_rad_s), least)
-        return replace(errors, noise=replace(before, density=density))
+        coherency = np.tile(np.eye(len(density), dtype=np.complex128), (density.shape[1], 1, 1))
+        coherency[:, outputs[:, None], outputs] = found.coherency_at(before.omega_rad_s)
+        return replace(errors, noise=NoiseSpectrum(before.omega_rad_s, density, coherency))
 
 
 @dataclass(frozen=True)
@@ -107,18 +112,20 @@ class LocalWeights:
     fits: tuple[LocalFit, ...]
     sample_time_s: float
 
-    def apply(
-        self, changes: Sequence[Real], outputs: Places, inputs: Places, frequencies: Places
-    ) -> Complex:
+    def functional(self, outputs: Places, inputs: Places, frequencies: Places) -> Functional:
         """See `OutputWeights`."""
-        found = np.zeros((len(outputs), len(inputs), len(frequencies)), dtype=np.complex128)
-        for index, change in enumerate(changes):
-            values = Bins.of(change, self.sample_time_s).values
-            for place, frequency in enumerate(frequencies):
-                fit = self.fits[frequency]
-                bins = values[:, fit.places[index]]
-                found[:, :, place] += bins @ fit.weights[index][inputs].T
-        return found
+        fits = [self.fits[frequency] for frequency in frequencies]
+
+        def apply(changes: Sequence[Real]) -> Complex:
+            found = np.zeros((len(outputs), len(inputs), len(fits)), dtype=np.complex128)
+            for index, change in enumerate(changes):
+                values = Bins.of(change, self.sample_time_s).values
+                for place, fit in enumerate(fits):
+                    bins = values[:, fit.places[index]]
+                    found[:, :, place] += bins @ fit.weights[index][inputs].T
+            return found
+
+        return apply
 
     def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
         """None: local polynomials have taken the leakage out of their noise already."""
@@ -204,7 +211,11 @@ class LinearEstimate:
         found = [np.shape(change) for change in changes]
         if found != needed:
             raise ShapeError("changes do not fit the records", found=found, needed=needed)
-        return self.weights.apply(changes, *self.places)
+        return self.functional()(changes)
+
+    def functional(self) -> Functional:
+        """The weights made ready to be applied again and again: no shape is checked."""
+        return self.weights.functional(*self.places)
 
     def errors_of(self, residuals: Sequence[Real]) -> CovarianceSource | None:
         """Errors of the response with the noise that a model's residuals show.

@@ -14,8 +14,10 @@ from flightid.responses.cautions import correlation_findings
 from flightid.responses.conditioned import random_error
 from flightid.responses.linear_estimate import LinearEstimate, LocalWeights
 from flightid.responses.local_fit import Bins, LocalFit, around, bins_needed, fit_locally
+from flightid.responses.noise import NoiseSpectrum
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.samples import Samples
+from flightid.responses.uncertainty import Points, union
 
 
 def estimate_local_polynomial(
@@ -71,7 +73,8 @@ def _response(
 ) -> FrequencyResponse:
     n_in = len(samples.inputs)
     response = np.array([fit.gain.T for fit in fits]).transpose(1, 2, 0)
-    noise = np.array([np.real(np.diag(fit.residual)) for fit in fits]).T
+    residuals = np.array([fit.residual for fit in fits])
+    noise = np.real(np.einsum("fii->if", residuals))
     # Variance of a gain for unit noise: what conditioning on other inputs and leakage leave.
     spread = np.array([sum(np.sum(np.abs(w) ** 2, axis=1) for w in fit.weights) for fit in fits]).T
     n_bins = np.array([fit.n_bins for fit in fits], dtype=np.float64)
@@ -98,7 +101,9 @@ def _response(
         method="local_polynomial",
         findings=tuple(correlation_findings(samples.inputs, spectrum[:n_in, :n_in])),
         history=(*samples.history, step),
-        errors=LocalErrors(tuple(fits), noise) if covariance else None,
+        errors=LocalErrors(tuple(fits), NoiseSpectrum.of_matrices(omega, residuals))
+        if covariance
+        else None,
         linear=LinearEstimate.of(
             samples, LocalWeights(tuple(fits), samples.sample_time_s), len(omega)
         )
@@ -124,12 +129,12 @@ class LocalErrors:
     Attributes
     ----------
     fits : tuple of LocalFit
-    noise : ndarray, shape (n_out, n_f)
-        One-sided noise spectra at the estimate's frequencies.
+    noise : NoiseSpectrum
+        At the estimate's frequencies.
     """
 
     fits: tuple[LocalFit, ...]
-    noise: NDArray[np.float64]
+    noise: NoiseSpectrum
 
     def covariance(
         self,
@@ -138,16 +143,66 @@ class LocalErrors:
         frequencies: NDArray[np.intp],
     ) -> NDArray[np.float64]:
         """See `CovarianceSource`; bins of noise are circular, so there is no pseudo-covariance."""
+        return np.stack(
+            self.covariances([Points(int(output), inputs, frequencies) for output in outputs])
+        )
+
+    def covariances(self, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
+        """See `JointErrors`: shares of bins do not depend on the output."""
+        overlap = self._overlaps(*union(wanted))
+        return [self._block(overlap, wanted, each, each) for each in wanted]
+
+    def combined(
+        self, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        """See `JointErrors`."""
+        overlap = self._overlaps(*union(wanted))
+        total = np.zeros(2 * (len(gains[0]),))
+        for place, (one, left) in enumerate(zip(wanted, gains, strict=True)):
+            for other, right in zip(wanted[: place + 1], gains[: place + 1], strict=True):
+                block = left @ self._block(overlap, wanted, one, other) @ right.T
+                total += block if one is other else block + block.T
+        return total
+
+    def _overlaps(
+        self, inputs: NDArray[np.intp], frequencies: NDArray[np.intp]
+    ) -> NDArray[np.complex128]:
+        """What any two points share for unit noise, shape (n_in, n_f, n_in, n_f)."""
         n_in, n_f = len(inputs), len(frequencies)
         shared = np.zeros((n_in, n_f, n_in, n_f), dtype=np.complex128)
         for a, first in enumerate(frequencies):
             for b, second in enumerate(frequencies[: a + 1]):
                 overlap = _overlap(self.fits[first], self.fits[second])[np.ix_(inputs, inputs)]
                 shared[:, a, :, b], shared[:, b, :, a] = overlap, overlap.conj().T
-        gram = shared.reshape(n_in * n_f, n_in * n_f)
-        half = 0.5 * np.block([[gram.real, -gram.imag], [gram.imag, gram.real]])
-        level = np.sqrt(np.tile(self.noise[np.ix_(outputs, frequencies)], (1, 2 * n_in)))
-        return np.asarray(level[:, :, None] * half * level[:, None, :])
+        return shared
+
+    def _block(
+        self,
+        overlap: NDArray[np.complex128],
+        wanted: Sequence[Points],
+        one: Points,
+        other: Points,
+    ) -> NDArray[np.float64]:
+        """Covariance of the points of one output with those of another."""
+        inputs, frequencies = union(wanted)
+        rows = np.searchsorted(inputs, one.inputs)
+        columns = np.searchsorted(inputs, other.inputs)
+        first = np.searchsorted(frequencies, one.frequencies)
+        second = np.searchsorted(frequencies, other.frequencies)
+        shared = overlap[np.ix_(rows, first, columns, second)]
+        level = np.sqrt(
+            np.multiply.outer(
+                self.noise.density[one.output, one.frequencies],
+                self.noise.density[other.output, other.frequencies],
+            )
+        )
+        turn = self.noise.coherency_at(self.noise.omega_rad_s)[:, other.output, one.output]
+        # The conjugate is on the first index of coherency; between two frequencies, their mean.
+        both = 0.5 * np.add.outer(turn[one.frequencies], turn[other.frequencies])
+        found = (shared * (level * both)[None, :, None, :]).reshape(
+            len(rows) * len(first), len(columns) * len(second)
+        )
+        return np.asarray(0.5 * np.block([[found.real, -found.imag], [found.imag, found.real]]))
 
 
 def _overlap(first: LocalFit, second: LocalFit) -> NDArray[np.complex128]:

@@ -1,4 +1,8 @@
-"""Noise spectrum of the outputs: what the inputs do not explain, without leakage."""
+"""Noise spectra of the outputs: what the inputs do not explain, without leakage.
+
+A gust moves all outputs of a vehicle at once, so their noise hangs together; errors that are taken
+as independent would count one cause as many.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +17,9 @@ from flightid.errors import DataError
 from flightid.responses.local_fit import Bins, bins_needed, fit_locally
 from flightid.responses.samples import Samples
 
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
 BEYOND_BAND = 1.5
 """Noise is estimated up to this multiple of the highest frequency of the response."""
 
@@ -26,20 +33,47 @@ class NoiseSpectrum:
     omega_rad_s : ndarray, shape (n,)
     density : ndarray, shape (n_out, n)
         unit² per Hz, positive.
+    coherency : ndarray of complex, shape (n, n_out, n_out), optional
+        Cross-spectra over the roots of both densities, conjugate on the first index, with ones on
+        the diagonal; without it the noises are independent.
     """
 
-    omega_rad_s: NDArray[np.float64]
-    density: NDArray[np.float64]
+    omega_rad_s: Real
+    density: Real
+    coherency: Complex | None = None
 
-    def at(self, omega_rad_s: NDArray[np.float64]) -> NDArray[np.float64]:
+    @classmethod
+    def of_matrices(cls, omega_rad_s: Real, matrices: Complex) -> NoiseSpectrum:
+        """From spectral matrices, shape (n, n_out, n_out), conjugate on the first index."""
+        density = np.real(np.einsum("nii->ni", matrices))
+        root = np.sqrt(np.maximum(density, np.finfo(float).tiny))
+        coherency = matrices / (root[:, :, None] * root[:, None, :])
+        places = np.arange(density.shape[1])
+        coherency[:, places, places] = 1.0
+        return cls(omega_rad_s, np.maximum(density, 0.0).T, coherency)
+
+    def at(self, omega_rad_s: Real) -> Real:
         """Density between the grid's frequencies, log-linear; held beyond its ends."""
         logs = np.log(np.maximum(self.density, np.finfo(float).tiny))
         return np.exp([np.interp(omega_rad_s, self.omega_rad_s, row) for row in logs])
 
+    def coherency_at(self, omega_rad_s: Real) -> Complex:
+        """Coherency between the grid's frequencies, shape (n, n_out, n_out).
 
-def estimate_noise(
-    samples: Samples, omega: NDArray[np.float64], response: NDArray[np.complex128]
-) -> NoiseSpectrum:
+        Linear, so that matrices stay positive; held beyond the grid's ends.
+        """
+        if self.coherency is None:
+            identity = np.eye(len(self.density), dtype=np.complex128)
+            return np.broadcast_to(identity, (len(omega_rad_s), *identity.shape))
+        last = len(self.omega_rad_s) - 1
+        place = np.interp(omega_rad_s, self.omega_rad_s, np.arange(last + 1.0))
+        below = np.minimum(place.astype(np.intp), max(last - 1, 0))
+        share = (place - below)[:, None, None]
+        above = np.minimum(below + 1, last)
+        return np.asarray((1.0 - share) * self.coherency[below] + share * self.coherency[above])
+
+
+def estimate_noise(samples: Samples, omega: Real, response: Complex) -> NoiseSpectrum:
     """Noise spectra from local polynomial fits on neighbouring groups of bins.
 
     With excitations, outputs and inputs are both fitted on them and the noise of ``y − H u`` is
@@ -77,12 +111,12 @@ def estimate_noise(
         (centre, _of_outputs(residual, joint, centre, omega, response))
         for centre, residual in _groups(records, n_regressors, float(omega[-1]))
     ]
-    return NoiseSpectrum(np.array([one for one, _ in found]), np.array([d for _, d in found]).T)
+    return _gather(found)
 
 
 def noise_of_residuals(
-    residuals: Sequence[NDArray[np.float64]],
-    regressors: Sequence[NDArray[np.float64]],
+    residuals: Sequence[Real],
+    regressors: Sequence[Real],
     sample_time_s: float,
     highest_rad_s: float,
 ) -> NoiseSpectrum:
@@ -110,14 +144,17 @@ def noise_of_residuals(
         Bins.of(np.concatenate([given, left]), sample_time_s)
         for given, left in zip(regressors, residuals, strict=True)
     ]
-    found = list(_groups(records, len(regressors[0]), highest_rad_s))
-    densities = [np.real(np.diag(residual)) for _, residual in found]
-    return NoiseSpectrum(np.array([centre for centre, _ in found]), np.array(densities).T)
+    return _gather(list(_groups(records, len(regressors[0]), highest_rad_s)))
+
+
+def _gather(found: Sequence[tuple[float, Complex]]) -> NoiseSpectrum:
+    matrices = np.array([matrix for _, matrix in found])
+    return NoiseSpectrum.of_matrices(np.array([centre for centre, _ in found]), matrices)
 
 
 def _groups(
     records: Sequence[Bins], n_regressors: int, highest_rad_s: float
-) -> Iterator[tuple[float, NDArray[np.complex128]]]:
+) -> Iterator[tuple[float, Complex]]:
     """Centre of each group of neighbouring bins, and the residual of its local fit."""
     count = bins_needed(n_regressors, len(records))
     size = min(len(bins.omega) for bins in records)
@@ -148,17 +185,12 @@ def _groups(
 
 
 def _of_outputs(
-    residual: NDArray[np.complex128],
-    joint: bool,
-    centre: float,
-    omega: NDArray[np.float64],
-    response: NDArray[np.complex128],
-) -> NDArray[np.float64]:
+    residual: Complex, joint: bool, centre: float, omega: Real, response: Complex
+) -> Complex:
     if not joint:
-        return np.real(np.diag(residual))
+        return residual
     n_out = response.shape[0]
     nearest = int(np.argmin(np.abs(omega - centre)))
     combine = np.concatenate([-response[:, :, nearest], np.eye(n_out)], axis=1)
     # residual has its conjugate on the first index.
-    density = np.real(np.einsum("oa,ab,ob->o", combine.conj(), residual, combine))
-    return np.asarray(np.maximum(density, 0.0))
+    return np.asarray(combine.conj() @ residual @ combine.T)

@@ -35,11 +35,17 @@ class Points(NamedTuple):
 
 
 @runtime_checkable
-class SharedWork(Protocol):
-    """A source that does what several outputs have in common once."""
+class JointErrors(Protocol):
+    """A source that knows how the errors of different outputs hang together."""
 
     def covariances(self, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
-        """One matrix for each, shaped as by `CovarianceSource.covariance`."""
+        """One matrix for each output, shaped as by `CovarianceSource.covariance`."""
+        ...
+
+    def combined(
+        self, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        """Covariance of the sum of the gains times the errors of all points."""
         ...
 
 
@@ -55,12 +61,45 @@ def covariances(errors: CovarianceSource, wanted: Sequence[Points]) -> list[NDAr
     -------
     list of ndarray, each shape (2 n_in n_f, 2 n_in n_f)
     """
-    if isinstance(errors, SharedWork):
+    if isinstance(errors, JointErrors):
         return errors.covariances(wanted)
     return [
         errors.covariance(np.array([each.output]), each.inputs, each.frequencies)[0]
         for each in wanted
     ]
+
+
+def combined(
+    errors: CovarianceSource, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Covariance of a sum of gains times errors, across outputs, inputs and frequencies.
+
+    Nothing is kept but the result, however many points there are.
+
+    Parameters
+    ----------
+    errors : CovarianceSource
+        Where it knows one output at a time only, different outputs are taken as independent.
+    wanted : sequence of Points
+    gains : sequence of ndarray, each shape (n_rows, 2 n_in n_f)
+        Columns ordered as the rows of `CovarianceSource.covariance`.
+
+    Returns
+    -------
+    ndarray, shape (n_rows, n_rows)
+    """
+    if isinstance(errors, JointErrors):
+        return errors.combined(wanted, gains)
+    blocks = covariances(errors, wanted)
+    parts = [gain @ block @ gain.T for gain, block in zip(gains, blocks, strict=True)]
+    return np.asarray(np.sum(parts, axis=0))
+
+
+def union(wanted: Sequence[Points]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """All inputs and all frequencies of some points, in order."""
+    inputs = np.unique(np.concatenate([each.inputs for each in wanted]))
+    frequencies = np.unique(np.concatenate([each.frequencies for each in wanted]))
+    return inputs, frequencies
 
 
 @dataclass(frozen=True)
@@ -84,8 +123,17 @@ class Selected:
         )
 
     def covariances(self, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
-        """See `SharedWork`."""
-        there = [
+        """See `JointErrors`."""
+        return covariances(self.errors, self._there(wanted))
+
+    def combined(
+        self, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        """See `JointErrors`."""
+        return combined(self.errors, self._there(wanted), gains)
+
+    def _there(self, wanted: Sequence[Points]) -> list[Points]:
+        return [
             Points(
                 int(self.outputs[each.output]),
                 self.inputs[each.inputs],
@@ -93,7 +141,6 @@ class Selected:
             )
             for each in wanted
         ]
-        return covariances(self.errors, there)
 
 
 @dataclass(frozen=True)

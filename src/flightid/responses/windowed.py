@@ -12,7 +12,7 @@ from flightid.record.history import Step
 from flightid.responses.cautions import band_findings, correlation_findings
 from flightid.responses.composite import Composite, combine
 from flightid.responses.conditioned import Conditioned, condition, random_error
-from flightid.responses.covariance import WindowedErrors, WindowShare
+from flightid.responses.covariance import WindowedErrors
 from flightid.responses.instrument import condition_on_excitation, excitation_projection
 from flightid.responses.noise import estimate_noise
 from flightid.responses.planning import valid_windows
@@ -20,6 +20,7 @@ from flightid.responses.response import FrequencyResponse
 from flightid.responses.samples import Samples
 from flightid.responses.spectra import Spectra, average_spectra
 from flightid.responses.transform import HANN_POWER, FoldedBasis, WindowPlan
+from flightid.responses.window_weights import WindowShare, WindowWeights
 
 
 @dataclass(frozen=True)
@@ -82,15 +83,13 @@ def windowed_errors(estimate: Windowed) -> WindowedErrors:
             projection = part.inverse @ excitation_projection(one, samples)
         shares.append(WindowShare(one.plan, scale * projection))
     kind = "excitations" if samples.excitations else "inputs"
-    return WindowedErrors(
+    windows = WindowWeights(
         tuple(samples.part(kind)),
         estimate.omega * samples.sample_time_s,
-        samples.sample_time_s,
         estimate.detrend,
         tuple(shares),
-        estimate.composite.sensitivity,
-        noise,
     )
+    return WindowedErrors(windows, samples.sample_time_s, estimate.composite.sensitivity, noise)
 
 
 def windowed_response(estimate: Windowed, method: str, step: Step) -> FrequencyResponse:

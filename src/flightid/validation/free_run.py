@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from flightid.identification.model_outputs import (
     Modes,
     System,
+    between_samples,
     driven_outputs,
     free_outputs,
     split_modes,
@@ -92,7 +93,8 @@ class FreeRun:
         """Answer to the inputs, shape (n_inputs, n_samples), with every free state at zero."""
         _, b, _, d, delays_s = self.matrices
         modes = self._modes(b, d, delays_s)
-        return self._answer(driven_outputs(modes, inputs, self.sample_time_s, self.hold))
+        between = between_samples(inputs, self.hold)
+        return self._answer(driven_outputs(modes, between, self.sample_time_s, self.hold))
 
     def free(self) -> tuple[list[Answer], list[Answer]]:
         """Answers to each free state, and to a constant 1 added to each state derivative."""
