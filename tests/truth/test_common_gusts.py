@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import flightid as fid
 from flightid.excitation import sweep
+from flightid.responses.store import read_response, write_response
 from flightid.responses.uncertainty import Points, combined, covariances
 from flightid.simulation import CrudePilot, Disturbance, FlightConditions, fly_closed_loop
 from tests.closeness import assert_close
@@ -159,6 +162,21 @@ def test_one_output_at_a_time_is_what_it_was() -> None:
     size = len(alone[0])
     shared = joint[:size, size:] / np.sqrt(np.outer(*map(np.diag, alone)))
     assert np.max(np.abs(shared)) > 0.3, "what moves the rate moves the attitude"
+
+
+def test_a_response_from_a_file_does_not_know_what_outputs_share(tmp_path: Path) -> None:
+    response = _estimate(_fly(0)).select(outputs=["q", "theta"], inputs=["lon"])
+    known = {name: TRUTH[name] for name in ("Mw", "Mcol", "Zw", "Zlon", "Zcol")}
+    model = HOVER.with_fixed(**known).with_responses("q/lon", "theta/lon")
+    options = {"omega_rad_s": (0.8, 8.0), "correct_bias": False}
+    stored = read_response(write_response(response, tmp_path / "response.nc"))
+    fits = [fid.identify(model, each, **options) for each in (response, stored)]
+    codes = [{finding.code for finding in fit.findings} for fit in fits]
+    assert "intervals-by-output" not in codes[0]
+    assert "intervals-by-output" in codes[1]
+    wide, narrow = (fit.parameters["Mlon"].stderr or 0.0 for fit in fits)
+    # Rate and attitude see the same gusts: taken as two witnesses they would halve the variance.
+    assert 1.2 < wide / narrow < 1.6
 
 
 @pytest.mark.slow

@@ -15,7 +15,13 @@ from flightid.errors import FitError
 from flightid.identification.selection import SelectedResponse
 from flightid.inference import decibel_phase_sensitivity, window_covariance
 from flightid.responses import FrequencyResponse
-from flightid.responses.uncertainty import CovarianceSource, Points, combined, covariances
+from flightid.responses.uncertainty import (
+    CovarianceSource,
+    Points,
+    combined,
+    covariances,
+    knows_between_outputs,
+)
 
 Array = NDArray[np.float64]
 
@@ -66,6 +72,13 @@ class ErrorModel:
     runs: tuple[Run, ...]
     known: CovarianceSource | None = None
     approximate: tuple[Array, ...] = ()
+
+    @property
+    def outputs_apart(self) -> bool:
+        """Whether several outputs have known errors, but not what they share."""
+        return (
+            len(self.runs) > 1 and self.known is not None and not knows_between_outputs(self.known)
+        )
 
     @cached_property
     def covariances(self) -> tuple[Array, ...]:

@@ -44,6 +44,8 @@ class Statistics:
     correlation : ndarray
     source : str
         Where the intervals come from.
+    outputs_apart : bool
+        Whether errors of different outputs were taken as independent for want of knowledge.
     """
 
     parameters: Mapping[str, FittedParameter]
@@ -51,6 +53,7 @@ class Statistics:
     covariance: Array | None
     correlation: Array
     source: str
+    outputs_apart: bool
 
 
 def statistics(
@@ -84,7 +87,9 @@ def statistics(
     weighted = coherence_jacobian(fitted, selected)[:, inner]
     correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
     parameters = fitted_parameters(fitted, names, covariance, weighted)
-    return Statistics(parameters, names, covariance, correlation, errors.source)
+    return Statistics(
+        parameters, names, covariance, correlation, errors.source, errors.outputs_apart
+    )
 
 
 def at_bound(parameter: Parameter) -> bool:

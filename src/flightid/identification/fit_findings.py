@@ -142,8 +142,18 @@ def judge_search(groups: Sequence[Sequence[End]], near: float | None = None) -> 
     return found
 
 
-def judge_intervals(source: str) -> list[Finding]:
+def judge_intervals(source: str, *, outputs_apart: bool) -> list[Finding]:
     """Verdict on where the 95 % intervals come from."""
+    if outputs_apart:
+        return [
+            Finding(
+                "intervals-by-output",
+                Light.AMBER,
+                "errors of different outputs were taken as independent: what moves several at "
+                "once, as a gust does, makes the intervals narrow",
+                "fit the response as estimated from records, not one from a file or arithmetic",
+            )
+        ]
     if source == UNKNOWN:
         return [
             Finding(

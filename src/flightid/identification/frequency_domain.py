@@ -273,7 +273,7 @@ def _assemble(
         *judge_cost(costs, total / len(costs)),
         *judge_parameters(found.parameters),
         *judge_correlation(found.names, found.correlation),
-        *judge_intervals(found.source),
+        *judge_intervals(found.source, outputs_apart=found.outputs_apart),
     )
     minima = local_minima(groups, free)
     return Fit(

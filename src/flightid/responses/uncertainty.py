@@ -95,6 +95,13 @@ def combined(
     return np.asarray(np.sum(parts, axis=0))
 
 
+def knows_between_outputs(errors: CovarianceSource) -> bool:
+    """Whether a source knows what different outputs share."""
+    if isinstance(errors, Selected):
+        return knows_between_outputs(errors.errors)
+    return isinstance(errors, JointErrors)
+
+
 def union(wanted: Sequence[Points]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """All inputs and all frequencies of some points, in order."""
     inputs = np.unique(np.concatenate([each.inputs for each in wanted]))
