@@ -62,7 +62,7 @@ class CrudePilot:
     Attributes
     ----------
     gains : mapping of str to mapping of str to float
-        By stick, then by measured channel; stick unit over channel unit.
+        By stick, then by measured channel; stick unit over channel unit. Empty: hands off.
     delay_s : float
         Reaction time, s; a sample of the flight or more.
     lag_s : float
@@ -98,7 +98,7 @@ class CrudePilot:
         """A, B, C, D and the delay of each watched channel, s."""
         gain = np.array(
             [[-row.get(name, 0.0) for name in self.inputs] for row in self.gains.values()]
-        )
+        ).reshape(len(self.gains), len(self.inputs))
         n, delays_s = len(self.gains), np.full(len(self.inputs), self.delay_s)
         if self.lag_s == 0.0:
             none = np.zeros((0, 0))
