@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from vehicles import ANGLES, COMMANDS, RATES, vehicle
 
 import flightid as fid
-from flightid.excitation import Excitation
 from flightid.conventions import Role
+from flightid.excitation import Excitation
 from flightid.record import Channel, Step
 from flightid.simulation import (
     Autopilot,
@@ -102,7 +102,7 @@ def fly_published(
 
 
 def sweeps_at_once(values: Mapping[str, float], seed: int, every: int = 4) -> list[fid.Record]:
-    """Records of the three sweeps without a log, in a loop of 400 Hz over `every`: for many flights."""
+    """Fly the three sweeps in a loop of 400 Hz over `every`; no log, for many flights."""
     base = schedule()
     flown = _flown(base, values, seed, every, {}, True)
     spans = [base.span(run) for run in base.runs]
@@ -169,7 +169,7 @@ def _as_flight(base: Flight, flown: fid.Record, seed: int) -> Flight:
 
 
 def read_back(flight: Flight, path: Path, log_every: int = 1) -> fid.Log:
-    """Write the flight's DataFlash log at a rate of ArduPilot's, 400 Hz over 1, 2, 4 or 8; read it."""
+    """Write the flight's DataFlash log, 400 Hz over 1, 2, 4 or 8, and read it."""
     kept = replace(flight, rows=flight.rows[::log_every], log_every=log_every)
     return fid.read_log(write_ardupilot_log(kept, path))
 

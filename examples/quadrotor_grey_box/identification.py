@@ -90,7 +90,7 @@ def attempt(records: Sequence[fid.Record], **structure: bool) -> fid.Fit | Refus
     try:
         return fid.identify(grey_box("roll_pitch", **structure), records, hold=HOLD)
     except FitError as error:
-        return Refusal(str(error))
+        return Refusal(f"{error.problem}: {error.found}")
 
 
 def mse(fit: fid.Fit, place: int, rate: str) -> float:

@@ -60,9 +60,7 @@ def _flight(log: fid.Log) -> tuple[Block, ...]:
         f"0.15 and 0.55), a gyro noise of {flights.GYRO_NOISE_RAD_S} rad/s on each sample and a "
         "log of every loop. Fits see the log alone."
     )
-    checks = [
-        finding for run in log.sid_runs for finding in log.check_injection(run).findings
-    ]
+    checks = [finding for run in log.sid_runs for finding in log.check_injection(run).findings]
     return Paragraph(words), Lights(tuple(checks), "Injection")
 
 
@@ -134,9 +132,7 @@ def _path(reduction: fid.Reduction) -> Figure:
 
 def _warning() -> str:
     value = truth()
-    effect = np.array(
-        [[value["Ltphi"], value["Lttheta"]], [value["Mtphi"], value["Mttheta"]]]
-    )
+    effect = np.array([[value["Ltphi"], value["Lttheta"]], [value["Mtphi"], value["Mttheta"]]])
     lost = abs(np.degrees(np.angle(-np.linalg.eigvals(effect)[0])))
     gain = float((effect * np.linalg.inv(effect).T)[0, 0])
     names = " and ".join(f"{name} = {value[name]:g}" for name in COUPLINGS)
@@ -144,8 +140,8 @@ def _warning() -> str:
         f"The published {names} are no small corrections. With equal controllers on both axes they "
         f"alone would take {lost:.0f} degrees of phase from the rate loops (the angle of the "
         f"effectiveness matrix's eigenvalues; relative gain {gain:.2f} where a symmetric frame has "
-        "1). Sweeps like these would have determined them to a fraction of a percent, or shown that "
-        "there are none; the study gives neither interval nor test. Do not tune decoupling on them."
+        "1). Sweeps like these would have determined them to a fraction of a percent, or shown "
+        "that there are none; the study has neither interval nor test. Tune no decoupling on them."
     )
 
 

@@ -85,7 +85,7 @@ def study(seed: int, folder: Path, *, full: bool) -> Study:
         "yaw": ident.predict(found.time["yaw"], doublets[2:]),
     }
     other = _sweeps(folder, seed + 1) if full else None
-    errors = {rate: _errors(found, place, sweeps, doublets, other) for place, rate in enumerate(RATES)}
+    errors = {rate: _errors(found, place, doublets, other) for place, rate in enumerate(RATES)}
     couplings: dict[str, tables.Attempt] = {
         "both sweeps": found.time["roll_pitch"],
         "roll sweep, controllers off": ident.attempt(
@@ -129,7 +129,6 @@ def _sweeps(
 def _errors(
     found: ident.Identified,
     place: int,
-    sweeps: list[fid.Record],
     doublets: list[fid.Record],
     other: list[fid.Record] | None,
 ) -> list[float | None]:

@@ -1,7 +1,7 @@
-"""The vehicles that are flown, and the grey boxes that are fitted: the library's, with rates alone.
+"""The vehicle that is flown and the grey boxes that are fitted: the library's, rates alone.
 
-Truth is the published table 3. The study measured rates, so attitude is no output here, and no state:
-nothing depends on it but the autopilot.
+Truth is the published table 3. The study measured rates, so attitude is no output here, and no
+state: nothing depends on it but the autopilot.
 """
 
 from __future__ import annotations

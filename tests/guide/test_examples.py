@@ -114,3 +114,22 @@ def test_the_r50_is_found_from_its_flights(tmp_path: Path) -> None:
     assert inside >= 0.85 * of, run.stdout
     assert "Table 6, hover: eigenvalues" in run.stdout
     assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
+
+
+def test_the_rig_grey_boxes_are_found_with_what_the_study_left_out(tmp_path: Path) -> None:
+    study = EXAMPLES / "quadrotor_grey_box" / "study.py"
+    run = _script(study, "short", "0", "out", folder=tmp_path)
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    said = run.stdout
+    inside = re.search(r"(\d) of 8 intervals cover the truth", said)
+    assert inside is not None
+    assert int(inside.group(1)) >= 7
+    # One sweep with the controllers off moves one command: the other's effect is not seen.
+    assert re.search(r"roll sweep, controllers off .*Lttheta, Mttheta", said)
+    # The gyro's noise is all that the models leave, in training and on doublets.
+    for rate in ("p", "q", "r"):
+        row = re.search(rf"^{rate} +0\.000144 +(\S+) +– +(\S+) ", said, re.MULTILINE)
+        assert row is not None
+        assert all(0.9 < float(each) / 0.000144 < 1.1 for each in row.groups())
+    assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
+    assert (tmp_path / "out" / "rig.BIN").read_bytes()[:2] == b"\xa3\x95"

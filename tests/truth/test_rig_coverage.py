@@ -33,7 +33,6 @@ def test_intervals_of_the_rig_cover_the_published_parameters(
                 assert parameter.interval95 is not None
                 low, high = parameter.interval95
                 inside[name] += low <= truth[name] <= high
-        print(seed, inside)
     shares = {name: count / FLIGHTS for name, count in inside.items()}
     # Eight parameters of 200 flights: 93 to 97 % in all; one alone may stray by three deviations.
     assert 0.93 <= sum(shares.values()) / len(shares) <= 0.97, shares

@@ -93,6 +93,13 @@ def test_a_gust_counts_against_its_state() -> None:
         assert_close(gust, sign * scale * air, atol=1e-5 * np.ptp(gust), why="linear; scale from p")
 
 
+def test_a_pilot_without_gains_keeps_hands_off() -> None:
+    stable = LinearSystem([[-4.0]], [[6.0]], [[1.0]], [[0.0]], ("lat",), ("p",))
+    flight = fly_closed_loop(stable, CrudePilot({}), chirp())
+    assert np.array_equal(flight["lat"], flight["sweep_lat"])
+    assert_close(flight["p"], simulate(stable, flight)["p"], atol=1e-12, why="the same exact hold")
+
+
 def test_noise_and_remnant_have_their_sizes_and_seeds() -> None:
     conditions = FlightConditions(noise={"p": 0.02}, remnant={"lat": Disturbance(0.05, 0.5)})
     pilot = CrudePilot({"lat": {"p": 0.0}}, delay_s=0.1)
