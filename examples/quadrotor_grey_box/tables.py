@@ -58,10 +58,10 @@ def parameters(found: Identified, truth: Mapping[str, float]) -> Table:
 def correlations(fit: fid.Fit) -> Table:
     """Correlations of the estimates."""
     rows = tuple(
-        (name, *map(float, row[: place + 1]), *[None] * (len(row) - place - 1))
+        (name, *(round(float(r), 3) for r in row[: place + 1]), *[None] * (len(row) - place - 1))
         for place, (name, row) in enumerate(zip(fit.names, fit.correlation, strict=True))
     )
-    heads = tuple(Column(name, digits=2) for name in fit.names)
+    heads = tuple(Column(name, digits=3) for name in fit.names)
     return Table("Correlations of the estimates", (Column("parameter"), *heads), rows)
 
 
@@ -97,15 +97,16 @@ def errors(measured: Mapping[str, Sequence[float | None]], noise_rad_s: float) -
     ]
     columns = (
         Column("rate"),
-        Column("variance of the gyro's noise", digits=3),
+        Column("gyro noise²", digits=3),
         Column("training", digits=3),
-        Column("validation, other sweep", digits=3),
-        Column("validation, doublet", digits=3),
+        Column("other sweep", digits=3),
+        Column("doublet", digits=3),
         Column("published training", digits=3),
         Column("published validation", digits=3),
     )
     notes = (
-        "Mean square of measured minus modelled rate, (rad/s)²; the study prints no unit.",
+        "Mean square of measured minus modelled rate, (rad/s)²; the study prints no unit. Another "
+        "sweep and a doublet validate: no fit has seen them.",
         "The right structure leaves the noise and nothing else, in training and validation alike.",
     )
     return Table("Mean squared errors", columns, tuple(rows), notes)
