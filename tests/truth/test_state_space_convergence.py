@@ -37,7 +37,7 @@ def recovered(seed: int) -> bool:
 
 
 def test_a_few_starts() -> None:
-    assert sum(recovered(seed) for seed in range(4)) >= 3
+    assert all(recovered(seed) for seed in range(2))
 
 
 @pytest.mark.slow

@@ -176,6 +176,12 @@ impl ModelTape {
         Ok(Linearisation { values, slopes })
     }
 
+    /// Zeros in the place of a linearisation that does not exist.
+    pub fn no_linearisation(&self) -> Linearisation {
+        let values = vec![0.0; self.tape.n_outputs()];
+        Linearisation { values, slopes: vec![0.0; self.height() * self.width()] }
+    }
+
     /// Derivatives, by some of the parameters, of every entry of ∂(r, y)/∂z that has one. Second
     /// derivatives of the tape, from dual numbers of dual numbers.
     ///

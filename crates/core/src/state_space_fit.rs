@@ -57,7 +57,7 @@ impl<'a> FreeStateSpace<'a> {
     /// which responses will be asked for (others are solved when asked).
     ///
     /// # Errors
-    /// `Shape` for what does not fit, `NotFinite` where the model has no linearisation.
+    /// `Shape` for what does not fit.
     pub fn new(
         tape: &'a ModelTape,
         pairs: &'a [(usize, usize)],
@@ -79,6 +79,11 @@ impl<'a> FreeStateSpace<'a> {
         let mut omega: Vec<f64> = omega.into_iter().collect();
         omega.sort_by(f64::total_cmp);
         omega.dedup();
+        let linear = match tape.linearise(point, values) {
+            // Other starts of a search may have one; `prepare` judges each.
+            Err(CoreError::NotFinite { .. }) => tape.no_linearisation(),
+            found => found?,
+        };
         Ok(Self {
             tape,
             pairs,
@@ -88,7 +93,7 @@ impl<'a> FreeStateSpace<'a> {
             inputs: used(pairs.iter().map(|pair| pair.1)),
             outputs: used(pairs.iter().map(|pair| pair.0)),
             omega,
-            linear: tape.linearise(point, values)?,
+            linear,
             sensitivities: Vec::new(),
             delay_slopes: Vec::new(),
             plan: None,

@@ -95,6 +95,25 @@ def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fi
     _check_model(model, data)
     selected = _select(model, data, options)
     setup = _check_start(model, selected)
+    try:
+        return _fit_selected(model, data, selected, setup, options)
+    except FitError as error:
+        if not setup:
+            raise
+        # What looked wrong before the fit is the likeliest reason why there is none.
+        action = "; ".join(f"{each.message} — {each.action}" for each in setup)
+        raise FitError(
+            error.problem, found=error.found, needed=error.needed, action=action
+        ) from error
+
+
+def _fit_selected(
+    model: Model,
+    data: FrequencyResponse,
+    selected: list[SelectedResponse],
+    setup: list[Finding],
+    options: Options,
+) -> Fit:
     errors = error_model(data, selected)
     groups = cluster(_minimise(model, selected, errors, options))
     fitted = _at(model, groups[0][0])

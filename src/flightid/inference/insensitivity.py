@@ -72,7 +72,9 @@ def null_combination(jacobian: Array, *, tolerance: float = 1e-9) -> Array | Non
     if np.any(size == 0.0):
         return np.asarray((size == 0.0).astype(np.float64))
     n = len(size)
-    _, values, right = np.linalg.svd(jacobian / size, full_matrices=True)
+    # The triangle has the same singular values, without a left basis of thousands of rows.
+    triangle = np.linalg.qr(jacobian / size, mode="r")
+    _, values, right = np.linalg.svd(triangle, full_matrices=True)
     if len(values) == n and values[-1] > tolerance * values[0]:
         return None
     share = np.abs(right[-1])
