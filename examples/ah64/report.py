@@ -17,6 +17,7 @@ from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Document, Figure, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.html import to_html
+from flightid.report.reduction import reduction_blocks
 from flightid.report.verification import verification_blocks
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def write(found: Results, folder: Path) -> Path:
         (
             Section("Responses that are fitted", _coherence(found)),
             Section("Heave before and after dynamic inflow", _heave(found)),
-            Section("Reduction of the structure", result_blocks(found.reduction)),
+            Section("Reduction of the structure", reduction_blocks(found.reduction)),
             Section("Six degrees of freedom with inflow", _fit(found.fit)),
             Section(
                 "Verification beside a linearised full-envelope model",

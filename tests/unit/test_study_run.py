@@ -44,6 +44,7 @@ span_s = [61.0, 66.0]
 [response]
 method = "instrument"
 compare = ["composite"]
+[reduce]
 [[model]]
 name = "Roll rate"
 template = "rate_motor_lag"
@@ -74,6 +75,11 @@ def test_every_stage_left_its_result(study: fid.Study) -> None:
     (item,) = study.identified
     assert list(item.fits) == ["instrument", "composite"]
     assert list(item.verifications) == ["doublet"]
+    assert item.reduction is not None
+    (step,) = item.reduction.path
+    assert (step.name, step.accepted) == ("tau", False)
+    assert item.fit is item.reduction.start
+    assert {f.code for f in item.reduction.path_findings} <= {f.code for f in item.findings}
     beside = item.verifications["doublet"]
     assert isinstance(beside, fid.Comparison)
     assert beside.names == ("Roll rate", "rate_integrator")
@@ -95,6 +101,10 @@ def test_text_html_and_json_agree_on_the_numbers(study: fid.Study) -> None:
     assert text == to_text(study.document)
     assert page == to_html(study.document)
     assert values["report"]["tally"] in text
+    path = values["models"][0]["reduction"]["path"]
+    assert [step["name"] for step in path] == ["tau"]
+    assert "Reduction of the structure" in page
+    assert "Step 1, tau: the average cost would rise to" in text
 
 
 def test_provenance_names_every_file_by_its_hash(study: fid.Study) -> None:

@@ -31,6 +31,8 @@ compare = ["composite"]
 [fit]
 starts = 3
 seed = 7
+[reduce]
+maximum_cramer_rao_percent = 30
 [[model]]
 name = "roll rate"
 template = "rate_motor_lag"
@@ -38,6 +40,7 @@ axis = "roll"
 identify = "sweep"
 verify = ["doublet"]
 band_rad_s = [0.5, 60]
+keep = "tau_s"
 parameters.tau_s = { value = 0.03, free = false }
 """
 
@@ -57,6 +60,10 @@ def test_a_whole_study_is_read(tmp_path: Path) -> None:
     assert model.parameters == {"tau_s": {"value": 0.03, "free": False}}
     assert settings.segment("doublet").span_s == (70.0, 80.0)
     assert settings.response.compare == ("composite",)
+    assert settings.reduce is not None
+    limits = settings.reduce.limits
+    assert (limits.maximum_cramer_rao_percent, limits.maximum_insensitivity_percent) == (30.0, 10.0)
+    assert (settings.reduce.after_rise, model.keep, model.drop) == ("stop", ("tau_s",), ())
 
 
 def test_a_model_file_lies_beside_the_study(tmp_path: Path) -> None:
@@ -101,6 +108,10 @@ def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> 
         ('[log]\npath = "flight.bin"', "[flight]\nsimulate = 'ufo'", "one of 'quadrotor'"),
         ('[log]\npath = "flight.bin"', "[[log]]", "log does not fit: found [{}]; needed a table"),
         ("[fit]", "[fit", "the study file is no TOML"),
+        ("cramer_rao_percent = 30", "cramer_rao_percent = 0", "needed a number above 0"),
+        ("maximum_cramer_rao", "maximum_cramer_raw", "Next: write 'maximum_cramer_rao_percent'"),
+        ("_percent = 30", '_percent = 30\nafter_rise = "hope"', "needed one of 'stop', 'next'"),
+        ("[reduce]\nmaximum_cramer_rao_percent = 30", "", "there is no key 'keep'"),
         ("seed = 7", "seed = 7\nwindows_s = []", "[fit]: there is no key 'windows_s'"),
         ('compare = ["composite"]', "windows_s = []", "needed a list of one or more numbers"),
     ],

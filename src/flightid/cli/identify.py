@@ -12,6 +12,7 @@ from flightid.cli.output import emit, json_option, leave_by_verdict, note
 if TYPE_CHECKING:
     from flightid.models import Model
     from flightid.record import Record
+    from flightid.responses import FrequencyResponse
 
 LOGS = {".bin", ".ulg", ".log"}
 
@@ -33,6 +34,9 @@ LOGS = {".bin", ".ulg", ".log"}
 )
 @click.option("--starts", type=click.IntRange(1), default=1, show_default=True)
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True)
+@click.option(
+    "--reduce", "reduced", is_flag=True, help="Drop the parameters that the data do not determine."
+)
 @json_option
 def command(
     file: Path,
@@ -44,6 +48,7 @@ def command(
     method: str,
     starts: int,
     seed: int,
+    reduced: bool,
     as_json: bool,
 ) -> None:
     """Identify a model from FILE, a log or a file of records.
@@ -55,27 +60,29 @@ def command(
 
     model = flightid.load_model(model_name, axis=axis)
     with progress(3, "Identifying") as advance:
-        records = _records(file, model, span, sid_run)
+        data: FrequencyResponse | list[Record]
+        data = records = _records(file, model, span, sid_run)
         advance()
         if method == "output_error":
             if band is not None:
                 raise click.UsageError("--band belongs to responses")
-            advance()
-            fit = flightid.identify(model, records, starts=starts, seed=seed)
         else:
-            response = flightid.estimate_response(
+            data = flightid.estimate_response(
                 records,
                 inputs=model.inputs,
                 outputs=model.outputs,
                 omega_rad_s=None if band is None else (*band, 100),
                 method=method,
             )
-            advance()
-            fit = flightid.identify(model, response, starts=starts, seed=seed)
         advance()
-    note(repr(fit))
-    emit(fit, as_json=as_json)
-    leave_by_verdict(fit.findings)
+        fit = flightid.identify(model, data, starts=starts, seed=seed)
+        result = flightid.reduce(fit, data) if reduced else fit
+        advance()
+    note(repr(result))
+    if isinstance(result, flightid.Reduction) and not as_json:
+        emit(result.fit, as_json=False)
+    emit(result, as_json=as_json)
+    leave_by_verdict(result.findings)
 
 
 def _records(

@@ -130,8 +130,10 @@ def _options(fit: Fit, given: Mapping[str, object]) -> dict[str, Any]:
     before = fit.provenance.get("options")
     used = dict(before) if isinstance(before, Mapping) else {}
     if not fit.responses:
-        used["method"] = str(fit.provenance.get("method")).replace(" ", "_")
-    return used | {"starts": 1, **given}
+        used["method"] = str(fit.provenance.get("method")).replace(" ", "_").lower()
+    if "starts" in used:
+        used["starts"] = 1
+    return used | dict(given)
 
 
 @dataclass

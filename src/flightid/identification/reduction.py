@@ -192,6 +192,11 @@ class Reduction:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Verdict on the path, and those on the reduced fit."""
+        return (*self.path_findings, *self.fit.findings)
+
+    @property
+    def path_findings(self) -> tuple[Finding, ...]:
+        """Verdict on the path alone."""
         before, after = self.start.average_cost, self.fit.average_cost
         out = ", ".join(self.dropped) or "nothing"
         found = [
@@ -216,7 +221,7 @@ class Reduction:
                     f"go on without it by resume(keep=[{last.name!r}]), or judge its interval",
                 )
             )
-        return (*found, *self.fit.findings)
+        return tuple(found)
 
     def __repr__(self) -> str:
         """Parameters before and after, steps and average cost on one line."""
@@ -239,21 +244,26 @@ class Reduction:
             Column("parameter"),
             Column("why"),
             Column("fixed at"),
-            Column("average cost", digits=5),
+            Column("cost", digits=5),
             Column("rise", "%", 3),
-            Column("worst insensitivity", "%", 3),
-            Column("worst Cramér–Rao", "%", 3),
+            Column("insensitivity", "%", 3),
+            Column("Cramér–Rao", "%", 3),
             Column("out"),
-            Column("note"),
         )
         percents = worst_percents(self.start)
-        first = (0, "", "start", None, self.start.average_cost, None, *percents, None, "")
+        first = (0, "", "start", None, self.start.average_cost, None, *percents, None)
         rows: list[tuple[Cell, ...]] = [first]
         for number, each in enumerate(self.path, 1):
             percents = (None, None) if each.fit is None else worst_percents(each.fit)
             row = (number, each.name, each.reason, each.value, each.cost_after)
-            rows.append((*row, each.rise_percent, *percents, each.accepted, each.note))
-        notes = (f"Ended: {self.stopped}.", *map(str, self.findings))
+            rows.append((*row, each.rise_percent, *percents, each.accepted))
+        remarks = (
+            f"Step {number}, {each.name}: {each.note.removesuffix('.')}."
+            for number, each in enumerate(self.path, 1)
+            if each.note
+        )
+        legend = "Average cost, and the worst percentages of all parameters, after the step."
+        notes = (f"Ended: {self.stopped}.", legend, *remarks, *map(str, self.findings))
         return Table(f"Reduction of {self.start.model.name}", columns, tuple(rows), notes)
 
     def to_dict(self) -> dict[str, object]:

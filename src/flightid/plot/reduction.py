@@ -8,6 +8,8 @@ from flightid.identification.reduction import Reduction, worst_percents
 from flightid.plot import look
 
 HEIGHT_PX = 520
+FLATTENING = 10.0
+"""Ratio of the highest cost to the path's from which a linear axis shows nothing of the path."""
 
 
 def reduction_path(reduction: Reduction) -> go.Figure:
@@ -65,9 +67,18 @@ def reduction_path(reduction: Reduction) -> go.Figure:
     made.update_xaxes(tickmode="array", tickvals=list(range(len(labels))), ticktext=labels)
     made.update_xaxes(range=[-0.4, len(labels) - 0.6])
     made.update_xaxes(title_text="step and parameter", row=2, col=1)
-    made.update_yaxes(title_text="average cost", rangemode="tozero", row=1, col=1)
+    made.update_yaxes(title_text="average cost", **_cost_axis(stands, undone), row=1, col=1)
     made.update_yaxes(title_text="worst of all [%]", type="log", row=2, col=1)
     return made
+
+
+def _cost_axis(stands: list, undone: list) -> dict[str, str]:  # type: ignore[type-arg]
+    """From zero; in the logarithm where steps that were undone would flatten the path."""
+    kept = max(fit.average_cost for _, fit in stands)
+    highest = max((cost for _, cost in undone), default=kept)
+    if kept > 0.0 and highest > FLATTENING * kept:
+        return {"type": "log"}
+    return {"rangemode": "tozero"}
 
 
 def _guides(made: go.Figure, reduction: Reduction, stands: list) -> None:  # type: ignore[type-arg]

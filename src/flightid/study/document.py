@@ -182,6 +182,11 @@ def _options(study: Study) -> dict[str, Cell]:
         "starts of a fit": settings.starts,
         "seed of the starts": settings.seed,
     }
+    if settings.reduce is not None:
+        options |= {
+            name.replace("_", " "): value for name, value in vars(settings.reduce.limits).items()
+        }
+        options["after a marked rise"] = settings.reduce.after_rise
     if settings.flight is not None and study.truth is not None:
         options["seed of the flight"] = settings.flight.seed
     return options

@@ -10,6 +10,7 @@ from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Figure, Lights, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.fitted_record import record_figures
+from flightid.report.reduction import reduction_blocks
 from flightid.report.verification import verification_blocks
 from flightid.table import Cell, Column, Table
 
@@ -47,11 +48,13 @@ def model_section(item: Identified, truth: Truth | None) -> Section:
         blocks.append(TableBlock(_comparison(item, truth)))
     if item.response is not None and item.response.findings:
         blocks.append(Lights(item.response.findings, "Frequency response"))
-    parts = tuple(
+    parts = [
         Section(f"Prediction of “{name}”", verification_blocks(verification))
         for name, verification in item.verifications.items()
-    )
-    return Section(item.settings.name, tuple(blocks), parts)
+    ]
+    if item.reduction is not None:
+        parts.insert(0, Section("Reduction of the structure", reduction_blocks(item.reduction)))
+    return Section(item.settings.name, tuple(blocks), tuple(parts))
 
 
 def _bode_figure(item: Identified, truth: Truth | None) -> Figure:

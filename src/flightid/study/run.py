@@ -106,11 +106,11 @@ def _identify(
 ) -> Identified:
     responses = estimate(task, records, settings)
     advance()
-    fits = fit(task, responses, records, settings)
+    fits, reduction = fit(task, responses, records, settings)
     advance()
     verifications = check(task, next(iter(fits.values())), records, settings)
     advance()
-    return Identified(task.settings, responses, fits, verifications)
+    return Identified(task.settings, responses, fits, verifications, reduction)
 
 
 def _write(study: Study, folder: Path) -> None:

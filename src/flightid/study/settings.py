@@ -15,6 +15,7 @@ from typing import Any, Literal, cast
 from flightid.errors import StudyError
 from flightid.study.flight import FlightPlan, read_flight
 from flightid.study.reading import TOP, TableReader
+from flightid.study.reducing import ReduceSettings, read_reduce
 
 MAXIMUM_BYTES = 1 << 20
 METHODS = ("composite", "local_polynomial", "instrument")
@@ -63,6 +64,8 @@ class ModelSettings:
         Overrides by parameter: value, min, max, free.
     rivals : mapping of str to str
         Models to verify side by side: library name, or path of a model file, by name.
+    keep, drop : tuple of str
+        Parameters that a reduction leaves in, or takes out first.
     """
 
     name: str
@@ -73,6 +76,8 @@ class ModelSettings:
     band_rad_s: tuple[float, float] | None
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     rivals: Mapping[str, str] = field(default_factory=dict)
+    keep: tuple[str, ...] = ()
+    drop: tuple[str, ...] = ()
 
     @property
     def segments(self) -> tuple[str, ...]:
@@ -143,6 +148,8 @@ class Settings:
         Starts of each fit, and the seed they are drawn with.
     initial : {"trim", "fit"}
         Whether a prediction starts at rest or from a state that is solved for.
+    reduce : ReduceSettings or None
+        How structures are reduced after their fit; None: not at all.
     """
 
     title: str
@@ -161,6 +168,7 @@ class Settings:
     starts: int
     seed: int
     initial: Literal["trim", "fit"]
+    reduce: ReduceSettings | None = None
 
     @property
     def on_records(self) -> bool:
@@ -215,8 +223,10 @@ def read_settings(path: Path) -> Settings:
     initial = cast(Literal["trim", "fit"], check.choice("initial", ("trim", "fit"), "trim"))
     check.finish()
     on_records = method != FITS[0]
+    reducing = root.maybe(lambda key: read_reduce(root.table(key)), "reduce")
     models = tuple(
-        _model(reader, path.parent, on_records=on_records) for reader in root.tables("model")
+        _model(reader, path.parent, on_records=on_records, reduced=reducing is not None)
+        for reader in root.tables("model")
     )
     root.finish()
     _require_references(segments, models)
@@ -235,6 +245,7 @@ def read_settings(path: Path) -> Settings:
         starts,
         seed,
         initial,
+        reducing,
     )
 
 
@@ -295,7 +306,7 @@ def _response(reader: TableReader) -> ResponseSettings:
     return made
 
 
-def _model(reader: TableReader, folder: Path, *, on_records: bool) -> ModelSettings:
+def _model(reader: TableReader, folder: Path, *, on_records: bool, reduced: bool) -> ModelSettings:
     template = reader.text("template")
     band = (
         reader.maybe(reader.interval, "band_rad_s") if on_records else reader.interval("band_rad_s")
@@ -314,6 +325,7 @@ def _model(reader: TableReader, folder: Path, *, on_records: bool) -> ModelSetti
             rival: str(folder / rival) if rival.endswith(".toml") else rival
             for rival in reader.names("rivals", ())
         },
+        *((reader.names("keep", ()), reader.names("drop", ())) if reduced else ()),
     )
     reader.finish()
     return made

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from flightid.conventions import Role
 from flightid.errors import StudyError
 from flightid.findings import Finding
-from flightid.identification import Fit, identify
+from flightid.identification import Fit, Reduction, identify, reduce
 from flightid.logs import Log, SidRun
 from flightid.models import Model, load_model
 from flightid.record import Record
@@ -57,12 +58,15 @@ class Identified:
         By estimator.
     verifications : mapping of str to Verification or Comparison
         By segment, none of which the fit has seen; side by side where there are rivals.
+    reduction : Reduction or None
+        How the structure of the fits came about, where the study asks for a reduction.
     """
 
     settings: ModelSettings
     responses: Mapping[str, FrequencyResponse]
     fits: Mapping[str, Fit]
     verifications: Mapping[str, Verification | Comparison]
+    reduction: Reduction | None = None
 
     @property
     def response(self) -> FrequencyResponse | None:
@@ -76,10 +80,11 @@ class Identified:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Verdicts on the response, the fit and each verification that count."""
+        """Verdicts on the response, the fit, its structure and each verification that count."""
         checks = (finding for each in self.verifications.values() for finding in each.findings)
         first = () if self.response is None else self.response.findings
-        return (*first, *self.fit.findings, *checks)
+        path = () if self.reduction is None else self.reduction.path_findings
+        return (*first, *self.fit.findings, *path, *checks)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values of every result."""
@@ -87,6 +92,7 @@ class Identified:
             "name": self.settings.name,
             "responses": {key: value.to_dict() for key, value in self.responses.items()},
             "fits": {key: value.to_dict() for key, value in self.fits.items()},
+            "reduction": None if self.reduction is None else self.reduction.to_dict(),
             "verifications": {key: value.to_dict() for key, value in self.verifications.items()},
         }
 
@@ -211,23 +217,33 @@ def fit(
     responses: Mapping[str, FrequencyResponse],
     records: Mapping[str, Record],
     settings: Settings,
-) -> dict[str, Fit]:
-    """Fit the model to the response of each estimator, or to the records."""
+) -> tuple[dict[str, Fit], Reduction | None]:
+    """Fit the model to the response of each estimator, or to the records.
+
+    Where the study asks for it, the structure is reduced by the data that count; all other
+    estimates are then fitted with that structure.
+    """
+    options: dict[str, Any] = {"starts": settings.starts, "seed": settings.seed}
+    sources: dict[str, Any] = dict(responses)
     if settings.on_records:
-        flown = [records[name] for name in task.settings.identify]
-        starts, seed = settings.starts, settings.seed
-        found = identify(task.model, flown, method=settings.method, starts=starts, seed=seed)
-        return {settings.method: found}
-    return {
-        method: identify(
-            task.model,
-            response,
-            starts=settings.starts,
-            seed=settings.seed,
-            minimum_coherence=settings.response.minimum_coherence,
+        options["method"] = settings.method
+        sources = {settings.method: [records[name] for name in task.settings.identify]}
+    else:
+        options["minimum_coherence"] = settings.response.minimum_coherence
+    (counts, data), *others = sources.items()
+    found, reduction, model = identify(task.model, data, **options), None, task.model
+    if settings.reduce is not None:
+        reduction = reduce(
+            found,
+            data,
+            keep=task.settings.keep,
+            drop=task.settings.drop,
+            after_rise=settings.reduce.after_rise,
+            **vars(settings.reduce.limits),
         )
-        for method, response in responses.items()
-    }
+        found, model = reduction.fit, model.with_fixed(**reduction.dropped)
+    rest = {name: identify(model, other, **options) for name, other in others}
+    return {counts: found, **rest}, reduction
 
 
 def check(

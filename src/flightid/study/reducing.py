@@ -1,0 +1,45 @@
+"""What a study file may say about the reduction of its models' structures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from flightid.identification.reduce import AFTER_RISE
+from flightid.identification.reduction_rules import ReductionLimits
+from flightid.study.reading import TableReader
+
+
+@dataclass(frozen=True)
+class ReduceSettings:
+    """How structures are reduced; see `flightid.reduce`.
+
+    Attributes
+    ----------
+    limits : ReductionLimits
+        Guides that a parameter must meet to stay.
+    after_rise : {"stop", "next"}
+        What follows a step whose cost rises markedly.
+    """
+
+    limits: ReductionLimits
+    after_rise: str
+
+
+def read_reduce(reader: TableReader) -> ReduceSettings:
+    """Read the table ``[reduce]``.
+
+    Raises
+    ------
+    StudyError
+        A key is unknown, or a value does not fit.
+    """
+    usual = ReductionLimits()
+    limits = ReductionLimits(
+        **{
+            each.name: reader.positive(each.name, getattr(usual, each.name))
+            for each in fields(usual)
+        }
+    )
+    after_rise = reader.choice("after_rise", AFTER_RISE, AFTER_RISE[0])
+    reader.finish()
+    return ReduceSettings(limits, after_rise)

@@ -1,0 +1,41 @@
+"""``flightid identify --reduce``: the smaller model and the path to it, as text and as JSON."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.cli.program import run
+
+STEP_S = 0.01
+
+
+def recorded(folder: Path) -> Path:
+    """A roll rate that integrates its command: no damping worth the name, and some noise."""
+    truth = fid.load_model("rate_first_order", axis="roll").with_values({"Lp": -1e-5})
+    time_s = np.arange(2000) * STEP_S
+    command = 0.1 * np.sign(np.sin(2.0 * np.pi * time_s / 1.7))
+    driven = fid.Record.from_arrays(time_s, inputs={"tau_phi": command}, units={"tau_phi": "1"})
+    flown = fid.simulate(truth, driven, units={"p": "rad/s"})
+    noise = np.random.default_rng(4).standard_normal(len(time_s))
+    return fid.write_records(folder / "flight.nc", flown.replace({"p": flown["p"] + 0.05 * noise}))
+
+
+def test_a_parameter_goes_and_the_path_is_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["identify", str(recorded(tmp_path)), "--model", "rate_first_order", "--axis", "roll"]
+    words += ["--method", "output_error", "--reduce"]
+    assert run(words) == 0
+    said = capsys.readouterr()
+    assert "Lp" in said.out.split("Reduction of")[1]
+    assert "fixed" in said.out.split("Reduction of")[0]
+    assert "3 to 2 free parameters" in said.err
+    assert run([*words, "--json"]) == 0
+    plain = json.loads(capsys.readouterr().out)
+    assert plain["schema"] == "flightid.reduction/1"
+    assert [step["name"] for step in plain["path"] if step["accepted"]] == ["Lp"]
