@@ -13,6 +13,9 @@ use crate::error::CoreError;
 use crate::householder::{back_substitute, dot, norm, triangularise};
 use crate::least_squares::{Minimum, Objective, Options, Point, Problem, Progress, Termination};
 
+/// Relative rise of the cost that rounding alone does not predict.
+const RISE: f64 = 1e-9;
+
 /// Where a search ended.
 #[derive(Debug, Clone)]
 pub struct Found {
@@ -240,7 +243,9 @@ impl<'a> Search<'a> {
     }
 
     fn refuse(&mut self, small: bool, predicted: f64, options: &Options) -> Option<Termination> {
-        if predicted <= options.cost_tolerance * self.cost {
+        // A step that was cut at bounds may promise a rise: that asks for damping, not for an end.
+        let rises = predicted < -RISE * self.cost;
+        if !rises && predicted <= options.cost_tolerance * self.cost {
             // Rounding hides any further reduction.
             return Some(Termination::Cost);
         }

@@ -45,6 +45,37 @@ fn rosenbrock_at_a_bound() {
     assert!((-400.0 * x * (1.5 - x * x) - 2.0 * (1.0 - x)).abs() < 1e-6);
 }
 
+/// Two nearly parallel columns whose free minimum (-9, 10) lies across both bounds.
+struct Parallel;
+
+impl Problem for Parallel {
+    fn n_parameters(&self) -> usize {
+        2
+    }
+    fn n_residuals(&self) -> usize {
+        2
+    }
+    fn residuals(&mut self, x: &[f64], r: &mut [f64]) -> Result<(), CoreError> {
+        r.copy_from_slice(&[x[0] + x[1] - 1.0, 0.1 * (x[1] - 10.0)]);
+        Ok(())
+    }
+    fn jacobian(&mut self, _: &[f64], j: &mut [f64]) -> Result<(), CoreError> {
+        j.copy_from_slice(&[1.0, 1.0, 0.0, 0.1]);
+        Ok(())
+    }
+}
+
+#[test]
+fn a_step_cut_at_two_bounds_does_not_end_the_search() {
+    // Cut at both bounds the first step promises a rise from 2 to 49.
+    let go = &mut |_: &Progress| true;
+    let (low, high) = ([0.0, -8.0], [8.0, 8.0]);
+    let found = minimise(&mut Parallel, &[0.0, 0.0], &low, &high, &Options::default(), go).unwrap();
+    assert_eq!(found.x[0], 0.0);
+    assert!((found.x[1] - 1.1 / 1.01).abs() < 1e-8, "{:?}", found.x);
+    assert!(found.termination.is_converged());
+}
+
 #[test]
 fn everything_fixed_and_interruption() {
     let found = solve([-1.2, 1.0], [-1.2, 1.0]);
