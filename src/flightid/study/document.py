@@ -12,6 +12,11 @@ from flightid.plot.fit import Estimate, parameter_intervals
 from flightid.report.blocks import provenance
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
+from flightid.study.black_box_section import (
+    black_box_in_short,
+    black_box_section,
+    black_box_table,
+)
 from flightid.study.model_section import model_section
 from flightid.study.truth import recovered
 from flightid.table import Cell, Column, Table
@@ -36,14 +41,18 @@ def study_document(study: Study) -> Document:
     Document
     """
     settings = study.settings
-    models = (model_section(item, study.truth) for item in study.identified)
+    models = [model_section(item, study.truth) for item in study.identified]
+    models += map(black_box_section, study.black_boxes)
     return Document(
         settings.title,
         settings.aircraft,
         (
             Section("Result", tuple(_result(study))),
             *models,
-            Section("The log", tuple(_log_blocks(study))),
+            Section(
+                "The records" if study.inspection is None else "The log",
+                tuple(_source_blocks(study)),
+            ),
             Section("Provenance", provenance(study.files, _options(study))),
         ),
         f"Made by flightid {VERSION} from {', '.join(study.files)}.",
@@ -100,12 +109,16 @@ def _inside(parameter: FittedParameter, true_value: float | None) -> bool | None
 def _result(study: Study) -> list[Block]:
     notes = study.settings.notes
     blocks: list[Block] = [Paragraph(notes)] if notes else []
-    blocks.append(Lights(tuple(map(_in_short, study.identified)), repeats=True))
+    short = [*map(_in_short, study.identified), *map(black_box_in_short, study.black_boxes)]
+    blocks.append(Lights(tuple(short), repeats=True))
     inside = [_inside(parameter, true) for _, parameter, true in _parameters(study)]
     judged = np.array([value for value in inside if value is not None], dtype=bool)
     if judged.size:
         blocks.append(Lights((recovered(judged),)))
-    blocks.append(TableBlock(parameter_table(study)))
+    if study.identified:
+        blocks.append(TableBlock(parameter_table(study)))
+    if study.black_boxes:
+        blocks.append(TableBlock(black_box_table(study.black_boxes)))
     return [*blocks, *_interval_figure(study)]
 
 
@@ -121,7 +134,10 @@ def _in_short(item: Identified) -> Finding:
     return Finding("model", light, f"{first}; {reasons[0].message}", reasons[0].action)
 
 
-def _log_blocks(study: Study) -> Iterator[Block]:
+def _source_blocks(study: Study) -> Iterator[Block]:
+    if study.inspection is None:
+        yield TableBlock(_record_table(study))
+        return
     yield Lights(study.inspection.findings)
     first, *others = study.inspection.tables()[1:]
     yield TableBlock(first)
@@ -151,7 +167,8 @@ def _record_table(study: Study) -> Table:
         )
         for name, record in study.records.items()
     )
-    return Table("Records cut from the log", columns, rows)
+    title = "Records" if study.inspection is None else "Records cut from the log"
+    return Table(title, columns, rows)
 
 
 def _interval_figure(study: Study) -> tuple[Figure, ...]:
@@ -170,6 +187,8 @@ def _interval_figure(study: Study) -> tuple[Figure, ...]:
 
 def _options(study: Study) -> dict[str, Cell]:
     settings, response = study.settings, study.settings.response
+    if not settings.models:
+        return {}
     options: dict[str, Cell] = {"fit": settings.method}
     if not settings.on_records:
         options |= {

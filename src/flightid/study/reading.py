@@ -60,6 +60,21 @@ class TableReader:
 
         return int(self._take(key, default, fits, f"a whole number from {minimum} on"))
 
+    def integers(self, key: str, default: Iterable[int] | None = None) -> tuple[int, ...]:
+        """Different whole numbers from 0 on; one alone may stand for a list of one."""
+
+        def fits(value: object) -> bool:
+            listed = value if isinstance(value, list) else [value]
+            whole = all(
+                isinstance(item, int) and not isinstance(item, bool) and item >= 0
+                for item in listed
+            )
+            return whole and bool(listed) and len(set(listed)) == len(listed)
+
+        usual = REQUIRED if default is None else default
+        found = self._take(key, usual, fits, "a whole number from 0 on, or a list of them")
+        return (found,) if isinstance(found, int) else tuple(found)
+
     def number(self, key: str, default: float = REQUIRED) -> float:
         """One finite number."""
         return float(self._take(key, default, _is_number, "a number"))
@@ -94,17 +109,19 @@ class TableReader:
     def numbers(
         self, key: str, default: Iterable[float] = REQUIRED, *, length: int | None = None
     ) -> tuple[float, ...]:
-        """Several finite numbers, of a given count or at least one."""
+        """Several finite numbers: of a given count, or at least one, which may stand alone."""
 
         def fits(value: object) -> bool:
+            listed = [value] if length is None and _is_number(value) else value
             return (
-                isinstance(value, list)
-                and (len(value) == length if length else bool(value))
-                and all(map(_is_number, value))
+                isinstance(listed, list)
+                and (len(listed) == length if length else bool(listed))
+                and all(map(_is_number, listed))
             )
 
         needed = f"a list of {length or 'one or more'} numbers"
-        return tuple(map(float, self._take(key, default, fits, needed)))
+        found = self._take(key, default, fits, needed)
+        return tuple(map(float, [found] if _is_number(found) else found))
 
     def interval(self, key: str) -> tuple[float, float]:
         """Two finite numbers, the first below the second."""

@@ -4,20 +4,32 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from flightid.errors import StudyError
 from flightid.files import sha256_of_file
-from flightid.inspection import inspect_log
+from flightid.inspection import Inspection, inspect_log
 from flightid.logs import read_log
 from flightid.progress import progress
 from flightid.record import Record
 from flightid.report.html import to_html
 from flightid.report.text import to_text
 from flightid.simulation import write_ardupilot_log
+from flightid.study.black_box import identify_black_box
 from flightid.study.output import RESULTS, require_replaceable, whole_folder
 from flightid.study.settings import Settings, read_settings
-from flightid.study.stages import Identified, Task, check, cut_records, estimate, fit, load_task
+from flightid.study.stages import (
+    Identified,
+    Task,
+    channels_needed,
+    check,
+    cut_records,
+    estimate,
+    fit,
+    load_records,
+    load_task,
+)
 from flightid.study.study import Study
 from flightid.study.truth import Truth
 
@@ -27,7 +39,7 @@ FLIGHT_LOG = "flight.bin"
 def run_study(
     path: str | Path, *, output: str | Path | None = None, log: str | Path | None = None
 ) -> Study:
-    """Carry out a study file: log, records, responses, models, verification, report.
+    """Carry out a study file: log or records, responses, models, verification, report.
 
     The output folder appears whole or not at all.
 
@@ -65,20 +77,55 @@ def run_study(
     require_replaceable(final)
     tasks = [load_task(model, on_records=settings.on_records) for model in settings.models]
     # Reading and cutting, three steps for each model, writing; a flight before all of it.
-    steps = 3 + 3 * len(tasks)
+    steps = 3 + 3 * (len(tasks) + len(settings.black_boxes))
     with whole_folder(final) as folder, progress(steps, source.stem) as advance:
-        flown, truth = _obtain_log(settings, None if log is None else Path(log), folder)
-        advance()
-        opened = read_log(flown)
-        inspection = inspect_log(opened)
-        records = cut_records(opened, settings, tasks)
-        advance()
-        identified = tuple(_identify(task, records, settings, advance) for task in tasks)
-        files = {item.name: sha256_of_file(item) for item in (source, flown)}
-        study = Study(settings, final, inspection, records, identified, truth, files)
+        taken = _take(settings, tasks, None if log is None else Path(log), folder)
+        advance(2)
+        identified = tuple(_identify(task, taken.records, settings, advance) for task in tasks)
+        boxes = []
+        for asked in settings.black_boxes:
+            boxes.append(identify_black_box(asked, taken.records))
+            advance(3)
+        files = {item.name: sha256_of_file(item) for item in (source, *taken.files)}
+        study = Study(
+            settings,
+            final,
+            taken.inspection,
+            taken.records,
+            identified,
+            tuple(boxes),
+            taken.truth,
+            files,
+        )
         _write(study, folder)
         advance()
     return study
+
+
+@dataclass(frozen=True, eq=False)
+class _Taken:
+    """Records of a study, and where they come from."""
+
+    records: Mapping[str, Record]
+    files: tuple[Path, ...]
+    inspection: Inspection | None = None
+    truth: Truth | None = None
+
+
+def _take(settings: Settings, tasks: list[Task], given: Path | None, folder: Path) -> _Taken:
+    """Records from files, from the log given or named, or from one that is flown now."""
+    needed = channels_needed(settings, tasks)
+    if settings.record_files:
+        if given is not None:
+            raise StudyError(
+                "the study reads records, not a log", found=str(given), action="leave out --log"
+            )
+        paths = dict.fromkeys(file.path for file in settings.record_files)
+        return _Taken(load_records(settings, needed), tuple(paths))
+    flown, truth = _obtain_log(settings, given, folder)
+    opened = read_log(flown)
+    records = cut_records(opened, settings, needed)
+    return _Taken(records, (flown,), inspect_log(opened), truth)
 
 
 def _obtain_log(settings: Settings, given: Path | None, folder: Path) -> tuple[Path, Truth | None]:

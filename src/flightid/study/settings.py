@@ -13,9 +13,12 @@ from pathlib import Path
 from typing import Any, Literal, cast
 
 from flightid.errors import StudyError
+from flightid.study.black_box_settings import BlackBoxSettings, read_black_box
 from flightid.study.flight import FlightPlan, read_flight
 from flightid.study.reading import TOP, TableReader
+from flightid.study.record_files import RecordFile, read_record_file
 from flightid.study.reducing import ReduceSettings, read_reduce
+from flightid.study.references import require_references
 
 MAXIMUM_BYTES = 1 << 20
 METHODS = ("composite", "local_polynomial", "instrument")
@@ -137,8 +140,12 @@ class Settings:
         Rate of the records; None: the slowest needed channel's.
     segments : tuple of Segment
         Stretches of the log.
+    record_files : tuple of RecordFile
+        Or: records that are read from files, without a log.
     models : tuple of ModelSettings
-        What to identify.
+        Models with equations to identify.
+    black_boxes : tuple of BlackBoxSettings
+        Models without.
     response : ResponseSettings
         How to estimate responses.
     method : str
@@ -162,7 +169,9 @@ class Settings:
     max_gap_s: float | None
     sample_rate_hz: float | None
     segments: tuple[Segment, ...]
+    record_files: tuple[RecordFile, ...]
     models: tuple[ModelSettings, ...]
+    black_boxes: tuple[BlackBoxSettings, ...]
     response: ResponseSettings
     method: str
     starts: int
@@ -212,6 +221,7 @@ def read_settings(path: Path) -> Settings:
     rate = channels.maybe(channels.positive, "sample_rate_hz")
     channels.finish()
     segments = tuple(_segment(reader) for reader in root.tables("segment"))
+    files = tuple(read_record_file(reader, path.parent) for reader in root.tables("record"))
     response = _response(root.table("response"))
     fit = root.table("fit")
     identify = root.table("identify")
@@ -224,12 +234,21 @@ def read_settings(path: Path) -> Settings:
     check.finish()
     on_records = method != FITS[0]
     reducing = root.maybe(lambda key: read_reduce(root.table(key)), "reduce")
+    readers = root.tables("model")
     models = tuple(
         _model(reader, path.parent, on_records=on_records, reduced=reducing is not None)
-        for reader in root.tables("model")
+        for reader in readers
+        if "structure" not in reader
     )
+    boxes = tuple(read_black_box(reader) for reader in readers if "structure" in reader)
     root.finish()
-    _require_references(segments, models)
+    if files and segments:
+        raise StudyError(
+            "study file: [[segment]] cuts a log, and there is none",
+            needed="span_s in a [[record]]",
+        )
+    kind = "record" if files else "segment"
+    require_references(files or segments, (*models, *boxes), kind=kind)
     return Settings(
         *words,
         log,
@@ -239,7 +258,9 @@ def read_settings(path: Path) -> Settings:
         max_gap_s,
         rate,
         segments,
+        files,
         models,
+        boxes,
         response,
         method,
         starts,
@@ -262,17 +283,18 @@ def _parsed(path: Path) -> dict[str, Any]:
 
 def _source(root: TableReader, folder: Path) -> tuple[Path | None, FlightPlan | None]:
     log, flight = root.table("log"), root.table("flight")
-    if ("log" in root) == ("flight" in root):
+    given = [key for key in ("log", "flight", "record") if key in root]
+    if len(given) != 1:
         raise StudyError(
             "study file: the source of the data is not clear",
-            found="both [log] and [flight]" if "log" in root else "neither [log] nor [flight]",
-            needed="one of them",
+            found=" and ".join(f"[{key}]" for key in given) or "none",
+            needed="one of [log], [flight] and [[record]]",
         )
     if "log" in root:
         path = folder / log.text("path")
         log.finish()
         return path, None
-    return None, read_flight(flight)
+    return None, read_flight(flight) if "flight" in root else None
 
 
 def _segment(reader: TableReader) -> Segment:
@@ -343,29 +365,3 @@ def _overrides(reader: TableReader) -> dict[str, dict[str, Any]]:
         entry.finish()
         overrides[name] = {key: value for key, value in given.items() if value is not None}
     return overrides
-
-
-def _require_references(segments: tuple[Segment, ...], models: tuple[ModelSettings, ...]) -> None:
-    if not models:
-        raise StudyError("study file: nothing to identify", needed="a [[model]]")
-    for kind, named in (("segment", segments), ("model", models)):
-        names = [item.name for item in named]
-        for name in names:
-            if names.count(name) > 1:
-                raise StudyError(f"study file: two [[{kind}]]s have one name", found=repr(name))
-    known = {segment.name for segment in segments}
-    for model in models:
-        for name in (*model.identify, *model.verify):
-            if name not in known:
-                raise StudyError(
-                    f"study file, model {model.name!r}: there is no such segment",
-                    found=repr(name),
-                    needed="one of " + ", ".join(map(repr, sorted(known))),
-                )
-        both = set(model.identify) & set(model.verify)
-        if both:
-            raise StudyError(
-                f"study file, model {model.name!r}: a model is verified on data it has seen",
-                found=", ".join(sorted(both)),
-                needed="segments that the fit does not use",
-            )

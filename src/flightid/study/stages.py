@@ -14,6 +14,7 @@ from flightid.logs import Log, SidRun
 from flightid.models import Model, load_model
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
+from flightid.study.record_files import load_record
 from flightid.study.settings import ModelSettings, Segment, Settings
 from flightid.validation import Comparison, Verification, verify
 
@@ -126,7 +127,50 @@ def load_task(settings: ModelSettings, *, on_records: bool = False) -> Task:
     return Task(settings, replace(model, parameters=parameters), rivals)
 
 
-def cut_records(log: Log, settings: Settings, tasks: Iterable[Task]) -> dict[str, Record]:
+def channels_needed(settings: Settings, tasks: Iterable[Task]) -> dict[str, dict[str, Role]]:
+    """Channels that the models take from each record, with their roles.
+
+    Parameters
+    ----------
+    settings : Settings
+        The study.
+    tasks : iterable of Task
+        Its models with equations.
+
+    Returns
+    -------
+    dict of str to dict of str to Role
+        By name of the segment or record.
+    """
+    users = [(task.settings.segments, task.model.inputs, task.model.outputs) for task in tasks]
+    users += [(box.segments, box.inputs, (box.output,)) for box in settings.black_boxes]
+    needed: dict[str, dict[str, Role]] = {}
+    # Outputs last: what one model drives and another predicts is measured.
+    for role, place in ((Role.INPUT, 1), (Role.OUTPUT, 2)):
+        for user in users:
+            for name in user[0]:
+                needed.setdefault(name, {}).update(dict.fromkeys(user[place], role))
+    return needed
+
+
+def load_records(settings: Settings, needed: Mapping[str, Mapping[str, Role]]) -> dict[str, Record]:
+    """Read every record file that a model uses.
+
+    Raises
+    ------
+    StudyError
+        A file is not there, or it is not clear which manoeuvre is meant.
+    """
+    return {
+        file.name: load_record(file, needed[file.name])
+        for file in settings.record_files
+        if file.name in needed
+    }
+
+
+def cut_records(
+    log: Log, settings: Settings, needed: Mapping[str, Mapping[str, Role]]
+) -> dict[str, Record]:
     """Take every segment that a model uses out of the log, with the channels its models need.
 
     Parameters
@@ -135,8 +179,8 @@ def cut_records(log: Log, settings: Settings, tasks: Iterable[Task]) -> dict[str
         The flight.
     settings : Settings
         The study.
-    tasks : iterable of Task
-        The models.
+    needed : mapping of str to mapping of str to Role
+        Channels by segment, from `channels_needed`.
 
     Returns
     -------
@@ -148,17 +192,14 @@ def cut_records(log: Log, settings: Settings, tasks: Iterable[Task]) -> dict[str
     StudyError
         The log holds no such system-identification run.
     """
-    records = {}
-    for segment in settings.segments:
-        users = [task for task in tasks if segment.name in task.settings.segments]
-        if users:
-            records[segment.name] = _cut(log, segment, settings, users)
-    return records
+    return {
+        segment.name: _cut(log, segment, settings, needed[segment.name])
+        for segment in settings.segments
+        if segment.name in needed
+    }
 
 
-def _cut(log: Log, segment: Segment, settings: Settings, users: list[Task]) -> Record:
-    roles = {name: Role.INPUT for task in users for name in task.model.inputs}
-    roles |= {name: Role.OUTPUT for task in users for name in task.model.outputs}
+def _cut(log: Log, segment: Segment, settings: Settings, roles: Mapping[str, Role]) -> Record:
     return log.record(
         settings.channel_map,
         names=list(roles),

@@ -12,6 +12,8 @@ from flightid.inspection import Inspection
 from flightid.record import Record
 from flightid.report.content import Document
 from flightid.report.json import to_dict
+from flightid.study.black_box import BlackBox
+from flightid.study.black_box_section import black_box_table
 from flightid.study.document import parameter_table, study_document
 from flightid.study.output import SCHEMA
 from flightid.study.settings import Settings
@@ -30,12 +32,14 @@ class Study:
         The study file, checked.
     output : Path
         Folder with ``report.html``, ``report.txt`` and ``results.json``.
-    inspection : Inspection
-        What the log can support.
+    inspection : Inspection or None
+        What the log can support; None where records come from files.
     records : mapping of str to Record
         By segment.
     identified : tuple of Identified
-        Responses, fits and verifications, one for each model.
+        Responses, fits and verifications, one for each model with equations.
+    black_boxes : tuple of BlackBox
+        Every stage of each model without.
     truth : Truth or None
         What should have been found, where the flight was simulated.
     files : mapping of str to str
@@ -50,9 +54,10 @@ class Study:
 
     settings: Settings
     output: Path
-    inspection: Inspection
+    inspection: Inspection | None
     records: Mapping[str, Record]
     identified: tuple[Identified, ...]
+    black_boxes: tuple[BlackBox, ...] = ()
     truth: Truth | None = None
     files: Mapping[str, str] = field(default_factory=dict)
 
@@ -67,8 +72,8 @@ class Study:
         return self.document.findings
 
     def summary(self) -> Table:
-        """Table of all parameters with their intervals."""
-        return parameter_table(self)
+        """Table of all parameters with their intervals, or of the black-box models."""
+        return parameter_table(self) if self.identified else black_box_table(self.black_boxes)
 
     def to_dict(self) -> dict[str, object]:
         """Every result as plain values, the report's content tree among them.
@@ -76,15 +81,16 @@ class Study:
         Returns
         -------
         dict
-            Keys ``schema``, ``title``, ``files``, ``inspection``, ``models``, ``truth``,
-            ``findings``, ``report``.
+            Keys ``schema``, ``title``, ``files``, ``inspection``, ``models``,
+            ``black_boxes``, ``truth``, ``findings``, ``report``.
         """
         return {
             "schema": SCHEMA,
             "title": self.settings.title,
             "files": dict(self.files),
-            "inspection": self.inspection.to_dict(),
+            "inspection": None if self.inspection is None else self.inspection.to_dict(),
             "models": [item.to_dict() for item in self.identified],
+            "black_boxes": [item.to_dict() for item in self.black_boxes],
             "truth": None if self.truth is None else self.truth.to_dict(),
             "findings": [finding.to_dict() for finding in self.findings],
             "report": to_dict(self.document),
@@ -92,7 +98,7 @@ class Study:
 
     def __repr__(self) -> str:
         """Title, number of models and verdicts on one line."""
-        n = len(self.identified)
+        n = len(self.identified) + len(self.black_boxes)
         return (
             f"Study({self.settings.title!r}, {n} model{'' if n == 1 else 's'}, "
             f"{self.document.tally})"

@@ -7,6 +7,8 @@
 
 from flightid.validation.comparison import Comparison, Contrast
 from flightid.validation.correlation_test import CorrelationTest, Horizon, Kind, Loop, Verdict
+from flightid.validation.cross_validation import cross_validate
+from flightid.validation.cross_validation_result import CrossRun, CrossValidation
 from flightid.validation.metrics import (
     fit_percent,
     mse,
@@ -32,6 +34,8 @@ __all__ = [
     "Comparison",
     "Contrast",
     "CorrelationTest",
+    "CrossRun",
+    "CrossValidation",
     "Envelopes",
     "Horizon",
     "Kind",
@@ -49,6 +53,7 @@ __all__ = [
     "Verdict",
     "Verification",
     "compare_spectra",
+    "cross_validate",
     "fit_percent",
     "mismatch",
     "mse",

@@ -1,0 +1,240 @@
+"""The stages of a black-box model in a study, from the coherence test to the spectra."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from flightid.conventions import Light, Role
+from flightid.findings import Finding
+from flightid.identification import NarxFit, PolynomialFit, identify
+from flightid.models import NarxModel, PolynomialModel
+from flightid.models.polynomial_structure import PolynomialStructure
+from flightid.record import Record
+from flightid.responses import CoherentPairs, FrequencyResponse, coherent_pairs, estimate_response
+from flightid.study.black_box_settings import NARX, BlackBoxSettings
+from flightid.validation import (
+    CrossValidation,
+    NarxSearch,
+    OrderScan,
+    ResidualTests,
+    SpectrumComparison,
+    compare_spectra,
+    cross_validate,
+    residual_tests,
+    scan_orders,
+    search_narx,
+)
+
+BlackBoxFit = PolynomialFit | NarxFit
+N_FREQUENCIES = 60
+AS_GOOD = 0.10
+"""Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
+
+
+@dataclass(frozen=True, eq=False)
+class BlackBox:
+    """What a study made of one black-box model.
+
+    Attributes
+    ----------
+    settings : BlackBoxSettings
+        What was asked.
+    response : FrequencyResponse
+        Estimate behind the coherence test.
+    coherent : CoherentPairs
+        The coherence test; inputs it does not keep are left out.
+    choice : OrderScan, NarxSearch or None
+        Structures that were tried, where there were several.
+    fit : PolynomialFit, NarxFit or None
+        None where no input is left.
+    tests : ResidualTests or None
+        Of errors one step ahead on the records of the fit.
+    cross : CrossValidation or None
+        On the records of the verification.
+    spectra : SpectrumComparison or None
+        Of the first record of the coherence test, measured and in free run.
+    """
+
+    settings: BlackBoxSettings
+    response: FrequencyResponse
+    coherent: CoherentPairs
+    choice: OrderScan | NarxSearch | None = None
+    fit: BlackBoxFit | None = None
+    tests: ResidualTests | None = None
+    cross: CrossValidation | None = None
+    spectra: SpectrumComparison | None = None
+
+    @property
+    def left_out(self) -> tuple[Finding, ...]:
+        """Inputs without coherence, with the reason."""
+        return tuple(
+            Finding("left-out", Light.UNKNOWN, f"{pair.name} is left out: {pair.reason}")
+            for pair in self.coherent.pairs
+            if not pair.kept
+        )
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Verdicts of all stages."""
+        parts = (self.fit, self.tests, self.cross, self.spectra)
+        found = (finding for part in parts if part is not None for finding in part.findings)
+        return (*self.left_out, *self.choice_findings, *found)
+
+    @property
+    def choice_findings(self) -> tuple[Finding, ...]:
+        """Verdicts of the search on its first structure, where that one is taken."""
+        if self.choice is None or self.settings.choose != "free_run":
+            return ()
+        return self.choice.findings
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values of every stage."""
+        stages = {
+            "coherence": self.coherent,
+            "choice": self.choice,
+            "fit": self.fit,
+            "residual_tests": self.tests,
+            "cross_validation": self.cross,
+            "spectra": self.spectra,
+        }
+        plain = {key: None if part is None else part.to_dict() for key, part in stages.items()}
+        return {
+            "name": self.settings.name,
+            "structure": self.settings.structure,
+            "left_out": [finding.to_dict() for finding in self.left_out],
+            **plain,
+        }
+
+
+def identify_black_box(settings: BlackBoxSettings, records: Mapping[str, Record]) -> BlackBox:
+    """Carry out every stage of one black-box model.
+
+    Parameters
+    ----------
+    settings : BlackBoxSettings
+        What is asked.
+    records : mapping of str to Record
+        By name.
+
+    Returns
+    -------
+    BlackBox
+
+    Raises
+    ------
+    FlightidError
+        A stage refuses its data; the message is that stage's.
+    """
+    gate = [_narrowed(records[name], settings, settings.inputs) for name in settings.coherence]
+    response = estimate_response(
+        gate,
+        inputs=settings.inputs,
+        outputs=[settings.output],
+        omega_rad_s=(*settings.band_rad_s, N_FREQUENCIES),
+    )
+    coherent = coherent_pairs(
+        response,
+        minimum_coherence=settings.minimum_coherence,
+        minimum_decades=settings.minimum_decades,
+    )
+    inputs = tuple(
+        name for name in settings.inputs if f"{settings.output}/{name}" in coherent.names
+    )
+    if not inputs:
+        return BlackBox(settings, response, coherent)
+
+    def taken(names: Sequence[str]) -> list[Record]:
+        return [_narrowed(records[name], settings, inputs) for name in names]
+
+    flown, unseen = taken(settings.identify), taken(settings.select)
+    choice, fit = (
+        _narx(settings, inputs, flown, unseen)
+        if settings.structure == NARX
+        else _polynomial(settings, inputs, flown, unseen)
+    )
+    seen = taken(settings.coherence)[0]
+    run = cross_validate(fit, seen, horizons=("free_run",)).of(seen.name)
+    return BlackBox(
+        settings,
+        response,
+        coherent,
+        choice,
+        fit,
+        _tests(fit, flown),
+        cross_validate(fit, taken(settings.verify)) if settings.verify else None,
+        compare_spectra(seen, run.predicted_record()),
+    )
+
+
+def _narrowed(record: Record, settings: BlackBoxSettings, inputs: Sequence[str]) -> Record:
+    """The channels of the model alone, in its roles: another model may see them otherwise."""
+    roles = {**dict.fromkeys(inputs, Role.INPUT), settings.output: Role.OUTPUT}
+    return record.select(roles).with_roles(**roles)
+
+
+def _polynomial(
+    settings: BlackBoxSettings,
+    inputs: tuple[str, ...],
+    flown: list[Record],
+    unseen: list[Record],
+) -> tuple[OrderScan | None, PolynomialFit]:
+    if not settings.is_scanned:
+        orders: dict[str, Any] = {name: values[0] for name, values in settings.orders.items()}
+        asked = PolynomialModel.general(settings.output, inputs, **orders, **settings.options)
+        return None, identify(asked, flown)
+    tried: dict[str, Any] = {"kind": settings.structure, **settings.orders, **settings.options}
+    scan = scan_orders(flown, unseen, output=settings.output, inputs=inputs, **tried)
+    chosen = _chosen(scan, settings.choose)
+    fit = scan.best if chosen == scan.trials[0].structure else identify(chosen, flown)
+    return scan, fit
+
+
+def _chosen(scan: OrderScan, how: str) -> PolynomialStructure:
+    if how == "simplest":
+        return scan.simplest.structure
+    if how == "bic":
+        return scan.smallest("bic").structure
+    first = scan.trials[0]
+    if how == "free_run" or first.free_run_rms is None:
+        return first.structure
+    limit = (1 + AS_GOOD) * first.free_run_rms
+    alike = [
+        (trial.criteria.bic, place)
+        for place, trial in enumerate(scan.trials)
+        if trial.criteria is not None
+        and trial.free_run_rms is not None
+        and trial.free_run_rms <= limit
+    ]
+    return scan.trials[min(alike)[1]].structure if alike else first.structure
+
+
+def _narx(
+    settings: BlackBoxSettings,
+    inputs: tuple[str, ...],
+    flown: list[Record],
+    unseen: list[Record],
+) -> tuple[NarxSearch | None, NarxFit]:
+    outputs_back, inputs_back = settings.orders["output_lags"], settings.orders["input_lags"]
+    model = NarxModel(
+        settings.output,
+        inputs,
+        outputs_back[0],
+        inputs_back[0],
+        width=settings.widths[0],
+        **settings.options,
+    )
+    if not settings.is_scanned:
+        return None, identify(model, flown)
+    pairs = [(a, b) for a in outputs_back for b in inputs_back]
+    search = search_narx(model, flown, unseen, lags=pairs, widths=settings.widths)
+    return search, search.best
+
+
+def _tests(fit: BlackBoxFit, flown: list[Record]) -> ResidualTests:
+    if isinstance(fit, PolynomialFit):
+        return residual_tests(fit)
+    runs = cross_validate(fit, flown, horizons=(1,)).runs
+    left = [run.residual_record() for run in runs if run.model == "model"]
+    return residual_tests(left, horizon="one step ahead")

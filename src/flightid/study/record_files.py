@@ -1,0 +1,132 @@
+"""Records that a study reads from files of samples: their settings, and how they are loaded."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from flightid.conventions import Role
+from flightid.errors import StudyError
+from flightid.record import Record, read_records
+from flightid.study.reading import TableReader
+
+
+@dataclass(frozen=True)
+class RecordFile:
+    """One manoeuvre in a file.
+
+    Attributes
+    ----------
+    name : str
+        Name by which models refer to it.
+    path : Path
+        CSV, Parquet, MATLAB or netCDF.
+    manoeuvre : str or None
+        Name of the manoeuvre, where the file holds several.
+    span_s : tuple of float or None
+        Start and stop on the file's clock, s; None: all of it.
+    time : str
+        Column of the time stamps.
+    sample_time_s : float or None
+        Sample time of a file without time column, s.
+    resample_to_s : float or None
+        Sample time of a new uniform grid, s.
+    columns : mapping of str to str
+        Column of a channel, where it has another name.
+    units : mapping of str to str
+        Unit of a channel, where the file does not say.
+    """
+
+    name: str
+    path: Path
+    manoeuvre: str | None = None
+    span_s: tuple[float, float] | None = None
+    time: str = "time"
+    sample_time_s: float | None = None
+    resample_to_s: float | None = None
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
+    """Check one table ``[[record]]``.
+
+    Raises
+    ------
+    StudyError
+        A key is unknown or a value does not fit.
+    """
+    made = RecordFile(
+        reader.text("name"),
+        folder / reader.text("path"),
+        reader.maybe(reader.text, "manoeuvre"),
+        reader.maybe(reader.interval, "span_s"),
+        reader.text("time", "time"),
+        reader.maybe(reader.positive, "sample_time_s"),
+        reader.maybe(reader.positive, "resample_to_s"),
+        _texts(reader.table("columns"), reader.values("columns")),
+        _texts(reader.table("units"), reader.values("units")),
+    )
+    reader.finish()
+    return made
+
+
+def _texts(reader: TableReader, values: Mapping[str, object]) -> dict[str, str]:
+    return {key: reader.text(key) for key in values}
+
+
+def load_record(file: RecordFile, roles: Mapping[str, Role]) -> Record:
+    """Read the channels that models need.
+
+    Parameters
+    ----------
+    file : RecordFile
+    roles : mapping of str to Role
+        Channels to take.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    StudyError
+        The file is not there, or holds several manoeuvres and none is named.
+    FlightidError
+        The file cannot be read as a record; the message says why.
+    """
+    if not file.path.is_file():
+        raise StudyError(
+            f"the file of record {file.name!r} is not there",
+            found=str(file.path),
+            needed="a file",
+            action="correct path of its [[record]]",
+        )
+
+    def named(role: Role) -> dict[str, str] | None:
+        chosen = {key: file.columns.get(key, key) for key, value in roles.items() if value is role}
+        return chosen or None
+
+    found = read_records(
+        file.path,
+        inputs=named(Role.INPUT),
+        outputs=named(Role.OUTPUT),
+        time=file.time,
+        units={key: unit for key, unit in file.units.items() if key in roles},
+        sample_time_s=file.sample_time_s,
+        resample_to_s=file.resample_to_s,
+    )
+    if file.manoeuvre is not None:
+        found = [record for record in found if record.name == file.manoeuvre]
+    if len(found) != 1:
+        raise StudyError(
+            f"it is not clear which manoeuvre record {file.name!r} is",
+            found=f"{len(found)} of that name" if file.manoeuvre else f"{len(found)} in the file",
+            needed="one",
+            action="name it with manoeuvre, or mend gaps with resample_to_s",
+        )
+    whole = found[0]
+    if file.span_s is None:
+        return whole.replace(name=file.name)
+    return whole.segment(*file.span_s, name=file.name)
