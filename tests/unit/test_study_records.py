@@ -215,24 +215,22 @@ def test_models_with_equations_may_use_record_files(folder: Path) -> None:
 
 
 OWN = """
+kind = "transfer"
 name = "angle"
-kind = "transfer_function"
-input = "drive"
-output = "angle"
-units = { drive = "V", angle = "rad" }
-numerator = ["k"]
-denominator = ["1", "2*zeta*omega", "omega**2"]
-[parameters.k]
-value = 15.0
-unit = "rad/(V*s**2)"
-[parameters.zeta]
-value = 0.3
-minimum = 0.0
-unit = "1"
-[parameters.omega]
-value = 4.5
-minimum = 0.1
-unit = "rad/s"
+source = "a second-order lag"
+[inputs]
+drive = "V"
+[outputs]
+angle = "rad"
+[parameters]
+k = { value = 3.0, min = 0.1, max = 100.0, unit = "rad/V", note = "steady gain" }
+zeta = { value = 0.3, min = 0.01, max = 2.0, unit = "1", note = "damping ratio" }
+omega = { value = 4.5, min = 0.5, max = 20.0, unit = "rad/s", note = "natural frequency" }
+tau = { value = 0.1, min = 0.0, max = 0.3, unit = "s", note = "delay" }
+[responses."angle/drive"]
+gain = "k*omega^2"
+denominator = ["s^2 + 2*zeta*omega*s + omega^2"]
+delay = "tau"
 """
 
 

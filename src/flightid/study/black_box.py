@@ -80,7 +80,23 @@ class BlackBox:
         """Verdicts of all stages."""
         parts = (self.fit, self.tests, self.cross, self.spectra)
         found = (finding for part in parts if part is not None for finding in part.findings)
-        return (*self.left_out, *self.choice_findings, *found)
+        return (*self.left_out, *self.choice_findings, *self.goal_findings, *found)
+
+    @property
+    def goal_findings(self) -> tuple[Finding, ...]:
+        """Whether the sum of squares that was asked for was reached."""
+        fit = self.fit
+        if not isinstance(fit, NarxFit) or fit.model.stop != "sse":
+            return ()
+        reached = fit.chosen[-1].sum_of_squares
+        if reached <= fit.model.goal:
+            return ()
+        message = (
+            f"the sum of squares is {reached:.3g} after {len(fit.chosen)} terms; the goal of "
+            f"{fit.model.goal:.3g} was not reached"
+        )
+        action = "sensor noise may lie above the goal: stop by 'press', or allow more terms"
+        return (Finding("goal-not-reached", Light.AMBER, message, action),)
 
     @property
     def choice_findings(self) -> tuple[Finding, ...]:

@@ -137,7 +137,8 @@ def black_box_section(item: BlackBox) -> Section:
     if item.choice is not None:
         parts.append(Section("Choice of the structure", _choice(item)))
     if item.fit is not None:
-        parts.append(Section("Model", _model(item.fit)))
+        goal = (Lights(item.goal_findings),) if item.goal_findings else ()
+        parts.append(Section("Model", (*goal, *_model(item.fit))))
     if item.tests is not None:
         parts.append(Section("Residual tests", tuple(_tests(item))))
     if item.cross is not None:

@@ -16,6 +16,19 @@ from flightid.validation.metrics import fit_percent, mse, theil
 MODEL, LINEAR = "model", "linear, same lags"
 
 
+def squared(unit: str) -> str:
+    """Unit of a mean square.
+
+    Example
+    -------
+    >>> squared("rad"), squared("m/s"), squared("1")
+    ('rad²', '(m/s)²', '')
+    """
+    if unit == "1":
+        return ""
+    return f"{unit}²" if unit.isalpha() else f"({unit})²"
+
+
 def horizon_words(horizon: int | str) -> str:
     """A horizon for people.
 
@@ -150,7 +163,7 @@ class CrossValidation:
             Column("initial state"),
             Column("fit", "%", 3),
             Column("TIC", digits=3),
-            Column("MSE", f"({unit})²" if unit != "1" else "", 3),
+            Column("MSE", squared(unit), 3),
             Column("rms", unit if unit != "1" else "", 3),
         )
         rows = tuple(
