@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from flightid.identification import ImpulseResponse, PolynomialFit
+from flightid.models.polynomial_structure import PolynomialStructure
 from flightid.plot import look
 from flightid.validation import OrderScan
 
@@ -16,13 +17,15 @@ HIGHEST = 3.0
 """Errors beyond this many times the smallest are drawn at the upper edge."""
 
 
-def order_scan(scan: OrderScan) -> go.Figure:
+def order_scan(scan: OrderScan, taken: PolynomialStructure | None = None) -> go.Figure:
     """Draw free-run error and BIC of each structure over its number of coefficients.
 
     Parameters
     ----------
     scan : OrderScan
         Result of `flightid.scan_orders`.
+    taken : PolynomialStructure, optional
+        Structure that was taken in the end, marked too.
 
     Returns
     -------
@@ -51,10 +54,12 @@ def order_scan(scan: OrderScan) -> go.Figure:
             row=row,
             col=1,
         )
-    for name, trial, colour in (
+    marked = [
         ("smallest free-run error", scan.trials[0], look.RIVAL),
         ("simplest within 2 %", scan.simplest, look.TRUTH),
-    ):
+    ]
+    marked += [("taken", trial, look.BLACK) for trial in kept if trial.structure == taken]
+    for name, trial, colour in marked:
         if trial not in kept:
             continue
         place = kept.index(trial)

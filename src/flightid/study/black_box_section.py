@@ -153,7 +153,8 @@ def black_box_section(item: BlackBox) -> Section:
 def _coherence(item: BlackBox) -> Iterable[Block]:
     if item.left_out:
         yield Lights(item.left_out)
-    yield TableBlock(item.coherent.summary())
+    needed = f"at least {item.coherent.minimum_coherence:g} over {item.coherent.minimum_decades:g}"
+    yield from result_blocks(item.coherent, title=f"Coherence, {needed} decades needed")
     for name in item.settings.inputs:
         yield _bode_figure(item, name)
 
@@ -186,8 +187,9 @@ def _choice(item: BlackBox) -> tuple[Block, ...]:
         return () if choice is None else result_blocks(choice)
     shown = "Every structure tried: error in free run on the selection records, and BIC of the fit."
     words = f"Chosen by “{item.settings.choose}”"
-    if isinstance(item.fit, PolynomialFit):
-        words += f": {item.fit.structure.orders_text}"
+    taken = item.fit.structure if isinstance(item.fit, PolynomialFit) else None
+    if taken is not None:
+        words += f": {taken.orders_text}"
     if item.settings.choose == "balanced":
         words += (
             ". Free runs do not see the noise model; so of all structures whose free-run error "
@@ -201,7 +203,7 @@ def _choice(item: BlackBox) -> tuple[Block, ...]:
     return (
         Paragraph(f"{words}."),
         *lights,
-        figure_block(order_scan(choice), shown),
+        figure_block(order_scan(choice, taken), shown),
         TableBlock(shorter, folded=True),
     )
 
@@ -221,7 +223,7 @@ def _tests(item: BlackBox) -> Iterable[Block]:
     tests = item.tests
     if tests is None:
         return
-    yield from result_blocks(tests)
+    yield from result_blocks(tests, title="Correlation functions")
     for name in tests.inputs:
         shown = f"Correlation functions of {item.settings.output} and {name} with their bands."
         yield figure_block(correlations(tests, item.settings.output, name), shown)
