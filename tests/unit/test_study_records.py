@@ -13,6 +13,7 @@ from scipy.io import savemat
 import flightid as fid
 from flightid.cli.program import run as command
 from flightid.errors import StudyError
+from flightid.report.content import Figure
 from flightid.report.html import to_html
 from flightid.report.text import to_text
 from flightid.study.settings import read_settings
@@ -122,6 +123,9 @@ def test_every_stage_stands_in_results_and_report(study: fid.Study) -> None:
     for title in ("Coherence", "Choice of the structure", "Residual tests", "Spectra", "Records"):
         assert f"\n{title}\n" in text
     assert to_html(study.document).startswith("<!")
+    figures = [block for block in study.document.walk() if isinstance(block, Figure)]
+    series = [name for figure in figures for name in figure.series]
+    assert any(name.startswith("taken: na 2, ") for name in series)
     assert "1 model" in repr(study)
     assert study.summary().title == "Black-box models"
     assert set(study.files) == {"study.toml", "rig.csv", "rig.mat"}
