@@ -128,8 +128,13 @@ def coherence_jacobian(fitted: Model, selected: Sequence[SelectedResponse]) -> A
     values = fitted.parameters.independent_values()
     free = fitted.parameters.free_indices
     rows = []
+    # One call gives all responses at its frequencies, which most of them share.
+    known: dict[bytes, NDArray[np.complex128]] = {}
     for place, each in enumerate(selected):
-        slope = fitted.native.log_gradient(values, free, each.omega_rad_s)[place]
+        omega = each.omega_rad_s
+        if omega.tobytes() not in known:
+            known[omega.tobytes()] = fitted.native.log_gradient(values, free, omega)
+        slope = known[omega.tobytes()][place]
         both = np.empty((2 * len(slope), len(free)))
         both[0::2] = _DECIBEL * np.sqrt(each.weight_db)[:, None] * slope.real
         both[1::2] = _DEGREE * np.sqrt(each.weight_deg)[:, None] * slope.imag
