@@ -25,6 +25,7 @@ pub mod gyro_filter;
 pub mod held_input;
 pub mod hold_integrals;
 pub mod householder;
+pub mod joint_objective;
 pub mod kinematics;
 pub mod lanes;
 pub mod least_squares;

@@ -12,9 +12,11 @@
 
 use rayon::prelude::*;
 
+use crate::dense_problem::Dense;
 use crate::error::CoreError;
 use crate::gram::triangle;
-use crate::least_squares::{Objective, Options, Point, Termination};
+use crate::joint_objective::Joint;
+use crate::least_squares::{Objective, Options, Point, Problem, Termination};
 use crate::levenberg_marquardt::search;
 use crate::output_error_weights::{Moments, Noise, Weights};
 use crate::record_pass::{RecordPass, Task};
@@ -143,7 +145,7 @@ impl RecordData {
 pub struct Estimate {
     /// Parameters θ.
     pub theta: Vec<f64>,
-    /// ½ Σ vᵀR⁻¹v + (N/2) ln det R.
+    /// ½ Σ vᵀR⁻¹v + (N/2) ln det R, and half the sum of squares of what is fitted beside records.
     pub objective: f64,
     /// R, n_outputs × n_outputs.
     pub noise: Vec<f64>,
@@ -342,11 +344,14 @@ impl<T: Trajectories> Objective for OutputError<'_, T> {
 }
 
 /// Fit from several starts, in parallel, until `stop` says true; the answers keep the order of the
-/// starts. One start runs on the calling thread.
-pub fn fit_from<T: Trajectories>(
+/// starts. One start runs on the calling thread. Residuals of variance one of other data on the same
+/// parameters, where there are any `beside`, add their sum of squares.
+#[allow(clippy::too_many_arguments)]
+pub fn fit_from<T: Trajectories, P: Problem + Clone + Sync>(
     trajectories: &T,
     data: &[RecordData],
     noise: &Noise,
+    beside: Option<&P>,
     starts: &[Vec<f64>],
     bounds: (&[f64], &[f64]),
     options: &Options,
@@ -355,8 +360,18 @@ pub fn fit_from<T: Trajectories>(
     let one = |start: &Vec<f64>| {
         let mut fit = OutputError::new(trajectories, data, noise)?;
         let proceed = &mut |_: &_| !stop();
-        let found = search(&mut fit, start, bounds.0, bounds.1, options, proceed)?;
-        fit.estimate(found.x, found.iterations, found.termination)
+        let Some(beside) = beside else {
+            let found = search(&mut fit, start, bounds.0, bounds.1, options, proceed)?;
+            return fit.estimate(found.x, found.iterations, found.termination);
+        };
+        let mut beside = beside.clone();
+        let mut other = Dense::new(&mut beside);
+        let mut joint = Joint::new(&mut other, &mut fit)?;
+        let found = search(&mut joint, start, bounds.0, bounds.1, options, proceed)?;
+        let share = 0.5 * other.cost(&found.x)?;
+        let mut ending = fit.estimate(found.x, found.iterations, found.termination)?;
+        ending.objective += share;
+        Ok(ending)
     };
     match starts {
         [only] => vec![one(only)],

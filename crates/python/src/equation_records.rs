@@ -11,6 +11,7 @@ use numpy::{
 use pyo3::prelude::*;
 
 use crate::error::from_core;
+use crate::frequency_fit::{Beside, WhitenedResponses};
 use crate::output_error::{
     Flown, NoiseArguments, Own, SearchArguments, driven, fit, hold, record_data, run,
 };
@@ -25,6 +26,7 @@ type Segments<'py> = (Vec<usize>, PyReadonlyArray2<'py, f64>, usize, PyReadonlyA
 /// record without cuts and without conditions at its end is run whole from its initial state.
 #[pyclass(frozen, module = "flightid._native")]
 struct EquationRecords {
+    model: Py<StateSpace>,
     motion: Motion,
     substeps: Vec<usize>,
     plans: Vec<Plan>,
@@ -59,7 +61,7 @@ impl EquationRecords {
 impl EquationRecords {
     #[new]
     fn new(
-        model: &StateSpace,
+        model: Py<StateSpace>,
         substeps: Vec<usize>,
         segments: Vec<Segments<'_>>,
     ) -> PyResult<Self> {
@@ -70,13 +72,15 @@ impl EquationRecords {
                 Ok(Plan { cuts, ends, n_growing, guesses })
             })
             .collect::<PyResult<_>>()?;
-        Ok(Self { motion: Motion::new(&model.tape).map_err(from_core)?, substeps, plans })
+        let motion = Motion::new(&model.get().tape).map_err(from_core)?;
+        Ok(Self { model, motion, substeps, plans })
     }
 
-    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int]) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
+    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
     ///
     /// As `StateSpace.fit_records`.
     #[allow(clippy::too_many_arguments)]
+    #[pyo3(signature = (values, free, records, own, first_order_hold, noise, search, responses = None))]
     fn fit_records<'py>(
         &self,
         py: Python<'py>,
@@ -87,10 +91,13 @@ impl EquationRecords {
         first_order_hold: bool,
         noise: NoiseArguments,
         search: SearchArguments<'py>,
+        responses: Option<WhitenedResponses<'py>>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let places = 0..records.len();
         let model = self.on(places, values.as_slice()?, &free, &records, first_order_hold)?;
-        fit(py, &model, &record_data(&records, own)?, noise, search)
+        let beside = responses.map(Beside::new).transpose()?;
+        let beside = self.model.get().on(beside.as_ref(), values.as_slice()?, &free)?;
+        fit(py, &model, &record_data(&records, own)?, noise, beside.as_ref(), search)
     }
 
     /// run_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]], first_order_hold: bool, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]

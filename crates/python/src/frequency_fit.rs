@@ -53,6 +53,45 @@ pub fn measured(data: Vec<Response<'_>>) -> PyResult<Vec<Measured>> {
         .collect()
 }
 
+fn whitenings(runs: Vec<Run<'_>>) -> PyResult<Vec<Whitening>> {
+    let copied = |(first, count, matrix): Run<'_>| {
+        Ok(Whitening { first, count, matrix: matrix.as_slice()?.to_vec() })
+    };
+    runs.into_iter().map(copied).collect()
+}
+
+/// Responses that are fitted together with records: data, and the whitening of their errors.
+pub type WhitenedResponses<'py> = (Vec<Response<'py>>, Vec<Run<'py>>);
+
+/// The same, copied out of NumPy.
+pub struct Beside {
+    data: Vec<Measured>,
+    cost: Cost,
+}
+
+impl Beside {
+    /// Copy.
+    ///
+    /// # Errors
+    /// For arrays that are not contiguous.
+    pub fn new((data, runs): WhitenedResponses<'_>) -> PyResult<Self> {
+        Ok(Self { data: measured(data)?, cost: Cost::Whitened(whitenings(runs)?) })
+    }
+
+    /// Frequencies of all responses.
+    pub fn omega(&self) -> impl Iterator<Item = f64> + '_ {
+        self.data.iter().flat_map(|each| each.omega.iter().copied())
+    }
+
+    /// A model on these responses.
+    ///
+    /// # Errors
+    /// Where they do not belong together.
+    pub fn fit<M: ResponseModel>(&self, model: M) -> PyResult<FrequencyFit<'_, M>> {
+        FrequencyFit::new(model, &self.data, &self.cost).map_err(from_core)
+    }
+}
+
 /// H(jω) of each response of a prepared model, shape (n_responses, n_freqs).
 ///
 /// # Errors
@@ -98,12 +137,7 @@ pub fn search<'py>(
     whitening: Vec<Run<'_>>,
     search: &Search<'py>,
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
-    let runs = whitening
-        .into_iter()
-        .map(|(first, count, matrix)| {
-            Ok(Whitening { first, count, matrix: matrix.as_slice()?.to_vec() })
-        })
-        .collect::<PyResult<Vec<_>>>()?;
+    let runs = whitenings(whitening)?;
     let cost = if runs.is_empty() { Cost::DecibelPhase } else { Cost::Whitened(runs) };
     let width = model.n_free().max(1);
     let fit = FrequencyFit::new(model, data, &cost).map_err(from_core)?;

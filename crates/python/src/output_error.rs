@@ -2,7 +2,7 @@
 //! identification/output_error.py)
 
 use flightid_core::CoreError;
-use flightid_core::least_squares::Options;
+use flightid_core::least_squares::{Options, Problem};
 use flightid_core::linear_output_error::{Driven, LinearFamily, LinearTrajectories};
 use flightid_core::linear_simulation::Hold;
 use flightid_core::output_error::{Estimate, RecordData, Trajectories, Wanted, fit_from};
@@ -96,7 +96,8 @@ pub fn record_data(records: &[Flown<'_>], own: Vec<Own<'_>>) -> PyResult<Vec<Rec
         .collect()
 }
 
-/// Fit from each start, or the words of the error that stopped it.
+/// Fit from each start, or the words of the error that stopped it; with responses beside the records
+/// where there are any.
 ///
 /// # Errors
 /// Where records and model do not belong together, or the user interrupts.
@@ -105,6 +106,7 @@ pub fn fit<'py, T: Trajectories>(
     trajectories: &T,
     data: &[RecordData],
     noise: NoiseArguments,
+    beside: Option<&(impl Problem + Clone + Sync)>,
     search: SearchArguments<'py>,
 ) -> PyResult<Vec<Bound<'py, PyAny>>> {
     let (starts, lower, upper, maximum_iterations) = search;
@@ -120,7 +122,7 @@ pub fn fit<'py, T: Trajectories>(
         cost_tolerance: 1e-14,
     };
     let work = |stop: interrupt::Stop<'_>| {
-        fit_from(trajectories, data, &noise, &starts, (lower, upper), &options, stop)
+        fit_from(trajectories, data, &noise, beside, &starts, (lower, upper), &options, stop)
     };
     let found = if starts.len() == 1 && data.len() == 1 {
         interrupt::run_here(py, work)?

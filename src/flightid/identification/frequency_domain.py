@@ -92,9 +92,9 @@ class Options:
 def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fit:
     """Fit a model to measured responses; see `flightid.identify`."""
     options.check()
-    _check_model(model, data)
-    selected = _select(model, data, options)
-    setup = _check_start(model, selected)
+    check_channels(model, data)
+    selected = select_by(model, data, options)
+    setup = check_start(model, selected)
     try:
         return _fit_selected(model, data, selected, setup, options)
     except FitError as error:
@@ -122,7 +122,7 @@ def _fit_selected(
     if options.correct_bias:
         without = Correction(data, options.hold)
         done = _without_bias(fitted, without, errors, found, options)
-        after = _select(model, done.data, options)
+        after = select_by(model, done.data, options)
         if done.applied:
             errors = errors_after(done, without, after) or errors
         changes = sizes(selected, after, errors) if done.applied else {}
@@ -134,12 +134,13 @@ def _fit_selected(
             selected, fitted = after, _at(model, best)
             following = points_follow(done, fitted, without, selected, errors)
             found = _statistics(fitted, selected, errors, best, options, following)
-    responses = _compare(fitted, selected)
+    responses = compare_responses(fitted, selected)
     fit = _assemble(fitted, options, data, groups, responses, found, setup)
     return replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
 
 
-def _select(model: Model, data: FrequencyResponse, options: Options) -> list[SelectedResponse]:
+def select_by(model: Model, data: FrequencyResponse, options: Options) -> list[SelectedResponse]:
+    """Points of the model's responses that the options choose."""
     return select_points(
         data,
         model.response_names,
@@ -178,14 +179,25 @@ def _without_bias(
     once = replace(options, starts=1)
 
     def refit(model: Model, corrected: FrequencyResponse) -> Model:
-        selected = _select(model, corrected, options)
+        selected = select_by(model, corrected, options)
         return _at(model, _minimise(model, selected, errors, once)[0])
 
     scales = {p.name: p.stderr for p in found.parameters.values() if p.stderr}
     return iterate(fitted, correction, scales, refit)
 
 
-def _check_model(model: Model, data: FrequencyResponse) -> None:
+def check_channels(model: Model, data: FrequencyResponse) -> None:
+    """Refuse a model without free parameters, and data without its channels or units.
+
+    Raises
+    ------
+    FitError
+        No free parameter.
+    UnknownNameError
+        A response of the model is not in the data.
+    UnitError
+        Data and model disagree on a unit.
+    """
     if not model.parameters.free:
         raise FitError(
             "the model has no free parameter",
@@ -200,16 +212,24 @@ def _check_model(model: Model, data: FrequencyResponse) -> None:
         require_match(data.units[name], model.units[name], subject=f"channel {name}")
 
 
-def _model_at(model: Model, omega: Array, place: int) -> NDArray[np.complex128]:
+def response_at(model: Model, omega: Array, place: int) -> NDArray[np.complex128]:
+    """One response of the model, by its place."""
     values = model.parameters.independent_values()
     return np.asarray(model.native.response(values, np.ascontiguousarray(omega))[place])
 
 
-def _check_start(model: Model, selected: Sequence[SelectedResponse]) -> list[Finding]:
+def check_start(model: Model, selected: Sequence[SelectedResponse]) -> list[Finding]:
+    """Look at the model's start values beside the data.
+
+    Raises
+    ------
+    FitError
+        The model has no response of a pair.
+    """
     found: list[Finding] = []
     for place, each in enumerate(selected):
         try:
-            start = _model_at(model, each.omega_rad_s, place)
+            start = response_at(model, each.omega_rad_s, place)
         except DataError:
             continue  # no value at the start: the search will say so if no start has one
         if not np.any(start):
@@ -254,14 +274,17 @@ def _sensitivity(
         from scipy.linalg import block_diag  # noqa: PLC0415
 
         return np.asarray(-block_diag(*(matrix for *_, matrix in whitening(errors))))
-    curves = [_model_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
+    curves = [response_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
     return coherence_sensitivity(selected, curves, errors)
 
 
-def _compare(fitted: Model, selected: Sequence[SelectedResponse]) -> tuple[FittedResponse, ...]:
+def compare_responses(
+    fitted: Model, selected: Sequence[SelectedResponse]
+) -> tuple[FittedResponse, ...]:
+    """Measured and fitted responses side by side, each with its cost J."""
     result = []
     for place, each in enumerate(selected):
-        curve = _model_at(fitted, each.measured.omega_rad_s, place)
+        curve = response_at(fitted, each.measured.omega_rad_s, place)
         ratio = curve[each.places] / each.response
         cost = float(
             np.sum(

@@ -12,6 +12,7 @@ from flightid.identification.filter_error import fit_filter_error
 from flightid.identification.fit import Fit
 from flightid.identification.fourier_output_error_fit import fit_fourier_output_error
 from flightid.identification.frequency_domain import Options, fit_responses
+from flightid.identification.joint import JointOptions, fit_jointly
 from flightid.identification.narx_fit import NarxFit
 from flightid.identification.orthogonal_least_squares import fit_narx
 from flightid.identification.output_error import fit_output_error
@@ -31,6 +32,7 @@ from flightid.models.polynomial_structure import PolynomialStructure
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 
+JointData = tuple[FrequencyResponse, Record | Sequence[Record]]
 RESPONSES, RECORDS, BOTH = "responses", "records", "responses and records"
 
 
@@ -76,12 +78,25 @@ METHODS: dict[tuple[type, str, str], Method] = {
         fit_fourier_output_error, FourierOutputErrorOptions
     ),
     (StateSpaceModel, RECORDS, "filter_error"): Method(fit_filter_error, FilterErrorOptions),
+    (TransferFunctionModel, BOTH, "joint"): Method(
+        lambda model, data, options: fit_jointly(model, flat(data), options), JointOptions
+    ),
+    (StateSpaceModel, BOTH, "joint"): Method(
+        lambda model, data, options: fit_jointly(model, flat(data), options), JointOptions
+    ),
 }
+
+
+def flat(data: object) -> list[object]:
+    """The items of data, those of sequences in it among them."""
+    if not (isinstance(data, list | tuple) and data):
+        return [data]
+    return [item for part in data for item in flat(part)]
 
 
 def kind_of(data: object) -> str:
     """Kind of data: ``"responses"``, ``"records"``, ``"responses and records"``, or its type."""
-    items = data if isinstance(data, list | tuple) and data else (data,)
+    items = flat(data)
     kinds = [
         RESPONSES if isinstance(item, FrequencyResponse) else RECORDS
         for item in items
@@ -178,9 +193,32 @@ def identify(
 ) -> Fit: ...
 
 
+@overload
+def identify(
+    model: Model,
+    data: JointData,
+    *,
+    method: str | None = ...,
+    starts: int = ...,
+    seed: int = ...,
+    omega_rad_s: Bands = ...,
+    n_omega: int = ...,
+    minimum_coherence: float | None = ...,
+    correct_bias: bool = ...,
+    initial_state: InitialState = ...,
+    free_bias: Freedom = ...,
+    free_reference: Freedom = ...,
+    noise_covariance: str = ...,
+    loss: str = ...,
+    loss_limit: float = ...,
+    hold: str = ...,
+    maximum_iterations: int = ...,
+) -> Fit: ...
+
+
 def identify(
     model: Model | NarxModel | PolynomialStructure,
-    data: FrequencyResponse | Record | Sequence[Record],
+    data: FrequencyResponse | Record | Sequence[Record] | JointData,
     *,
     method: str | None = None,
     **options: Any,
@@ -200,6 +238,8 @@ def identify(
     - state-space model on records: ``"fourier_output_error"`` (outputs at the records' harmonics;
       biases drop out, unstable models are no special case) and ``"filter_error"`` (a Kalman filter
       with estimated process noise, for turbulence).
+    - model on (response, records): ``"joint"``. Both likelihoods together, the response's with the
+      covariance of its errors; the flights of the response are to be others than the records.
     - `NarxModel` on records: orthogonal least squares; polynomial structure
       (`PolynomialModel.arx` … `.general`) on records: prediction errors. Options are the model's.
 
@@ -207,7 +247,7 @@ def identify(
     ----------
     model : TransferFunctionModel, StateSpaceModel, NarxModel or PolynomialStructure
         Structure, start values and bounds; everything in it is fitted.
-    data : FrequencyResponse, or Record or sequence of Record
+    data : FrequencyResponse, Record or sequence of Record, or tuple of both
         Measured, with the model's channels, in the model's units.
     method : str, optional
         See above.

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.errors import FlightidError
 from flightid.findings import Finding
 from flightid.identification.equation_error import equation_error_start
 from flightid.identification.equation_records import (
@@ -28,12 +29,14 @@ from flightid.identification.fit_findings import (
     judge_search,
 )
 from flightid.identification.fitted_record import FittedRecord
+from flightid.identification.fourier_output_error_fit import fit_fourier_output_error
 from flightid.identification.multistart import End, cluster, collect, draw_starts, local_minima
 from flightid.identification.record_findings import judge_channels, judge_fit
 from flightid.identification.record_options import RecordOptions
 from flightid.identification.record_setup import OwnNumbers, RecordSet, prepare_records
 from flightid.identification.record_statistics import RecordStatistics, record_statistics
-from flightid.models import Model
+from flightid.identification.regression_options import FourierOutputErrorOptions
+from flightid.models import Model, StateSpaceModel
 from flightid.record import Channel, Record, Step
 from flightid.version import VERSION
 
@@ -42,6 +45,10 @@ _NEAR = 0.5 * np.log(1.1)
 """Log-likelihood of a sample whose residual variance is ten percent larger."""
 ROUNDS = 3
 """Most searches with a new choice of the modes that are set at the end of a record."""
+WhitenedResponses = tuple[
+    Sequence[tuple[Array, NDArray[np.complex128], Array, Array]], Sequence[tuple[int, int, Array]]
+]
+"""Frequencies, response and two weights, not used, of each; first response, number and matrix."""
 NativeEnd = tuple[Array, float, Array, list[Array], list[list[bool]], int, str]
 
 
@@ -66,7 +73,61 @@ def fit_output_error(model: Model, data: Record | Sequence[Record], options: Rec
         model = equation_error_start(model, data)
     prepared = prepare_records(model, data, options)
     setup = judge_channels(prepared)
-    model, prepared, runs_of, groups = _searched(model, prepared, options)
+    return conclude(searched(model, prepared, options), options, setup)
+
+
+@dataclass(frozen=True)
+class Searched:
+    """Where a search over records ended.
+
+    Attributes
+    ----------
+    model : TransferFunctionModel or StateSpaceModel
+        From which the last round started.
+    prepared : RecordSet
+    runs_of : EquationRuns or None
+    groups : list of list of RecordEnd
+        Ends of all starts, best group first.
+    """
+
+    model: Model
+    prepared: RecordSet
+    runs_of: EquationRuns | None
+    groups: list[list[RecordEnd]]
+
+    @property
+    def fitted(self) -> Model:
+        """The model at the best end."""
+        return _with_estimates(self.model, self.groups[0][0])
+
+
+def conclude(
+    found: Searched,
+    options: RecordOptions,
+    setup: Sequence[Finding],
+    beside: Array | None = None,
+) -> Fit:
+    """The result of a search.
+
+    Parameters
+    ----------
+    found : Searched
+    options : RecordOptions
+    setup : sequence of Finding
+        Put before those of the fit.
+    beside : ndarray, shape (n, n_free), optional
+        Slopes of residuals of unit variance that were fitted together with the records.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    FitError
+        The data do not see a parameter, or a combination of parameters.
+    """
+    model, prepared, runs_of, groups = found.model, found.prepared, found.runs_of, found.groups
     best = groups[0][0]
     fitted = _with_estimates(model, best)
     own = [start.filled(end) for start, end in zip(prepared.own, best.own, strict=True)]
@@ -76,29 +137,68 @@ def fit_output_error(model: Model, data: Record | Sequence[Record], options: Rec
     ]
     if runs_of is not None:
         own = [runs_of.start(fitted, prepared, k, numbers) for k, numbers in enumerate(own)]
-        setup += judge_runs(runs_of)
-    found = record_statistics(
-        fitted, prepared, own, best.determined, runs, best.noise, options.limit
+        setup = [*setup, *judge_runs(runs_of)]
+    known = record_statistics(
+        fitted, prepared, own, best.determined, runs, best.noise, options.limit, beside
     )
-    return _assemble(fitted, prepared, options, groups, runs, found, setup)
+    return _assemble(fitted, prepared, options, groups, runs, known, setup)
 
 
-def _searched(
-    model: Model, prepared: RecordSet, options: RecordOptions
-) -> tuple[Model, RecordSet, EquationRuns | None, list[list[RecordEnd]]]:
-    """Search, again where the estimates have other growing modes than their start."""
+def searched(
+    model: Model,
+    prepared: RecordSet,
+    options: RecordOptions,
+    responses: WhitenedResponses | None = None,
+) -> Searched:
+    """Search, again where the estimates have other growing modes than their start.
+
+    Parameters
+    ----------
+    model : TransferFunctionModel or StateSpaceModel
+    prepared : RecordSet
+    options : RecordOptions
+    responses : WhitenedResponses, optional
+        Fitted together with the records.
+
+    Returns
+    -------
+    Searched
+
+    Raises
+    ------
+    FitError
+        No start led anywhere.
+    """
     starts = options
     for _ in range(ROUNDS):
         runs_of = equation_runs(model, prepared)
         placed = prepared if runs_of is None else segmented_starts(prepared, runs_of)
         placed = replace(placed, model=model)
-        groups = cluster(search_records(placed, starts, runs_of))
+        groups = cluster(search_records(placed, starts, runs_of, responses))
         fitted = _with_estimates(model, groups[0][0])
         after = equation_runs(fitted, prepared)
         if _growing(after) == _growing(runs_of):
             break
-        model, starts = fitted, replace(options, starts=1)
-    return model, placed, runs_of, groups
+        model, starts = _overgrown(model, fitted, after, placed), replace(options, starts=1)
+    return Searched(model, placed, runs_of, groups)
+
+
+def _overgrown(
+    model: Model, fitted: Model, after: EquationRuns | None, prepared: RecordSet
+) -> Model:
+    """Where to search from, once the estimates grow otherwise than the model that was run.
+
+    A run from the first sample to the last of a vehicle that turns out unstable tells nothing, and
+    its estimates may grow without bound. Transforms of the records do not care which modes grow.
+    """
+    if not (after is not None and after.is_segmented and isinstance(model, StateSpaceModel)):
+        return fitted
+    options = FourierOutputErrorOptions(hold="first" if prepared.first_order_hold else "zero")
+    try:
+        return fit_fourier_output_error(model, prepared.records, options).model
+    except FlightidError:
+        # A nonlinear model, or records too short to transform: what was found is all there is.
+        return fitted
 
 
 def _growing(runs: EquationRuns | None) -> list[int]:
@@ -111,7 +211,10 @@ def _with_estimates(model: Model, end: RecordEnd) -> Model:
 
 
 def search_records(
-    prepared: RecordSet, options: RecordOptions, runs_of: EquationRuns | None = None
+    prepared: RecordSet,
+    options: RecordOptions,
+    runs_of: EquationRuns | None = None,
+    responses: WhitenedResponses | None = None,
 ) -> list[RecordEnd]:
     """Ends of all starts, best first; no statistics."""
     model = prepared.model
@@ -130,6 +233,7 @@ def search_records(
             np.array([parameter.maximum for parameter in free]),
             options.maximum_iterations,
         ),
+        responses,
     )
     return collect([each if isinstance(each, str) else RecordEnd.of_native(each) for each in found])
 
@@ -194,7 +298,7 @@ def _assemble(
     groups: Sequence[Sequence[RecordEnd]],
     runs: Sequence[tuple[Array, Array]],
     found: RecordStatistics,
-    setup: list[Finding],
+    setup: Sequence[Finding],
 ) -> Fit:
     best = groups[0][0]
     records = _fitted_records(replace(prepared, model=fitted), runs, found)

@@ -89,8 +89,12 @@ def record_statistics(
     runs: Sequence[tuple[Array, Array]],
     noise: Array,
     limit: float,
+    beside: Array | None = None,
 ) -> RecordStatistics:
     """Standard errors, bounds and correlations of a fit to records.
+
+    `beside` are the slopes, by all free parameters, of residuals of unit variance from other data
+    that were fitted together with the records.
 
     Raises
     ------
@@ -114,11 +118,12 @@ def record_statistics(
         residual = _limited(whitener @ (measured - outputs), limit)
         shared, rest = white[:, :, : len(free)][:, :, inner], white[:, :, len(free) :]
         blocks.append(Block.of(shared, rest[:, :, np.array(kept, dtype=bool)], residual))
-    triangle = triangle_of(blocks)
+    other = np.zeros((0, len(free))) if beside is None else beside
+    triangle = triangle_of(blocks, other[:, inner])
     require_identifiable(names, triangle)
-    covariance, own_covariances, crossed, models = covariances(blocks, triangle)
+    covariance, own_covariances, crossed, models = covariances(blocks, triangle, other[:, inner])
     plain = information_inverse(triangle)
-    freedom = freedom_of(blocks, models, triangle)
+    freedom = freedom_of(blocks, models, triangle, other[:, inner])
     parameters = fitted_parameters(fitted, names, covariance, triangle / np.sqrt(2.0), freedom)
     ratio = np.sqrt(np.diag(covariance) / np.diag(plain)) if names else np.ones(1)
     return RecordStatistics(
@@ -153,9 +158,11 @@ def _limited(residual: Array, limit: float) -> Array:
     return np.asarray(np.clip(residual, -limit, limit) / inside)
 
 
-def triangle_of(blocks: Sequence[Block]) -> Array:
-    """Triangle of the sensitivities of all records together."""
-    parts = [np.linalg.qr(block.projected, mode="r") for block in blocks]
+def triangle_of(blocks: Sequence[Block], beside: Array | None = None) -> Array:
+    """Triangle of the sensitivities of all records, and of what is fitted beside them."""
+    parts = [np.asarray(np.linalg.qr(block.projected, mode="r")) for block in blocks]
+    if beside is not None:
+        parts.append(beside)
     return np.asarray(np.linalg.qr(np.vstack(parts), mode="r"))
 
 
@@ -176,8 +183,16 @@ def _noise_covariance(models: Sequence[Autoregression], columns: Array, n_output
     return total
 
 
+def _share_beside(plain: Array, beside: Array | None) -> Array:
+    """Covariance that residuals of unit variance beside the records bring into the estimates."""
+    if beside is None:
+        return np.zeros_like(plain)
+    gain = beside @ plain
+    return np.asarray(gain.T @ gain)
+
+
 def covariances(
-    blocks: Sequence[Block], triangle: Array
+    blocks: Sequence[Block], triangle: Array, beside: Array | None = None
 ) -> tuple[Array, list[Array], list[Array], list[Autoregression]]:
     """Covariance of the shared parameters, of each record's own, between the two; noise models."""
     plain = information_inverse(triangle)
@@ -200,7 +215,7 @@ def covariances(
     models = noise_models([block.residual for block in blocks], left)
     gains = [block.projected @ plain for block in blocks]
     parts = [_noise_covariance(models, gain, n_outputs) for gain in gains]
-    shared = np.asarray(sum(parts))
+    shared = np.asarray(sum(parts)) + _share_beside(plain, beside)
     own, crossed = [], []
     for block, gain, part in zip(blocks, gains, parts, strict=True):
         # Own numbers answer the record's own noise and, through the parameters, everybody's.
@@ -250,7 +265,12 @@ def start_errors(
     return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", whole, joint, whole)))
 
 
-def freedom_of(blocks: Sequence[Block], models: Sequence[Autoregression], triangle: Array) -> Array:
+def freedom_of(
+    blocks: Sequence[Block],
+    models: Sequence[Autoregression],
+    triangle: Array,
+    beside: Array | None = None,
+) -> Array:
     """Degrees of freedom of each variance: noise models are themselves estimates."""
     plain = information_inverse(triangle)
     n_outputs = blocks[0].residual.shape[0]
@@ -263,7 +283,10 @@ def freedom_of(blocks: Sequence[Block], models: Sequence[Autoregression], triang
     doubt = sum(
         variance**2 / model.freedom() for variance, model in zip(variances, models, strict=True)
     )
-    return np.asarray(variances.sum(axis=0) ** 2 / np.maximum(doubt, np.finfo(float).tiny))
+    total = variances.sum(axis=0) + np.diag(_share_beside(plain, beside))
+    # Errors that are known leave no doubt, nor does a residual that vanishes.
+    known = doubt > 0.0
+    return np.where(known, total**2 / np.where(known, doubt, 1.0), np.inf)
 
 
 def _own_numbers(

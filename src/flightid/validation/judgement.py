@@ -128,6 +128,15 @@ def _findings(
                 "" if light is Light.GREEN else "verify with smaller inputs, or mend the model",
             )
         )
+    if any(each.shifts.input_shift is not None for each in predictions):
+        found.append(
+            Finding(
+                "verification-nonlinear",
+                Light.GREEN,
+                "the model is not linear: its equations were integrated, and a free bias is a "
+                "constant shift of each input",
+            )
+        )
     short = [each for each in predictions if each.shifts.rank < each.shifts.n_free]
     if short:
         found.append(

@@ -38,6 +38,8 @@ class Shifts:
         one choice among many, while the prediction is not touched.
     e_folds : float
         How often the model's fastest growing mode grows by e over the record; 0 where none grows.
+    input_shift : ndarray, shape (n_inputs,), or None
+        Of a nonlinear model, whose equations were integrated: constant added to the inputs.
 
     Example
     -------
@@ -51,6 +53,7 @@ class Shifts:
     n_free: int
     rank: int
     e_folds: float = 0.0
+    input_shift: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)

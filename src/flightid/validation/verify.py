@@ -7,8 +7,10 @@ from dataclasses import replace
 from typing import Literal, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.errors import ModelError, OptionError, UnitError, UnknownNameError
+from flightid.models import StateSpaceModel
 from flightid.record import Channel, Record, Step
 from flightid.responses import FrequencyResponse
 from flightid.simulation.simulate import Hold, LinearModel
@@ -16,7 +18,8 @@ from flightid.units import canonical
 from flightid.validation.comparison import Comparison, compared
 from flightid.validation.judgement import guide_weights, judge
 from flightid.validation.muad import mismatch
-from flightid.validation.shifts import Freedom, predict
+from flightid.validation.nonlinear_run import predict_equations
+from flightid.validation.shifts import Freedom, Shifts, predict
 from flightid.validation.verification import Prediction, Verification
 
 Initial = Literal["trim", "fit"]
@@ -69,13 +72,16 @@ def verify(
     ``dx/dt = A x + B (u - u_ref) + b``, ``y = C x + D (u - u_ref) + y_ref``: a free run over the
     whole record. Nothing of the model changes; state biases b, reference shifts y_ref and, with
     ``initial="fit"``, the initial state are solved for by weighted least squares in each record,
-    since they belong to the record. u_ref is the record's declared trim, or zero.
+    since they belong to the record. u_ref is the record's declared trim, or zero. The equations of
+    a nonlinear model are integrated instead, on the channels as they are; its free bias is a
+    constant shift of each input.
 
     Assumes: records that were not used in the fit, and start in trim unless the initial state is
-    fitted. Biased when the record is short against the slowest mode: a free initial state can then
-    imitate a response. For an unstable model fit the initial state: growing modes are then run
-    backward from the end of the record, which is exact for records of any length, and a finding
-    says where that explains rather than predicts.
+    fitted; a nonlinear model that does not explode within a record. Biased when the record is short
+    against the slowest mode: a free initial state can then imitate a response. For an unstable
+    model fit the initial state: growing modes are then run backward from the end of the record,
+    which is exact for records of any length, and a finding says where that explains rather than
+    predicts.
 
     Parameters
     ----------
@@ -224,8 +230,20 @@ def _predict(
     freedom: Freedom,
     hold: Hold,
 ) -> Prediction:
-    a, b, c, d, delays_s = (np.ascontiguousarray(m, dtype=np.float64) for m in model.state_space())
     rows = [list(model.outputs).index(name) for name in chosen]
+    if isinstance(model, StateSpaceModel) and not model.is_linear:
+        predicted, shifts = predict_equations(
+            model,
+            record.matrix(model.inputs),
+            record.matrix(chosen),
+            record.sample_time_s,
+            rows=rows,
+            freedom=freedom,
+            weights=guide_weights(record, chosen),
+            hold=hold,
+        )
+        return _prediction(record, model, chosen, predicted, shifts, hold)
+    a, b, c, d, delays_s = (np.ascontiguousarray(m, dtype=np.float64) for m in model.state_space())
     trim = record.trim
     measured = record.matrix(chosen)
     offset = np.array([[trim.get(name, 0.0)] for name in chosen])
@@ -241,12 +259,23 @@ def _predict(
         hold=hold,
     )
     total = replace(shifts, reference=shifts.reference + offset[:, 0])
+    return _prediction(record, model, chosen, predicted + offset, total, hold)
+
+
+def _prediction(
+    record: Record,
+    model: LinearModel,
+    chosen: tuple[str, ...],
+    predicted: NDArray[np.float64],
+    shifts: Shifts,
+    hold: Hold,
+) -> Prediction:
     known = record.channels
     channels = [known[name] for name in model.inputs]
     channels += [Channel(name, known[name].unit, known[name].role, "predicted") for name in chosen]
     made = record.replace(
-        dict(zip(chosen, predicted + offset, strict=True)),
+        dict(zip(chosen, predicted, strict=True)),
         channels=channels,
         step=Step("verify", {"hold": hold}),
     )
-    return Prediction(record, made, total)
+    return Prediction(record, made, shifts)

@@ -1,0 +1,200 @@
+"""Frequency responses and records of one vehicle in one fit, each weighed by its likelihood.
+
+Minimised is ½ eᵀP⁻¹e of the measured responses, with the covariance P of their errors, plus the
+negative logarithm of the records' likelihood; native: `joint_objective.rs`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError
+from flightid.findings import Finding
+from flightid.identification.bias_rounds import iterate, judge_bias, provenance, sizes
+from flightid.identification.error_model import ErrorModel, error_model, whitening
+from flightid.identification.fit import Fit
+from flightid.identification.fit_findings import judge_cost, judge_intervals
+from flightid.identification.frequency_domain import (
+    Options,
+    check_channels,
+    check_start,
+    compare_responses,
+    response_at,
+    select_by,
+)
+from flightid.identification.independence import judge_independence
+from flightid.identification.output_error import (
+    Searched,
+    WhitenedResponses,
+    conclude,
+    searched,
+)
+from flightid.identification.record_findings import judge_channels
+from flightid.identification.record_options import RecordOptions
+from flightid.identification.record_setup import RecordSet, prepare_records
+from flightid.identification.selection import Bands, SelectedResponse
+from flightid.models import Model
+from flightid.record import Record
+from flightid.responses import FrequencyResponse
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointOptions(RecordOptions):
+    """Options of a joint fit: those of records, and points of the response; see `identify`."""
+
+    omega_rad_s: Bands = None
+    n_omega: int = 20
+    minimum_coherence: float | None = 0.6
+    correct_bias: bool = True
+
+    @property
+    def of_responses(self) -> Options:
+        """The part that concerns the responses."""
+        return Options(
+            omega_rad_s=self.omega_rad_s,
+            n_omega=self.n_omega,
+            minimum_coherence=self.minimum_coherence,
+            cost="likelihood",
+            correct_bias=self.correct_bias,
+            hold=self.hold,
+        )
+
+
+@dataclass(frozen=True)
+class ChosenPoints:
+    """Fitted points of the responses, with the covariance of their errors."""
+
+    selected: list[SelectedResponse]
+    errors: ErrorModel
+
+    @property
+    def native(self) -> WhitenedResponses:
+        """As the native half takes it; weights of decibels and degrees are not used."""
+        none = [np.zeros(len(each.places)) for each in self.selected]
+        data = [
+            (each.omega_rad_s, each.response, zero, zero)
+            for each, zero in zip(self.selected, none, strict=True)
+        ]
+        return data, whitening(self.errors)
+
+    def slopes(self, fitted: Model) -> Array:
+        """Derivatives of the whitened errors by the free parameters."""
+        values, free = fitted.parameters.independent_values(), fitted.parameters.free_indices
+        by_response = []
+        for place, each in enumerate(self.selected):
+            curve = response_at(fitted, each.omega_rad_s, place)
+            slope = fitted.native.log_gradient(values, free, each.omega_rad_s)[place]
+            by_response.append(curve[:, None] * slope)
+        rows = []
+        for first, count, matrix in whitening(self.errors):
+            run = np.concatenate(by_response[first : first + count])
+            rows.append(matrix @ np.concatenate([run.real, run.imag]))
+        return np.vstack(rows)
+
+
+def fit_jointly(model: Model, data: Sequence[object], options: JointOptions) -> Fit:
+    """Fit a model to a frequency response and records together; see `flightid.identify`."""
+    response, records = _divided(data)
+    of_responses = options.of_responses
+    of_responses.check()
+    check_channels(model, response)
+    prepared = prepare_records(model, records, options)
+    points = _points(model, response, of_responses)
+    setup = [
+        *judge_independence(response, records, model.outputs),
+        *judge_channels(prepared),
+        *check_start(model, points.selected),
+    ]
+    found = searched(model, prepared, options, points.native)
+    correction: dict[str, object] = {"applied": False, "reason": "correct_bias=False"}
+    if options.correct_bias:
+        found, points, correction, said = _without_bias(found, prepared, response, points, options)
+        setup += said
+    fit = conclude(found, options, setup, points.slopes(found.fitted))
+    return _with_responses(fit, response, points, correction)
+
+
+def _divided(data: Sequence[object]) -> tuple[FrequencyResponse, list[Record]]:
+    responses = [item for item in data if isinstance(item, FrequencyResponse)]
+    if len(responses) != 1:
+        raise DataError(
+            "a joint fit takes one frequency response",
+            found=len(responses),
+            needed="one, of all inputs and outputs, beside the records",
+            action="estimate one response from all its records together",
+        )
+    return responses[0], [item for item in data if isinstance(item, Record)]
+
+
+def _points(model: Model, response: FrequencyResponse, options: Options) -> ChosenPoints:
+    selected = select_by(model, response, options)
+    return ChosenPoints(selected, error_model(response, selected))
+
+
+def _without_bias(
+    found: Searched,
+    prepared: RecordSet,
+    response: FrequencyResponse,
+    points: ChosenPoints,
+    options: JointOptions,
+) -> tuple[Searched, ChosenPoints, dict[str, object], list[Finding]]:
+    """Take the estimator's bias out of the response, and fit again, until nothing moves."""
+    once = replace(options, starts=1)
+    ends: dict[int, Searched] = {}
+
+    def corrected_points(corrected: FrequencyResponse) -> ChosenPoints:
+        # The errors stay those of the response as it was measured.
+        return ChosenPoints(select_by(prepared.model, corrected, once.of_responses), points.errors)
+
+    def refit(model: Model, corrected: FrequencyResponse) -> Model:
+        end = searched(model, prepared, once, corrected_points(corrected).native)
+        fitted = end.fitted
+        ends[id(fitted)] = end
+        return fitted
+
+    first = conclude(found, options, (), points.slopes(found.fitted))
+    scales = {p.name: p.stderr for p in first.parameters.values() if p.stderr}
+    done = iterate(found.fitted, response, scales, refit, options.hold)
+    if done.applied:
+        after = corrected_points(done.data)
+        moved = sizes(points.selected, after.selected, points.errors)
+        last = ends[id(done.model)]
+        # The other minima are those of the first search.
+        found = replace(last, groups=[last.groups[0], *found.groups[1:]])
+        return found, after, provenance(done, moved, options.hold), judge_bias(done, moved)
+    return found, points, provenance(done, {}, options.hold), judge_bias(done, {})
+
+
+def _with_responses(
+    fit: Fit, response: FrequencyResponse, points: ChosenPoints, correction: Mapping[str, object]
+) -> Fit:
+    """The fit of the records with its responses beside them."""
+    compared = compare_responses(fit.model, points.selected)
+    costs = {each.name: each.cost for each in compared}
+    total = sum(costs.values())
+    source = points.errors.source
+    return replace(
+        fit,
+        cost=total,
+        average_cost=total / len(costs),
+        costs={**costs, **fit.costs},
+        responses=compared,
+        intervals_from=f"{source} and {fit.intervals_from}",
+        findings=(
+            *fit.findings,
+            *judge_cost(costs, total / len(costs)),
+            *judge_intervals(source),
+        ),
+        provenance={
+            **fit.provenance,
+            "method": "joint",
+            "response_history": [str(step) for step in response.history],
+            "estimator_bias": dict(correction),
+        },
+    )

@@ -1,0 +1,31 @@
+"""95 % intervals of joint fits cover 93 to 97 of 100 pairs of flights."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from tests.joint_flights import BAND, flight, lag, swept
+
+FLIGHTS = 200
+
+
+@pytest.mark.slow
+def test_joint_intervals_cover_the_truth() -> None:
+    truth = lag()
+    inside, shares = [], []
+    for seed in range(FLIGHTS):
+        response = swept(truth, 2 * seed, noise=0.3)
+        record = flight(truth, 2 * seed + 1, noise=0.3)
+        fit = fid.identify(truth, (response, record), omega_rad_s=BAND)
+        alone = fid.identify(truth, record)
+        for name in fit.names:
+            low, high = fit.parameters[name].interval95
+            narrow, wide = fit.parameters[name].stderr, alone.parameters[name].stderr
+            assert wide is not None
+            inside.append(low <= float(truth.parameters[name].value or 0.0) <= high)
+            shares.append(narrow / wide)
+    share = float(np.mean(inside))
+    assert 0.93 <= share <= 0.97, (share, np.mean(shares))
+    assert np.mean(shares) < 0.9

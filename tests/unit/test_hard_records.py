@@ -1,0 +1,71 @@
+"""Nonlinear and unstable vehicles at their edges: exact data, poor starts, errors with a type."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.errors import FitError
+from flightid.models import Output, Parameter, Parameters, StateSpaceModel
+from tests.closeness import assert_close
+from tests.truth.test_equation_records_truth import flown, longitudinal, stepped, unstable_flight
+
+
+def test_a_nonlinear_flight_without_any_noise_has_intervals() -> None:
+    model = longitudinal()
+    record = flown(model, stepped(), 0.0, 0)
+    start = model.with_values({"Ma": -4.4, "Maa": -13.0, "Zaa": 1.6})
+    fit = fid.identify(start, record, free_bias=False)
+    for parameter in model.parameters.free:
+        found = fit.parameters[parameter.name]
+        assert_close(found.value, parameter.value, rtol=1e-9, why="no noise")
+        assert found.interval95 is not None
+        assert np.all(np.isfinite(found.interval95))
+
+
+def test_an_unstable_vehicle_is_found_from_a_stable_start() -> None:
+    model, record = unstable_flight(1)
+    start = model.with_values({"Malpha": -4.0, "Mq": -2.0})
+    assert start.eigenvalues().real.max() < -1.0
+    fit, near = (fid.identify(each, record, free_bias=False) for each in (start, model))
+    for name in fit.names:
+        one, other = fit.parameters[name].value, near.parameters[name].value
+        assert_close(one, other, rtol=1e-4, why="the same minimum")
+    assert "unstable-model" in {finding.code for finding in fit.findings}
+
+
+def _scalar(left: str, right: str, unit: str, **values: float) -> StateSpaceModel:
+    """One state, with parameters of one unit."""
+    return StateSpaceModel(
+        states={"x": "1"},
+        input_units={"u": "1"},
+        measurements={"y": Output("x", "1")},
+        equations={left: right},
+        parameters=Parameters([Parameter(n, v, unit) for n, v in values.items()]),
+        name="scalar",
+    )
+
+
+def _response(n: int = 400) -> fid.Record:
+    time_s = np.arange(n) * 0.05
+    u = np.sin(time_s) + np.sin(3.1 * time_s)
+    return fid.Record.from_arrays(time_s, inputs={"u": u}, outputs={"y": 0.3 * u}, units={})
+
+
+def test_a_run_that_explodes_from_every_start_is_a_fit_error() -> None:
+    model = _scalar("x'", "a*x^3 + b*u", "1/s", a=50.0, b=5.0)
+    with pytest.raises(FitError, match=r"diverged from every start.*run diverges at sample"):
+        fid.identify(model, _response())
+
+
+def test_a_formula_without_a_value_is_a_fit_error() -> None:
+    model = _scalar("x'", "a*x + b*sqrt(u - 10)", "1/s", a=-1.0, b=1.0)
+    with pytest.raises(FitError, match="diverged from every start"):
+        fid.identify(model, _response())
+
+
+def test_equations_that_lose_a_derivative_are_a_fit_error() -> None:
+    model = _scalar("(a - b)*x'", "u - x + x^2", "s", a=1.0, b=1.0)
+    with pytest.raises(FitError, match=r"diverged from every start.*singular"):
+        fid.identify(model, _response())

@@ -1,0 +1,102 @@
+"""Responses and records in one fit: recovery, narrower intervals, what it says and refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.errors import DataError, FitError, OptionError
+from tests.closeness import assert_close
+from tests.joint_flights import BAND, flight, lag, swept
+
+FAST = {"omega_rad_s": BAND, "correct_bias": False}
+
+
+def _given(
+    model: fid.TransferFunctionModel, error: float, seed: int | None = None
+) -> fid.FrequencyResponse:
+    """The model's own response, with what its errors are said to be, and with a draw of them."""
+    omega = np.geomspace(*BAND, 40)
+    response = model.frequency_response(omega)
+    if seed is not None:
+        drawn = np.random.default_rng(seed).standard_normal((2, *response.shape))
+        response = response * (1.0 + error * (drawn[0] + 1j * drawn[1]))
+    return fid.FrequencyResponse.from_values(
+        omega, response, inputs=["tau_phi"], outputs=["p"],
+        units={"p": "rad/s"}, random_error=np.full(40, error),
+    )  # fmt: skip
+
+
+def test_data_without_noise_give_the_parameters_back() -> None:
+    truth = lag()
+    start = truth.with_values({"Lp": -3.0, "Ltphi": 90.0})
+    fit = fid.identify(start, (_given(truth, 0.01), flight(truth, 0, noise=0.0)))
+    for name, wanted in (("Lp", -5.0), ("Ltphi", 150.0)):
+        assert_close(fit.parameters[name].value, wanted, rtol=1e-7, why="no noise")
+    assert [each.name for each in fit.responses] == ["p/tau_phi"]
+    assert len(fit.records) == 1
+    assert set(fit.costs) == {"p/tau_phi", "p"}
+    assert fit.intervals_from == "random error and coloured residuals"
+    assert "1 response, 1 record" in repr(fit)
+    assert fit.to_dict()["provenance"]["method"] == "joint"
+
+
+def test_it_is_the_weighted_mean_of_both_fits() -> None:
+    """Near the minimum both costs are parabolas: information adds, estimates are weighted by it."""
+    truth = lag()
+    response, record = _given(truth, 0.01, seed=0), flight(truth, 1, noise=0.1)
+    one = fid.identify(truth, response, cost="likelihood", **FAST)
+    other = fid.identify(truth, record)
+    both = fid.identify(truth, (response, [record]), **FAST)
+    assert one.covariance is not None
+    assert other.covariance is not None
+    assert both.covariance is not None
+    weights = [np.linalg.inv(each.covariance) for each in (one, other)]
+    joint = np.linalg.inv(weights[0] + weights[1])
+    values = [np.array([each.parameters[n].value for n in both.names]) for each in (one, other)]
+    mean = joint @ (weights[0] @ values[0] + weights[1] @ values[1])
+    found = np.array([both.parameters[name].value for name in both.names])
+    errors = np.sqrt(np.diag(both.covariance))
+    assert np.all(np.abs(found - mean) < 0.1 * errors)
+    assert_close(errors, np.sqrt(np.diag(joint)), rtol=0.05, why="weights of a finite record")
+    for name in both.names:
+        alone = [each.parameters[name].stderr for each in (one, other)]
+        stderr = both.parameters[name].stderr
+        assert stderr is not None
+        assert all(stderr < each for each in alone if each is not None)
+
+
+def test_the_bias_of_the_estimate_is_taken_out() -> None:
+    truth = lag()
+    data = (swept(truth, 0, noise=1e-6), flight(truth, 1, noise=1e-3))
+    errors = {}
+    for corrected in (True, False):
+        fit = fid.identify(truth, data, omega_rad_s=BAND, correct_bias=corrected)
+        errors[corrected] = abs(fit.parameters["Lp"].value / -5.0 - 1.0)
+        assert fit.provenance["estimator_bias"]["applied"] is corrected
+    assert errors[True] < 0.1 * errors[False]
+
+
+def test_the_same_flight_on_both_sides_is_found() -> None:
+    truth = lag()
+    record = flight(truth, 0)
+    response = fid.estimate_response(record, omega_rad_s=(*BAND, 30))
+    codes = {f.code for f in fid.identify(truth, (response, record), **FAST).findings}
+    assert "joint-data-twice" in codes
+    codes = {f.code for f in fid.identify(truth, (response, flight(truth, 1)), **FAST).findings}
+    assert not codes & {"joint-data-twice", "joint-data-unknown"}
+    codes = {f.code for f in fid.identify(truth, (_given(truth, 0.01), record)).findings}
+    assert "joint-data-unknown" in codes
+
+
+def test_what_it_refuses() -> None:
+    truth = lag()
+    record = flight(truth, 0)
+    known = _given(truth, 0.01)
+    with pytest.raises(DataError, match="one frequency response"):
+        fid.identify(truth, (known, known, record))  # type: ignore[call-overload]
+    with pytest.raises(FitError, match="needs the errors"):
+        fid.identify(truth, (_given(truth, 0.0), record))
+    with pytest.raises(OptionError, match="no such option"):
+        fid.identify(truth, (known, record), cost="likelihood")  # type: ignore[call-overload]
