@@ -32,7 +32,8 @@ STARTS = 20
 STEPS = 4
 
 
-def _model() -> fid.StateSpaceModel:
+def two_rates() -> fid.StateSpaceModel:
+    """The model at its start values."""
     units = dict.fromkeys(NAMES[:4], "1/s") | dict.fromkeys(NAMES[4:], "1/s^2")
     return fid.StateSpaceModel(
         states={"p": "rad/s", "r": "rad/s"},
@@ -52,16 +53,17 @@ def _model() -> fid.StateSpaceModel:
     )
 
 
-def _record() -> fid.Record:
+def two_rates_record(seed: int = 0) -> fid.Record:
+    """One flight with noise, from the true model at rest."""
     time_s = np.arange(N) * DT
     controls = {
         "aileron": 0.05 * np.sin(0.06 * time_s**1.7),
         "rudder": 0.04 * np.sin(0.05 * time_s**1.8 + 1.0),
     }
     driven = fid.Record.from_arrays(time_s, inputs=controls, units=dict.fromkeys(controls, "rad"))
-    truth = _model().with_values(dict(zip(NAMES, TRUTH.tolist(), strict=True)))
+    truth = two_rates().with_values(dict(zip(NAMES, TRUTH.tolist(), strict=True)))
     flown = fid.simulate(truth, driven, units={"p": "rad/s", "r": "rad/s"})
-    noise = np.random.default_rng(0).standard_normal((2, N)) * NOISE[:, None]
+    noise = np.random.default_rng(seed).standard_normal((2, N)) * NOISE[:, None]
     return flown.replace({"p": flown["p"] + noise[0], "r": flown["r"] + noise[1]})
 
 
@@ -182,13 +184,13 @@ def _native(record: fid.Record, starts: int) -> Callable[[], Array]:
     from flightid.identification.record_setup import prepare_records  # noqa: PLC0415
 
     options = RecordOptions(starts=starts, initial_state="trim", free_bias=False)
-    prepared = prepare_records(_model(), record, options)
+    prepared = prepare_records(two_rates(), record, options)
     return lambda: search_records(prepared, options)[0].x
 
 
 def run() -> Table:
     """Seconds of one fit from the same start, and the ratio to the native search."""
-    record = _record()
+    record = two_rates_record()
     inputs, measured = record.matrix(("aileron", "rudder")), record.matrix(("p", "r"))
     timed = {
         "native search": _best(_native(record, 1), REPEATS),
@@ -196,7 +198,7 @@ def run() -> Table:
         "NumPy, exact sensitivities": _best(lambda: _numpy_fit(inputs, measured), 1),
         "SciPy lsim, finite differences": _best(lambda: _lsim_fit(inputs, measured), 1),
     }
-    verb = _model()
+    verb = two_rates()
     timed["flightid.identify, with intervals"] = _best(
         lambda: np.array(
             [

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.identification.bias_rounds import iterate, judge_bias, provenance, sizes
+from flightid.identification.bias_statistics import errors_after
 from flightid.identification.error_model import ErrorModel, error_model, whitening
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import judge_cost, judge_intervals
@@ -163,7 +164,9 @@ def _without_bias(
     done = iterate(found.fitted, response, scales, refit, options.hold)
     if done.applied:
         after = corrected_points(done.data)
-        moved = sizes(points.selected, after.selected, points.errors)
+        known = errors_after(done, response, after.selected, options.hold)
+        after = after if known is None else replace(after, errors=known)
+        moved = sizes(points.selected, after.selected, after.errors)
         last = ends[id(done.model)]
         # The other minima are those of the first search.
         found = replace(last, groups=[last.groups[0], *found.groups[1:]])
