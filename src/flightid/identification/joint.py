@@ -17,6 +17,7 @@ from flightid.findings import Finding
 from flightid.identification.bias_rounds import iterate, judge_bias, provenance, sizes
 from flightid.identification.bias_statistics import errors_after
 from flightid.identification.error_model import ErrorModel, error_model, whitening
+from flightid.identification.estimator_bias import Correction
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import judge_cost, judge_intervals
 from flightid.identification.frequency_domain import (
@@ -161,10 +162,11 @@ def _without_bias(
 
     first = conclude(found, options, (), points.slopes(found.fitted))
     scales = {p.name: p.stderr for p in first.parameters.values() if p.stderr}
-    done = iterate(found.fitted, response, scales, refit, options.hold)
+    without = Correction(response, options.hold)
+    done = iterate(found.fitted, without, scales, refit)
     if done.applied:
         after = corrected_points(done.data)
-        known = errors_after(done, response, after.selected, options.hold)
+        known = errors_after(done, without, after.selected)
         after = after if known is None else replace(after, errors=known)
         moved = sizes(points.selected, after.selected, after.errors)
         last = ends[id(done.model)]
@@ -192,7 +194,7 @@ def _with_responses(
         findings=(
             *fit.findings,
             *judge_cost(costs, total / len(costs)),
-            *judge_intervals(source),
+            *judge_intervals(source, outputs_apart=points.errors.outputs_apart),
         ),
         provenance={
             **fit.provenance,
