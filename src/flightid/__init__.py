@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         FittedRecord,
         FittedResponse,
         ImpulseResponse,
+        InnovationsFit,
         LocalMinimum,
         NarxFit,
         PolynomialFit,
@@ -36,6 +37,7 @@ if TYPE_CHECKING:
     from flightid.inspection import Inspection, inspect_log
     from flightid.logs import Log, LogTable, read_log
     from flightid.models import (
+        InnovationsModel,
         ModelBuilder,
         NarxModel,
         Output,
@@ -83,6 +85,8 @@ _HOMES = {
     "FittedResponse": "flightid.identification",
     "FlightidError": "flightid.errors",
     "FrequencyResponse": "flightid.responses",
+    "InnovationsFit": "flightid.identification",
+    "InnovationsModel": "flightid.models",
     "Inspection": "flightid.inspection",
     "LinearSystem": "flightid.simulation.simulate",
     "LocalMinimum": "flightid.identification",
@@ -141,6 +145,8 @@ __all__ = [
     "FlightidError",
     "FrequencyResponse",
     "ImpulseResponse",
+    "InnovationsFit",
+    "InnovationsModel",
     "Inspection",
     "LinearSystem",
     "LocalMinimum",

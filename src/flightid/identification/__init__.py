@@ -5,6 +5,7 @@ from flightid.identification.fit import Fit, FittedParameter, FittedResponse, Lo
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.identify import identify
 from flightid.identification.impulse_response import ImpulseResponse, impulse_response
+from flightid.identification.innovations_fit import InnovationsFit
 from flightid.identification.narx_fit import ChosenTerm, NarxFit
 from flightid.identification.polynomial_fit import PolynomialFit
 from flightid.identification.reduce import reduce
@@ -14,6 +15,7 @@ from flightid.identification.structures import (
     StructureRow,
     compare_structures,
 )
+from flightid.identification.subspace_order import OrderChoice
 
 __all__ = [
     "Advice",
@@ -23,8 +25,10 @@ __all__ = [
     "FittedRecord",
     "FittedResponse",
     "ImpulseResponse",
+    "InnovationsFit",
     "LocalMinimum",
     "NarxFit",
+    "OrderChoice",
     "PolynomialFit",
     "Reduction",
     "ReductionStep",

@@ -12,6 +12,7 @@ from flightid.identification.filter_error import fit_filter_error
 from flightid.identification.fit import Fit
 from flightid.identification.fourier_output_error_fit import fit_fourier_output_error
 from flightid.identification.frequency_domain import Options, fit_responses
+from flightid.identification.innovations_fit import InnovationsFit
 from flightid.identification.joint import JointOptions, fit_jointly
 from flightid.identification.narx_fit import NarxFit
 from flightid.identification.orthogonal_least_squares import fit_narx
@@ -26,9 +27,11 @@ from flightid.identification.regression_options import (
     FourierOutputErrorOptions,
 )
 from flightid.identification.selection import Bands
+from flightid.identification.subspace_fit import fit_subspace
 from flightid.models import Model, StateSpaceModel, TransferFunctionModel
 from flightid.models.narx import NarxModel
 from flightid.models.polynomial_structure import PolynomialStructure
+from flightid.models.subspace_structure import SubspaceStructure
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 
@@ -67,6 +70,9 @@ METHODS: dict[tuple[type, str, str], Method] = {
     ),
     (PolynomialStructure, RECORDS, "prediction_error"): Method(
         lambda model, data, _: fit_polynomial(model, data), NoOptions
+    ),
+    (SubspaceStructure, RECORDS, "subspace"): Method(
+        lambda model, data, _: fit_subspace(model, data), NoOptions
     ),
     (TransferFunctionModel, RECORDS, "output_error"): Method(fit_output_error, RecordOptions),
     (StateSpaceModel, RECORDS, "output_error"): Method(fit_output_error, RecordOptions),
@@ -117,7 +123,7 @@ def _method(model: object, data: object, name: str | None) -> Method:
             "there is no fit for this model and these data",
             found=f"{type(model).__name__} and {type(data).__name__}",
             needed="TransferFunctionModel or StateSpaceModel and FrequencyResponse or Record, "
-            "or NarxModel or PolynomialStructure and Record",
+            "or NarxModel, PolynomialStructure or SubspaceStructure and Record",
         )
     if name is None:
         return next(iter(ways.values()))
@@ -148,6 +154,10 @@ def identify(model: NarxModel, data: Record | Sequence[Record]) -> NarxFit: ...
 
 @overload
 def identify(model: PolynomialStructure, data: Record | Sequence[Record]) -> PolynomialFit: ...
+
+
+@overload
+def identify(model: SubspaceStructure, data: Record | Sequence[Record]) -> InnovationsFit: ...
 
 
 @overload
@@ -217,12 +227,12 @@ def identify(
 
 
 def identify(
-    model: Model | NarxModel | PolynomialStructure,
+    model: Model | NarxModel | PolynomialStructure | SubspaceStructure,
     data: FrequencyResponse | Record | Sequence[Record] | JointData,
     *,
     method: str | None = None,
     **options: Any,
-) -> Fit | NarxFit | PolynomialFit:
+) -> Fit | NarxFit | PolynomialFit | InnovationsFit:
     """Fit the free parameters of a model to data.
 
     By the kinds of model and data, the default first:
@@ -241,11 +251,13 @@ def identify(
     - model on (response, records): ``"joint"``. Both likelihoods together, the response's with the
       covariance of its errors; the flights of the response are to be others than the records.
     - `NarxModel` on records: orthogonal least squares; polynomial structure
-      (`PolynomialModel.arx` … `.general`) on records: prediction errors. Options are the model's.
+      (`PolynomialModel.arx` … `.general`) on records: prediction errors. Subspace structure
+      (`InnovationsModel.subspace`): singular values, then prediction errors. Options are the
+      model's.
 
     Parameters
     ----------
-    model : TransferFunctionModel, StateSpaceModel, NarxModel or PolynomialStructure
+    model : Model, NarxModel, PolynomialStructure or SubspaceStructure
         Structure, start values and bounds; everything in it is fitted.
     data : FrequencyResponse, Record or sequence of Record, or tuple of both
         Measured, with the model's channels, in the model's units.
@@ -300,7 +312,7 @@ def identify(
 
     Returns
     -------
-    Fit, NarxFit or PolynomialFit
+    Fit, NarxFit, PolynomialFit or InnovationsFit
         Estimates with 95 % intervals that carry the errors of the data through the fit,
         Cramér–Rao bounds and insensitivities, costs, correlations, findings.
 
@@ -359,5 +371,7 @@ def identify(
     (-6.0, 180.0)
     """
     chosen = _method(model, data, method)
-    result: Fit | NarxFit | PolynomialFit = chosen.fit(model, data, _options(chosen, options))
+    result: Fit | NarxFit | PolynomialFit | InnovationsFit = chosen.fit(
+        model, data, _options(chosen, options)
+    )
     return result

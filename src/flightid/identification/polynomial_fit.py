@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -134,36 +134,7 @@ class PolynomialFit:
 
     def roots_table(self) -> Table:
         """Table of poles and zeros with 95 % half-widths."""
-        columns = (
-            Column("response"),
-            Column("root"),
-            Column("real", digits=5),
-            Column("± real", digits=2),
-            Column("imaginary", digits=5),
-            Column("± imaginary", digits=2),
-            Column("natural frequency", "rad/s"),
-            Column("± frequency", "rad/s", 2),
-            Column("damping"),
-            Column("± damping", digits=2),
-            Column("note"),
-        )
-        rows: list[tuple[Cell, ...]] = []
-        for root in self.roots:
-            errors = root.stderr or (None, None)
-            wide = [None if error is None else 1.96 * error for error in errors]
-            rows.append(
-                (
-                    root.response, root.kind, root.z.real, wide[0], root.z.imag,
-                    wide[1] if root.z.imag else None,
-                    *_with_half(root.natural_frequency), *_with_half(root.damping), root.note,
-                )
-            )  # fmt: skip
-        return Table(
-            "Poles and zeros",
-            columns,
-            tuple(rows),
-            ("one line for each conjugate pair; ± is half a 95 % interval",),
-        )
+        return roots_table(self.roots)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key, without the samples."""
@@ -203,6 +174,40 @@ class PolynomialFit:
 
     def _repr_html_(self) -> str:
         return self.summary()._repr_html_() + self.roots_table()._repr_html_()
+
+
+def roots_table(roots: Sequence[FittedRoot]) -> Table:
+    """Table of poles and zeros with 95 % half-widths."""
+    columns = (
+        Column("response"),
+        Column("root"),
+        Column("real", digits=5),
+        Column("± real", digits=2),
+        Column("imaginary", digits=5),
+        Column("± imaginary", digits=2),
+        Column("natural frequency", "rad/s"),
+        Column("± frequency", "rad/s", 2),
+        Column("damping"),
+        Column("± damping", digits=2),
+        Column("note"),
+    )
+    rows: list[tuple[Cell, ...]] = []
+    for root in roots:
+        errors = root.stderr or (None, None)
+        wide = [None if error is None else 1.96 * error for error in errors]
+        rows.append(
+            (
+                root.response, root.kind, root.z.real, wide[0], root.z.imag,
+                wide[1] if root.z.imag else None,
+                *_with_half(root.natural_frequency), *_with_half(root.damping), root.note,
+            )
+        )  # fmt: skip
+    return Table(
+        "Poles and zeros",
+        columns,
+        tuple(rows),
+        ("one line for each conjugate pair; ± is half a 95 % interval",),
+    )
 
 
 def _row(item: FittedParameter) -> tuple[Cell, ...]:

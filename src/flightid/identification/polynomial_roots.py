@@ -21,6 +21,21 @@ DOUBLE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
+class Errors:
+    """Covariance of the coefficients of a model with its degrees of freedom, and its sample time.
+
+    Example
+    -------
+    >>> Errors(0.1, None, 100).covariance is None
+    True
+    """
+
+    sample_time_s: float
+    covariance: Array | None
+    degrees: int
+
+
+@dataclass(frozen=True, eq=False)
 class FittedRoot:
     """One real pole or zero, or the upper one of a conjugate pair.
 
@@ -99,7 +114,9 @@ def fitted_roots(model: PolynomialModel, degrees: int) -> tuple[FittedRoot, ...]
         order = [mode.z for mode in discrete_modes([z for _, z, _ in poles], model.sample_time_s)]
         poles.sort(key=lambda item: order.index(item[1]))
         zeros = [item for item in roots if item[0] == ZERO]
-        found += [_fitted(model, name, degrees, *item) for item in (*poles, *zeros)]
+        errors = Errors(model.sample_time_s, model.covariance, degrees)
+        response = f"{model.output}/{name}"
+        found += [fitted_root(response, errors, *item) for item in (*poles, *zeros)]
     return tuple(found)
 
 
@@ -141,56 +158,69 @@ def _roots(
             yield kind, complex(z), gradient
 
 
-def _fitted(
-    model: PolynomialModel,
-    name: str,
-    degrees: int,
+def fitted_root(
+    response: str,
+    errors: Errors,
     kind: str,
     z: complex,
     gradient: NDArray[np.complex128] | None,
 ) -> FittedRoot:
-    response = f"{model.output}/{name}"
+    """A pole or zero with the errors that its gradient by the coefficients makes.
+
+    Parameters
+    ----------
+    response : str
+        ``"output/input"``.
+    errors : Errors
+        Of the coefficients.
+    kind : {"pole", "zero"}
+    z : complex
+    gradient : ndarray of complex, shape (n_coefficients,), or None
+    """
     note = zero_note(z) if kind == ZERO else ""
-    mode = discrete_modes([z], model.sample_time_s)[0] if kind == POLE else None
+    mode = discrete_modes([z], errors.sample_time_s)[0] if kind == POLE else None
     if mode is not None:
         note = "; ".join(filter(None, (mode.reason, "unstable" if abs(z) > 1.0 else "")))
     covariance = None
-    if gradient is not None and model.covariance is not None:
+    if gradient is not None and errors.covariance is not None:
         rows = np.array([gradient.real, gradient.imag])
-        covariance = np.asarray(rows @ model.covariance @ rows.T)
+        covariance = np.asarray(rows @ errors.covariance @ rows.T)
     omega = zeta = None
     if mode is not None and mode.s is not None and mode.s != 0.0 and mode.damping is not None:
         s, size = mode.s, abs(mode.s)
-        rate = None if gradient is None else gradient / (z * model.sample_time_s)
+        rate = None if gradient is None else gradient / (z * errors.sample_time_s)
         towards = None if rate is None else np.real(np.conj(s) * rate) / size
         sideways = (
             None
             if rate is None or towards is None or not mode.is_pair
             else -rate.real / size + s.real * towards / size**2
         )
-        omega = propagated(
-            f"natural frequency at z = {z:.4g}", "rad/s", size, towards, model, degrees
-        )
-        zeta = propagated(f"damping at z = {z:.4g}", "1", mode.damping, sideways, model, degrees)
+        omega = propagated(f"natural frequency at z = {z:.4g}", "rad/s", size, towards, errors)
+        zeta = propagated(f"damping at z = {z:.4g}", "1", mode.damping, sideways, errors)
     return FittedRoot(response, kind, z, covariance, omega, zeta, note, gradient)
 
 
 def propagated(
-    name: str, unit: str, value: float, gradient: Array | None, model: PolynomialModel, degrees: int
+    name: str, unit: str, value: float, gradient: Array | None, errors: Errors
 ) -> FittedParameter:
     """A function of the coefficients with its first-order interval.
 
     Reference: Ljung, *System Identification*, 2nd ed., eq. 9.56 (Gauss' approximation).
     """
-    if gradient is None or model.covariance is None:
+    if gradient is None or errors.covariance is None:
         reason = (
             "no error to first order" if gradient is None else "the coefficients have no errors"
         )
         return FittedParameter(name, unit, value, "derived", reason=reason)
-    variance = float(gradient @ model.covariance @ gradient)
+    variance = float(gradient @ errors.covariance @ gradient)
     stderr = max(variance, 0.0) ** 0.5
     return FittedParameter(
-        name, unit, value, "derived", stderr, interval95(value, stderr, degrees_of_freedom=degrees)
+        name,
+        unit,
+        value,
+        "derived",
+        stderr,
+        interval95(value, stderr, degrees_of_freedom=errors.degrees),
     )
 
 
@@ -210,5 +240,6 @@ def fitted_gains(model: PolynomialModel, degrees: int) -> dict[str, FittedParame
         gradient[places["f", i]] = -value / f
         units = (model.units.get(model.output, "1"), model.units.get(name, "1"))
         unit = units[0] if units[1] == "1" else f"{units[0]}/({units[1]})"
-        found[response] = propagated(f"gain {response}", unit, value, gradient, model, degrees)
+        errors = Errors(model.sample_time_s, model.covariance, degrees)
+        found[response] = propagated(f"gain {response}", unit, value, gradient, errors)
     return found

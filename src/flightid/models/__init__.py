@@ -6,6 +6,8 @@ State space: `model_tape.rs`, `state_space_fit.rs`.
 from flightid.models.blocks import Block
 from flightid.models.builder import ModelBuilder
 from flightid.models.description import Model
+from flightid.models.innovations import InnovationsModel
+from flightid.models.innovations_prediction import InnovationsPrediction
 from flightid.models.load import library_names, load_model
 from flightid.models.narx import NarxEquation, NarxModel, NarxPrediction
 from flightid.models.narx_terms import Lag, Term
@@ -17,12 +19,15 @@ from flightid.models.record_values import RecordValue
 from flightid.models.save import write_model
 from flightid.models.statespace import StateSpaceModel
 from flightid.models.statespace_parts import Output, ResponsePair, StateSpaceMatrices
+from flightid.models.subspace_structure import SubspaceStructure
 from flightid.models.tables import Axis, TableFunction
 from flightid.models.transfer import TransferFunction, TransferFunctionModel
 
 __all__ = [
     "Axis",
     "Block",
+    "InnovationsModel",
+    "InnovationsPrediction",
     "Lag",
     "Model",
     "ModelBuilder",
@@ -39,6 +44,7 @@ __all__ = [
     "ResponsePair",
     "StateSpaceMatrices",
     "StateSpaceModel",
+    "SubspaceStructure",
     "TableFunction",
     "Term",
     "TransferFunction",

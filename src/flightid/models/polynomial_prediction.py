@@ -17,6 +17,7 @@ from flightid.models.polynomial_structure import OFFSETS
 from flightid.record import Record
 
 if TYPE_CHECKING:
+    from flightid.models.innovations import InnovationsModel
     from flightid.models.polynomial import PolynomialModel
 
 Array = NDArray[np.float64]
@@ -90,7 +91,7 @@ def predict(
         if value not in allowed:
             raise OptionError(f"unknown {what}", found=value, needed=", ".join(allowed))
     data = gather_channels([record], model.output, model.inputs, offsets)
-    _require_same(model, data.units, data.sample_time_s)
+    require_same(model, data.units, data.sample_time_s)
     if horizon == "free_run":
         deviation = free_run(model, data.output, data.inputs, initial=initial)
     else:
@@ -106,7 +107,10 @@ def predict(
     )
 
 
-def _require_same(model: PolynomialModel, units: Mapping[str, str], sample_time_s: float) -> None:
+def require_same(
+    model: PolynomialModel | InnovationsModel, units: Mapping[str, str], sample_time_s: float
+) -> None:
+    """Refuse records with another sample time or other units than the model's."""
     if abs(sample_time_s / model.sample_time_s - 1.0) > SAME_SAMPLE_TIME:
         raise DataError(
             "the record has another sample time than the model",

@@ -6,7 +6,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from flightid.identification import ImpulseResponse, PolynomialFit
+from flightid.identification import ImpulseResponse, InnovationsFit, PolynomialFit
+from flightid.identification.innovations_roots import ALL
 from flightid.models.polynomial_structure import PolynomialStructure
 from flightid.plot import look
 from flightid.validation import OrderScan
@@ -82,12 +83,12 @@ def order_scan(scan: OrderScan, taken: PolynomialStructure | None = None) -> go.
     return made
 
 
-def pole_zero(fit: PolynomialFit, response: str | None = None) -> go.Figure:
+def pole_zero(fit: PolynomialFit | InnovationsFit, response: str | None = None) -> go.Figure:
     """Draw poles and zeros in the z plane with 95 % ellipses, and the unit circle.
 
     Parameters
     ----------
-    fit : PolynomialFit
+    fit : PolynomialFit or InnovationsFit
     response : str, optional
         ``"output/input"``; default: the first.
 
@@ -95,7 +96,9 @@ def pole_zero(fit: PolynomialFit, response: str | None = None) -> go.Figure:
     -------
     plotly.graph_objects.Figure
     """
-    name = response or f"{fit.structure.output}/{fit.structure.inputs[0]}"
+    output = fit.model.outputs[0] if isinstance(fit, InnovationsFit) else fit.model.output
+    name = response or f"{output}/{fit.model.inputs[0]}"
+    within = [root for root in fit.roots if root.response in (name, ALL)]
     made = look.figure(1, height_px=560)
     angle = np.linspace(0.0, 2 * np.pi, 181)
     made.add_trace(
@@ -103,7 +106,7 @@ def pole_zero(fit: PolynomialFit, response: str | None = None) -> go.Figure:
     )
     styles = {"pole": ("x", look.MODEL), "zero": ("circle-open", look.RIVAL)}
     for kind, (symbol, colour) in styles.items():
-        shown = [root for root in fit.roots if root.kind == kind and root.response == name]
+        shown = [root for root in within if root.kind == kind]
         places = [z for root in shown for z in _both(root.z)]
         made.add_trace(
             go.Scatter(
@@ -123,7 +126,7 @@ def pole_zero(fit: PolynomialFit, response: str | None = None) -> go.Figure:
                 edge = look.line(f"{kind}s", x, y, colour=colour, width=1.0, legend=False)
                 made.add_trace(edge.update(legendgroup=kind, hoverinfo="skip"))
     look.label_axes(made, x="real", y=["imaginary"])
-    reach = max([1.15, *(abs(r.z) * 1.1 for r in fit.roots if r.response == name)])
+    reach = max([1.15, *(abs(root.z) * 1.1 for root in within)])
     reach = min(reach, 3.0)
     made.update_xaxes(range=[-reach, reach])
     made.update_yaxes(range=[-reach, reach], scaleanchor="x")

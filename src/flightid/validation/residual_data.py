@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError, ShapeError
 from flightid.identification import Fit
+from flightid.identification.innovations_fit import InnovationsFit
 from flightid.identification.polynomial_fit import PolynomialFit
 from flightid.record import Record
 from flightid.validation.correlation import Series
@@ -20,6 +21,7 @@ Residuals = (
     Fit
     | Verification
     | PolynomialFit
+    | InnovationsFit
     | Sequence[PolynomialFit]
     | Record
     | Sequence[Record]
@@ -91,6 +93,8 @@ def gather_residuals(
         return _of_fit(residuals, _channel_names(inputs), outputs, horizon)
     if isinstance(residuals, Verification):
         return _of_verification(residuals, _channel_names(inputs), outputs, horizon)
+    if isinstance(residuals, InnovationsFit):
+        return _of_innovations(residuals, _channel_names(inputs), outputs, horizon)
     if isinstance(residuals, PolynomialFit):
         residuals = (residuals,)
     if isinstance(residuals, Sequence) and residuals and isinstance(residuals[0], PolynomialFit):
@@ -227,6 +231,33 @@ def _of_fits(
     words = _FREE_RUN if coloured else _ONE_STEP
     made = _checked(series, driven, scale, found, words)
     return replace(made, fitted_noise=noise, fitted_input=spent)
+
+
+def _of_innovations(
+    fit: InnovationsFit,
+    inputs: Iterable[str] | None,
+    outputs: Iterable[str] | None,
+    horizon: Horizon | None,
+) -> ResidualData:
+    """Errors one step ahead of all outputs of one model."""
+    if horizon not in (None, Horizon.ONE_STEP):
+        raise OptionError(
+            "these fits have another predictor", found=str(horizon), needed=str(Horizon.ONE_STEP)
+        )
+    names = tuple(fit.structure.outputs if outputs is None else outputs)
+    places = [fit.structure.outputs.index(name) for name in names]
+    driven = fit.structure.inputs if inputs is None else inputs
+    series = {name: tuple(e[i] for e in fit.errors) for name, i in zip(names, places, strict=True)}
+    made = _checked(
+        series,
+        _columns(fit.records, driven),
+        _sizes(fit.records, names),
+        Horizon.ONE_STEP,
+        _ONE_STEP,
+    )
+    # Poles and gains of the predictor shape each correlation; input matrices the other.
+    n = fit.model.order
+    return replace(made, fitted_noise=2 * n, fitted_input=n)
 
 
 def _channel_names(inputs: Inputs | None) -> tuple[str, ...] | None:

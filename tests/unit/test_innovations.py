@@ -1,0 +1,256 @@
+"""Innovations models and their subspace fits: recovery, prediction, choices and refusals."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.errors import DataError, ModelError, OptionError
+from flightid.models.linear_recursion import run_recursion
+from flightid.plot.subspace import singular_values
+from tests.closeness import assert_close
+from tests.innovations_records import PAIR, SINGLE, flown
+
+M = fid.InnovationsModel
+OPEN = ("moesp", "n4sid", "cva")
+
+
+@pytest.fixture(scope="module")
+def noisy():
+    structure = M.subspace(("y", "z"), ("u", "v"), offsets="none", maximum_order=6)
+    records = [flown(PAIR, 1, n=600, noise=0.5), flown(PAIR, 2, n=300, noise=0.5)]
+    return fid.identify(structure, records)
+
+
+def test_recursion_by_doubling_is_the_recursion():
+    drawn = np.random.default_rng(3)
+    for radius in (0.9, 1.02):
+        a = radius * np.linalg.qr(drawn.standard_normal((3, 3)))[0]
+        w, x = drawn.standard_normal((3, 70)), drawn.standard_normal(3)
+        expected = [x]
+        for t in range(69):
+            expected.append(a @ expected[-1] + w[:, t])
+        assert_close(
+            run_recursion(a, w, x), np.array(expected).T, rtol=1e-12, atol=1e-12, why="sum"
+        )
+
+
+@pytest.mark.parametrize("method", OPEN)
+@pytest.mark.parametrize("direct", [False, True])
+def test_noise_free_records_give_the_model_back(method, direct):
+    d = np.array([[0.3, -0.2], [0.1, 0.4]]) if direct else None
+    a, b, c, _, k = PAIR.matrices
+    truth = M(PAIR.outputs, PAIR.inputs, 0.1, a, b, c, d, k, units=PAIR.units)
+    structure = M.subspace(("y", "z"), ("u", "v"), method=method, direct=direct, offsets="none")
+    fit = fid.identify(structure, [flown(truth, 1, n=300), flown(truth, 2, n=200)])
+    assert fit.model.order == 4
+    pulses = truth.pulse_response(30)
+    assert_close(fit.model.pulse_response(30), pulses, atol=1e-11, why="rounding through one SVD")
+    found, wanted = (np.sort_complex(each.poles()) for each in (fit.model, truth))
+    assert_close(found, wanted, rtol=1e-11, why="rounding through one SVD")
+    assert fit.criteria.bic is None
+    assert fit.covariance is None
+
+
+def test_unstable_models_are_found_too():
+    a, b, c, _, k = SINGLE.matrices
+    truth = M(("y",), ("u",), 0.1, a * 1.1, b, c, None, k)
+    fit = fid.identify(
+        M.subspace("y", "u", 2, offsets="none", horizon=8),
+        [flown(truth, seed, n=80, noise=0.1, warm_up=0) for seed in range(4)],
+    )
+    assert_close(
+        np.sort_complex(fit.model.poles()), np.sort_complex(truth.poles()), rtol=1e-3, why="noise"
+    )
+    assert "unstable-model" in [finding.code for finding in fit.findings]
+
+
+def test_order_is_found_and_refinement_lowers_the_loss(noisy):
+    assert noisy.order.chosen == noisy.order.gap == noisy.order.smallest_bic == 4
+    rough = fid.identify(
+        M.subspace(("y", "z"), ("u", "v"), 4, offsets="none", refine=False, maximum_order=6),
+        noisy.records,
+    )
+    assert noisy.criteria.loss < rough.criteria.loss
+    assert "not-refined" in [finding.code for finding in rough.findings]
+    assert_close(
+        noisy.model.pulse_response(20), PAIR.pulse_response(20), atol=0.15, why="noise of 0.5"
+    )
+    assert "4 states chosen" in repr(noisy.order)
+    assert len(noisy.order.summary().rows) == 6
+
+
+def test_all_methods_end_in_the_same_optimum(noisy):
+    for method in ("n4sid", "pbsid"):
+        structure = M.subspace(("y", "z"), ("u", "v"), 4, method=method, offsets="none")
+        fit = fid.identify(structure, noisy.records)
+        assert_close(fit.criteria.loss, noisy.criteria.loss, rtol=1e-6, why="one minimum")
+
+
+def test_predictor_based_estimate_is_unbiased_under_feedback():
+    record = flown(SINGLE, 5, n=3000, noise=1.5, feedback=0.25)
+    options = {"offsets": "none", "refine": False}
+    error = {
+        method: np.abs(
+            fid.identify(
+                M.subspace("y", "u", 2, method=method, **options), record
+            ).model.pulse_response(15)
+            - SINGLE.pulse_response(15)
+        ).max()
+        for method in ("moesp", "pbsid")
+    }
+    assert error["pbsid"] < 0.1
+    assert error["pbsid"] < 0.5 * error["moesp"]
+
+
+def assert_near(item, truth):
+    """Within four standard errors: the coverage itself is a matter of many runs."""
+    assert item.interval95[0] < item.value < item.interval95[1]
+    assert 0.0 < abs(item.value - truth) < 4.0 * item.stderr < 0.2 * abs(truth)
+
+
+def test_intervals_hold_the_truth_here(noisy):
+    for root, mode in zip(noisy.modes, PAIR.modes(), strict=True):
+        assert_near(root.natural_frequency, mode.natural_frequency_rad_s)
+        assert_near(root.damping, mode.damping)
+    for name, gain in PAIR.gains().items():
+        assert_near(noisy.gains[name], gain)
+    assert noisy.gains["y/u"].unit == "rad/(V)"
+
+
+def test_units_scale_gains_and_their_errors_alike():
+    record = flown(SINGLE, 1, n=400, noise=0.5)
+    other = record.replace({"y": 1000.0 * record["y"]})
+    fits = [fid.identify(M.subspace("y", "u", 2), each) for each in (record, other)]
+    one, many = (fit.gains["y/u"] for fit in fits)
+    assert_close(many.value, 1000.0 * one.value, rtol=1e-6, why="same optimum")
+    assert_close(many.stderr, 1000.0 * one.stderr, rtol=1e-4, why="same optimum")
+
+
+def test_prediction_horizons_meet_their_limits(noisy):
+    record = noisy.records[0]
+    one = noisy.predict(record, 1)
+    assert_close(one.residual, noisy.errors[0], atol=1e-7, why="same predictor")
+    far = noisy.model.predict(record, 400, initial="zero", offsets="none")
+    free = noisy.model.predict(record, initial="zero", offsets="none")
+    assert_close(far.predicted[:, :300], free.predicted[:, :300], atol=1e-6, why="noise unseen")
+    rms = [noisy.predict(record, k).error_rms["y"] for k in (1, 3, 10)]
+    assert rms == sorted(rms)
+    assert free.fit_percent["z"] < one.fit_percent["z"]
+    assert "1 ahead from an estimated state" in repr(one)
+
+
+def test_forms_of_one_model_agree(noisy):
+    model = noisy.model
+    omega = np.geomspace(0.1, 30.0, 7)
+    above, below = model.transfer("z", "u")
+    later = np.exp(-1j * omega * 0.1)
+    ratio = np.polyval(above[::-1], later) / np.polyval(below[::-1], later)
+    assert_close(model.frequency_response(omega)[1, 0], ratio, rtol=1e-9, why="same response")
+    turned = model.transformed(np.random.default_rng(0).standard_normal((4, 4)))
+    assert_close(turned.pulse_response(9), model.pulse_response(9), atol=1e-9, why="similar")
+    zeros = model.zeros()["z/u"]
+    assert_close(np.polyval(np.trim_zeros(above, "f"), zeros), 0.0 * zeros, atol=1e-8, why="zeros")
+    again = M.from_dict(json.loads(json.dumps(model.to_dict())))
+    assert_close(again.pulse_response(9), model.pulse_response(9), rtol=1e-15, why="kept")
+    assert_close(
+        model.frequency_response([1e-9])[0, 0].real, model.gains()["y/u"], rtol=1e-6, why="dc"
+    )
+
+
+def test_delayed_responses_have_no_zeros_at_infinity():
+    poly = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], nk=(4,))
+    a, b, c, d, k = poly.state_space()
+    model = M(("y",), ("u",), 0.1, a, b, c, d, k)
+    zeros = model.zeros()["y/u"]
+    assert_close(zeros[np.abs(zeros) > 1e-3], [-0.5], rtol=1e-9, why="one zero of B")
+
+
+def test_views_are_complete(noisy):
+    assert repr(noisy) in noisy.summary().to_text()
+    assert len(noisy.roots_table().rows) == len(noisy.roots)
+    assert json.loads(json.dumps(noisy.to_dict()))["order"]["chosen"] == 4
+    assert "pole" in noisy.model.summary().to_text()
+    assert "<table" in noisy._repr_html_() + noisy.model._repr_html_()
+    figure = singular_values(noisy.order)
+    assert len(figure.data) >= 3
+    tests = fid.residual_tests(noisy)
+    assert tests.fitted_noise == 8
+    assert len({row[0] for row in tests.summary().rows}) > 0
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        ({"order": 0}, "order is outside its range"),
+        ({"method": "era"}, "unknown method"),
+        ({"offsets": "median"}, "unknown offsets"),
+        ({"initial": "rest"}, "unknown initial"),
+        ({"horizon": 4, "order": 6}, "the horizon is too short"),
+        ({"maximum_iterations": 0}, "maximum_iterations is outside"),
+    ],
+)
+def test_options_outside_their_range_are_refused(change, problem):
+    with pytest.raises(OptionError, match=problem):
+        M.subspace("y", "u", **change)
+
+
+def test_channels_are_checked():
+    with pytest.raises(OptionError, match="named twice"):
+        M.subspace("y", "y")
+    with pytest.raises(OptionError, match="no outputs or no inputs"):
+        M.subspace("y", ())
+
+
+def test_records_that_cannot_do_are_refused():
+    record = flown(SINGLE, 1, n=300, noise=0.1)
+    structure = M.subspace("y", "u")
+    with pytest.raises(DataError, match="too short for the horizon"):
+        fid.identify(M.subspace("y", "u", horizon=60), record)
+    with pytest.raises(DataError, match="too short for the horizon"):
+        fid.identify(M.subspace("y", "u", horizon=110, method="pbsid"), record)
+    sine = record.replace({"u": np.sin(record.time_s)})
+    with pytest.raises(DataError, match="not persistently exciting"):
+        fid.identify(structure, sine)
+    with pytest.raises(DataError, match="constant"):
+        fid.identify(structure, record.replace({"u": np.full(300, 2.0)}))
+    clean = flown(SINGLE, 1, n=300)
+    with pytest.raises(DataError, match="order is larger than the records support"):
+        fid.identify(M.subspace("y", "u", 5, offsets="none"), clean)
+    with pytest.raises(DataError, match="not independent"):
+        fid.identify(M.subspace("y", "u", 2, method="pbsid", offsets="none"), clean)
+
+
+def test_models_that_contradict_themselves_are_refused():
+    with pytest.raises(ModelError, match="matrix B"):
+        M(("y",), ("u",), 0.1, [[0.5]], [[1.0, 2.0]], [[1.0]])
+    with pytest.raises(ModelError, match="matrix A"):
+        M(("y",), ("u",), 0.1, [[np.nan]], [[1.0]], [[1.0]])
+    with pytest.raises(ModelError, match="sample time"):
+        M(("y",), ("u",), 0.0, [[0.5]], [[1.0]], [[1.0]])
+    with pytest.raises(ModelError, match="noise covariance"):
+        M(("y",), ("u",), 0.1, [[0.5]], [[1.0]], [[1.0]], noise_covariance=np.eye(2))
+    with pytest.raises(ModelError, match="no innovations model"):
+        M.from_dict({"a": []})
+    with pytest.raises(ModelError, match="do not make a model"):
+        M.from_dict({"schema": "flightid.innovations_model/1", "a": "text"})
+
+
+def test_predictions_refuse_what_they_do_not_know():
+    record = flown(SINGLE, 1, n=50)
+    with pytest.raises(OptionError, match="unknown horizon"):
+        SINGLE.predict(record, 0)
+    with pytest.raises(OptionError, match="unknown initial state"):
+        SINGLE.predict(record, initial="backcast")
+    with pytest.raises(DataError, match="another sample time"):
+        M(("y",), ("u",), 0.2, [[0.5]], [[1.0]], [[1.0]]).predict(record)
+
+
+def test_a_run_that_leaves_the_numbers_is_held():
+    record = flown(SINGLE, 1, n=400)
+    run = M(("y",), ("u",), 0.1, [[3.0]], [[1.0]], [[1.0]]).predict(record, initial="zero")
+    assert run.diverged
+    assert np.all(np.isfinite(run.predicted))
