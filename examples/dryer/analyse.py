@@ -46,6 +46,20 @@ EXPECTED = {
 }  # fmt: skip
 
 
+SINGULAR_VALUES = (69.8841, 14.9963, 3.6675, 1.9677, 0.3000, 0.2078)
+"""PO-MOESP with 15 block rows on all samples, means left in."""
+
+
+def print_subspace(record: fid.Record) -> None:
+    structure = fid.InnovationsModel.subspace(
+        "temperature", "voltage", 4, horizon=15, direct=True, offsets="none", refine=False
+    )
+    order = fid.identify(structure, record).order
+    print("PO-MOESP singular values")
+    for found, expected in zip(order.singular_values, SINGULAR_VALUES, strict=False):
+        print(f"  {found:9.4f} (expected {expected:9.4f})")
+
+
 def read(path: Path) -> fid.Record:
     columns = np.loadtxt(path, usecols=(0, 1), max_rows=100_000, delimiter=_delimiter(path)).T
     time_s = np.arange(columns.shape[1]) * SAMPLE_TIME_S
@@ -90,6 +104,7 @@ def main(path: Path) -> None:
                 f"standard error {parameter.stderr or 0.0:.5f})"
             )
         print()
+    print_subspace(record)
 
 
 if __name__ == "__main__":

@@ -13,6 +13,8 @@ from flightid.version import VERSION as __version__
 
 if TYPE_CHECKING:
     from flightid import conditioning, excitation, validation
+    from flightid.dynamics.continuous import to_continuous, to_discrete
+    from flightid.dynamics.interpretation import Interpretation, interpret
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.identification import (
@@ -88,6 +90,10 @@ _HOMES = {
     "InnovationsFit": "flightid.identification",
     "InnovationsModel": "flightid.models",
     "Inspection": "flightid.inspection",
+    "Interpretation": "flightid.dynamics.interpretation",
+    "interpret": "flightid.dynamics.interpretation",
+    "to_continuous": "flightid.dynamics.continuous",
+    "to_discrete": "flightid.dynamics.continuous",
     "LinearSystem": "flightid.simulation.simulate",
     "LocalMinimum": "flightid.identification",
     "Log": "flightid.logs",
@@ -148,6 +154,7 @@ __all__ = [
     "InnovationsFit",
     "InnovationsModel",
     "Inspection",
+    "Interpretation",
     "LinearSystem",
     "LocalMinimum",
     "Log",
@@ -182,6 +189,7 @@ __all__ = [
     "identify",
     "impulse_response",
     "inspect_log",
+    "interpret",
     "library_names",
     "load_model",
     "read_log",
@@ -191,6 +199,8 @@ __all__ = [
     "run_study",
     "scan_orders",
     "simulate",
+    "to_continuous",
+    "to_discrete",
     "validation",
     "verify",
     "write_model",

@@ -1,0 +1,39 @@
+"""Monte Carlo: 95 % intervals of innovations fits cover the truth, over 500 runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from tests.innovations_records import SINGLE, flown
+
+RUNS = 500
+
+
+def coverage(runs, *, feedback=0.0, n=500):
+    """Share of runs whose intervals hold frequency, damping and gain."""
+    mode, gain = SINGLE.modes()[0], SINGLE.gains()["y/u"]
+    method = "pbsid" if feedback else "moesp"
+    structure = fid.InnovationsModel.subspace("y", "u", 2, method=method, offsets="none")
+    inside = {"frequency": [], "damping": [], "gain": []}
+    for seed in range(runs):
+        record = flown(SINGLE, seed, n=n, noise=0.5, feedback=feedback)
+        fit = fid.identify(structure, record)
+        pole = fit.modes[0]
+        for key, item, wanted in (
+            ("frequency", pole.natural_frequency, mode.natural_frequency_rad_s),
+            ("damping", pole.damping, mode.damping),
+            ("gain", fit.gains["y/u"], gain),
+        ):
+            low, high = item.interval95
+            inside[key].append(low < wanted < high)
+    return {key: float(np.mean(values)) for key, values in inside.items()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("feedback", [0.0, 0.2])
+def test_intervals_cover_the_truth(feedback):
+    found = coverage(RUNS, feedback=feedback)
+    for share in found.values():
+        assert 0.93 <= share <= 0.97, found
