@@ -22,24 +22,7 @@ from flightid.errors import (
 from flightid.models import Lag, NarxEquation, Term
 from flightid.models.narx_terms import product_term
 from tests.closeness import assert_close
-
-
-def quadratic(n: int = 400, seed: int = 0, noise: float = 0.0, name: str = "q") -> fid.Record:
-    """y(t) = 0.5 y(t-1) + 0.6 u(t-1) - 0.3 u(t-2)² + 0.1 + e, offset and scale on both channels."""
-    rng = np.random.default_rng(seed)
-    u = rng.uniform(-1, 1, n)
-    e = noise * rng.standard_normal(n)
-    y = np.zeros(n)
-    for t in range(2, n):
-        y[t] = 0.5 * y[t - 1] + 0.6 * u[t - 1] - 0.3 * u[t - 2] ** 2 + 0.1 + e[t]
-    return fid.Record.from_arrays(
-        np.arange(n) / 5,
-        inputs={"u": 2 * u + 7},
-        outputs={"y": 3 * y - 4},
-        units={"u": "V", "y": "rad"},
-        name=name,
-    )
-
+from tests.narx_records import quadratic
 
 MODEL = fid.NarxModel("y", ("u",), 1, 2, kernel=None, degree=2, stop="bic")
 
@@ -302,6 +285,7 @@ REFUSED: list[tuple[type[Exception], str, Callable[[], object]]] = [
     (DataError, "channel 'u' is constant", _constant),
     (DataError, "too few samples", lambda: fid.identify(MODEL, quadratic(7))),
     (FitError, "cannot be told apart", _sine),
+    (DataError, "not finite", lambda: quadratic().replace({"u": np.full(400, np.nan)})),
     (UnknownNameError, "w", lambda: fid.identify(replace(MODEL, inputs=("w",)), quadratic())),
     (
         OptionError,
@@ -364,7 +348,10 @@ def test_refusals_of_a_prediction() -> None:
 
 def test_names_that_the_native_half_does_not_know() -> None:
     one = np.ones((2, 1))
+    given = (one[:, 0], one.T.copy(), one)
     with pytest.raises(ModelError, match="not defined"):
-        _native.select_terms(one[:, 0], one.T.copy(), one, one[:0], "gaussian", 1.0, 0, "x", 0.0, 1)
+        _native.select_terms(*given, one[:0], "gaussian", 1.0, True, 0, "x", 0.0, 1)
     with pytest.raises(ModelError, match="not defined"):
-        _native.radial_columns(one, one, "cubic", 1.0)
+        _native.select_terms(*given, one, "cubic", 1.0, True, 0, "terms", 0.0, 1)
+    with pytest.raises(ModelError, match="not defined"):
+        _native.select_terms(*given, one, "gaussian", 1.0, True, 0, "terms", 0.0, 1, "lasso", 0.0)

@@ -3,6 +3,8 @@
 //! Reference: Chen, Cowan & Grant, "Orthogonal least squares learning algorithm for radial basis
 //! function networks", IEEE Trans. Neural Networks 2 (1991), section II.
 
+use rayon::prelude::*;
+
 use crate::error::CoreError;
 
 /// Shape of a radial function of distance d and width β.
@@ -95,6 +97,21 @@ impl<'a> Radial<'a> {
     pub fn value(&self, index: usize, x: &[f64]) -> f64 {
         let centre = &self.centres[index * self.dimension..(index + 1) * self.dimension];
         self.kernel.value(squared_distance(x, centre), self.beta)
+    }
+
+    /// Function `index` at every row of the regressors.
+    pub(crate) fn fill(&self, index: usize, regressors: &[f64], values: &mut [f64]) {
+        let rows = regressors.chunks_exact(self.dimension);
+        values.iter_mut().zip(rows).for_each(|(value, x)| *value = self.value(index, x));
+    }
+
+    /// All functions at every row of the regressors, one function after the other.
+    pub fn columns(&self, regressors: &[f64]) -> Vec<f64> {
+        let n = regressors.len() / self.dimension;
+        let mut values = vec![0.0; n * self.len()];
+        let columns = values.par_chunks_exact_mut(n.max(1)).enumerate();
+        columns.for_each(|(index, column)| self.fill(index, regressors, column));
+        values
     }
 }
 

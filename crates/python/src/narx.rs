@@ -3,8 +3,9 @@
 
 use crate::error::from_core;
 use flightid_core::CoreError;
+use flightid_core::local_regularisation::{Regularisation, select_regularised};
 use flightid_core::narx::{Lag, Monomial, Narx};
-use flightid_core::orthogonal_least_squares::{Candidates, Stop, select};
+use flightid_core::orthogonal_least_squares::{Candidates, Stop};
 use flightid_core::radial_basis::{Kernel, Radial};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -16,8 +17,18 @@ type Path<'py> = (
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<f64>>,
     usize,
 );
+
+fn of_name(name: &str, penalty: f64) -> Result<Regularisation, CoreError> {
+    match name {
+        "none" => Ok(Regularisation::Uniform(0.0)),
+        "uniform" => Ok(Regularisation::Uniform(penalty)),
+        "local" => Ok(Regularisation::Local(penalty)),
+        _ => Err(CoreError::UnknownName { name: name.to_owned() }),
+    }
+}
 
 fn stop_rule(name: &str, goal: f64) -> Result<Stop, CoreError> {
     match name {
@@ -32,12 +43,13 @@ fn stop_rule(name: &str, goal: f64) -> Result<Stop, CoreError> {
     }
 }
 
-/// select_terms(target: NDArray[np.float64], columns: NDArray[np.float64], regressors: NDArray[np.float64], centres: NDArray[np.float64], kernel: str, beta: float, forced: int, stop: str, goal: float, maximum_terms: int) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int]
+/// select_terms(target: NDArray[np.float64], columns: NDArray[np.float64], regressors: NDArray[np.float64], centres: NDArray[np.float64], kernel: str, beta: float, keep: bool, forced: int, stop: str, goal: float, maximum_terms: int, regularisation: str = 'none', penalty: float = 0.0) -> tuple[list[int], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int]
 ///
-/// Orthogonal least squares over given columns, then radial functions at the centres: terms, error
-/// reduction, sums of squares, leave-one-out mean squares; weights and flat triangular factor of the
-/// kept terms; number of collinear candidates.
+/// Orthogonal least squares over given columns, then radial functions at the centres (kept, or
+/// computed at each reading): terms, error reduction, sums of squares, leave-one-out mean squares;
+/// weights, penalties and flat triangular factor of the kept terms; number of collinear candidates.
 #[pyfunction]
+#[pyo3(signature = (target, columns, regressors, centres, kernel, beta, keep, forced, stop, goal, maximum_terms, regularisation="none", penalty=0.0))]
 #[allow(clippy::too_many_arguments)]
 fn select_terms<'py>(
     py: Python<'py>,
@@ -47,10 +59,13 @@ fn select_terms<'py>(
     centres: PyReadonlyArray2<'py, f64>,
     kernel: &str,
     beta: f64,
+    keep: bool,
     forced: usize,
     stop: &str,
     goal: f64,
     maximum_terms: usize,
+    regularisation: &str,
+    penalty: f64,
 ) -> PyResult<Path<'py>> {
     let dimension = regressors.as_array().ncols();
     let (y, columns) = (target.as_slice()?, columns.as_slice()?);
@@ -63,8 +78,13 @@ fn select_terms<'py>(
                 let kernel = Kernel::from_name(kernel)?;
                 Some((Radial::new(kernel, beta, centres, dimension)?, regressors))
             };
-            let candidates = Candidates { columns, radial, n_samples: y.len() };
-            select(&candidates, y, forced, stop_rule(stop, goal)?, maximum_terms)
+            let kept = match radial {
+                Some((functions, at)) if keep => functions.columns(at),
+                _ => Vec::new(),
+            };
+            let candidates = Candidates { columns, kept: &kept, radial, n_samples: y.len() };
+            let (rule, penalties) = (stop_rule(stop, goal)?, of_name(regularisation, penalty)?);
+            select_regularised(&candidates, y, forced, penalties, rule, maximum_terms)
         })
         .map_err(from_core)?;
     Ok((
@@ -73,36 +93,10 @@ fn select_terms<'py>(
         found.sum_of_squares.into_pyarray(py),
         found.press.into_pyarray(py),
         found.weights.into_pyarray(py),
+        found.penalties.into_pyarray(py),
         found.factor.into_pyarray(py),
         found.collinear,
     ))
-}
-
-/// radial_columns(regressors: NDArray[np.float64], centres: NDArray[np.float64], kernel: str, beta: float) -> NDArray[np.float64]
-///
-/// Radial functions of the regressors, one after another, flat, (n_centres × n_samples).
-#[pyfunction]
-fn radial_columns<'py>(
-    py: Python<'py>,
-    regressors: PyReadonlyArray2<'py, f64>,
-    centres: PyReadonlyArray2<'py, f64>,
-    kernel: &str,
-    beta: f64,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let dimension = regressors.as_array().ncols();
-    let (regressors, centres) = (regressors.as_slice()?, centres.as_slice()?);
-    let values = py
-        .detach(|| {
-            let kernel = Kernel::from_name(kernel)?;
-            let radial = Radial::new(kernel, beta, centres, dimension)?;
-            Ok((0..radial.len())
-                .flat_map(|index| {
-                    regressors.chunks_exact(dimension).map(move |x| radial.value(index, x))
-                })
-                .collect::<Vec<f64>>())
-        })
-        .map_err(from_core)?;
-    Ok(values.into_pyarray(py))
 }
 
 /// run_narx(measured: NDArray[np.float64], inputs: NDArray[np.float64], lags: list[tuple[int, int]], monomials: list[tuple[float, list[tuple[int, int]]]], centres: NDArray[np.float64], radial_weights: NDArray[np.float64], kernel: str, beta: float, bounds: tuple[float, float], horizon: int) -> tuple[NDArray[np.float64], int, int | None]
@@ -150,6 +144,5 @@ fn run_narx<'py>(
 /// Never in practice; PyO3's own.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(select_terms, module)?)?;
-    module.add_function(wrap_pyfunction!(radial_columns, module)?)?;
     module.add_function(wrap_pyfunction!(run_narx, module)?)
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flightid.findings import Finding
@@ -19,6 +20,8 @@ class ChosenTerm:
 
     `error_reduction` is the share of the scaled output's sum of squares that the term explained
     when it was chosen; `sum_of_squares` and `leave_one_out` (mean square) are the errors after it.
+    `penalty` is λ of its regularisation. `stderr` holds for the terms as given, in white noise: it
+    ignores the choice unless samples were held back for the weights (`NarxModel.held_back`).
     """
 
     term: Term
@@ -27,6 +30,7 @@ class ChosenTerm:
     error_reduction: float
     sum_of_squares: float
     leave_one_out: float
+    penalty: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -40,11 +44,11 @@ class NarxFit:
     baseline : NarxEquation
         Linear ARX model with constant, of the same lags and records.
     chosen : tuple of ChosenTerm
-        In the order of choice.
+        In the order of choice; with samples held back, products before radial functions.
     one_step_rms, free_run_rms, baseline_free_run_rms : float
         Errors on the training records, in the output's unit.
     n_samples : int
-        Training samples, those that initialise lags excluded.
+        Samples that the weights rest on, those that initialise lags excluded.
     findings : tuple of Finding
 
     Example
@@ -82,8 +86,25 @@ class NarxFit:
         """Prediction on a record, `horizon` samples ahead or ``"free_run"``."""
         return self.equation.predict(record, horizon)
 
+    def residuals(
+        self, data: Record | Sequence[Record], horizon: int | str = 1
+    ) -> tuple[Record, ...]:
+        """Records with the prediction errors in place of the output, for `residual_tests`.
+
+        The samples that start the lags are cut off.
+        """
+        records = (data,) if isinstance(data, Record) else data
+        found = []
+        for record in records:
+            run = self.predict(record, horizon)
+            errors = record.replace({self.model.output: run.measured - run.predicted})
+            first = record.time_s[run.start]
+            found.append(errors.segment(first, record.time_s[-1] + record.sample_time_s))
+        return tuple(found)
+
     def summary(self) -> Table:
         """Table of the terms with weight, standard error and error-reduction ratio."""
+        penalised = self.model.regularisation != "none"
         rows = tuple(
             (
                 item.term.name,
@@ -94,6 +115,7 @@ class NarxFit:
                 100.0 * item.error_reduction,
                 item.sum_of_squares,
                 item.leave_one_out,
+                *([item.penalty] if penalised else []),
             )
             for item in self.chosen
         )
@@ -106,19 +128,32 @@ class NarxFit:
             Column("ERR", "%"),
             Column("SSE"),
             Column("leave-one-out mean square"),
+            *([Column("penalty λ")] if penalised else []),
         )
         unit = self.equation.scaling.units[self.model.output]
         notes = (
             repr(self.model),
-            "weights and errors are of channels scaled to zero mean and unit deviation; standard "
-            "errors hold for the chosen terms as given, in white noise, and are too small after a "
-            "choice among many",
+            "weights and errors are of channels scaled to zero mean and unit deviation; "
+            + self._meaning_of_errors(),
             f"rms error on training records [{unit}]: one step {self.one_step_rms:.4g}, free run "
             f"{self.free_run_rms:.4g}, free run of the linear model of the same lags "
             f"{self.baseline_free_run_rms:.4g}",
             *map(str, self.findings),
         )
         return Table(f"NARX model of {self.model.output}", columns, rows, notes)
+
+    def _meaning_of_errors(self) -> str:
+        model = self.model
+        if model.held_back:
+            return (
+                f"weights and standard errors come from the last {100 * model.held_back:.3g} % of "
+                "each record, which took no part in the choice; they hold in white noise"
+            )
+        kind = "" if model.regularisation == "none" else "Bayesian (posterior) "
+        return (
+            f"{kind}standard errors ignore the choice of terms: they hold for the terms as given, "
+            "in white noise, and are too small after a choice among many (see held_back)"
+        )
 
     def to_dict(self) -> dict[str, object]:
         """Plain values: ``schema``, structure, scaling, terms with centres, errors, findings."""
@@ -140,6 +175,7 @@ class NarxFit:
                     "weight": item.weight,
                     "stderr": item.stderr,
                     "error_reduction": item.error_reduction,
+                    "penalty": item.penalty,
                 }
                 for item in self.chosen
             ],

@@ -18,6 +18,7 @@ from flightid.record import Record
 
 STOPS = ("press", "sse", "err", "terms", "aic", "aicc", "bic")
 CANDIDATES = ("data", "kmeans", "grid")
+REGULARISATIONS = ("none", "uniform", "local")
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,17 @@ class NarxModel:
         Sum of squared errors or error-reduction ratio that ends the selection.
     maximum_terms : int
         Most terms, constant and linear ones included.
+    regularisation : str
+        ``"none"``, ``"uniform"`` (one `penalty` for all chosen terms) or ``"local"``: a penalty of
+        its own for each chosen term, from the evidence for it; terms without evidence go. Constant
+        and linear terms are not penalised.
+    penalty : float
+        λ of the squared coefficient of a term's part that is orthogonal to the terms before it;
+        for ``"local"`` that of the first choice.
+    held_back : float
+        Share of each record, at its end, that takes no part in the choice of terms: weights and
+        their standard errors come from it alone, so that the errors hold in spite of the choice
+        (in white noise). 0: choice and weights share all samples.
     guard : float
         Predictions are held inside the middle of the training outputs ± guard times half their
         range, and flagged.
@@ -90,6 +102,9 @@ class NarxModel:
     stop: str = "press"
     goal: float = 0.0
     maximum_terms: int = 30
+    regularisation: str = "none"
+    penalty: float = 0.0
+    held_back: float = 0.0
     guard: float = 3.0
 
     def __post_init__(self) -> None:
@@ -98,7 +113,12 @@ class NarxModel:
         for name, low in {**least, "n_candidates": 1}.items():
             if getattr(self, name) < low:
                 raise OptionError(f"{name} is too small", found=getattr(self, name), needed=low)
-        choices = {"stop": STOPS, "candidates": CANDIDATES, "kernel": (*KERNELS, None)}
+        choices = {
+            "stop": STOPS,
+            "candidates": CANDIDATES,
+            "kernel": (*KERNELS, None),
+            "regularisation": REGULARISATIONS,
+        }
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 needed = ", ".join(map(str, allowed))
@@ -112,6 +132,28 @@ class NarxModel:
         if self.stop in ("sse", "err") and not self.goal > 0:
             raise OptionError(f"stop {self.stop!r} has no goal", found=self.goal, needed="above 0")
         width_to_beta(self.width, self.width_convention)
+        self._check_penalties()
+
+    def _check_penalties(self) -> None:
+        penalty, kind = self.penalty, self.regularisation
+        if not (math.isfinite(penalty) and penalty >= 0):
+            raise OptionError("a penalty is negative", found=penalty, needed="0 or more")
+        if (kind == "uniform") is not (penalty > 0) and kind != "local":
+            raise OptionError(
+                "penalty and regularisation disagree",
+                found=f"regularisation={kind!r}, penalty={penalty}",
+                needed="a penalty above 0 for 'uniform', none for 'none'",
+            )
+        if not 0 <= self.held_back < 1:
+            raise OptionError(
+                "held_back is no share", found=self.held_back, needed="0 to below 1, such as 0.5"
+            )
+        if self.held_back and kind != "none":
+            raise OptionError(
+                "penalised weights have no standard errors to hold samples back for",
+                found=f"regularisation={kind!r}, held_back={self.held_back}",
+                needed="one of the two",
+            )
 
     @property
     def beta(self) -> float:

@@ -14,6 +14,7 @@ from flightid.findings import Finding
 from flightid.identification.identify import identify
 from flightid.identification.narx_fit import NarxFit
 from flightid.models.narx import NarxEquation, NarxModel
+from flightid.progress import track
 from flightid.record import Record
 from flightid.table import Cell, Column, Table
 from flightid.validation.metrics import fit_percent, rms_error
@@ -171,7 +172,9 @@ def search_narx(
         for (n_y, n_u), width in product(pairs, list(widths) or [model.width])
     ]
     start = max(lag.lag for trial in models for lag in trial.lags)
-    trials = [_trial(trial, training, unseen, start) for trial in models]
+    trials = [
+        _trial(trial, training, unseen, start) for trial in track(models, "NARX lags and widths")
+    ]
     if all(trial.fit is None for trial in trials):
         raise FitError(
             "no structure of the search could be fitted",

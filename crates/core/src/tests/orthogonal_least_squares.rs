@@ -1,6 +1,6 @@
 use super::*;
 use crate::householder;
-use crate::radial_basis::Kernel;
+use crate::radial_basis::{Kernel, Radial};
 use crate::random::Random;
 use proptest::prelude::*;
 
@@ -42,8 +42,8 @@ fn compare(n: usize, m: usize, count: usize, seed: u64) {
     let mut random = Random::new(seed);
     let columns = normal(&mut random, n * m);
     let y = normal(&mut random, n);
-    let candidates = Candidates { columns: &columns, radial: None, n_samples: n };
-    let ours = select(&candidates, &y, 0, Stop::Terms, count).unwrap();
+    let candidates = Candidates::given(&columns, n);
+    let ours = select(&candidates, &y, 0, &[], Stop::Terms, count).unwrap();
     let (terms, ratios) = brute_force(&columns, &y, count);
     assert_eq!(ours.terms, terms);
     for (a, b) in ours.error_reduction.iter().zip(&ratios) {
@@ -76,10 +76,10 @@ fn radial_candidates_on_the_fly_equal_the_same_columns_given() {
     let columns: Vec<f64> = (0..n)
         .flat_map(|j| x.chunks(dimension).map(move |row| radial.value(j, row)).collect::<Vec<_>>())
         .collect();
-    let given = Candidates { columns: &columns, radial: None, n_samples: n };
-    let lazy = Candidates { columns: &[], radial: Some((radial, &x)), n_samples: n };
-    let a = select(&given, &y, 0, Stop::Press, 25).unwrap();
-    let b = select(&lazy, &y, 0, Stop::Press, 25).unwrap();
+    let given = Candidates::given(&columns, n);
+    let lazy = Candidates { columns: &[], kept: &[], radial: Some((radial, &x)), n_samples: n };
+    let a = select(&given, &y, 0, &[], Stop::Press, 25).unwrap();
+    let b = select(&lazy, &y, 0, &[], Stop::Press, 25).unwrap();
     assert_eq!((&a.terms, a.kept), (&b.terms, b.kept));
     assert_eq!(a.weights, b.weights);
     let (terms, ratios) = brute_force(&columns, &y, 20);
@@ -98,8 +98,8 @@ fn nearly_collinear_candidates_keep_their_digits() {
         columns.extend(trend.iter().map(|value| value + 1e-4 * random.normal()));
     }
     let y: Vec<f64> = trend.iter().map(|value| 3.0 * value + 0.1 * random.normal()).collect();
-    let candidates = Candidates { columns: &columns, radial: None, n_samples: n };
-    let ours = select(&candidates, &y, 1, Stop::Terms, 8).unwrap();
+    let candidates = Candidates::given(&columns, n);
+    let ours = select(&candidates, &y, 1, &[], Stop::Terms, 8).unwrap();
     let mut terms = vec![0];
     for step in 1..8 {
         let score = |j: &usize| fitted(&columns, &y, &[&terms[..], &[*j]].concat());
@@ -118,8 +118,8 @@ fn press_is_the_error_of_models_refitted_without_each_sample() {
     let (n, m) = (25, 6);
     let columns = normal(&mut random, n * m);
     let y = normal(&mut random, n);
-    let candidates = Candidates { columns: &columns, radial: None, n_samples: n };
-    let ours = select(&candidates, &y, 0, Stop::Terms, 3).unwrap();
+    let candidates = Candidates::given(&columns, n);
+    let ours = select(&candidates, &y, 0, &[], Stop::Terms, 3).unwrap();
     let mut sum = 0.0;
     for left in 0..n {
         let keep = |j: usize| -> Vec<f64> {
@@ -127,8 +127,8 @@ fn press_is_the_error_of_models_refitted_without_each_sample() {
         };
         let part: Vec<f64> = ours.terms.iter().flat_map(|j| keep(*j)).collect();
         let rest: Vec<f64> = (0..n).filter(|t| *t != left).map(|t| y[t]).collect();
-        let small = Candidates { columns: &part, radial: None, n_samples: n - 1 };
-        let refit = select(&small, &rest, 3, Stop::Terms, 3).unwrap();
+        let small = Candidates::given(&part, n - 1);
+        let refit = select(&small, &rest, 3, &[], Stop::Terms, 3).unwrap();
         let terms = ours.terms.iter().zip(&refit.weights);
         let predicted: f64 = terms.map(|(j, weight)| weight * columns[j * n + left]).sum();
         sum += (y[left] - predicted).powi(2);
@@ -148,8 +148,8 @@ fn sparse_problem() -> (Vec<f64>, Vec<f64>) {
 #[test]
 fn stops_keep_what_they_promise() {
     let (columns, y) = sparse_problem();
-    let candidates = Candidates { columns: &columns, radial: None, n_samples: 200 };
-    let run = |stop| select(&candidates, &y, 0, stop, 20).unwrap();
+    let candidates = Candidates::given(&columns, 200);
+    let run = |stop| select(&candidates, &y, 0, &[], stop, 20).unwrap();
     assert_eq!(run(Stop::Bayes).terms[..2], [4, 17]);
     assert_eq!(run(Stop::Bayes).kept, 2);
     assert_eq!(run(Stop::ErrorReduction(0.01)).terms, [4, 17]);
@@ -168,8 +168,8 @@ fn stops_keep_what_they_promise() {
 fn an_exact_fit_ends_the_selection() {
     let (columns, _) = sparse_problem();
     let y: Vec<f64> = (0..200).map(|t| columns[800 + t] - 0.5 * columns[3400 + t]).collect();
-    let candidates = Candidates { columns: &columns, radial: None, n_samples: 200 };
-    let mut terms = select(&candidates, &y, 0, Stop::Press, 20).unwrap().terms;
+    let candidates = Candidates::given(&columns, 200);
+    let mut terms = select(&candidates, &y, 0, &[], Stop::Press, 20).unwrap().terms;
     terms.sort_unstable();
     assert_eq!(terms, [4, 17]);
 }
@@ -177,8 +177,8 @@ fn an_exact_fit_ends_the_selection() {
 #[test]
 fn forced_terms_come_first_and_one_thread_gives_the_same_bits() {
     let (columns, y) = sparse_problem();
-    let candidates = Candidates { columns: &columns, radial: None, n_samples: 200 };
-    let run = || select(&candidates, &y, 2, Stop::Terms, 12).unwrap();
+    let candidates = Candidates::given(&columns, 200);
+    let run = || select(&candidates, &y, 2, &[], Stop::Terms, 12).unwrap();
     let ours = run();
     assert_eq!(ours.terms[..3], [0, 1, 4]);
     for threads in [1, 3] {
@@ -202,25 +202,69 @@ fn copies_of_a_term_are_counted_and_refused_when_forced() {
     let copy = columns[800..1000].to_vec();
     columns.extend(copy.iter().map(|value| -3.0 * value));
     columns.splice(200..400, copy);
-    let candidates = Candidates { columns: &columns, radial: None, n_samples: 200 };
-    let ours = select(&candidates, &y, 0, Stop::Terms, 5).unwrap();
+    let candidates = Candidates::given(&columns, 200);
+    let ours = select(&candidates, &y, 0, &[], Stop::Terms, 5).unwrap();
     assert_eq!(ours.collinear, 2);
     let both = [&columns[800..1000], &columns[200..400]].concat();
-    let twice = Candidates { columns: &both, radial: None, n_samples: 200 };
-    let refused = select(&twice, &y, 2, Stop::Terms, 5).unwrap_err();
+    let twice = Candidates::given(&both, 200);
+    let refused = select(&twice, &y, 2, &[], Stop::Terms, 5).unwrap_err();
     assert_eq!(refused, CoreError::Singular { what: "the set of forced terms" });
 }
 
 #[test]
 fn refuses_what_cannot_be_selected_from() {
-    let none = Candidates { columns: &[], radial: None, n_samples: 2 };
-    assert!(select(&none, &[1.0, 2.0], 0, Stop::Terms, 1).is_err());
-    let some = Candidates { columns: &[1.0, 2.0], radial: None, n_samples: 2 };
-    assert!(select(&some, &[0.0, 0.0], 0, Stop::Terms, 1).is_err());
-    assert!(select(&some, &[f64::NAN, 0.0], 0, Stop::Terms, 1).is_err());
-    assert!(select(&some, &[1.0], 0, Stop::Terms, 1).is_err());
-    assert!(select(&some, &[1.0, 2.0], 2, Stop::Terms, 2).is_err());
+    let none = Candidates::given(&[], 2);
+    assert!(select(&none, &[1.0, 2.0], 0, &[], Stop::Terms, 1).is_err());
+    let some = Candidates::given(&[1.0, 2.0], 2);
+    assert!(select(&some, &[0.0, 0.0], 0, &[], Stop::Terms, 1).is_err());
+    assert!(select(&some, &[f64::NAN, 0.0], 0, &[], Stop::Terms, 1).is_err());
+    assert!(select(&some, &[1.0], 0, &[], Stop::Terms, 1).is_err());
+    assert!(select(&some, &[1.0, 2.0], 2, &[], Stop::Terms, 2).is_err());
     let radial = Radial::new(Kernel::Gaussian, 1.0, &[0.0, 1.0], 2).unwrap();
-    let odd = Candidates { columns: &[], radial: Some((radial, &[1.0; 3])), n_samples: 2 };
-    assert!(select(&odd, &[1.0, 2.0], 0, Stop::Terms, 1).is_err());
+    let odd =
+        Candidates { columns: &[], kept: &[], radial: Some((radial, &[1.0; 3])), n_samples: 2 };
+    assert!(select(&odd, &[1.0, 2.0], 0, &[], Stop::Terms, 1).is_err());
+}
+
+#[test]
+fn products_found_ahead_are_those_of_the_directions() {
+    let mut random = Random::new(21);
+    // More samples than a block, and columns with a common part.
+    let (n, m) = (700, 60);
+    let trend = normal(&mut random, n);
+    let columns: Vec<f64> = (0..n * m).map(|i| random.normal() + trend[i % n]).collect();
+    let y = normal(&mut random, n);
+    let candidates = Candidates::given(&columns, n);
+    let mut state = State::new(&candidates, &y, &[]).unwrap();
+    let mut ahead = LookAhead::new(0, 40);
+    for _ in 0..39 {
+        let index = state.best().unwrap();
+        assert!(state.add(index));
+        let share = ahead.share(index, &state.progress());
+        let direct = &state.directions[state.directions.len() - 1];
+        for j in (0..m).filter(|j| state.remainders[*j].open) {
+            let mut scratch = Vec::new();
+            let column = candidates.column(j, &mut scratch);
+            let exact = dot(direct, column);
+            let error = (share[j] - exact).abs() / dot(column, column).sqrt();
+            assert!(error < 1e-14, "{error}");
+        }
+        state.deflate(share);
+    }
+    assert!(ahead.reads() < 25, "the candidates were read {} times", ahead.reads());
+}
+
+#[test]
+fn refuses_penalties_and_columns_without_meaning() {
+    let some = Candidates::given(&[1.0, 2.0], 2);
+    assert!(select(&some, &[1.0, 2.0], 0, &[1.0, 1.0], Stop::Terms, 1).is_err());
+    assert!(select(&some, &[1.0, 2.0], 0, &[-1.0], Stop::Terms, 1).is_err());
+    let nan = Candidates::given(&[1.0, 2.0, 3.0, f64::NAN], 2);
+    let refused = select(&nan, &[1.0, 2.0], 0, &[], Stop::Terms, 1).unwrap_err();
+    assert_eq!(refused, CoreError::NotFinite { what: "the candidates", index: 1 });
+    assert!(select(&some, &[1.0, 2.0], 0, &[f64::NAN], Stop::Terms, 1).is_err());
+    let radial = Radial::new(Kernel::Gaussian, 1.0, &[0.0, 1.0], 1).unwrap();
+    let odd =
+        Candidates { columns: &[], kept: &[1.0], radial: Some((radial, &[0.0; 2])), n_samples: 2 };
+    assert!(select(&odd, &[1.0, 2.0], 0, &[], Stop::Terms, 1).is_err());
 }
