@@ -11,8 +11,8 @@ much that is, draws from the model tell.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,7 @@ LARGEST_ORDER = 20
 SEPARATIONS = 20
 RESTORATIONS = 2
 DRAWS = 32
-MANY = 1_000_000
-"""Samples beyond which a quarter of the draws tells as much."""
+"""Draws of random walks."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +62,12 @@ class Autoregression:
                 [1.0], denominator, np.zeros(n_lags - order - 1), zi=state
             )[0]
         return result
+
+    def product(self, columns: Array) -> Array:
+        """Covariance matrix of the residual times columns, shape (n, k)."""
+        if not self.weights.size:
+            return np.asarray(self.lags[0] * columns)
+        return toeplitz_product(self.autocovariance(len(columns)), columns)
 
     def freedom(self) -> float:
         """Degrees of freedom of the model's level at zero frequency, where slow sensitivities look.
@@ -221,7 +226,6 @@ def corrected_covariance(
     >>> float(white[0, 0])
     0.0025
     """
-    n = slopes.shape[1]
     weighed = slopes / deviations[:, None, None] ** 2
     information = np.einsum("onp,onq->pq", slopes, weighed, optimize=True)
     # Columns differ by many orders of magnitude: scale them before inverting.
@@ -231,8 +235,9 @@ def corrected_covariance(
     walks = None if noise is None else projection.walks(noise)
     total = np.zeros_like(information)
     doubt = np.zeros(len(information))
-    for scaled, model in zip(weighed, projection.models(residuals, walks), strict=True):
-        part = inverse @ (scaled.T @ toeplitz_product(model.autocovariance(n), scaled)) @ inverse
+    models = projection.models(residuals, deviations, walks)
+    for scaled, model in zip(weighed, models, strict=True):
+        part = inverse @ (scaled.T @ model.product(scaled)) @ inverse
         total += part
         doubt += np.diag(part) ** 2 / model.freedom()
     if noise is not None:
@@ -264,15 +269,40 @@ class _Projection:
         draws = np.random.default_rng(0).standard_normal((n - 1, noise.steps.shape[2], DRAWS))
         return np.array([periodogram(walk) for walk in self.left(noise.outputs_of(draws))])
 
-    def models(self, residuals: Array, walks: Array | None) -> list[Autoregression]:
+    def models(
+        self, residuals: Array, deviations: Array, walks: Array | None
+    ) -> list[Autoregression]:
         """Models of the outputs' own noise."""
-        return noise_models([residuals], lambda drawn: [self.left(drawn[0])], walks)
+        white = self.slopes / deviations[:, None, None]
+        taken = Taken(np.zeros((*white.shape[:2], 0)), white @ np.linalg.cholesky(self.inverse))
+        size = deviations[:, None]
+        models = noise_models(
+            [residuals / size], [taken], None if walks is None else walks / size**2
+        )
+        return [
+            replace(model, lags=model.lags * deviation**2)
+            for model, deviation in zip(models, deviations, strict=True)
+        ]
+
+
+@dataclass(frozen=True)
+class Taken:
+    """Orthonormal directions along which a fit takes noise out of one record's residuals.
+
+    Attributes
+    ----------
+    own : ndarray, shape (n_outputs, n, n_own)
+        Of numbers that belong to this record.
+    shared : ndarray, shape (n_outputs, n, n_shared)
+        Of parameters; orthonormal over all records together.
+    """
+
+    own: Array
+    shared: Array
 
 
 def noise_models(
-    residuals: Sequence[Array],
-    left: Callable[[list[Array]], list[Array]],
-    known: Array | None = None,
+    residuals: Sequence[Array], taken: Sequence[Taken], known: Array | None = None
 ) -> list[Autoregression]:
     """Models of the outputs' noise, in rounds: what the fit took of it is given back.
 
@@ -280,8 +310,8 @@ def noise_models(
     ----------
     residuals : sequence of ndarray, shape (n_outputs, n)
         By record.
-    left : callable
-        What the fit leaves of noise, shape (n_outputs, n, n_draws) by record, in the same shape.
+    taken : sequence of Taken
+        By record, in the residuals' own metric.
     known : ndarray, shape (n_outputs, n_bins), optional
         Mean periodograms of parts to leave out of the models; one record alone.
 
@@ -292,19 +322,17 @@ def noise_models(
 
     Example
     -------
-    >>> white = np.random.default_rng(0).standard_normal((2, 1, 2000))
-    >>> model, = noise_models(list(white), lambda drawn: drawn)
+    >>> white = np.random.default_rng(0).standard_normal((1, 2000))
+    >>> model, = noise_models([white], [Taken(np.zeros((1, 2000, 0)), np.zeros((1, 2000, 0)))])
     >>> model.autocovariance(2).round(1) + 0.0
     array([1., 0.])
     """
     lengths = [each.shape[1] for each in residuals]
     total, length, n_outputs = sum(lengths), _length(max(lengths)), residuals[0].shape[0]
-    draws = DRAWS if total * n_outputs < MANY else DRAWS // 4
     outputs = range(n_outputs)
     seen = np.array([pooled([each[o][:, None] for each in residuals], length) for o in outputs])
-    random = np.random.default_rng(1)
-    white = [
-        fft.rfft(random.standard_normal((n_outputs, length, draws)), axis=1) for _ in residuals
+    directions = [
+        fft.rfft(np.concatenate([each.own, each.shared], axis=2), length, axis=1) for each in taken
     ]
     lost = np.zeros_like(seen)
     models: list[Autoregression] = []
@@ -313,22 +341,50 @@ def noise_models(
             autoregression(power, total, None if known is None else known[o], length)
             for o, power in enumerate(seen + lost)
         ]
-        spectra = np.array([model.spectrum() for model in models])
-        shaped = np.sqrt(spectra)[:, :, None]
-        drawn = [
-            fft.irfft(each * shaped, length, axis=1)[:, :n]
-            for each, n in zip(white, lengths, strict=True)
-        ]
-        kept = left(drawn)
-        lost = np.array(
-            [
-                pooled([each[o] for each in drawn], length)
-                - pooled([each[o] for each in kept], length)
-                for o in outputs
-            ]
-        )
-        lost += [spectrum - _leaking(spectrum, lengths, length) for spectrum in spectra]
+        lost = _lost(models, directions, lengths, [each.own.shape[2] for each in taken])
+        for o, model in enumerate(models):
+            spectrum = model.spectrum()
+            lost[o] += spectrum - _leaking(spectrum, lengths, length)
     return models
+
+
+def _lost(
+    models: Sequence[Autoregression],
+    directions: Sequence[Array],
+    lengths: Sequence[int],
+    n_own: Sequence[int],
+) -> Array:
+    """Mean periodogram of noise less that of what a fit leaves of it.
+
+    With orthonormal directions Q it leaves w - Q Qᵀ w, whose mean periodogram lies below that of w
+    by 2 Re F(Ω q) F(q)* - F(q) Qᵀ Ω Q F(q)*, F the transform over an output's samples.
+    """
+    length = models[0].length
+    spectra = [model.spectrum() for model in models]
+    twice = np.full(len(spectra[0]), 2.0)
+    twice[0] = 1.0
+    if length % 2 == 0:
+        twice[-1] = 1.0
+    inner = [
+        np.asarray(
+            sum(
+                (each.conj().T @ (each * (twice * spectrum / length)[:, None])).real
+                for each, spectrum in zip(parts, spectra, strict=True)
+            )
+        )
+        for parts in directions
+    ]
+    shared = sum(each[m:, m:] for each, m in zip(inner, n_own, strict=True))
+    lost = np.zeros((len(models), len(spectra[0])))
+    for parts, each, m, n in zip(directions, inner, n_own, lengths, strict=True):
+        each[m:, m:] = shared
+        for o, (part, spectrum, model) in enumerate(zip(parts, spectra, models, strict=True)):
+            shaped = part * spectrum[:, None]
+            if model.weights.size:
+                # Noise ends with the record.
+                shaped = fft.rfft(fft.irfft(shaped, length, axis=0)[:n], length, axis=0)
+            lost[o] += np.sum(((2.0 * shaped - part @ each) * part.conj()).real, axis=1)
+    return lost / sum(lengths)
 
 
 def toeplitz_product(first: Array, columns: Array) -> Array:

@@ -1,4 +1,8 @@
-"""Output-error fit of the instrument errors: Levenberg-Marquardt on the triangle of a QR."""
+"""Output-error fit of the instrument errors: Levenberg-Marquardt on the triangle of a QR.
+
+A loop of its own beside the native one of model fits: kinematics give outputs and slopes in one
+pass, so a trial point is a linearisation already, and the measured inputs, noise and all, drive it.
+"""
 
 from __future__ import annotations
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from flightid.identification.record_statistics import (
     Block,
     covariances,
-    freedom_of,
     information_inverse,
     triangle_of,
 )
@@ -49,10 +48,10 @@ def coloured_covariance(
         flat = np.ascontiguousarray(slopes.reshape(-1, n))
         blocks.append(Block(flat, np.zeros((k, n)), basis, np.eye(k), residuals))
     triangle = triangle_of(blocks)
-    covariance, _, _, models = covariances(blocks, triangle)
+    covariance, _, _, freedom = covariances(blocks, triangle)
     plain = np.diag(information_inverse(triangle))
     # Of data without noise, rounding alone is left, and that may be negative.
     lift = np.maximum(_ROUNDING * plain - np.diag(covariance), 0.0)
     covariance = covariance + np.diag(lift)
     inflation = float(np.max(np.sqrt(np.diag(covariance) / plain), initial=1.0))
-    return covariance, freedom_of(blocks, models, triangle), inflation
+    return covariance, freedom, inflation

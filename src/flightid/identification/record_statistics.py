@@ -17,8 +17,8 @@ from scipy.linalg import solve_triangular
 
 from flightid.conditioning.coloured_residuals import (
     Autoregression,
+    Taken,
     noise_models,
-    toeplitz_product,
 )
 from flightid.identification.estimates import at_bound, fitted_parameters, require_identifiable
 from flightid.identification.fit import FittedParameter
@@ -121,9 +121,8 @@ def record_statistics(
     other = np.zeros((0, len(free))) if beside is None else beside
     triangle = triangle_of(blocks, other[:, inner])
     require_identifiable(names, triangle)
-    covariance, own_covariances, crossed, models = covariances(blocks, triangle, other[:, inner])
+    covariance, own_covariances, crossed, freedom = covariances(blocks, triangle, other[:, inner])
     plain = information_inverse(triangle)
-    freedom = freedom_of(blocks, models, triangle, other[:, inner])
     parameters = fitted_parameters(fitted, names, covariance, triangle / np.sqrt(2.0), freedom)
     ratio = np.sqrt(np.diag(covariance) / np.diag(plain)) if names else np.ones(1)
     return RecordStatistics(
@@ -168,19 +167,23 @@ def triangle_of(blocks: Sequence[Block], beside: Array | None = None) -> Array:
 
 def information_inverse(triangle: Array) -> Array:
     """(RᵀR)⁻¹ of a triangle R: the covariance for white residuals of unit variance."""
-    size = np.linalg.norm(triangle, axis=0)
-    root = solve_triangular(triangle / size, np.eye(len(size))) / size[:, None]
+    root = _inverse_root(triangle)
     return np.asarray(root @ root.T)
 
 
-def _noise_covariance(models: Sequence[Autoregression], columns: Array, n_outputs: int) -> Array:
-    """columnsᵀ Ω columns for the noise Ω of one record."""
-    n_samples = len(columns) // n_outputs
-    parts = columns.reshape(n_outputs, n_samples, columns.shape[1])
-    total = np.zeros((columns.shape[1], columns.shape[1]))
-    for model, part in zip(models, parts, strict=True):
-        total += part.T @ toeplitz_product(model.autocovariance(len(part)), part)
-    return total
+def _inverse_root(triangle: Array) -> Array:
+    """R⁻¹."""
+    size = np.linalg.norm(triangle, axis=0)
+    return np.asarray(solve_triangular(triangle / size, np.eye(len(size))) / size[:, None])
+
+
+def _answers(models: Sequence[Autoregression], block: Block) -> Array:
+    """[basis, projected]ᵀ Ω [basis, projected] for the noise of each output of one record."""
+    directions = np.hstack([block.basis, block.projected])
+    parts = directions.reshape(len(models), -1, directions.shape[1])
+    return np.array(
+        [part.T @ model.product(part) for model, part in zip(models, parts, strict=True)]
+    )
 
 
 def _share_beside(plain: Array, beside: Array | None) -> Array:
@@ -193,41 +196,56 @@ def _share_beside(plain: Array, beside: Array | None) -> Array:
 
 def covariances(
     blocks: Sequence[Block], triangle: Array, beside: Array | None = None
-) -> tuple[Array, list[Array], list[Array], list[Autoregression]]:
-    """Covariance of the shared parameters, of each record's own, between the two; noise models."""
+) -> tuple[Array, list[Array], list[Array], Array]:
+    """Covariance of the shared parameters, of each record's own, between the two.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+    triangle : ndarray, shape (n, n)
+        Of the sensitivities of all records together, and of what is fitted beside them.
+    beside : ndarray, shape (n_beside, n), optional
+        Sensitivities of residuals of unit variance beside the records.
+
+    Returns
+    -------
+    shared : ndarray, shape (n, n)
+    own, crossed : list of ndarray
+        By record, shapes (n_own, n_own) and (n_own, n).
+    freedom : ndarray, shape (n,)
+        Degrees of freedom of each shared variance: noise models are themselves estimates.
+    """
     plain = information_inverse(triangle)
-    n_outputs = blocks[0].residual.shape[0]
-
-    def left(drawn: list[Array]) -> list[Array]:
-        flat = [
-            each.reshape(block.residual.size, -1) for each, block in zip(drawn, blocks, strict=True)
-        ]
-        moved = plain @ sum(
-            block.projected.T @ each for block, each in zip(blocks, flat, strict=True)
-        )
-        return [
-            (each - block.basis @ (block.basis.T @ each) - block.projected @ moved).reshape(
-                whole.shape
-            )
-            for block, each, whole in zip(blocks, flat, drawn, strict=True)
-        ]
-
-    models = noise_models([block.residual for block in blocks], left)
-    gains = [block.projected @ plain for block in blocks]
-    parts = [_noise_covariance(models, gain, n_outputs) for gain in gains]
-    shared = np.asarray(sum(parts)) + _share_beside(plain, beside)
+    root = _inverse_root(triangle)
+    taken = []
+    for block in blocks:
+        parts = (block.basis, block.projected @ root)
+        taken.append(Taken(*(part.reshape(*block.residual.shape, -1) for part in parts)))
+    models = noise_models([block.residual for block in blocks], taken)
+    answers = [_answers(models, block) for block in blocks]
+    sizes = [block.basis.shape[1] for block in blocks]
+    variances = plain @ sum(each[:, m:, m:] for each, m in zip(answers, sizes, strict=True)) @ plain
+    known = _share_beside(plain, beside)
+    shared = np.asarray(variances.sum(axis=0)) + known
     own, crossed = [], []
-    for block, gain, part in zip(blocks, gains, parts, strict=True):
+    for block, each, m in zip(blocks, answers, sizes, strict=True):
         # Own numbers answer the record's own noise and, through the parameters, everybody's.
+        noise = each.sum(axis=0)
         back = np.linalg.inv(block.triangle)
-        direct = (block.basis - gain @ block.shared_on_own.T) @ back.T
         through = back @ block.shared_on_own
-        own.append(
-            _noise_covariance(models, direct, n_outputs) + through @ (shared - part) @ through.T
-        )
-        both = _noise_covariance(models, np.hstack([direct, gain]), n_outputs)
-        crossed.append(both[: direct.shape[1], direct.shape[1] :] - through @ (shared - part))
-    return shared, own, crossed, models
+        gain = np.vstack([np.zeros((m, len(plain))), plain])
+        direct = np.vstack([back.T, -plain @ through.T])
+        others = shared - gain.T @ noise @ gain
+        own.append(direct.T @ noise @ direct + through @ others @ through.T)
+        crossed.append(direct.T @ noise @ gain - through @ others)
+    diagonals = np.diagonal(variances, axis1=1, axis2=2)
+    doubt = sum(
+        variance**2 / model.freedom() for variance, model in zip(diagonals, models, strict=True)
+    )
+    # Errors that are known leave no doubt, nor does a residual that vanishes.
+    doubtful = doubt > 0.0
+    freedom = np.where(doubtful, np.diag(shared) ** 2 / np.where(doubtful, doubt, 1.0), np.inf)
+    return shared, own, crossed, np.asarray(freedom)
 
 
 def start_errors(
@@ -263,30 +281,6 @@ def start_errors(
     biases = np.zeros((len(slopes), joint.shape[0] - shared.shape[1] - n_moving))
     whole = np.hstack([shared, own, biases])
     return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", whole, joint, whole)))
-
-
-def freedom_of(
-    blocks: Sequence[Block],
-    models: Sequence[Autoregression],
-    triangle: Array,
-    beside: Array | None = None,
-) -> Array:
-    """Degrees of freedom of each variance: noise models are themselves estimates."""
-    plain = information_inverse(triangle)
-    n_outputs = blocks[0].residual.shape[0]
-    variances = np.zeros((n_outputs, len(plain)))
-    for block in blocks:
-        parts = (block.projected @ plain).reshape(n_outputs, -1, len(plain))
-        for output, (model, part) in enumerate(zip(models, parts, strict=True)):
-            product = toeplitz_product(model.autocovariance(len(part)), part)
-            variances[output] += np.einsum("nk,nk->k", part, product)
-    doubt = sum(
-        variance**2 / model.freedom() for variance, model in zip(variances, models, strict=True)
-    )
-    total = variances.sum(axis=0) + np.diag(_share_beside(plain, beside))
-    # Errors that are known leave no doubt, nor does a residual that vanishes.
-    known = doubt > 0.0
-    return np.where(known, total**2 / np.where(known, doubt, 1.0), np.inf)
 
 
 def _own_numbers(
