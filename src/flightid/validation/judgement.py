@@ -59,6 +59,7 @@ def judge(
     numbers: dict[str, dict[str, float]] = {
         key: {} for key in ("theil", "rms_error", "mse", "fit_percent", "vaf", "r_squared")
     }
+    power = []
     for name in compared:
         # About the mean of each measured record: how a constant is shared between trim, bias and
         # reference shift must not change a number, and an offset must not flatter it.
@@ -74,6 +75,7 @@ def judge(
         numbers["fit_percent"][name] = float(metrics.fit_percent(y, y_hat))
         numbers["vaf"][name] = float(metrics.vaf_percent(y, y_hat))
         numbers["r_squared"][name] = float(metrics.r_squared(y, y_hat))
+        power.append([np.mean(np.square(signal)) for signal in (y - y_hat, y, y_hat)])
     first = predictions[0].measured
     factors = [_guide_factor(first.unit(name)) for name in compared]
     j_rms = None
@@ -84,9 +86,13 @@ def judge(
             if factor is not None
         ]
         j_rms = float(np.sqrt(np.mean(np.square(errors))))
+    # One number for all outputs, each counted in the guide's units: the verdict of the reference.
+    error, seen, said = np.sqrt(guide_weights(first, compared) @ np.array(power))
+    overall = float(error / (seen + said))
     return Verification(
         outputs=compared,
         predictions=predictions,
+        overall_theil=overall,
         j_rms=j_rms,
         initial=initial,
         free_bias=freedom.bias,
@@ -94,28 +100,46 @@ def judge(
         hold=hold,
         mismatch=mismatch,
         findings=(
-            *_findings(numbers["theil"], j_rms, predictions),
+            *_findings(overall, numbers["theil"], j_rms, predictions),
             *(() if mismatch is None else mismatch.findings),
         ),
         **numbers,
     )
 
 
-def _findings(
-    theil: dict[str, float], j_rms: float | None, predictions: tuple[Prediction, ...]
-) -> tuple[Finding, ...]:
+def _theil_findings(overall: float, theil: dict[str, float]) -> list[Finding]:
+    """All outputs together, then each; a poor one is no red by itself where all together agree.
+
+    An output that these inputs hardly move is mostly gust and noise, and no model predicts that.
+    """
+    verdict = _light(overall, THEIL_GUIDE)
+    several = len(theil) > 1
+    values = {"all outputs together": overall, **theil} if several else theil
     found = []
-    for name, value in theil.items():
+    for name, value in values.items():
         light = _light(value, THEIL_GUIDE)
+        if light is Light.RED and verdict is not Light.RED:
+            light = Light.AMBER
+        action = "" if light is Light.GREEN else "look where the prediction parts from the record"
         found.append(
             Finding(
                 "verification-theil",
                 light,
                 f"{name}: Theil coefficient {value:.3f}, guide at most {THEIL_GUIDE[0]:g} "
                 f"to {THEIL_GUIDE[1]:g}",
-                "" if light is Light.GREEN else "look where the prediction parts from the record",
+                action,
             )
         )
+    return found
+
+
+def _findings(
+    overall: float,
+    theil: dict[str, float],
+    j_rms: float | None,
+    predictions: tuple[Prediction, ...],
+) -> tuple[Finding, ...]:
+    found = _theil_findings(overall, theil)
     if j_rms is not None:
         # The guide is in absolute units, for piloted aircraft and modest inputs: no red by itself.
         light = Light.GREEN if j_rms <= J_RMS_GUIDE[1] else Light.AMBER
