@@ -1,0 +1,44 @@
+"""Run every benchmark of this folder, or those that are named, and print their tables.
+
+Run: python -m benchmarks [topic ...]      for example: python -m benchmarks output_error narx
+
+A topic is a module here with `run()`, which returns a table. Peers that are not installed are left
+out with a word; `pip install .[bench]` brings them.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from pkgutil import iter_modules
+
+from flightid.errors import FlightidError
+
+
+def topics() -> list[str]:
+    """Names of the benchmarks in this folder."""
+    return sorted(m.name for m in iter_modules([str(Path(__file__).parent)]) if m.name[0] != "_")
+
+
+def main(wanted: list[str]) -> int:
+    """Print the tables; 2 for an unknown topic, 1 where one could not run."""
+    known = topics()
+    stray = [name for name in wanted if name not in known]
+    if stray:
+        print(f"no such benchmark: {', '.join(stray)}; there are {', '.join(known)}")
+        return 2
+    failed = 0
+    for name in wanted or known:
+        print(f"\n{name} …", flush=True)
+        try:
+            print(import_module(f"benchmarks.{name}").run(), flush=True)
+        except (ModuleNotFoundError, FileNotFoundError, FlightidError) as error:
+            # One peer or one record that is not here must not take the others' tables with it.
+            print(f"  not run: {error}")
+            failed += 1
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
