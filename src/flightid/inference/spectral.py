@@ -25,7 +25,7 @@ def neighbours(count: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     -------
     >>> low, high = neighbours(100)
     >>> int(low[50]), int(high[50]), int(low[0]), int(high[0])
-    (35, 66, 0, 7)
+    (20, 81, 0, 11)
     """
     reach = max(FEWEST, round(SHARE * count))
     place = np.arange(count)
@@ -83,7 +83,7 @@ def spectral_covariance(jacobian: Complex, residuals: Complex) -> tuple[Array, f
     >>> rows = np.ones((1, 50, 1), dtype=complex)
     >>> noise = np.exp(2j * np.arange(50))[None]
     >>> covariance, freedom = spectral_covariance(rows, noise)
-    >>> round(covariance[0, 0], 4)
+    >>> round(float(covariance[0, 0]), 4)
     0.0101
     """
     n_parameters = jacobian.shape[2]
