@@ -39,11 +39,16 @@ def flight(
 
 
 def swept(
-    model: fid.TransferFunctionModel, seed: int, *, noise: float = 1.0
+    model: fid.TransferFunctionModel,
+    seed: int,
+    *,
+    noise: float = 1.0,
+    window_s: str | list[float] = "auto",
 ) -> fid.FrequencyResponse:
     """Response estimated from a sweep of forty seconds."""
     time_s = np.arange(2000) * SAMPLE_TIME_S
     ratio = np.log(BAND[1] / BAND[0])
     phase = BAND[0] * 40.0 / ratio * np.expm1(time_s / 40.0 * ratio)
     moment = 0.03 * np.sin(phase) * np.minimum(1.0, np.minimum(time_s, 40.0 - time_s) / 2.0)
-    return fid.estimate_response(_flown(model, moment, seed, noise), omega_rad_s=(*BAND, 30))
+    flown = _flown(model, moment, seed, noise)
+    return fid.estimate_response(flown, omega_rad_s=(*BAND, 30), window_s=window_s)

@@ -11,16 +11,20 @@ from tests.joint_flights import BAND, flight, lag, swept
 FLIGHTS = 200
 
 
-@pytest.mark.slow
-@pytest.mark.xfail(
+COMPOSITE = pytest.mark.xfail(
     strict=True,
-    reason="0.908 over 200 pairs: the intervals do not know that corrected points follow the model",
+    reason="the covariance of a composite holds the weights of its windows fixed, and is too small "
+    "for one short sweep: the response alone falls as short",
 )
-def test_joint_intervals_cover_the_truth() -> None:
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("window_s", [[10.0], pytest.param("auto", marks=COMPOSITE)])
+def test_joint_intervals_cover_the_truth(window_s: str | list[float]) -> None:
     truth = lag()
     inside, shares = [], []
     for seed in range(FLIGHTS):
-        response = swept(truth, 2 * seed, noise=0.3)
+        response = swept(truth, 2 * seed, noise=0.3, window_s=window_s)
         record = flight(truth, 2 * seed + 1, noise=0.3)
         fit = fid.identify(truth, (response, record), omega_rad_s=BAND)
         alone = fid.identify(truth, record)

@@ -34,7 +34,11 @@ from flightid.identification.multistart import End, cluster, collect, draw_start
 from flightid.identification.record_findings import judge_channels, judge_fit
 from flightid.identification.record_options import RecordOptions
 from flightid.identification.record_setup import OwnNumbers, RecordSet, prepare_records
-from flightid.identification.record_statistics import RecordStatistics, record_statistics
+from flightid.identification.record_statistics import (
+    Beside,
+    RecordStatistics,
+    record_statistics,
+)
 from flightid.identification.regression_options import FourierOutputErrorOptions
 from flightid.models import Model, StateSpaceModel
 from flightid.record import Channel, Record, Step
@@ -105,7 +109,7 @@ def conclude(
     found: Searched,
     options: RecordOptions,
     setup: Sequence[Finding],
-    beside: Array | None = None,
+    beside: Beside | None = None,
 ) -> Fit:
     """The result of a search.
 
@@ -115,8 +119,8 @@ def conclude(
     options : RecordOptions
     setup : sequence of Finding
         Put before those of the fit.
-    beside : ndarray, shape (n, n_free), optional
-        Slopes of residuals of unit variance that were fitted together with the records.
+    beside : Beside, optional
+        Residuals of unit variance that were fitted together with the records.
 
     Returns
     -------

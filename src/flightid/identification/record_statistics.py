@@ -81,6 +81,26 @@ class Block:
         return cls(shared - basis @ on_own, on_own, basis, triangle, residual)
 
 
+@dataclass(frozen=True)
+class Beside:
+    """Residuals of unit variance, fitted together with the records, and what they answer to.
+
+    Attributes
+    ----------
+    slopes : ndarray, shape (n_residuals, n_free)
+        Derivatives by the free parameters, the data being as they are.
+    total : ndarray, shape (n_residuals, n_free)
+        The same with data that follow the parameters, as corrected points do.
+    """
+
+    slopes: Array
+    total: Array
+
+    def of(self, parameters: NDArray[np.bool_]) -> Beside:
+        """Columns of some parameters."""
+        return Beside(self.slopes[:, parameters], self.total[:, parameters])
+
+
 def record_statistics(
     fitted: Model,
     prepared: RecordSet,
@@ -89,12 +109,11 @@ def record_statistics(
     runs: Sequence[tuple[Array, Array]],
     noise: Array,
     limit: float,
-    beside: Array | None = None,
+    beside: Beside | None = None,
 ) -> RecordStatistics:
     """Standard errors, bounds and correlations of a fit to records.
 
-    `beside` are the slopes, by all free parameters, of residuals of unit variance from other data
-    that were fitted together with the records.
+    `beside` concerns residuals of other data that were fitted together with the records.
 
     Raises
     ------
@@ -118,10 +137,10 @@ def record_statistics(
         residual = _limited(whitener @ (measured - outputs), limit)
         shared, rest = white[:, :, : len(free)][:, :, inner], white[:, :, len(free) :]
         blocks.append(Block.of(shared, rest[:, :, np.array(kept, dtype=bool)], residual))
-    other = np.zeros((0, len(free))) if beside is None else beside
-    triangle = triangle_of(blocks, other[:, inner])
+    other = None if beside is None else beside.of(inner)
+    triangle = triangle_of(blocks, None if other is None else other.slopes)
     require_identifiable(names, triangle)
-    covariance, own_covariances, crossed, freedom = covariances(blocks, triangle, other[:, inner])
+    covariance, own_covariances, crossed, freedom = covariances(blocks, triangle, other)
     plain = information_inverse(triangle)
     parameters = fitted_parameters(fitted, names, covariance, triangle / np.sqrt(2.0), freedom)
     ratio = np.sqrt(np.diag(covariance) / np.diag(plain)) if names else np.ones(1)
@@ -186,16 +205,20 @@ def _answers(models: Sequence[Autoregression], block: Block) -> Array:
     )
 
 
-def _share_beside(plain: Array, beside: Array | None) -> Array:
-    """Covariance that residuals of unit variance beside the records bring into the estimates."""
+def _gain(root: Array, beside: Beside | None) -> Array:
+    """What turns a gradient into a change of the estimates, from the root R⁻¹ of the information.
+
+    Where data follow the parameters, the equations that the estimates solve bend less than the
+    cost does, and the gain is larger than the inverse of the information.
+    """
     if beside is None:
-        return np.zeros_like(plain)
-    gain = beside @ plain
-    return np.asarray(gain.T @ gain)
+        return np.asarray(root @ root.T)
+    follows = (beside.slopes @ root).T @ ((beside.slopes - beside.total) @ root)
+    return np.asarray(root @ np.linalg.solve(np.eye(len(root)) - follows, root.T))
 
 
 def covariances(
-    blocks: Sequence[Block], triangle: Array, beside: Array | None = None
+    blocks: Sequence[Block], triangle: Array, beside: Beside | None = None
 ) -> tuple[Array, list[Array], list[Array], Array]:
     """Covariance of the shared parameters, of each record's own, between the two.
 
@@ -204,8 +227,8 @@ def covariances(
     blocks : sequence of Block
     triangle : ndarray, shape (n, n)
         Of the sensitivities of all records together, and of what is fitted beside them.
-    beside : ndarray, shape (n_beside, n), optional
-        Sensitivities of residuals of unit variance beside the records.
+    beside : Beside, optional
+        Residuals beside the records.
 
     Returns
     -------
@@ -215,8 +238,8 @@ def covariances(
     freedom : ndarray, shape (n,)
         Degrees of freedom of each shared variance: noise models are themselves estimates.
     """
-    plain = information_inverse(triangle)
     root = _inverse_root(triangle)
+    turned = _gain(root, beside)
     taken = []
     for block in blocks:
         parts = (block.basis, block.projected @ root)
@@ -224,17 +247,20 @@ def covariances(
     models = noise_models([block.residual for block in blocks], taken)
     answers = [_answers(models, block) for block in blocks]
     sizes = [block.basis.shape[1] for block in blocks]
-    variances = plain @ sum(each[:, m:, m:] for each, m in zip(answers, sizes, strict=True)) @ plain
-    known = _share_beside(plain, beside)
-    shared = np.asarray(variances.sum(axis=0)) + known
+    heard = sum(each[:, m:, m:] for each, m in zip(answers, sizes, strict=True))
+    variances = turned @ heard @ turned.T
+    shared = np.asarray(variances.sum(axis=0))
+    if beside is not None:
+        brought = beside.slopes @ turned.T
+        shared = shared + brought.T @ brought
     own, crossed = [], []
     for block, each, m in zip(blocks, answers, sizes, strict=True):
         # Own numbers answer the record's own noise and, through the parameters, everybody's.
         noise = each.sum(axis=0)
         back = np.linalg.inv(block.triangle)
         through = back @ block.shared_on_own
-        gain = np.vstack([np.zeros((m, len(plain))), plain])
-        direct = np.vstack([back.T, -plain @ through.T])
+        gain = np.vstack([np.zeros((m, len(turned))), turned.T])
+        direct = np.vstack([back.T, -turned.T @ through.T])
         others = shared - gain.T @ noise @ gain
         own.append(direct.T @ noise @ direct + through @ others @ through.T)
         crossed.append(direct.T @ noise @ gain - through @ others)
