@@ -11,15 +11,8 @@ from tests.joint_flights import BAND, flight, lag, swept
 FLIGHTS = 200
 
 
-COMPOSITE = pytest.mark.xfail(
-    strict=True,
-    reason="the covariance of a composite holds the weights of its windows fixed, and is too small "
-    "for one short sweep: the response alone falls as short",
-)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("window_s", [[10.0], pytest.param("auto", marks=COMPOSITE)])
+@pytest.mark.parametrize("window_s", [[10.0], "auto"])
 def test_joint_intervals_cover_the_truth(window_s: str | list[float]) -> None:
     truth = lag()
     inside, shares = [], []
