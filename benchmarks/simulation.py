@@ -9,7 +9,8 @@ import numpy as np
 import scipy.signal
 
 from flightid import Record, Table
-from flightid.simulation import LinearSystem, fly, simulate
+from flightid.models.linear_system import LinearSystem
+from flightid.simulation import fly, simulate
 from flightid.table import Column
 
 N_SAMPLES = 40_000

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from flightid.logs import Log, LogTable, read_log
     from flightid.models import (
         InnovationsModel,
+        LinearSystem,
         ModelBuilder,
         NarxModel,
         Output,
@@ -61,7 +62,7 @@ if TYPE_CHECKING:
         coherent_pairs,
         estimate_response,
     )
-    from flightid.simulation.simulate import LinearSystem, simulate
+    from flightid.simulation.simulate import simulate
     from flightid.study import Study, run_study
     from flightid.table import Table
     from flightid.validation import Comparison, OrderScan, ResidualTests, Verification
@@ -94,7 +95,7 @@ _HOMES = {
     "interpret": "flightid.dynamics.interpretation",
     "to_continuous": "flightid.dynamics.continuous",
     "to_discrete": "flightid.dynamics.continuous",
-    "LinearSystem": "flightid.simulation.simulate",
+    "LinearSystem": "flightid.models",
     "LocalMinimum": "flightid.identification",
     "Log": "flightid.logs",
     "LogTable": "flightid.logs",

@@ -91,7 +91,8 @@ def test_what_cannot_be_converted_is_refused():
     with pytest.raises(ModelError, match="pole at -1"):
         fid.to_continuous(edge, "tustin")
     system = fid.LinearSystem(A, B, C, D, *CHANNELS, [0.25, 0.0])
-    with pytest.raises(ModelError, match="not a whole number of samples"):
-        fid.to_discrete(system, 0.1)
+    with pytest.raises(DataError, match="part of a sample"):
+        fid.to_discrete(system, 0.1, "tustin")
+    assert fid.to_discrete(system, 0.1).order == system.order + 3
     with pytest.raises(DataError, match="sample time is not positive"):
         fid.to_discrete(system, 0.0)

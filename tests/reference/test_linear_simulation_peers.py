@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightid import Record, _native
-from flightid.simulation import LinearSystem, simulate
+from flightid.models.linear_system import LinearSystem
+from flightid.simulation import simulate
 from tests.closeness import assert_close
 
 ROUNDING = "both are exact for this hold; only rounding differs"

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 import flightid as fid
 from flightid.conventions import Light
-from flightid.simulation.simulate import LinearSystem
+from flightid.models.linear_system import LinearSystem
 from flightid.validation.comparison import N_STRETCHES, swap_p_value
 from tests.closeness import assert_close
 

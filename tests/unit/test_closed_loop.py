@@ -9,11 +9,11 @@ from scipy.integrate import solve_ivp
 import flightid as fid
 from flightid import errors
 from flightid.excitation import Excitation, sweep
+from flightid.models.linear_system import LinearSystem
 from flightid.simulation import (
     CrudePilot,
     Disturbance,
     FlightConditions,
-    LinearSystem,
     actuator_positions,
     fly_closed_loop,
     simulate,

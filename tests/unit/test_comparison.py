@@ -12,9 +12,9 @@ import flightid as fid
 from flightid.cli.program import run
 from flightid.conventions import Light
 from flightid.errors import OptionError, UnknownNameError
+from flightid.models.linear_system import LinearSystem
 from flightid.plot import verification as pictures
 from flightid.report.verification import verification_blocks, verification_sections
-from flightid.simulation.simulate import LinearSystem
 from tests.closeness import assert_close
 
 TIME_S = np.arange(600) * 0.02

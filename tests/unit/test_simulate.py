@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from flightid import Record, errors
-from flightid.simulation import LinearSystem, simulate
+from flightid.models.linear_system import LinearSystem
+from flightid.simulation import simulate
 from tests.closeness import assert_close
 
 LAG = LinearSystem([[-2.0]], [[2.0]], [[1.0]], [[0.5]], ("tau_phi",), ("p",))
@@ -77,7 +78,7 @@ def test_refusals(record: Record) -> None:
         )
     with pytest.raises(errors.ShapeError, match="initial state"):
         simulate(LAG, record, initial_state=[0.0, 0.0])
-    with pytest.raises(errors.OptionError, match="input delay"):
+    with pytest.raises(errors.DataError, match="a delay is negative"):
         simulate(LinearSystem(LAG.a, LAG.b, LAG.c, LAG.d, LAG.inputs, LAG.outputs, [-1.0]), record)
     with pytest.raises(errors.DataError, match="not finite"):
         simulate(LinearSystem([[900.0]], [[1.0]], [[1.0]], [[0.0]], ("tau_phi",), ("p",)), record)

@@ -21,8 +21,8 @@ from flightid.errors import (
     UnitError,
     UnknownNameError,
 )
+from flightid.models.linear_system import LinearSystem
 from flightid.plot import verification as pictures
-from flightid.simulation.simulate import LinearSystem
 from tests.closeness import assert_close
 
 TIME_S = np.arange(400) * 0.02

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag, expm, logm, schur, solve_sylvester
+from scipy.linalg import expm, logm, schur, solve_sylvester
 
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.identification import InnovationsFit, PolynomialFit
 from flightid.models import InnovationsModel, PolynomialModel
-from flightid.simulation.simulate import LinearModel, LinearSystem
+from flightid.models.linear_system import LinearModel, LinearSystem
 
 Array = NDArray[np.float64]
 Four = tuple[Array, Array, Array, Array]
@@ -19,8 +19,6 @@ METHODS = ("zero", "first", "tustin")
 AT_ORIGIN = 1e-7
 """Poles closer to the origin than this are delays: rounding moves a double pole by its root."""
 ROUNDING = 1e-9
-WHOLE = 1e-6
-"""Fraction of a sample below which a delay is a whole number of samples."""
 
 
 def to_continuous(
@@ -93,14 +91,12 @@ def to_discrete(model: LinearModel, sample_time_s: float, hold: str = "zero") ->
     Returns
     -------
     InnovationsModel
-        Delays of the inputs as states.
+        Delays of the inputs as states, parts of a sample too.
 
     Raises
     ------
-    ModelError
-        A delay that is not a whole number of samples.
     DataError
-        A sample time that is not positive.
+        A sample time that is not positive; with "tustin" a delay of part of a sample.
     OptionError
         An unknown hold.
 
@@ -117,21 +113,17 @@ def to_discrete(model: LinearModel, sample_time_s: float, hold: str = "zero") ->
     _require_hold(hold)
     if not sample_time_s > 0:
         raise DataError("the sample time is not positive", found=sample_time_s, needed="seconds")
-    a, b, c, d, delays = model.state_space()
-    lags = np.rint(delays / sample_time_s)
-    if np.any(np.abs(delays / sample_time_s - lags) > WHOLE):
-        raise ModelError(
-            "a delay is not a whole number of samples",
-            found=f"{', '.join(f'{delay:.6g}' for delay in delays)} s",
-            needed=f"multiples of {sample_time_s:.6g} s",
-            action="choose another sample time, or simulate, which takes any delay",
-        )
+    system = LinearSystem.of(model)
     if hold == "tustin":
+        a, b, c, d, delays_s = system.state_space()
         parts = _to_tustin(a, b, c, d, sample_time_s)
+        # Delays of a bilinear model stay delays: only whole samples of them have a meaning.
+        names = system.inputs, system.outputs, delays_s
+        sampled = LinearSystem(*parts, *names, sample_time_s=sample_time_s).with_pade()
     else:
-        parts = _to_hold(a, b, c, d, sample_time_s, hold)
-    matrices = _with_delays(*parts, lags.astype(np.int64))
-    return InnovationsModel(tuple(model.outputs), tuple(model.inputs), sample_time_s, *matrices)
+        sampled = system.sampled(sample_time_s, "zero" if hold == "zero" else "first")
+    found = sampled.state_space()[:4]
+    return InnovationsModel(sampled.outputs, sampled.inputs, sample_time_s, *found)
 
 
 def _require_hold(hold: str) -> None:
@@ -201,13 +193,6 @@ def _holds(a: Array, step: float) -> tuple[Array, Array, Array]:
     return made[:n, :n], made[:n, n : 2 * n], made[:n, 2 * n :]
 
 
-def _to_hold(a: Array, b: Array, c: Array, d: Array, step: float, hold: str) -> Four:
-    phi, full, ramp = _holds(a, step)
-    if hold == "zero":
-        return phi, full @ b, c, d
-    return phi, (full + phi @ ramp - ramp) @ b, c, d + c @ ramp @ b
-
-
 def _from_hold(a: Array, b: Array, c: Array, d: Array, step: float, hold: str) -> Four:
     logarithm: Any = logm(a) if a.size else np.zeros(a.shape)
     rate = np.real(logarithm) / step
@@ -236,17 +221,3 @@ def _from_tustin(a: Array, b: Array, c: Array, d: Array, step: float) -> Four:
 
 def _arrays(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> Four:
     return np.asarray(a), np.asarray(b), np.asarray(c), np.asarray(d)
-
-
-def _with_delays(a: Array, b: Array, c: Array, d: Array, lags: NDArray[np.int64]) -> Four:
-    """Each input through a chain of as many unit delays."""
-    for j, lag in enumerate(lags):
-        for _ in range(int(lag)):
-            n = a.shape[0]
-            a = block_diag(a, np.zeros((1, 1)))
-            a[:n, n], c = b[:, j], np.hstack([c, d[:, j : j + 1]])
-            b = np.vstack([b, np.zeros((1, b.shape[1]))])
-            d = d.copy()
-            b[:, j], d[:, j] = 0.0, 0.0
-            b[n, j] = 1.0
-    return a, b, c, d

@@ -8,6 +8,7 @@ from flightid.models.builder import ModelBuilder
 from flightid.models.description import Model
 from flightid.models.innovations import InnovationsModel
 from flightid.models.innovations_prediction import InnovationsPrediction
+from flightid.models.linear_system import LinearModel, LinearSystem
 from flightid.models.load import library_names, load_model
 from flightid.models.narx import NarxEquation, NarxModel, NarxPrediction
 from flightid.models.narx_terms import Lag, Term
@@ -29,6 +30,8 @@ __all__ = [
     "InnovationsModel",
     "InnovationsPrediction",
     "Lag",
+    "LinearModel",
+    "LinearSystem",
     "Model",
     "ModelBuilder",
     "NarxEquation",

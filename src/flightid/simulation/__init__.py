@@ -12,7 +12,7 @@ from flightid.simulation.closed_loop import (
 from flightid.simulation.flight import Flight, fly
 from flightid.simulation.quadrotor import QuadrotorParameters, Sensors, Turbulence
 from flightid.simulation.scenario import fly_scenario
-from flightid.simulation.simulate import LinearModel, LinearSystem, simulate
+from flightid.simulation.simulate import simulate
 from flightid.simulation.truth import RateTruth, rate_truth
 from flightid.simulation.twin_rotor import TwinRotor
 from flightid.simulation.twin_rotor_parameters import Draught, Encoders, TwinRotorParameters
@@ -25,8 +25,6 @@ __all__ = [
     "Encoders",
     "Flight",
     "FlightConditions",
-    "LinearModel",
-    "LinearSystem",
     "PilotDoublet",
     "QuadrotorParameters",
     "RateGains",

@@ -8,8 +8,8 @@ import numpy as np
 
 from flightid import _native
 from flightid.errors import OptionError, UnknownNameError
+from flightid.models.realisation import Matrices
 from flightid.record import Record, Step
-from flightid.simulation.simulate import Matrices
 
 
 def actuator_positions(record: Record, actuators: Mapping[str, float]) -> Record:

@@ -11,9 +11,11 @@ import numpy as np
 from flightid import _native
 from flightid.errors import OptionError, UnitError, UnknownNameError
 from flightid.excitation.excitation import Excitation
+from flightid.models.hold_equivalent import Hold
+from flightid.models.linear_system import LinearModel
+from flightid.models.realisation import Matrices
 from flightid.record import Record, Step
 from flightid.simulation.actuators import check_actuators, contiguous, with_actuators
-from flightid.simulation.simulate import Hold, LinearModel, Matrices
 from flightid.units import canonical
 
 STANDING_BY = "sweep_"
@@ -195,7 +197,7 @@ def fly_closed_loop(
     Example
     -------
     >>> from flightid.excitation import sweep
-    >>> from flightid.simulation import LinearSystem
+    >>> from flightid.models.linear_system import LinearSystem
     >>> roll = LinearSystem([[0.5]], [[10.0]], [[1.0]], [[0.0]], ("lat",), ("p",))
     >>> chirp = sweep(band_rad_s=(1.0, 20.0), amplitude=0.1, duration_s=20.0, sample_rate_hz=50.0,
     ...               name="lat")

@@ -2,108 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol, runtime_checkable
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid import _native
 from flightid.conventions import Role
-from flightid.errors import ModelError, OptionError, ShapeError
-from flightid.models import StateSpaceModel
+from flightid.errors import DataError, ModelError, OptionError, ShapeError
+from flightid.models import LinearModel, LinearSystem, StateSpaceModel
+from flightid.models.hold_equivalent import Hold
+from flightid.models.linear_recursion import run_recursion
 from flightid.record import Channel, Record, Step
 from flightid.simulation.nonlinear import run_equations, start_of
-
-Hold = Literal["zero", "first"]
-Matrices = tuple[
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-]
-
-
-@runtime_checkable
-class LinearModel(Protocol):
-    """What can be simulated: named inputs and outputs, and a state space with input delays."""
-
-    @property
-    def inputs(self) -> Sequence[str]:
-        """Names of the inputs."""
-        ...
-
-    @property
-    def outputs(self) -> Sequence[str]:
-        """Names of the outputs."""
-        ...
-
-    def state_space(self) -> Matrices:
-        """A (n, n), B (n, m), C (p, n), D (p, m) and the delay of each input (m,), s."""
-        ...
-
-
-@dataclass(frozen=True)
-class LinearSystem:
-    """A linear system given by its matrices: dx/dt = A x + B u(t − τ), y = C x + D u(t − τ).
-
-    Attributes
-    ----------
-    a, b, c, d : ndarray, shapes (n, n), (n, m), (p, n), (p, m)
-        Matrices of the state space, in units that belong to the channels.
-    inputs, outputs : tuple of str
-        Channel names, m and p of them.
-    delays_s : ndarray, shape (m,)
-        Delay of each input, s; zero when left out.
-
-    Example
-    -------
-    >>> roll = LinearSystem([[-5.0]], [[200.0]], [[1.0]], [[0.0]], ("tau_phi",), ("p",), [0.01])
-    >>> roll.state_space()[4]
-    array([0.01])
-    """
-
-    a: ArrayLike
-    b: ArrayLike
-    c: ArrayLike
-    d: ArrayLike
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
-    delays_s: ArrayLike = field(default=())
-
-    def __repr__(self) -> str:
-        """Size on one line."""
-        n = np.asarray(self.a).shape[0]
-        names = f"inputs [{', '.join(self.inputs)}], outputs [{', '.join(self.outputs)}]"
-        return f"LinearSystem({n} states, {names})"
-
-    def state_space(self) -> Matrices:
-        """Matrices and delays as arrays.
-
-        Raises
-        ------
-        ShapeError
-            A matrix does not fit the names or the other matrices.
-        """
-        m, p = len(self.inputs), len(self.outputs)
-        n = np.asarray(self.a).shape[0]
-        delays = np.asarray(self.delays_s, dtype=np.float64)
-        return (
-            _shaped("A", self.a, (n, n)),
-            _shaped("B", self.b, (n, m)),
-            _shaped("C", self.c, (p, n)),
-            _shaped("D", self.d, (p, m)),
-            _shaped("delays_s", delays if delays.size else np.zeros(m), (m,)),
-        )
-
-
-def _shaped(name: str, values: ArrayLike, needed: tuple[int, ...]) -> NDArray[np.float64]:
-    array = np.ascontiguousarray(values, dtype=np.float64)
-    if array.shape != needed and not (array.size == 0 and 0 in needed):
-        raise ShapeError(f"{name} does not fit the system", found=array.shape, needed=needed)
-    return array.reshape(needed)
 
 
 def simulate(
@@ -119,7 +31,8 @@ def simulate(
 ) -> Record:
     """Drive a model with the inputs of a record.
 
-    Linear models are discretised exactly for the chosen hold, fractional delays included. A
+    Linear models are discretised exactly for the chosen hold, fractional delays included; a sampled
+    `LinearSystem` runs as it is, from rest. A
     nonlinear `StateSpaceModel` advances by Runge-Kutta steps of fourth order and takes its inputs
     and states whole, not as departures from a trim. Before the first sample each input is taken
     to have had the value of that sample.
@@ -210,13 +123,57 @@ def simulate(
             raise OptionError(
                 "a linear model has no substeps: its discretisation is exact", found=substeps
             )
-        a, b, c, d, delays_s = (np.ascontiguousarray(m) for m in model.state_space())
-        start = _linear_start(model, initial_state, a.shape[0])
-        _, computed = _native.simulate_linear(
-            a, b, c, d, delays_s, driven, start, data.sample_time_s, first
-        )
+        computed = _run_linear(model, driven, data.sample_time_s, initial_state, first)
     computed += _biases(output_bias, outputs)
     return _as_record(data, names, dict(zip(outputs, computed, strict=True)), units, hold)
+
+
+def _run_linear(
+    model: LinearModel,
+    driven: NDArray[np.float64],
+    sample_time_s: float,
+    initial_state: ArrayLike | Mapping[str, float] | None,
+    first: bool,
+) -> NDArray[np.float64]:
+    """Outputs of a linear model, continuous or sampled, shape (p, n_samples)."""
+    if isinstance(model, LinearSystem) and model.sample_time_s is not None:
+        return _run_sampled(model, driven, sample_time_s, initial_state)
+    a, b, c, d, delays_s = (np.ascontiguousarray(m) for m in model.state_space())
+    start = _linear_start(model, initial_state, a.shape[0])
+    _, computed = _native.simulate_linear(a, b, c, d, delays_s, driven, start, sample_time_s, first)
+    return computed
+
+
+def _run_sampled(
+    model: LinearSystem,
+    driven: NDArray[np.float64],
+    sample_time_s: float,
+    initial_state: ArrayLike | Mapping[str, float] | None,
+) -> NDArray[np.float64]:
+    step = model.sample_time_s or 0.0
+    if abs(step - sample_time_s) > 1e-9 * step:
+        raise DataError(
+            "the record has another sample time than the sampled system",
+            found=f"{sample_time_s:g} s",
+            needed=f"{step:g} s",
+            action="resample the record, or give the continuous system",
+        )
+    whole = model.with_pade()
+    a, b, c, d, _ = whole.state_space()
+    start = np.zeros(whole.order)
+    given = _linear_start(model, initial_state, model.order)
+    if given.shape != (model.order,):
+        raise ShapeError("the initial state does not fit", found=given.shape, needed=(model.order,))
+    start[: model.order] = given
+    with np.errstate(over="ignore", invalid="ignore"):
+        outputs = c @ run_recursion(a, b @ driven, start) + d @ driven
+    if not np.all(np.isfinite(outputs)):
+        raise DataError(
+            "the run diverges to infinity",
+            found=f"poles up to {np.abs(model.poles()).max():.4g} in size",
+            needed="a stable system, or a shorter record",
+        )
+    return np.asarray(outputs, dtype=np.float64)
 
 
 def _linear_start(

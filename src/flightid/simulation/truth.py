@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid import _native
 from flightid.errors import OptionError
+from flightid.models.linear_system import LinearSystem
 from flightid.simulation.autopilot import Autopilot
 from flightid.simulation.quadrotor import QuadrotorParameters
-from flightid.simulation.simulate import LinearSystem
 
 AxisName = Literal["roll", "pitch", "yaw"]
 Gyro = Literal["filtered", "mean", "raw"]

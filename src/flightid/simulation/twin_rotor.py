@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid import _native
 from flightid.errors import OptionError, ShapeError
+from flightid.models.linear_system import LinearSystem
 from flightid.record import Record, Step
-from flightid.simulation.simulate import LinearSystem
 from flightid.simulation.twin_rotor_parameters import (
     Draught,
     Encoders,

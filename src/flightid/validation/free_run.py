@@ -20,7 +20,7 @@ from flightid.identification.model_outputs import (
     free_outputs,
     split_modes,
 )
-from flightid.simulation.simulate import Matrices
+from flightid.models.realisation import Matrices
 
 Array = NDArray[np.float64]
 

@@ -116,7 +116,7 @@ class Mismatch:
     -------
     >>> import numpy as np
     >>> from flightid.responses import FrequencyResponse
-    >>> from flightid.simulation.simulate import LinearSystem
+    >>> from flightid.models.linear_system import LinearSystem
     >>> lag = LinearSystem([[-2.0]], [[2.0]], [[1.0]], [[0.0]], ("u",), ("y",))
     >>> omega = np.geomspace(0.5, 10.0, 20)
     >>> flown = FrequencyResponse.from_values(omega, [[1.1 * 2 / (2 + 1j * omega)]],
@@ -228,7 +228,7 @@ def mismatch(
     Example
     -------
     >>> import numpy as np
-    >>> from flightid.simulation.simulate import LinearSystem
+    >>> from flightid.models.linear_system import LinearSystem
     >>> lag = LinearSystem([[-2.0]], [[2.0]], [[1.0]], [[0.0]], ("u",), ("y",))
     >>> omega = np.geomspace(0.5, 10.0, 20)
     >>> late = FrequencyResponse.from_values(

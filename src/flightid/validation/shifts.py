@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
-from flightid.simulation.simulate import Matrices
+from flightid.models.realisation import Matrices
 from flightid.validation.free_run import Answer, FreeRun
 
 RANK_TOLERANCE = 1e-10

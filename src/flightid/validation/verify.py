@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from flightid.errors import ModelError, OptionError, UnitError, UnknownNameError
 from flightid.models import StateSpaceModel
+from flightid.models.hold_equivalent import Hold
+from flightid.models.linear_system import LinearModel
 from flightid.record import Channel, Record, Step
 from flightid.responses import FrequencyResponse
-from flightid.simulation.simulate import Hold, LinearModel
 from flightid.units import canonical
 from flightid.validation.comparison import Comparison, compared
 from flightid.validation.judgement import guide_weights, judge
@@ -128,7 +129,8 @@ def verify(
     Example
     -------
     >>> import numpy as np
-    >>> from flightid.simulation.simulate import LinearSystem, simulate
+    >>> from flightid.models.linear_system import LinearSystem
+    >>> from flightid.simulation.simulate import simulate
     >>> time_s = np.arange(500) * 0.02
     >>> lag = LinearSystem([[-2.0]], [[2.0]], [[1.0]], [[0.0]], ("u",), ("y",))
     >>> truth = simulate(lag, Record.from_arrays(time_s, inputs={"u": np.sign(np.sin(time_s))}))
