@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
+from flightid.models.delay_states import delays_as_states, shift_registers
 from flightid.models.hold_equivalent import Hold, hold_equivalent
 from flightid.models.innovations import InnovationsModel
-from flightid.models.delay_states import delays_as_states, shift_registers
 from flightid.models.polynomial import PolynomialModel
 from flightid.models.realisation import Matrices
 
