@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 from flights import truth
 
+import flightid as fid
 from flightid.files import write_atomically
 from flightid.plot import look
 from flightid.plot.fit import estimates_of, fit_figure, parameter_intervals
@@ -17,13 +17,12 @@ from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Document, Figure, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.html import to_html
+from flightid.report.modes import modes_blocks
 from flightid.report.reduction import reduction_blocks
 from flightid.report.verification import verification_blocks
 
 if TYPE_CHECKING:
     from identify import Results
-
-    import flightid as fid
 
 SHOWN = ("q/lon", "p/lat", "r/ped", "ax/lon", "q/lat", "p/ped")
 """On-axis angular responses, and some that are harder."""
@@ -110,9 +109,7 @@ def _fit(fit: fid.Fit) -> tuple[Block, ...]:
         for name in SHOWN
         if name in fitted
     ]
-    modes = np.array2string(fit.model.eigenvalues(), precision=3)
-    words = f"Eigenvalues of the identified model, rad/s: {modes}"
     picture = figure_block(
         parameter_intervals(drawn), "Estimates with 95 % intervals, in percent of the truth."
     )
-    return (*result_blocks(fit), Paragraph(words), picture, *pictures)
+    return (*result_blocks(fit), *modes_blocks(fid.modes(fit)), picture, *pictures)

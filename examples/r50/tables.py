@@ -11,7 +11,7 @@ from flights import LIBRARY
 from identification import Identified
 
 import flightid as fid
-from flightid.dynamics import eigenvalues_of
+from flightid.dynamics import Quantity
 from flightid.table import Cell, Column, Table
 
 PUBLISHED = tomllib.loads(Path(__file__).with_name("published.toml").read_text(encoding="utf-8"))
@@ -95,20 +95,25 @@ def covered(condition: str, fit: fid.Fit) -> tuple[int, int]:
 
 def eigenvalues(condition: str, fit: fid.Fit) -> Table:
     """Tables 6 and 7: modes of the identified model beside the published ones."""
-    left = list(eigenvalues_of(fit))
+    left = list(fid.modes(fit))
     rows: list[tuple[Cell, ...]] = []
     for real, imaginary, description in PUBLISHED[condition]["eigenvalues"]:
-        mode = complex(real, imaginary)
-        nearest = min(left, key=lambda each: abs(each.value - mode))
+        place = complex(real, imaginary)
+        nearest = min(left, key=lambda mode: abs(mode.root - place))
         left.remove(nearest)
-        half = nearest.half_widths or (None, None, None, None)
-        rows.append(
-            (
-                *(real, imaginary, nearest.value.real, half[0], nearest.value.imag, half[1]),
-                *(nearest.natural_rad_s, nearest.damping, description),
+        numbers = [
+            cell
+            for each in (
+                nearest.real,
+                nearest.imaginary,
+                nearest.natural_frequency,
+                nearest.damping_ratio,
             )
-        )
+            for cell in (each.value, half(each))
+        ]
+        rows.append((description, real, imaginary, *numbers, nearest.name))
     columns = (
+        Column("published mode"),
         Column("published real", "rad/s"),
         Column("imaginary", "rad/s"),
         Column("real", "rad/s"),
@@ -116,13 +121,21 @@ def eigenvalues(condition: str, fit: fid.Fit) -> Table:
         Column("imaginary", "rad/s"),
         Column("±", "rad/s", 2),
         Column("natural frequency", "rad/s"),
+        Column("±", "rad/s", 2),
         Column("damping ratio", digits=3),
-        Column("mode"),
+        Column("±", digits=2),
+        Column("what takes part here"),
     )
     number = 6 if condition == "hover" else 7
-    others = ", ".join(f"{each.value.real:.2g}" for each in left) or "none"
+    others = ", ".join(f"{mode.name} {mode.root.real:.2g}" for mode in left) or "none"
     notes = ("± is half a 95 % interval, from the parameters' covariance.", f"Others: {others}.")
     return Table(f"Table {number}, {condition}: eigenvalues", columns, tuple(rows), notes)
+
+
+def half(quantity: Quantity) -> float | None:
+    """Half of a 95 % interval."""
+    interval = quantity.interval95
+    return None if interval is None else (interval[1] - interval[0]) / 2.0
 
 
 def of_both(both: Mapping[str, Identified]) -> list[Table]:

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from flightid import conditioning, excitation, validation
     from flightid.dynamics.continuous import to_continuous, to_discrete
     from flightid.dynamics.interpretation import Interpretation, interpret
+    from flightid.dynamics.mode_result import Modes
+    from flightid.dynamics.modes import modes
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.identification import (
@@ -101,6 +103,8 @@ _HOMES = {
     "LogTable": "flightid.logs",
     "Output": "flightid.models",
     "ModelBuilder": "flightid.models",
+    "Modes": "flightid.dynamics.mode_result",
+    "modes": "flightid.dynamics.modes",
     "NarxFit": "flightid.identification",
     "NarxModel": "flightid.models",
     "PairResponse": "flightid.responses",
@@ -161,6 +165,7 @@ __all__ = [
     "Log",
     "LogTable",
     "ModelBuilder",
+    "Modes",
     "NarxFit",
     "NarxModel",
     "OrderScan",
@@ -193,6 +198,7 @@ __all__ = [
     "interpret",
     "library_names",
     "load_model",
+    "modes",
     "read_log",
     "read_records",
     "reduce",

@@ -215,7 +215,7 @@ def interpret(
             "only discrete black-box models are interpreted",
             found=type(discrete).__name__,
             needed="PolynomialModel, InnovationsModel or a fit of one",
-            action="for a state-space model of known physics see dynamics.eigenvalues_of",
+            action="for a state-space model of known physics see flightid.modes",
         )
     if isinstance(model, PolynomialFit | InnovationsFit):
         roots = model.roots

@@ -238,9 +238,9 @@ class _Weights:
 
     def leading(self) -> list[StateWord]:
         order = np.argsort(-self.shares)
-        return [
-            self.words[k] for n, k in enumerate(order) if n == 0 or self.shares[k] >= PARTNER
-        ][:2]
+        return [self.words[k] for n, k in enumerate(order) if n == 0 or self.shares[k] >= PARTNER][
+            :2
+        ]
 
     def turning(self) -> str:
         """Axis of the largest angular rate in the shape."""

@@ -21,8 +21,10 @@ CLOSE = 1e-6
 """Relative distance of two eigenvalues below which neither has a derivative."""
 DEFECTIVE = 1e-7
 """Cosine between left and right vector below which the eigenvalue is not simple."""
-SECOND_ORDER = 0.5
-"""Second-order shift in standard errors above which a first-order interval means nothing."""
+DEPARTURE = 0.5
+"""Departure from first order, in standard errors, above which its interval means nothing."""
+STILL = 1e-11
+"""Standard error relative to the largest eigenvalue that is rounding."""
 UNINVOLVED = 1e-9
 """Participation below which a state does not take part."""
 
@@ -138,11 +140,12 @@ def eigenpairs(a: Array, directions: Array | None = None) -> Iterator[Eigenpair]
     if not len(a):
         return
     # In balanced coordinates the units of the states do not decide what is small.
-    balanced, (scale, _) = matrix_balance(a, permute=False, separate=True)
+    outcome: Any = matrix_balance(a, permute=False, separate=True)
+    balanced, scale = outcome[0], outcome[1][0]
     spread = None if directions is None else directions * (scale / scale[:, None])
     solved: Any = eig(balanced, left=True, right=True)
     values, left, right = solved
-    shifts = None if spread is None else _second_order(balanced, values, left, right, spread)
+    shifts = None if spread is None else _departures(balanced, values, left, right, spread)
     for place in np.lexsort((values.imag, -values.real)):
         value = _exact(values[place], float(np.max(np.abs(values))))
         if value.imag < 0.0:
@@ -170,7 +173,7 @@ def _exact(value: complex, largest: float) -> complex:
 def _distance(values: Complex, place: int) -> float:
     """Distance to the nearest other eigenvalue, relative to the size or to one."""
     apart = np.delete(np.abs(values - values[place]), place)
-    return float(np.min(apart, initial=np.inf)) / max(abs(values[place]), 1e-3)
+    return float(np.min(apart, initial=np.inf) / max(abs(values[place]), 1e-3))
 
 
 def _nearest(values: Complex, place: int) -> complex:
@@ -194,7 +197,7 @@ def _moved(
     scale: Array,
     values: Complex,
     place: int,
-    shifts: Complex | None,
+    shifts: Array | None,
 ) -> Eigenpair:
     w, v = vectors
     moves, vector_moves = _derivatives(a, complex(values[place]), v, directions)
@@ -204,15 +207,17 @@ def _moved(
     change = left_moves * v + w * vector_moves
     factor_moves = (change - factors * np.sum(change, axis=1, keepdims=True)) / across
     spread = float(np.sqrt(np.sum(np.abs(moves) ** 2)))
-    shift = 0.0 if shifts is None else abs(shifts[place])
-    if shift > SECOND_ORDER * spread and spread > 0.0:
+    if spread <= STILL * float(np.max(np.abs(values))):
+        return Eigenpair(pair.value, pair.vector, pair.factors, 0.0 * moves, None, None)
+    shift = 0.0 if shifts is None else float(shifts[place])
+    if shift > DEPARTURE * spread:
         other = _nearest(values, place)
         return Eigenpair(
             pair.value,
             pair.vector,
             pair.factors,
-            reason=f"first order does not hold: the second-order shift is {shift / spread:.2g} "
-            f"standard errors (nearest other eigenvalue {other:.4g})",
+            reason=f"first order does not hold: the eigenvalue departs from it by "
+            f"{shift / spread:.2g} standard errors (nearest other eigenvalue {other:.4g})",
         )
     return Eigenpair(
         pair.value, pair.vector, pair.factors, moves, scale * vector_moves, factor_moves
@@ -234,22 +239,24 @@ def _derivatives(
     return np.asarray(solved[n]), np.asarray(solved[:n].T)
 
 
-def _second_order(
+def _departures(
     a: Array, values: Complex, left: Complex, right: Complex, directions: Array
-) -> Complex:
-    """Mean shift of each eigenvalue to second order: half the sum of its second differences.
+) -> Array:
+    """How far each eigenvalue departs from first order, one standard error up and down.
 
-    Taken from the eigenvalues themselves, so that it tells where they meet and turn.
+    Taken from the eigenvalues themselves, so that it tells where they meet and turn: the mean shift
+    to second order, or the root of the sum of squares where departures up and down cancel.
     """
-    n, found = len(a), np.zeros(len(values), dtype=np.complex128)
-    ahead, behind = (np.linalg.eigvals(a + sign * directions) for sign in (1.0, -1.0))
     across = np.einsum("si,si->i", left.conj(), right)
     safe = np.where(np.abs(across) > DEFECTIVE, across, 1.0)
     slopes = np.einsum("si,kst,ti->ki", left.conj(), directions, right) / safe
-    for place in range(n):
-        for sign, moved in ((1.0, ahead), (-1.0, behind)):
-            expected = values[place] + sign * slopes[:, place]
-            nearest = np.argmin(np.abs(moved - expected[:, None]), axis=1)
-            departed = np.take_along_axis(moved, nearest[:, None], axis=1)[:, 0] - expected
-            found[place] += 0.5 * np.sum(departed)
-    return found
+    found = []
+    for sign in (1.0, -1.0):
+        moved = np.linalg.eigvals(a + sign * directions)
+        expected = values + sign * slopes
+        apart = moved[:, None, :] - expected[:, :, None]
+        nearest = np.argmin(np.abs(apart), axis=2)
+        found.append(np.take_along_axis(apart, nearest[:, :, None], axis=2)[:, :, 0])
+    mean = np.abs(np.sum(found[0] + found[1], axis=0)) / 2.0
+    scatter = np.sqrt(np.sum(np.abs(found[0]) ** 2 + np.abs(found[1]) ** 2, axis=0) / 2.0)
+    return np.asarray(np.maximum(mean, scatter))

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from flightid.dynamics.modes import modes
+from flightid.models import StateSpaceModel
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Figure, Lights, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.fitted_record import record_figures
+from flightid.report.modes import modes_blocks
 from flightid.report.reduction import reduction_blocks
 from flightid.report.verification import verification_blocks
 from flightid.table import Cell, Column, Table
@@ -52,6 +55,8 @@ def model_section(item: Identified, truth: Truth | None) -> Section:
         Section(f"Prediction of “{name}”", verification_blocks(verification))
         for name, verification in item.verifications.items()
     ]
+    if isinstance(item.fit.model, StateSpaceModel):
+        parts.insert(0, Section("Modes", modes_blocks(modes(item.fit))))
     if item.reduction is not None:
         parts.insert(0, Section("Reduction of the structure", reduction_blocks(item.reduction)))
     return Section(item.settings.name, tuple(blocks), tuple(parts))

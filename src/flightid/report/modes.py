@@ -1,0 +1,39 @@
+"""What a report shows of modes: verdicts, their table, the map, and who takes part."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from flightid.plot.modes import pole_map
+from flightid.report.blocks import result_blocks
+from flightid.report.content import Block, TableBlock
+from flightid.report.figures import figure_block
+
+if TYPE_CHECKING:
+    from flightid.dynamics import Modes
+
+CAPTION = (
+    "Eigenvalues with their 95 % regions; rays of equal damping ratio ζ, circles of equal natural "
+    "frequency."
+)
+
+
+def modes_blocks(found: Modes) -> tuple[Block, ...]:
+    """Blocks of a section about modes.
+
+    Parameters
+    ----------
+    found : Modes
+        Result of `flightid.modes`.
+
+    Returns
+    -------
+    tuple of Block
+    """
+    blocks: list[Block] = list(result_blocks(found))
+    if any(mode.eigenvalue is not None for mode in found):
+        blocks.append(figure_block(pole_map(found), CAPTION))
+    parts = found.participation_table()
+    if parts.rows:
+        blocks.append(TableBlock(parts, folded=True))
+    return tuple(blocks)

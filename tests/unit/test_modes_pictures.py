@@ -1,0 +1,64 @@
+"""The map of eigenvalues and what a report shows of modes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import flightid as fid
+from flightid.plot.modes import CHI_SQUARE_95, pole_map
+from flightid.report.content import Figure, Lights, TableBlock
+from flightid.report.modes import modes_blocks
+from tests.closeness import assert_close
+
+
+def _fit() -> fid.Fit:
+    truth = fid.load_model("fixed_wing_lateral")
+    omega = np.geomspace(0.1, 25.0, 40)
+    data = fid.FrequencyResponse.from_values(
+        omega,
+        truth.frequency_response(omega),
+        inputs=truth.inputs,
+        outputs=truth.outputs,
+        units=truth.units,
+        random_error=np.full((len(truth.outputs), 2, 40), 0.05),
+    )
+    return fid.identify(truth, data)
+
+
+def test_regions_hold_95_percent_and_slow_modes_are_drawn_again() -> None:
+    found = fid.modes(_fit())
+    made = pole_map(found)
+    markers = [t for t in made.data if t.mode == "markers"]
+    assert len(markers) == 2
+    assert len(markers[0].x) == 3
+    assert len(markers[1].x) == 1
+    assert_close(markers[1].x[0], found.modes[0].root.real, rtol=1e-12, why="the spiral again")
+    (ellipse,) = [t for t in made.data if t.fill == "toself"]
+    roll = found.mode("Dutch roll")
+    away = np.array([ellipse.x, ellipse.y]) - np.array([[roll.root.real], [roll.root.imag]])
+    assert roll.covariance is not None
+    squares = np.einsum("an,ab,bn->n", away, np.linalg.inv(roll.covariance), away)
+    assert_close(squares, CHI_SQUARE_95, rtol=1e-9, why="one level of the density")
+    bars = [t for t in made.data if t.mode == "lines" and t.line.width == 5]
+    assert_close(
+        bars[0].x, found.modes[0].real.interval95, rtol=1e-12, why="a real eigenvalue has a bar"
+    )
+
+
+def test_several_models_share_one_map() -> None:
+    both = {name: fid.modes(fid.load_model(name)) for name in ("r50_hover", "r50_cruise")}
+    made = pole_map(both)
+    assert {t.name for t in made.data if t.mode == "markers"} == set(both)
+    symbols = {t.marker.symbol for t in made.data if t.mode == "markers"}
+    assert len(symbols) == 2
+
+
+def test_report_blocks() -> None:
+    lights, table, figure, parts = modes_blocks(fid.modes(fid.load_model("ah64_hover")))
+    assert isinstance(lights, Lights)
+    assert isinstance(table, TableBlock)
+    assert isinstance(figure, Figure)
+    assert isinstance(parts, TableBlock)
+    assert parts.folded
+    box = fid.PolynomialModel("y", ("u",), 0.1, a=[1.0, 0.5], b=[[1.0]])
+    assert len(modes_blocks(fid.modes(box))) == 2
