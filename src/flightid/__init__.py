@@ -14,9 +14,11 @@ from flightid.version import VERSION as __version__
 if TYPE_CHECKING:
     from flightid import conditioning, excitation, validation
     from flightid.dynamics.continuous import to_continuous, to_discrete
+    from flightid.dynamics.handling_qualities import attitude_bandwidth
     from flightid.dynamics.interpretation import Interpretation, interpret
     from flightid.dynamics.mode_result import Modes
     from flightid.dynamics.modes import modes
+    from flightid.dynamics.pilot_cutoff import pilot_cutoff
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.identification import (
@@ -94,6 +96,8 @@ _HOMES = {
     "InnovationsModel": "flightid.models",
     "Inspection": "flightid.inspection",
     "Interpretation": "flightid.dynamics.interpretation",
+    "attitude_bandwidth": "flightid.dynamics.handling_qualities",
+    "pilot_cutoff": "flightid.dynamics.pilot_cutoff",
     "interpret": "flightid.dynamics.interpretation",
     "to_continuous": "flightid.dynamics.continuous",
     "to_discrete": "flightid.dynamics.continuous",
@@ -187,6 +191,7 @@ __all__ = [
     "Verification",
     "__version__",
     "advise",
+    "attitude_bandwidth",
     "coherent_pairs",
     "compare_structures",
     "conditioning",
@@ -199,6 +204,7 @@ __all__ = [
     "library_names",
     "load_model",
     "modes",
+    "pilot_cutoff",
     "read_log",
     "read_records",
     "reduce",

@@ -9,7 +9,8 @@ import pytest
 from scipy.optimize import brentq
 
 import flightid as fid
-from flightid.dynamics import AttitudeBandwidth, attitude_bandwidth
+from flightid.dynamics import attitude_bandwidth
+from flightid.dynamics.rating_charts_reading import rating_chart
 from flightid.errors import DataError, OptionError, UnknownNameError
 from tests.closeness import assert_close
 
@@ -25,7 +26,7 @@ def model(tau: float, lag: float, gain: float = 2.0) -> fid.TransferFunctionMode
     parameters = [fid.Parameter("K", gain, "rad/s"), fid.Parameter("tau", tau, "s")]
     parameters.append(fid.Parameter("T", lag, "s"))
     response = fid.TransferFunction("phi", "lat", "K", denominator=("s", "T*s + 1"), delay="tau")
-    return fid.TransferFunctionModel((response,), fid.Parameters(parameters))
+    return fid.TransferFunctionModel((response,), fid.Parameters(parameters), {"phi": "rad"})
 
 
 def measured(tau: float, lag: float, n: int, high: float = 60.0) -> fid.FrequencyResponse:
@@ -77,6 +78,12 @@ def test_what_the_band_does_not_show_is_said() -> None:
     short = attitude_bandwidth(measured(0.1, 0.3, 200, high=8.0), "phi", "lat")
     assert short.phase_delay_s is None
     assert [finding.code for finding in short.findings] == ["phase-delay"]
+    assert short.phase_slope_delay_s is not None
+    omega = np.linspace(short.omega_180_rad_s, 8.0, 2001)
+    slope = np.polyfit(omega, -np.degrees(omega * 0.1 + np.arctan(omega * 0.3)), 1)[0]
+    assert_close(
+        short.phase_slope_delay_s, -slope / 114.6, rtol=2e-3, why="as far as the band goes"
+    )
     late = attitude_bandwidth(model(0.1, 0.3), "phi", "lat", band_rad_s=(2.0, 30.0))
     assert late.gain_bandwidth_rad_s is not None
     rising = fid.FrequencyResponse.from_values(
@@ -93,9 +100,11 @@ def test_what_the_band_does_not_show_is_said() -> None:
     json.dumps(flat.to_dict(), allow_nan=False)
     assert "–" in str(flat.summary())
     assert "<table" in flat._repr_html_()
-    assert repr(AttitudeBandwidth(5.0, 2.0, 1.5, None)) == (
-        "AttitudeBandwidth(1.5 rad/s, phase delay unknown)"
-    )
+    nearer = attitude_bandwidth(measured(0.1, 0.3, 200, high=6.0), "phi", "lat")
+    assert repr(nearer).startswith("AttitudeBandwidth(phi/lat, 2.142 rad/s, phase delay unknown")
+    assert "phase-slope" in [finding.code for finding in nearer.findings]
+    chart = rating_chart("attitude_bandwidth", axis="yaw", task="other", speed="hover")
+    assert nearer.rate(chart) is None
 
 
 def test_refusals() -> None:
@@ -109,3 +118,164 @@ def test_refusals() -> None:
         attitude_bandwidth(model(0.1, 0.3), "phi", "lat", band_rad_s=(3.0, 1.0))
     with pytest.raises(UnknownNameError, match="no such channel"):
         attitude_bandwidth(model(0.1, 0.3), "psi", "lat")
+    with pytest.raises(OptionError, match="response_type is not known"):
+        attitude_bandwidth(model(0.1, 0.3), "phi", "lat", response_type="acceleration")
+    with pytest.raises(OptionError, match="output_is is not known"):
+        attitude_bandwidth(model(0.1, 0.3), "phi", "lat", output_is="p")
+    with pytest.raises(OptionError, match="sign has no meaning"):
+        attitude_bandwidth(model(0.1, 0.3), "phi", "lat", sign=0)
+
+
+def test_a_rate_is_integrated_and_a_sign_turned() -> None:
+    response = measured(0.1, 0.3, 400)
+    omega = response.omega_rad_s
+    rate = fid.FrequencyResponse.from_values(
+        omega, -1j * omega * response.response[0, 0], inputs=["lat"], outputs=["p"]
+    )
+    found = attitude_bandwidth(rate, "p", "lat", output_is="rate", sign=-1)
+    plain = attitude_bandwidth(response, "phi", "lat")
+    assert_close(found.spread.values, plain.spread.values, rtol=1e-9, why="the same attitude")
+    first = fid.load_model("rate_first_order")
+    as_rate = attitude_bandwidth(first, "p", "tau_phi", output_is="rate")
+    attitude = fid.load_model("attitude_first_order").with_values(
+        {name: first.parameters[name].value for name in ("Lp", "Ltphi", "tau")}
+    )
+    as_angle = attitude_bandwidth(attitude, "phi", "tau_phi")
+    assert_close(as_rate.spread.values, as_angle.spread.values, rtol=1e-9, why="p = s phi")
+
+
+def test_what_counts_depends_on_the_response_type() -> None:
+    parameters = [fid.Parameter("T", 0.5, "s"), fid.Parameter("tau", 0.2, "s")]
+    parameters.append(fid.Parameter("K", 1.0, "1/s"))
+    flat = fid.TransferFunctionModel(
+        (fid.TransferFunction("phi", "lat", "K", ("T*s + 1",), ("s",), "tau"),),
+        fid.Parameters(parameters),
+    )
+    rate = attitude_bandwidth(flat, "phi", "lat", response_type="rate")
+    attitude = attitude_bandwidth(flat, "phi", "lat", response_type="attitude")
+    gain = rate.gain_bandwidth_rad_s
+    assert gain is not None
+    level = np.hypot(1.0 / rate.omega_180_rad_s, 0.5) * 10.0**0.3
+    assert_close(gain, 1.0 / np.sqrt(level**2 - 0.25), rtol=1e-9, why="|H|² = 1/ω² + 1/4")
+    assert gain < rate.phase_bandwidth_rad_s
+    assert rate.bandwidth_rad_s == gain
+    assert rate.gain_limited
+    assert "gain-limited" in [finding.code for finding in rate.findings]
+    assert attitude.bandwidth_rad_s == attitude.phase_bandwidth_rad_s
+    assert "gain-limited" not in [finding.code for finding in attitude.findings]
+
+
+def test_slope_of_the_phase_is_the_least_squares_line() -> None:
+    tau, lag = 0.1, 0.3
+    found = attitude_bandwidth(model(tau, lag), "phi", "lat")
+    low = found.omega_180_rad_s
+    omega = np.linspace(low, 2.0 * low, 20001)
+    phase = -90.0 - np.degrees(omega * tau + np.arctan(omega * lag))
+    slope = np.polyfit(omega, phase, 1)[0]
+    assert found.phase_slope_delay_s is not None
+    assert_close(found.phase_slope_delay_s, -slope / 114.6, rtol=2e-4, why="200 points of it")
+
+
+def test_phase_that_is_no_line_is_said_and_its_slope_counts() -> None:
+    omega = np.geomspace(0.5, 30.0, 300)
+    bend = np.where(omega > 8.0, -90.0 * np.minimum(1.0, (omega - 8.0) / 1.0), 0.0)
+    phase = np.radians(-90.0 - 90.0 * omega / 5.0 + bend)
+    response = fid.FrequencyResponse.from_values(
+        omega, np.exp(1j * phase) / omega, inputs=["lat"], outputs=["phi"]
+    )
+    found = attitude_bandwidth(response, "phi", "lat")
+    assert found.nonlinear
+    assert found.rated_delay_s == found.phase_slope_delay_s != found.phase_delay_s
+    assert "phase-nonlinear" in [finding.code for finding in found.findings]
+
+
+def test_low_coherence_and_several_crossings_are_said() -> None:
+    response = measured(0.1, 0.3, 200)
+    omega = response.omega_rad_s
+    wobble = np.radians(25.0 * np.sin(60.0 * np.log(omega)))
+    noisy = fid.FrequencyResponse.from_values(
+        omega,
+        response.response[0, 0] * np.exp(1j * wobble),
+        inputs=["lat"],
+        outputs=["phi"],
+        coherence=np.where((omega > 4.0) & (omega < 7.0), 0.4, 0.9),
+    )
+    codes = [finding.code for finding in attitude_bandwidth(noisy, "phi", "lat").findings]
+    assert {"low-coherence", "several-crossings"} <= set(codes)
+
+
+def test_black_box_models_and_systems_are_read_to_nyquist() -> None:
+    continuous = fid.load_model("attitude_first_order")
+    sampled = fid.LinearSystem.of(continuous).sampled(0.002)
+    exact = attitude_bandwidth(continuous, "phi", "tau_phi", band_rad_s=(0.3, 100.0))
+    found = attitude_bandwidth(sampled, "phi", "tau_phi", band_rad_s=(0.3, 1e4))
+    delayed = continuous.with_values({"tau": continuous.parameters["tau"].value + 0.001})
+    half_sample = attitude_bandwidth(delayed, "phi", "tau_phi", band_rad_s=(0.3, 100.0))
+    assert found.curve.omega[-1] < np.pi / 0.002
+    assert_close(found.spread.values, half_sample.spread.values, rtol=2e-3, why="half a sample")
+    assert abs(found.spread.values[3] - exact.spread.values[3]) > 2e-4
+
+
+def test_intervals_are_those_of_the_parameters() -> None:
+    truth = model(0.1, 0.3)
+    omega = np.geomspace(0.3, 20.0, 60)
+    data = fid.FrequencyResponse.from_values(
+        omega,
+        truth.frequency_response(omega),
+        inputs=["lat"],
+        outputs=["phi"],
+        units={"phi": "rad"},
+        random_error=np.full((1, 1, 60), 0.02),
+    )
+    fit = fid.identify(truth, data)
+    found = attitude_bandwidth(fit, "phi", "lat")
+    names = list(fit.names)
+    step = {"tau": 1e-6, "T": 1e-6, "K": 1e-6}
+    slope = np.array(
+        [
+            (
+                attitude_bandwidth(_moved(fit, name, step[name]), "phi", "lat").spread.values
+                - attitude_bandwidth(_moved(fit, name, -step[name]), "phi", "lat").spread.values
+            )
+            / (2.0 * step[name])
+            for name in names
+        ]
+    ).T
+    assert found.spread.covariance is not None
+    expected = slope @ fit.covariance @ slope.T
+    assert_close(found.spread.covariance, expected, rtol=0.02, why="first order")
+    low, high = found.bandwidth.interval95 or (0.0, 0.0)
+    half = 1.96 * np.sqrt(expected[1, 1])
+    assert_close([low, high], [2.14214 - half, 2.14214 + half], rtol=2e-3, why="quantiles of draws")
+    assert all(each.interval95 is not None for each in found.quantities)
+
+
+def _moved(fit: fid.Fit, name: str, step: float) -> fid.TransferFunctionModel:
+    moved = fit.model.with_values({name: fit.parameters[name].value + step})
+    assert isinstance(moved, fid.TransferFunctionModel)
+    return moved
+
+
+def test_intervals_of_a_measured_response_are_those_of_its_errors() -> None:
+    response = measured(0.1, 0.3, 60)
+    random_error = np.full((1, 1, 60), 0.01)
+    given = fid.FrequencyResponse.from_values(
+        response.omega_rad_s,
+        response.response,
+        inputs=["lat"],
+        outputs=["phi"],
+        random_error=random_error,
+    )
+    found = attitude_bandwidth(given, "phi", "lat")
+    random = np.random.default_rng(3)
+    drawn = []
+    for _ in range(400):
+        noise = random.standard_normal((2, 60)) * 0.01
+        values = response.response[0, 0] * (1.0 + noise[0] + 1j * noise[1])
+        one = fid.FrequencyResponse.from_values(
+            response.omega_rad_s, values, inputs=["lat"], outputs=["phi"]
+        )
+        drawn.append(attitude_bandwidth(one, "phi", "lat").spread.values)
+    scatter = np.std(drawn, axis=0)
+    assert found.spread.stderr is not None
+    assert_close(found.spread.stderr, scatter, rtol=0.12, why="scatter of 400 noisy responses")

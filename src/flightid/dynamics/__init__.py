@@ -1,9 +1,14 @@
 """Dynamics: what a model says of the vehicle's motion, and what it is like to fly."""
 
-from flightid.dynamics.handling_qualities import AttitudeBandwidth, attitude_bandwidth
+from flightid.dynamics.handling_qualities import attitude_bandwidth
+from flightid.dynamics.handling_qualities_result import AttitudeBandwidth
 from flightid.dynamics.mode_names import NamedMode
 from flightid.dynamics.mode_result import Mode, Modes, Participation
+from flightid.dynamics.pilot_cutoff import PilotCutoff, pilot_cutoff
 from flightid.dynamics.quantity import Quantity, quantity_table
+from flightid.dynamics.rating import Rating, rate
+from flightid.dynamics.rating_charts import RatingChart, Region
+from flightid.dynamics.rating_charts_reading import rating_chart, rating_charts
 from flightid.dynamics.spread import Propagated, Spread
 from flightid.dynamics.spread_of import spread_of
 
@@ -13,10 +18,18 @@ __all__ = [
     "Modes",
     "NamedMode",
     "Participation",
+    "PilotCutoff",
     "Propagated",
     "Quantity",
+    "Rating",
+    "RatingChart",
+    "Region",
     "Spread",
     "attitude_bandwidth",
+    "pilot_cutoff",
     "quantity_table",
+    "rate",
+    "rating_chart",
+    "rating_charts",
     "spread_of",
 ]

@@ -1,0 +1,175 @@
+"""An attitude response as decibels and degrees, with the crossings that handling qualities read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from flightid.errors import DataError, UnknownNameError
+from flightid.models import LinearSystem, StateSpaceModel, TransferFunctionModel
+from flightid.responses import FrequencyResponse
+
+GRID_POINTS = 2000
+SLOPE_POINTS = 200
+DEGREES_PER_RADIAN = 57.3
+"""As the standard writes it in the definition of phase delay."""
+BELOW_NYQUIST = 0.999
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """What is looked at: one output to one input, in one band, as an attitude.
+
+    Attributes
+    ----------
+    output, input : str
+    low, high : float
+        Band, rad/s.
+    integrate : bool
+        The output is a rate: its integral is looked at.
+    sign : int
+        −1 for a control that pulls the other way.
+    """
+
+    output: str
+    input: str
+    low: float
+    high: float
+    integrate: bool = False
+    sign: int = 1
+
+    def attitude(self, omega: Array, values: Complex) -> Complex:
+        """The response as that of an attitude to a control of positive effect."""
+        return self.sign * values / (1j * omega) if self.integrate else self.sign * values
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """Decibels and degrees on a grid, and between its frequencies.
+
+    Attributes
+    ----------
+    omega, decibels, degrees : ndarray, shape (n,)
+        rad/s, dB, and unwrapped degrees on the branch on which an integrator lies at −90°.
+    exact : callable, or None
+        A model's response at one frequency; None joins measured points by straight lines over log
+        frequency.
+    """
+
+    omega: Array
+    decibels: Array
+    degrees: Array
+    exact: Callable[[float], complex] | None
+
+    @classmethod
+    def of(cls, thing: object, pair: Pair) -> Curve:
+        """Curve of a response, a model or a system.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such channel.
+        DataError
+            Fewer than two points in the band, or a zero among them.
+        """
+        exact = None
+        if isinstance(thing, FrequencyResponse):
+            measured = thing.pair(pair.output, pair.input)
+            inside = (measured.omega_rad_s >= pair.low) & (measured.omega_rad_s <= pair.high)
+            omega = measured.omega_rad_s[inside]
+            values = pair.attitude(omega, measured.response[inside])
+        else:
+            respond, high = _evaluator(thing, pair)
+            omega = np.geomspace(pair.low, min(pair.high, high), GRID_POINTS)
+            values = respond(omega)
+
+            def exact(at: float) -> complex:
+                return complex(respond(np.array([at]))[0])
+
+        if len(omega) < 2 or np.any(values == 0.0):
+            raise DataError(
+                f"{pair.output}/{pair.input} has no points in the band",
+                found=f"{np.count_nonzero(values)} between {pair.low:g} and {pair.high:g} rad/s",
+                needed="two or more, none of them zero",
+            )
+        degrees = np.degrees(np.unwrap(np.angle(values)))
+        degrees -= 360.0 * np.ceil((degrees[0] - 90.0) / 360.0)
+        return cls(omega, 20.0 * np.log10(np.abs(values)), degrees, exact)
+
+    def at(self, omega: float) -> tuple[float, float]:
+        """Decibels and degrees at one frequency: of a model exactly, else between neighbours."""
+        logs, wanted = np.log(self.omega), np.log(omega)
+        decibel = float(np.interp(wanted, logs, self.decibels))
+        degrees = float(np.interp(wanted, logs, self.degrees))
+        if self.exact is None:
+            return decibel, degrees
+        value = self.exact(omega)
+        angle = float(np.degrees(np.angle(value)))
+        turns = round((degrees - angle) / 360.0)
+        return float(20.0 * np.log10(abs(value))), angle + 360.0 * turns
+
+    def falls_through(self, level: float) -> float | None:
+        """Lowest frequency at which the phase falls through a level."""
+        places = self.falls(level)
+        return None if not len(places) else self._between(int(places[0]), 1, level)
+
+    def falls(self, level: float) -> NDArray[np.intp]:
+        """Grid points after which the phase falls through a level."""
+        high = self.degrees - level
+        return np.flatnonzero((high[:-1] > 0.0) & (high[1:] <= 0.0))
+
+    def above(self, limit: float, margin_db: float) -> float | None:
+        """Highest frequency below a limit at which the gain is still a margin above that there."""
+        level = self.at(limit)[0] + margin_db
+        count = int(np.searchsorted(self.omega, limit))
+        high = np.append(self.decibels[:count], level - margin_db) - level
+        places = np.flatnonzero((high[:-1] >= 0.0) & (high[1:] < 0.0))
+        return None if not len(places) else self._between(int(places[-1]), 0, level)
+
+    def phase_delay(self, crossing: float) -> float | None:
+        """Fall of phase from −180° to twice its frequency, as a delay, s; None beyond the band."""
+        if 2.0 * crossing > self.omega[-1] * (1.0 + 1e-12):
+            return None
+        beyond = -180.0 - self.at(2.0 * crossing)[1]
+        return beyond / (DEGREES_PER_RADIAN * 2.0 * crossing)
+
+    def phase_slope(self, low: float, high: float) -> tuple[float, float]:
+        """Least-squares slope of phase over frequency as a phase delay, s, and rms misfit, deg.
+
+        Half the slope: with phase on one line through −180° at ω_180 it is the phase delay.
+        """
+        omega = np.linspace(low, high, SLOPE_POINTS)
+        phase = np.interp(np.log(omega), np.log(self.omega), self.degrees)
+        line = np.polyfit(omega - low, phase, 1)
+        misfit = phase - np.polyval(line, omega - low)
+        return float(-line[0] / (2.0 * DEGREES_PER_RADIAN)), float(np.sqrt(np.mean(misfit**2)))
+
+    def _between(self, place: int, part: int, level: float) -> float:
+        left = float(self.omega[place])
+        right = float(self.omega[min(place + 1, len(self.omega) - 1)])
+        return float(brentq(lambda at: self.at(at)[part] - level, left, right, xtol=1e-12))
+
+
+def _evaluator(thing: object, pair: Pair) -> tuple[Callable[[Array], Complex], float]:
+    """Attitude response of a model, and the highest frequency at which it means anything."""
+    system = (
+        thing
+        if isinstance(thing, TransferFunctionModel | StateSpaceModel)
+        else LinearSystem.of(thing)
+    )
+    for name, known in ((pair.output, system.outputs), (pair.input, system.inputs)):
+        if name not in known:
+            raise UnknownNameError("there is no such channel", found=name, needed=", ".join(known))
+    row, column = list(system.outputs).index(pair.output), list(system.inputs).index(pair.input)
+    step = system.sample_time_s if isinstance(system, LinearSystem) else None
+
+    def respond(omega: Array) -> Complex:
+        return pair.attitude(omega, system.frequency_response(omega)[row, column])
+
+    return respond, np.inf if step is None else BELOW_NYQUIST * np.pi / step
