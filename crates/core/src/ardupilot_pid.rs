@@ -1,128 +1,175 @@
-//! ArduPilot's rate PID in the autopilot's own single precision (Python side:
-//! `simulation/autopilot.py`).
+//! ArduPilot's rate PID (Python side: `control/autopilots/arducopter.py`, `simulation/autopilot.py`),
+//! in the autopilot's own single precision or in double for its linear view.
 //!
-//! Structure of AC_PID: low-pass on target (FLTT), on error (FLTE) and on the derivative of the
-//! filtered error (FLTD), integrator clamped to IMAX, P + D clamped to PDMX, feed-forward outside.
-//! Notches and the slew limiter (NTF, NEF, SMAX) are off, as they are by default.
+//! Structure of AC_PID: notch and low-pass on target (NTF, FLTT), notch and low-pass on error (NEF,
+//! FLTE), low-pass on the derivative of the filtered error (FLTD), integrator clamped to IMAX, slew
+//! limiter on P + D (SMAX), P + D clamped to PDMX, feed-forward outside. Helicopters let the
+//! integrator leak down to ILMI before each loop.
+
+use crate::notch_filter::{Notch, ardupilot_notch};
+use crate::one_pole::newest_weight;
+use crate::slew_limiter::SlewLimiter;
+use num_traits::{Float, FloatConst};
+
+/// ArduPilot's `is_positive` and `is_zero` compare with the spacing of single precision at one.
+const SMALLEST: f64 = f32::EPSILON as f64;
+/// Time constant of the slew limiter's decay, s; not a parameter of multicopters.
+const SLEW_TAU_S: f64 = 1.0;
 
 /// Settings of one axis; names and units of the ATC_RAT_xxx parameters.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct PidGains {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PidGains<F> {
     /// P, 1/(rad/s).
-    pub p: f32,
+    pub p: F,
     /// I, 1/rad.
-    pub i: f32,
+    pub i: F,
     /// D, 1/(rad/s²).
-    pub d: f32,
+    pub d: F,
     /// FF, 1/(rad/s).
-    pub ff: f32,
+    pub ff: F,
     /// D_FF, 1/(rad/s²).
-    pub d_ff: f32,
+    pub d_ff: F,
     /// IMAX, largest integrator output.
-    pub imax: f32,
+    pub imax: F,
     /// PDMX, largest |P + D|; 0 is off.
-    pub pdmx: f32,
+    pub pdmx: F,
     /// FLTT, target filter, Hz; 0 is off.
-    pub fltt: f32,
+    pub fltt: F,
     /// FLTE, error filter, Hz; 0 is off.
-    pub flte: f32,
+    pub flte: F,
     /// FLTD, derivative filter, Hz; 0 is off.
-    pub fltd: f32,
+    pub fltd: F,
+    /// SMAX, largest slew rate of P + D, 1/s; 0 is off.
+    pub smax: F,
+    /// Notch that NTF names: centre in Hz, quality, attenuation in dB; zeros are off.
+    pub target_notch: [F; 3],
+    /// Notch that NEF names.
+    pub error_notch: [F; 3],
 }
 
-impl PidGains {
+impl<F: Float> PidGains<F> {
     /// Every number is finite, and bounds and filters are not negative.
     pub fn is_sound(&self) -> bool {
-        let bounds = [self.imax, self.pdmx, self.fltt, self.flte, self.fltd];
+        let bounds = [self.imax, self.pdmx, self.fltt, self.flte, self.fltd, self.smax];
         let gains = [self.p, self.i, self.d, self.ff, self.d_ff];
-        bounds.iter().all(|v| v.is_finite() && *v >= 0.0) && gains.iter().all(|v| v.is_finite())
+        let notches = self.target_notch.iter().chain(&self.error_notch);
+        bounds.iter().chain(notches).all(|v| v.is_finite() && *v >= F::zero())
+            && gains.iter().all(|v| v.is_finite())
     }
 }
 
 /// What the controller computed in one loop, as PIDR, PIDP and PIDY log it.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct PidTerms {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PidTerms<F> {
     /// Filtered target, rad/s.
-    pub target: f32,
+    pub target: F,
     /// Filtered error, rad/s.
-    pub error: f32,
+    pub error: F,
     /// Proportional output.
-    pub p: f32,
+    pub p: F,
     /// Integrator output.
-    pub i: f32,
+    pub i: F,
     /// Derivative output.
-    pub d: f32,
+    pub d: F,
     /// Feed-forward of the target.
-    pub ff: f32,
+    pub ff: F,
     /// Feed-forward of the target's derivative.
-    pub d_ff: f32,
+    pub d_ff: F,
+    /// Factor that the slew limiter put on P and D.
+    pub dmod: F,
+    /// Slew rate that the limiter sees, 1/s.
+    pub slew_rate: F,
 }
 
-impl PidTerms {
+impl<F: Float> PidTerms<F> {
     /// Sum without feed-forward.
-    pub fn feedback(&self) -> f32 {
+    pub fn feedback(&self) -> F {
         self.p + self.d + self.i
     }
 
     /// Feed-forward, which the mixer adds.
-    pub fn feedforward(&self) -> f32 {
+    pub fn feedforward(&self) -> F {
         self.ff + self.d_ff
     }
 }
 
 /// One axis of the rate controller.
 #[derive(Debug, Clone)]
-pub struct Pid {
-    gains: PidGains,
-    dt: f32,
-    target: f32,
-    error: f32,
-    derivative: f32,
-    integrator: f32,
+pub struct Pid<F> {
+    gains: PidGains<F>,
+    dt: F,
+    smallest: F,
+    target: F,
+    error: F,
+    derivative: F,
+    integrator: F,
+    target_notch: Option<Notch<F>>,
+    error_notch: Option<Notch<F>>,
+    slew: Option<SlewLimiter<F>>,
+    slew_scale: F,
+    last_pd: F,
+    leak: Option<[F; 2]>,
     started: bool,
 }
 
-/// Weight of the newest sample in ArduPilot's one-pole filter; a cut-off of 0 Hz switches it off.
-fn newest_weight(dt: f32, cutoff_hz: f32) -> f32 {
-    if cutoff_hz <= 0.0 {
-        return 1.0;
-    }
-    let rc = 1.0 / (2.0 * std::f32::consts::PI * cutoff_hz);
-    dt / (dt + rc)
-}
-
-impl Pid {
+impl<F: Float + FloatConst> Pid<F> {
     /// A controller at rest with a loop time, s.
-    pub fn new(gains: PidGains, dt: f32) -> Self {
+    pub fn new(gains: PidGains<F>, dt: F) -> Self {
+        let zero = F::zero();
+        let notch = |[center, quality, attenuation]: [F; 3]| {
+            ardupilot_notch(F::one() / dt, center, quality, attenuation).map(Notch::new)
+        };
+        let tau = F::from(SLEW_TAU_S).unwrap_or_else(F::one);
         Self {
             gains,
             dt,
-            target: 0.0,
-            error: 0.0,
-            derivative: 0.0,
-            integrator: 0.0,
+            smallest: F::from(SMALLEST).unwrap_or_else(F::epsilon),
+            target: zero,
+            error: zero,
+            derivative: zero,
+            integrator: zero,
+            target_notch: notch(gains.target_notch),
+            error_notch: notch(gains.error_notch),
+            slew: if gains.smax > zero { SlewLimiter::new(gains.smax, tau) } else { None },
+            slew_scale: F::one(),
+            last_pd: zero,
+            leak: None,
             started: false,
         }
     }
 
+    /// SMAX counts in other units of P + D (planes: 45 degrees of servo).
+    pub fn with_slew_scale(self, scale: F) -> Self {
+        Self { slew_scale: scale, ..self }
+    }
+
+    /// The integrator leaks by a share of what exceeds `floor` before each loop (helicopters).
+    pub fn with_leak(self, share: F, floor: F) -> Self {
+        Self { leak: Some([share, floor]), ..self }
+    }
+
     /// One loop: target and measured rate in rad/s; with `limited` the integrator may only shrink.
-    pub fn update(&mut self, target: f32, measured: f32, limited: bool) -> PidTerms {
+    pub fn update(&mut self, target: F, measured: F, limited: bool) -> PidTerms<F> {
         let (g, dt) = (self.gains, self.dt);
-        let mut target_derivative = 0.0;
+        self.leak();
+        let target = filtered(&mut self.target_notch, target);
+        let mut target_derivative = F::zero();
         if self.started {
             let (target_last, error_last) = (self.target, self.error);
-            self.target += newest_weight(dt, g.fltt) * (target - self.target);
-            self.error += newest_weight(dt, g.flte) * ((self.target - measured) - self.error);
+            self.target = self.target + newest_weight(dt, g.fltt) * (target - self.target);
+            let error = filtered(&mut self.error_notch, self.target - measured);
+            self.error = self.error + newest_weight(dt, g.flte) * (error - self.error);
             let derivative = (self.error - error_last) / dt;
-            self.derivative += newest_weight(dt, g.fltd) * (derivative - self.derivative);
+            self.derivative =
+                self.derivative + newest_weight(dt, g.fltd) * (derivative - self.derivative);
             target_derivative = (self.target - target_last) / dt;
         } else {
             self.started = true;
             self.target = target;
-            self.error = target - measured;
+            self.error = filtered(&mut self.error_notch, target - measured);
         }
         self.integrate(limited);
-        let (p, d) = self.limited_pd();
+        let (p, d, dmod) = self.limited_pd();
         PidTerms {
             target: self.target,
             error: self.error,
@@ -131,27 +178,57 @@ impl Pid {
             d,
             ff: self.target * g.ff,
             d_ff: target_derivative * g.d_ff,
+            dmod,
+            slew_rate: self.slew.as_ref().map_or_else(F::zero, SlewLimiter::slew_rate),
+        }
+    }
+
+    fn leak(&mut self) {
+        let Some([share, floor]) = self.leak else { return };
+        if self.gains.i.abs() < self.smallest {
+            return;
+        }
+        if self.integrator > floor {
+            self.integrator = self.integrator - (self.integrator - floor) * share;
+        } else if self.integrator < -floor {
+            self.integrator = self.integrator - (self.integrator + floor) * share;
         }
     }
 
     fn integrate(&mut self, limited: bool) {
-        let shrinks = self.integrator * self.error < 0.0;
-        if self.gains.i == 0.0 {
-            self.integrator = 0.0;
+        let small = self.smallest;
+        let (integrator, error) = (self.integrator, self.error);
+        let shrinks =
+            (integrator >= small && error <= -small) || (integrator <= -small && error >= small);
+        if self.gains.i.abs() < small {
+            self.integrator = F::zero();
         } else if !limited || shrinks {
-            let next = self.integrator + self.error * self.gains.i * self.dt;
-            self.integrator = next.clamp(-self.gains.imax, self.gains.imax);
+            let next = integrator + error * self.gains.i * self.dt;
+            self.integrator = next.max(-self.gains.imax).min(self.gains.imax);
         }
     }
 
-    fn limited_pd(&self) -> (f32, f32) {
-        let (p, d) = (self.error * self.gains.p, self.derivative * self.gains.d);
+    fn limited_pd(&mut self) -> (F, F, F) {
+        let (mut p, mut d) = (self.error * self.gains.p, self.derivative * self.gains.d);
+        let demand = self.last_pd * self.slew_scale;
+        let dmod = self.slew.as_mut().map_or_else(F::one, |slew| slew.modifier(demand, self.dt));
+        p = p * dmod;
+        d = d * dmod;
         let size = (p + d).abs();
-        if self.gains.pdmx > 0.0 && size > self.gains.pdmx {
+        if self.gains.pdmx >= self.smallest && size > self.gains.pdmx {
             let scale = self.gains.pdmx / size;
-            return (p * scale, d * scale);
+            p = p * scale;
+            d = d * scale;
         }
-        (p, d)
+        self.last_pd = p + d;
+        (p, d, dmod)
+    }
+}
+
+fn filtered<F: Float>(notch: &mut Option<Notch<F>>, sample: F) -> F {
+    match notch {
+        Some(notch) => notch.apply(sample),
+        None => sample,
     }
 }
 
@@ -159,8 +236,22 @@ impl Pid {
 mod tests {
     use super::*;
 
-    fn gains() -> PidGains {
-        PidGains { p: 0.5, i: 2.0, imax: 0.25, pdmx: 0.1, ..PidGains::default() }
+    fn gains() -> PidGains<f32> {
+        PidGains {
+            p: 0.5,
+            i: 2.0,
+            d: 0.0,
+            ff: 0.0,
+            d_ff: 0.0,
+            imax: 0.25,
+            pdmx: 0.1,
+            fltt: 0.0,
+            flte: 0.0,
+            fltd: 0.0,
+            smax: 0.0,
+            target_notch: [0.0; 3],
+            error_notch: [0.0; 3],
+        }
     }
 
     #[test]
@@ -180,9 +271,11 @@ mod tests {
     }
 
     #[test]
-    fn filters_off_pass_everything() {
-        assert_eq!(newest_weight(0.0025, 0.0), 1.0);
-        let weight = newest_weight(0.0025, 20.0);
-        assert!((weight - 0.239_057).abs() < 1e-6);
+    fn a_leaking_integrator_settles_above_its_floor() {
+        let free = PidGains { imax: 10.0, ..gains() };
+        let mut pid = Pid::new(free, 0.01).with_leak(0.02, 0.1);
+        let settled = (0..2000).map(|_| pid.update(0.05, 0.0, false)).last().unwrap();
+        // In balance the leak of 2 % of the excess equals a loop's growth of 0.05·2·0.01.
+        assert!((settled.i - (0.1 + 0.001 / 0.02)).abs() < 2e-3, "{}", settled.i);
     }
 }

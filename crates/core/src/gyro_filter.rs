@@ -1,45 +1,48 @@
-//! ArduPilot's two-pole low-pass (INS_GYRO_FILTER): a Butterworth biquad, prewarped at its cut-off.
+//! Two-pole low-pass of the gyro in ArduPilot (INS_GYRO_FILTER) and PX4 (IMU_GYRO_CUTOFF): a
+//! Butterworth section, prewarped at its cut-off (Python side: `control/autopilots/filters.py`).
 
-/// One channel of the filter.
+use crate::notch_filter::Section;
+use num_traits::{Float, FloatConst};
+
+/// b0, b1, b2, a1, a2 of the low-pass; None for a cut-off of 0, which switches it off.
+pub fn low_pass<F: Float + FloatConst>(sample_rate_hz: F, cutoff_hz: F) -> Option<Section<F>> {
+    if cutoff_hz <= F::zero() {
+        return None;
+    }
+    let (one, two) = (F::one(), F::one() + F::one());
+    let ohm = (F::PI() * cutoff_hz / sample_rate_hz).tan();
+    let c = one + F::SQRT_2() * ohm + ohm * ohm;
+    let b0 = ohm * ohm / c;
+    let a1 = two * (ohm * ohm - one) / c;
+    let a2 = (one - F::SQRT_2() * ohm + ohm * ohm) / c;
+    Some([b0, two * b0, b0, a1, a2])
+}
+
+/// One channel of the filter, direct form II.
 #[derive(Debug, Clone)]
-pub struct GyroFilter {
-    feedforward: [f64; 3],
-    feedback: [f64; 2],
-    delay: [f64; 2],
+pub struct GyroFilter<F> {
+    section: Section<F>,
+    delay: [F; 2],
     started: bool,
 }
 
-impl GyroFilter {
+impl<F: Float + FloatConst> GyroFilter<F> {
     /// Filter with a cut-off (Hz) at a sample rate (Hz); a cut-off of 0 passes everything.
-    pub fn new(cutoff_hz: f64, sample_rate_hz: f64) -> Self {
-        let mut filter = Self {
-            feedforward: [1.0, 0.0, 0.0],
-            feedback: [0.0; 2],
-            delay: [0.0; 2],
-            started: false,
-        };
-        if cutoff_hz > 0.0 {
-            let ohm = (std::f64::consts::PI * cutoff_hz / sample_rate_hz).tan();
-            let c = 1.0 + std::f64::consts::SQRT_2 * ohm + ohm * ohm;
-            let b0 = ohm * ohm / c;
-            filter.feedforward = [b0, 2.0 * b0, b0];
-            filter.feedback = [
-                2.0 * (ohm * ohm - 1.0) / c,
-                (1.0 - std::f64::consts::SQRT_2 * ohm + ohm * ohm) / c,
-            ];
-        }
-        filter
+    pub fn new(cutoff_hz: F, sample_rate_hz: F) -> Self {
+        let zero = F::zero();
+        let passing = [F::one(), zero, zero, zero, zero];
+        let section = low_pass(sample_rate_hz, cutoff_hz).unwrap_or(passing);
+        Self { section, delay: [zero; 2], started: false }
     }
 
     /// Next sample; the first one is taken as the steady state.
-    pub fn apply(&mut self, sample: f64) -> f64 {
-        let [a1, a2] = self.feedback;
+    pub fn apply(&mut self, sample: F) -> F {
+        let [b0, b1, b2, a1, a2] = self.section;
         if !self.started {
             self.started = true;
-            self.delay = [sample / (1.0 + a1 + a2); 2];
+            self.delay = [sample / (F::one() + a1 + a2); 2];
         }
         let newest = sample - a1 * self.delay[0] - a2 * self.delay[1];
-        let [b0, b1, b2] = self.feedforward;
         let output = b0 * newest + b1 * self.delay[0] + b2 * self.delay[1];
         self.delay = [newest, self.delay[0]];
         output
@@ -52,7 +55,7 @@ mod tests {
 
     #[test]
     fn gain_is_one_at_rest_and_half_power_at_the_cut_off() {
-        let (cutoff, rate) = (40.0, 400.0);
+        let (cutoff, rate): (f64, f64) = (40.0, 400.0);
         let mut filter = GyroFilter::new(cutoff, rate);
         assert!((filter.apply(2.0) - 2.0).abs() < 1e-12);
         let mut peak: f64 = 0.0;

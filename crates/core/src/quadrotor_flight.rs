@@ -26,7 +26,7 @@ pub struct Autopilot {
     /// INS_GYRO_FILTER, Hz; 0 is off.
     pub gyro_filter_hz: f64,
     /// ATC_RAT_RLL, PIT and YAW.
-    pub rate: [PidGains; 3],
+    pub rate: [PidGains<f32>; 3],
     /// ATC_ANG and ATC_ACCEL.
     pub attitude: AttitudeGains,
     /// MOT_ parameters.
@@ -99,8 +99,8 @@ struct Loop<'a> {
     vehicle: &'a Quadrotor,
     autopilot: &'a Autopilot,
     dt: f64,
-    pids: [Pid; 3],
-    filters: [GyroFilter; 3],
+    pids: [Pid<f32>; 3],
+    filters: [GyroFilter<f64>; 3],
     mode: SystemIdMode,
     injection: Injection,
     rate_target: [f32; 3],
@@ -116,7 +116,7 @@ struct Acted {
     gyro: [f64; 3],
     gyro_mean: [f64; 3],
     filtered: [f64; 3],
-    terms: [PidTerms; 3],
+    terms: [PidTerms<f32>; 3],
     output: [f64; 3],
     throttle: f64,
     mixed: Mixed,
@@ -128,7 +128,7 @@ impl Loop<'_> {
     fn act(&mut self, x: &State, gyro: [f64; 3], k: usize) -> Result<Acted, CoreError> {
         let last = self.last_gyro.replace(gyro).unwrap_or(gyro);
         let filtered: [f64; 3] = std::array::from_fn(|i| self.filters[i].apply(gyro[i]));
-        let terms: [PidTerms; 3] = std::array::from_fn(|i| {
+        let terms: [PidTerms<f32>; 3] = std::array::from_fn(|i| {
             let target = self.rate_target[i] + self.injection.rate[i];
             self.pids[i].update(target, filtered[i] as f32, self.limited)
         });

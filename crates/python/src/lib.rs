@@ -5,6 +5,7 @@
 
 use pyo3::prelude::*;
 
+pub mod autopilots;
 pub mod chirp;
 pub mod closed_loop;
 pub mod dataflash;
@@ -42,6 +43,7 @@ fn version() -> &'static str {
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(version, module)?)?;
+    autopilots::register(module)?;
     chirp::register(module)?;
     kinematics::register(module)?;
     linear_recursion::register(module)?;

@@ -1,11 +1,11 @@
 //! Binding of the simulated quadrotor (Python side: `simulation/flight.py`). Parameter groups come as
 //! mappings from field name to value.
 
+use crate::autopilots::pid_gains;
 use crate::error::from_core;
 use crate::group::{item, read};
 use flightid_core::ardupilot_mixer::Mixer;
 use flightid_core::ardupilot_mode::{AttitudeGains, SidRun};
-use flightid_core::ardupilot_pid::{Pid, PidGains};
 use flightid_core::quadrotor::{Gust, N_STATES, Quadrotor};
 use flightid_core::quadrotor_flight::{Autopilot, COLUMNS, Plan, Sensors, fly};
 use flightid_core::turbulence::Turbulence;
@@ -37,10 +37,6 @@ fn vehicle(m: &Bound<'_, PyDict>) -> PyResult<Quadrotor> {
             rig_friction_n_m_s,
         }
     ))
-}
-
-fn pid_gains(m: &Bound<'_, PyDict>) -> PyResult<PidGains> {
-    Ok(read!(m, PidGains { p, i, d, ff, d_ff, imax, pdmx, fltt, flte, fltd }))
 }
 
 fn autopilot(m: &Bound<'_, PyDict>) -> PyResult<Autopilot> {
@@ -173,37 +169,11 @@ fn quadrotor_trajectory<'py>(
     Ok(array.into_pyarray(py))
 }
 
-/// ardupilot_pid(gains: dict[str, float], loop_time_s: float, target: NDArray[np.float32], measured: NDArray[np.float32], limited: NDArray[np.bool_]) -> NDArray[np.float32]
-///
-/// Terms of ArduPilot's rate PID, (n, 7): filtered target, filtered error, P, I, D, FF, D_FF.
-#[pyfunction]
-fn ardupilot_pid<'py>(
-    py: Python<'py>,
-    gains: &Bound<'py, PyDict>,
-    loop_time_s: f32,
-    target: PyReadonlyArray1<'py, f32>,
-    measured: PyReadonlyArray1<'py, f32>,
-    limited: PyReadonlyArray1<'py, bool>,
-) -> PyResult<Bound<'py, PyArray2<f32>>> {
-    let mut pid = Pid::new(pid_gains(gains)?, loop_time_s);
-    let inputs = target.as_slice()?.iter().zip(measured.as_slice()?).zip(limited.as_slice()?);
-    let rows: Vec<f32> = inputs
-        .flat_map(|((&target, &measured), &limited)| {
-            let t = pid.update(target, measured, limited);
-            [t.target, t.error, t.p, t.i, t.d, t.ff, t.d_ff]
-        })
-        .collect();
-    let array = Array2::from_shape_vec((rows.len() / 7, 7), rows)
-        .map_err(|error| PyValueError::new_err(error.to_string()))?;
-    Ok(array.into_pyarray(py))
-}
-
 /// Add this area to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(quadrotor_columns, module)?)?;
     module.add_function(wrap_pyfunction!(fly_quadrotor, module)?)?;
     module.add_function(wrap_pyfunction!(quadrotor_derivative, module)?)?;
     module.add_function(wrap_pyfunction!(quadrotor_trajectory, module)?)?;
-    module.add_function(wrap_pyfunction!(ardupilot_pid, module)?)?;
     Ok(())
 }

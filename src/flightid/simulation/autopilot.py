@@ -14,7 +14,7 @@ AXIS_LETTERS = ("RLL", "PIT", "YAW")
 
 @dataclass(frozen=True)
 class RateGains:
-    """ATC_RAT_xxx parameters of one axis (AC_PID; notches and slew limiter off).
+    """ATC_RAT_xxx parameters of one axis (AC_PID; notches off).
 
     Attributes
     ----------
@@ -26,6 +26,8 @@ class RateGains:
         Bounds of the integrator and of |P + D| (0 is off).
     fltt, flte, fltd : float
         Cut-offs of target, error and derivative filters, Hz (0 is off).
+    smax : float
+        Slew rate of P + D beyond which both are lowered, 1/s (0 is off).
 
     Example
     -------
@@ -43,6 +45,12 @@ class RateGains:
     fltt: float = 20.0
     flte: float = 0.0
     fltd: float = 20.0
+    smax: float = 0.0
+
+    def to_native(self) -> dict[str, Any]:
+        """Fields by name, as the native half reads them."""
+        off = (0.0, 0.0, 0.0)
+        return asdict(self) | {"target_notch": off, "error_notch": off}
 
 
 def _yaw() -> RateGains:
@@ -134,7 +142,7 @@ class Autopilot:
     def to_native(self) -> dict[str, Any]:
         """Fields by name, as the native half reads them."""
         fields = asdict(self)
-        fields["rate"] = [asdict(gains) for gains in self.rate]
+        fields["rate"] = [gains.to_native() for gains in self.rate]
         return fields
 
 

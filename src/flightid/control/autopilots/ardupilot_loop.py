@@ -1,0 +1,125 @@
+"""ArduPilot's rate PID as a loop: what multicopters, helicopters and planes share."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from flightid import _native
+from flightid.control.autopilots.axis_loop import AxisLoop, Gyro, LoopFlags, LoopRun, samples
+from flightid.control.autopilots.filters import (
+    Omega,
+    Response,
+    Section,
+    difference_response,
+    one_pole_response,
+    sections_response,
+)
+
+NOTCH_OFF = (0.0, 0.0, 0.0)
+PID_COLUMNS = ("Tar", "Err", "P", "I", "D", "FF", "DFF", "Dmod", "SRate")
+"""Columns of the native PID, under the names of the PIDR message."""
+
+
+@dataclass(frozen=True, repr=False)
+class ArduPilotLoop(AxisLoop):
+    """An axis whose rate controller is AC_PID.
+
+    Attributes
+    ----------
+    target_notch, error_notch : tuple of float
+        Notches that NTF and NEF name: centre (Hz), quality, attenuation (dB); zeros are off.
+    """
+
+    target_notch: tuple[float, float, float] = NOTCH_OFF
+    error_notch: tuple[float, float, float] = NOTCH_OFF
+
+    def _notch(self, settings: tuple[float, float, float], omega: Omega) -> Response:
+        section = _native.ardupilot_notch_section(self.loop_rate_hz, *settings)
+        return sections_response([section] if section else [], omega, self.loop_rate_hz)
+
+    def _pole(self, role: str, omega: Omega) -> Response:
+        return one_pole_response(self.values[role], omega, self.loop_rate_hz)
+
+    def _target_filter(self, omega: Omega) -> Response:
+        return self._notch(self.target_notch, omega) * self._pole("fltt", omega)
+
+    def _integrator(self, omega: Omega) -> Response:
+        return np.asarray(1 / difference_response(omega, self.loop_rate_hz))
+
+    def _pid_terms(self, omega: Omega) -> dict[str, Response]:
+        """P, I and D from the error, per unit of the gain."""
+        error = self._notch(self.error_notch, omega) * self._pole("flte", omega)
+        slope = difference_response(omega, self.loop_rate_hz) * self._pole("fltd", omega)
+        return {"p": error, "i": error * self._integrator(omega), "d": error * slope}
+
+    def _gyro_sections(self) -> tuple[Section, ...]:
+        low_pass = _native.gyro_low_pass_section(self.gyro_rate_hz, self.values["gyro_filter"])
+        return self.gyro_notches + ((low_pass,) if low_pass else ())
+
+    def _filtered(self, raw: ArrayLike, single_precision: bool) -> np.ndarray:
+        rate, _ = _native.gyro_filters(
+            np.ascontiguousarray(raw, dtype=np.float64),
+            self.gyro_rate_hz,
+            list(self.gyro_notches),
+            self.values["gyro_filter"],
+            0.0,
+            self._samples_per_loop,
+            single_precision,
+        )
+        return rate
+
+    def _pid(
+        self,
+        target: np.ndarray,
+        rate: np.ndarray,
+        flags: LoopFlags,
+        single_precision: bool,
+        *,
+        leak: tuple[float, float] | None = None,
+        slew_scale: float = 1.0,
+    ) -> dict[str, np.ndarray]:
+        roles = ("p", "i", "d", "ff", "d_ff", "imax", "pdmx", "fltt", "flte", "fltd", "smax")
+        gains: dict[str, object] = {role: self.values[role] for role in roles}
+        gains |= {"target_notch": self.target_notch, "error_notch": self.error_notch}
+        limited = np.zeros(target.size, dtype=bool) if flags.limited is None else flags.limited
+        rows = _native.ardupilot_pid(
+            gains,
+            1 / self.loop_rate_hz,
+            target,
+            rate,
+            np.ascontiguousarray(np.atleast_2d(limited.T).any(axis=0)),
+            leak,
+            slew_scale,
+            single_precision,
+        )
+        return dict(zip(PID_COLUMNS, rows.T, strict=True))
+
+    def run(
+        self,
+        setpoint_rad_s: ArrayLike,
+        rate_rad_s: ArrayLike,
+        flags: LoopFlags | None = None,
+        *,
+        gyro: Gyro = "filtered",
+        single_precision: bool = True,
+    ) -> LoopRun:
+        """See `AxisLoop.run`."""
+        per_loop = self._samples_per_loop if gyro == "raw" else 1
+        setpoint, rate = samples(setpoint_rad_s, rate_rad_s, per_loop)
+        if gyro == "raw":
+            rate = self._filtered(rate, single_precision)
+        terms = self._terms(setpoint, rate, flags or LoopFlags(), single_precision)
+        output = sum(
+            (terms[name] for name in ("P", "I", "D", "FF", "DFF")), np.zeros(setpoint.size)
+        )
+        return LoopRun(output, terms, rate)
+
+    @abstractmethod
+    def _terms(
+        self, setpoint: np.ndarray, rate: np.ndarray, flags: LoopFlags, single_precision: bool
+    ) -> dict[str, np.ndarray]:
+        """Terms of every loop under the names of PIDR."""

@@ -1,0 +1,342 @@
+"""One axis of an autopilot's rate and angle controllers: exact linear view and exact recursion."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flightid.control.autopilots.filters import (
+    Omega,
+    Response,
+    Section,
+    hold_response,
+    sections_response,
+)
+from flightid.control.autopilots.parameter_table import Axis, GainRange, gain_ranges
+from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
+from flightid.table import Column, Table
+
+Gyro = Literal["raw", "filtered"]
+Samples = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LoopFlags:
+    """What else than set-point and rate a loop looks at; left out: false, and full thrust.
+
+    Attributes
+    ----------
+    limited : ndarray of bool, shape (n,) or (n, 2)
+        The actuators cannot give more: in both directions, or (PX4) upwards and downwards.
+    landed : ndarray of bool, shape (n,)
+        On the ground; PX4 then does not integrate.
+    thrust : ndarray, shape (n,)
+        Thrust set-point 0…1; PX4's controller until 2017 integrates only with thrust.
+    acceleration : ndarray, shape (n,)
+        Filtered angular acceleration, rad/s², as PX4 logs it; left out: made from the rate.
+    """
+
+    limited: NDArray[np.bool_] | None = None
+    landed: NDArray[np.bool_] | None = None
+    thrust: Samples | None = None
+    acceleration: Samples | None = None
+
+
+@dataclass(frozen=True)
+class LoopRun:
+    """What a controller computed from set-point and rate.
+
+    Attributes
+    ----------
+    output : ndarray, shape (n,)
+        Sum of all terms, in `AxisLoop.output_unit`.
+    terms : mapping of str to ndarray
+        ``P``, ``I``, ``D``, ``FF`` and what else the autopilot has, under its log's names.
+    rate : ndarray, shape (n,)
+        Filtered rate that the controller took, rad/s.
+    """
+
+    output: Samples
+    terms: Mapping[str, Samples]
+    rate: Samples
+
+    def __repr__(self) -> str:
+        """Length and terms on one line."""
+        return f"LoopRun({self.output.size} loops, terms {', '.join(self.terms)})"
+
+
+@dataclass(frozen=True)
+class AxisLoop(ABC):
+    """One axis of an autopilot. Made by `axis_loop` or `axis_loop_of`.
+
+    Signs and units: rates in rad/s, outputs in `output_unit`. `feedback` is positive for negative
+    feedback, so the loop transfer is L = feedback · plant and 1 + L = 0 is the stability limit.
+
+    Attributes
+    ----------
+    axis : {"roll", "pitch", "yaw"}
+        Axis.
+    values, names : mapping of str to float and to str
+        Parameter values and the autopilot's names, by role.
+    loop_rate_hz : float
+        Rate of the controller, Hz.
+    gyro_rate_hz : float
+        Rate of the gyro filters, Hz; the controller takes their latest output.
+    computation_delay_s : float
+        From the gyro sample to the output, s. No parameter holds it; a plant identified from logged
+        outputs already includes it, and it stays zero then.
+    gyro_notches : tuple of Section
+        Fixed notches on the gyro, at `gyro_rate_hz`.
+    assumed : tuple of str
+        Parameters that the vehicle's firmware did not have.
+    unmodelled : tuple of str
+        What of the vehicle's settings this view leaves out, one sentence each.
+    """
+
+    axis: Axis
+    values: Mapping[str, float]
+    names: Mapping[str, str]
+    loop_rate_hz: float
+    gyro_rate_hz: float
+    computation_delay_s: float = 0.0
+    gyro_notches: tuple[Section, ...] = ()
+    assumed: tuple[str, ...] = ()
+    unmodelled: tuple[str, ...] = ()
+    autopilot: ClassVar[str] = ""
+    output_unit: ClassVar[str] = "1"
+    set_point_delay_loops: ClassVar[int] = 0
+    """Loops between an angle error and the rate loop that acts on it."""
+
+    def __post_init__(self) -> None:
+        if not (self.loop_rate_hz > 0 and self.gyro_rate_hz >= self.loop_rate_hz * (1 - 1e-9)):
+            raise OptionError(
+                "the rates of loop and gyro do not fit",
+                found=f"loop {self.loop_rate_hz} Hz, gyro {self.gyro_rate_hz} Hz",
+                needed="a positive loop rate and a gyro at least as fast",
+            )
+        if not all(np.isfinite(value) for value in self.values.values()):
+            raise DataError("a parameter is not a finite number", found=dict(self.gains))
+
+    def __repr__(self) -> str:
+        """Autopilot, axis, rate and gains on one line."""
+        shown = {"p", "i", "d", "ff"} & set(self.values)
+        gains = ", ".join(
+            f"{r.upper()} {self.values[r]:.4g}" for r in sorted(shown, key="pidff".find)
+        )
+        return f"AxisLoop({self.autopilot} {self.axis}, {self.loop_rate_hz:g} Hz, {gains})"
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """Values by the autopilot's own parameter names, filters included."""
+        return {self.names[role]: value for role, value in self.values.items()}
+
+    @property
+    def ranges(self) -> dict[str, GainRange]:
+        """What a designer may move, by parameter name."""
+        return gain_ranges(self.autopilot, self.axis)
+
+    def with_gains(self, gains: Mapping[str, float] | None = None, **named: float) -> Self:
+        """Copy with other parameter values, by the autopilot's names.
+
+        Raises
+        ------
+        UnknownNameError
+            The controller has no such parameter.
+        """
+        roles = {name: role for role, name in self.names.items()}
+        changed = {**(gains or {}), **named}
+        for name in changed:
+            if name not in roles:
+                raise UnknownNameError(
+                    f"the {self.axis} controller has no such parameter",
+                    found=name,
+                    needed="one of " + ", ".join(roles),
+                )
+        values = {**self.values, **{roles[n]: float(v) for n, v in changed.items()}}
+        return replace(self, values=values)
+
+    def feedback(
+        self, omega_rad_s: ArrayLike, *, gyro: Gyro = "raw", hold: bool = True
+    ) -> Response:
+        """From measured rate to output, positive for negative feedback.
+
+        Parameters
+        ----------
+        omega_rad_s : array_like, shape (n_f,)
+            Frequencies above zero, rad/s.
+        gyro : {"raw", "filtered"}
+            Where the loop is entered: ahead of the gyro filters, or behind them for a plant that
+            was identified from the filtered rate.
+        hold : bool
+            Whether the output is held for a loop and delayed by `computation_delay_s`; False for a
+            plant that holds both already, as one identified from logged outputs does.
+
+        Returns
+        -------
+        ndarray of complex, shape (n_f,)
+            `output_unit` per rad/s.
+        """
+        terms, names = self.basis(omega_rad_s, gyro=gyro, hold=hold)
+        gains = self.gains
+        return np.asarray(np.array([gains[name] for name in names]) @ terms)
+
+    def forward(self, omega_rad_s: ArrayLike, *, hold: bool = True) -> Response:
+        """From rate set-point to output, target filter and feed-forward included."""
+        terms, names = self.forward_basis(omega_rad_s, hold=hold)
+        gains = self.gains
+        return np.asarray(np.array([gains[name] for name in names]) @ terms)
+
+    def angle(self, omega_rad_s: ArrayLike) -> Response:
+        """From angle error (rad) to rate set-point (rad/s), with the loops it waits."""
+        omega = _frequencies(omega_rad_s)
+        delay = np.exp(-1j * omega * self.set_point_delay_loops / self.loop_rate_hz)
+        return np.asarray(self.angle_gain_1_s * delay)
+
+    def basis(
+        self, omega_rad_s: ArrayLike, *, gyro: Gyro = "raw", hold: bool = True
+    ) -> tuple[Response, tuple[str, ...]]:
+        """Feedback per unit of each gain in which it is linear: shape (n_terms, n_f), and names."""
+        omega = _frequencies(omega_rad_s)
+        common = self.gyro_response(omega) if gyro == "raw" else np.ones(omega.size, complex)
+        return self._shared(self._feedback_terms(omega), common, omega, hold)
+
+    def forward_basis(
+        self, omega_rad_s: ArrayLike, *, hold: bool = True
+    ) -> tuple[Response, tuple[str, ...]]:
+        """Path from the rate set-point per unit of each gain: shape (n_terms, n_f), and names."""
+        omega = _frequencies(omega_rad_s)
+        return self._shared(self._forward_terms(omega), np.ones(omega.size, complex), omega, hold)
+
+    def gyro_response(self, omega_rad_s: ArrayLike) -> Response:
+        """Filters between the gyro's samples and the rate that the controller takes."""
+        omega = _frequencies(omega_rad_s)
+        return sections_response(self._gyro_sections(), omega, self.gyro_rate_hz)
+
+    @property
+    @abstractmethod
+    def angle_gain_1_s(self) -> float:
+        """Gain of the angle controller, 1/s."""
+
+    @abstractmethod
+    def run(
+        self,
+        setpoint_rad_s: ArrayLike,
+        rate_rad_s: ArrayLike,
+        flags: LoopFlags | None = None,
+        *,
+        gyro: Gyro = "filtered",
+        single_precision: bool = True,
+    ) -> LoopRun:
+        """Run the controller's own recursion, at rest before the first sample.
+
+        Parameters
+        ----------
+        setpoint_rad_s : array_like, shape (n,)
+            Rate set-point of each loop, rad/s.
+        rate_rad_s : array_like
+            Rate of each loop, shape (n,), as the controller takes it; with ``gyro="raw"`` the
+            gyro's samples at `gyro_rate_hz`, as many for each loop as the rates tell.
+        flags : LoopFlags, optional
+            Limits, landing, thrust.
+        gyro : {"raw", "filtered"}
+            What `rate_rad_s` is.
+        single_precision : bool
+            True: the firmware's arithmetic. False: double precision.
+        """
+
+    @abstractmethod
+    def _feedback_terms(self, omega: Omega) -> dict[str, Response]:
+        """From the filtered rate, by role, per unit of the gain."""
+
+    @abstractmethod
+    def _forward_terms(self, omega: Omega) -> dict[str, Response]:
+        """From the rate set-point, by role, per unit of the gain."""
+
+    @abstractmethod
+    def _gyro_sections(self) -> tuple[Section, ...]:
+        """Second-order sections on the gyro."""
+
+    def _shared(
+        self, terms: dict[str, Response], common: Response, omega: Omega, hold: bool
+    ) -> tuple[Response, tuple[str, ...]]:
+        shared = common * self._output_response(omega)
+        if hold:
+            delay = np.exp(-1j * omega * self.computation_delay_s)
+            shared = shared * hold_response(omega, self.loop_rate_hz) * delay
+        stacked = np.array(list(terms.values())) * shared
+        return stacked, tuple(self.names[role] for role in terms)
+
+    def _output_response(self, omega: Omega) -> Response:
+        return np.ones(omega.size, dtype=np.complex128)
+
+    @property
+    def _samples_per_loop(self) -> int:
+        ratio = self.gyro_rate_hz / self.loop_rate_hz
+        if abs(ratio - round(ratio)) > 1e-6:
+            raise OptionError(
+                "raw gyro samples cannot be run",
+                found=f"{ratio:.4g} samples in a loop",
+                needed="a whole number",
+                action="run the filtered rate instead",
+            )
+        return round(ratio)
+
+    def summary(self) -> Table:
+        """Parameters with their ranges."""
+        ranges = self.ranges
+        rows = tuple(
+            (name, value, *_range_cells(ranges.get(name))) for name, value in self.gains.items()
+        )
+        columns = tuple(map(Column, ("parameter", "value", "low", "high", "unit", "note")))
+        return Table(repr(self), columns, rows, self.unmodelled)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "schema": "flightid.axis_loop/1",
+            "autopilot": self.autopilot,
+            "axis": self.axis,
+            "loop_rate_hz": self.loop_rate_hz,
+            "gyro_rate_hz": self.gyro_rate_hz,
+            "computation_delay_s": self.computation_delay_s,
+            "gains": self.gains,
+            "assumed": list(self.assumed),
+            "unmodelled": list(self.unmodelled),
+        }
+
+
+def _range_cells(found: GainRange | None) -> tuple[float | None, float | None, str, str]:
+    return (
+        (None, None, "", "") if found is None else (found.low, found.high, found.unit, found.note)
+    )
+
+
+def _frequencies(omega_rad_s: ArrayLike) -> Omega:
+    omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=np.float64))
+    if omega.ndim != 1 or not np.all(omega > 0):
+        raise OptionError(
+            "the integrator has no response at these frequencies",
+            found=f"shape {omega.shape}, lowest {omega.min() if omega.size else None} rad/s",
+            needed="one axis of frequencies above zero",
+        )
+    return omega
+
+
+def samples(setpoint: ArrayLike, rate: ArrayLike, per_loop: int) -> tuple[Samples, Samples]:
+    """Contiguous arrays of set-points and rates whose lengths agree."""
+    first = np.ascontiguousarray(setpoint, dtype=np.float64)
+    second = np.ascontiguousarray(rate, dtype=np.float64)
+    if first.ndim != 1 or second.shape != (first.size * per_loop,):
+        raise ShapeError(
+            "set-points and rates do not belong together",
+            found=f"{first.shape} and {second.shape}",
+            needed=f"{per_loop} rates for each set-point",
+        )
+    if not (np.isfinite(first).all() and np.isfinite(second).all()):
+        raise DataError("set-point or rate holds a value that is not finite")
+    return first, second
