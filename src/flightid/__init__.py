@@ -13,6 +13,7 @@ from flightid.version import VERSION as __version__
 
 if TYPE_CHECKING:
     from flightid import conditioning, excitation, validation
+    from flightid.control.margins import Margins, margins
     from flightid.dynamics.continuous import to_continuous, to_discrete
     from flightid.dynamics.handling_qualities import attitude_bandwidth
     from flightid.dynamics.interpretation import Interpretation, interpret
@@ -103,6 +104,8 @@ _HOMES = {
     "to_discrete": "flightid.dynamics.continuous",
     "LinearSystem": "flightid.models",
     "LocalMinimum": "flightid.identification",
+    "Margins": "flightid.control.margins",
+    "margins": "flightid.control.margins",
     "Log": "flightid.logs",
     "LogTable": "flightid.logs",
     "Output": "flightid.models",
@@ -168,6 +171,7 @@ __all__ = [
     "LocalMinimum",
     "Log",
     "LogTable",
+    "Margins",
     "ModelBuilder",
     "Modes",
     "NarxFit",
@@ -203,6 +207,7 @@ __all__ = [
     "interpret",
     "library_names",
     "load_model",
+    "margins",
     "modes",
     "pilot_cutoff",
     "read_log",

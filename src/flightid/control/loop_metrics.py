@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 DISTURBANCE_LEVEL_DB = -3.0
 """Level of the sensitivity that bounds the disturbance-rejection bandwidth."""
 TINY = 1e-300
+ON_AXIS = 1e-9
+"""Share of the imaginary part below which the last point counts as real."""
 OCTAVE = 2.0
 """The gain's slope at the lowest frequencies is taken over this ratio."""
 
@@ -60,7 +62,8 @@ class LoopMetrics:
     disturbance_peak_db : ndarray
         Greatest ``|1/(1+L)|``, dB.
     unstable_poles : ndarray of float
-        Unstable poles of the closed loop by the Nyquist criterion in the band.
+        Unstable poles of the closed loop by the Nyquist criterion in the band; below zero where
+        the open loop must have more than were given.
 
     Example
     -------
@@ -87,7 +90,7 @@ class LoopMetrics:
     @property
     def is_stable(self) -> NDArray[np.bool_]:
         """Whether the closed loop has no unstable pole, by the Nyquist criterion in the band."""
-        return np.asarray(self.unstable_poles == 0.0)
+        return np.asarray(self.unstable_poles <= 0.0)
 
     @property
     def modulus_margin(self) -> Array:
@@ -157,12 +160,13 @@ def loop_metrics(
     lead, rows = values.shape[:-1], values.reshape(-1, values.shape[-1])
     begun = _unstable(unstable_poles, lead)
     logs = np.log(omega)
+    rows, ends = _ending(omega, rows)
     passes, starts = phase_crossings(logs, rows), _beginning(omega, rows)
-    unstable = begun + _encirclements(passes, starts, len(rows))
-    sign = np.where(unstable == 0.0, 1.0, -1.0)
+    unstable = begun + _encirclements(passes, starts.joined(ends), len(rows))
+    sign = np.where(unstable > 0.0, -1.0, 1.0)
     found: dict[str, Array] = _phase_margins(gain_crossings(logs, rows), sign)
-    found |= _gain_margins(passes.joined(starts.kept(starts.weight != 0.0)), sign)
-    below = np.abs(1.0 + rows)
+    found |= _gain_margins(passes.joined(starts.kept(starts.weight != 0.0)).joined(ends), sign)
+    below = np.maximum(np.abs(1.0 + rows), TINY)
     inverse = np.log(below)
     found |= _peak("sensitivity_peak", logs, -inverse)
     found |= _peak("complementary_peak", logs, np.log(np.abs(rows)) - inverse)
@@ -226,6 +230,23 @@ def _beginning(omega: Array, rows: NDArray[np.complex128]) -> Crossings:
     gain = np.where(infinite, np.inf, gains_at(first))
     at = np.where(infinite, 0.0, omega[0])
     return Crossings(np.arange(len(rows)), at, gain, weight)
+
+
+def _ending(omega: Array, rows: NDArray[np.complex128]) -> tuple[NDArray[np.complex128], Crossings]:
+    """Rows that end on the negative axis, as at π/T of a sampled loop: half a crossing.
+
+    Such a point is moved a hair to the side from which the response comes, to be passed once.
+    """
+    last, before = rows[:, -1], rows[:, -2]
+    places = np.flatnonzero((np.abs(last.imag) <= ON_AXIS * np.abs(last)) & (last.real < 0.0))
+    if len(places):
+        side = np.where(before[places].imag >= 0.0, 1.0, -1.0)
+        rows = rows.copy()
+        rows[places, -1] = last[places].real + 1j * side * TINY
+        ends = np.full(len(places), omega[-1])
+        return rows, Crossings(places, ends, gains_at(last[places]), 0.5 * side)
+    none = np.zeros(0)
+    return rows, Crossings(np.zeros(0, dtype=np.intp), none, none, none)
 
 
 def _encirclements(passes: Crossings, starts: Crossings, n_rows: int) -> Array:

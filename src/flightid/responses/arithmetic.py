@@ -241,6 +241,27 @@ def open_loop(response: FrequencyResponse, feedback: Known) -> FrequencyResponse
     return _mapped(response, t / (1 - t * k), 1 / (1 - t * k) ** 2)
 
 
+def loop_of_sensitivity(response: FrequencyResponse) -> FrequencyResponse:
+    """Broken loop behind a measured sensitivity of one pair: ``L = 1/S − 1``.
+
+    The sensitivity is error over reference, or the fed-back signal over a disturbance added to it.
+    Errors grow without bound where S is small, that is where the loop gain is high.
+
+    Example
+    -------
+    >>> seen = FrequencyResponse.from_values([1.0], [0.25], inputs=["r"], outputs=["e"])
+    >>> loop_of_sensitivity(seen).response
+    array([[[3.+0.j]]])
+    """
+    _require_pair(response)
+    s = response.response
+    if np.any((s == 0.0) | (s == 1.0)):
+        raise DataError(
+            "a sensitivity is zero or one at a frequency", needed="a loop with a finite gain"
+        )
+    return _mapped(response, (1.0 - s) / s, -1.0 / s**2)
+
+
 def peel_loop(augmented: FrequencyResponse, actuator: Known, gyro: Known) -> FrequencyResponse:
     """Bare response behind an active rate gyro: ``H_aug / (H_act − H_aug H_act H_gyro)``.
 
