@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from flightid.dynamics.continuous import to_continuous, to_discrete
     from flightid.dynamics.handling_qualities import attitude_bandwidth
     from flightid.dynamics.interpretation import Interpretation, interpret
+    from flightid.dynamics.lower_order import lower_order
     from flightid.dynamics.mode_result import Modes
     from flightid.dynamics.modes import modes
     from flightid.dynamics.pilot_cutoff import pilot_cutoff
@@ -98,6 +99,7 @@ _HOMES = {
     "Inspection": "flightid.inspection",
     "Interpretation": "flightid.dynamics.interpretation",
     "attitude_bandwidth": "flightid.dynamics.handling_qualities",
+    "lower_order": "flightid.dynamics.lower_order",
     "pilot_cutoff": "flightid.dynamics.pilot_cutoff",
     "interpret": "flightid.dynamics.interpretation",
     "to_continuous": "flightid.dynamics.continuous",
@@ -207,6 +209,7 @@ __all__ = [
     "interpret",
     "library_names",
     "load_model",
+    "lower_order",
     "margins",
     "modes",
     "pilot_cutoff",

@@ -2,6 +2,8 @@
 
 from flightid.dynamics.handling_qualities import attitude_bandwidth
 from flightid.dynamics.handling_qualities_result import AttitudeBandwidth
+from flightid.dynamics.lower_order import lower_order
+from flightid.dynamics.lower_order_result import LowerOrder
 from flightid.dynamics.mode_names import NamedMode
 from flightid.dynamics.mode_result import Mode, Modes, Participation
 from flightid.dynamics.pilot_cutoff import PilotCutoff, pilot_cutoff
@@ -14,6 +16,7 @@ from flightid.dynamics.spread_of import spread_of
 
 __all__ = [
     "AttitudeBandwidth",
+    "LowerOrder",
     "Mode",
     "Modes",
     "NamedMode",
@@ -26,6 +29,7 @@ __all__ = [
     "Region",
     "Spread",
     "attitude_bandwidth",
+    "lower_order",
     "pilot_cutoff",
     "quantity_table",
     "rate",
