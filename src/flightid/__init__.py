@@ -14,7 +14,9 @@ from flightid.version import VERSION as __version__
 if TYPE_CHECKING:
     from flightid import conditioning, excitation, validation
     from flightid.control.margins import Margins, margins
+    from flightid.dynamics.approximate_modes import approximate_modes
     from flightid.dynamics.continuous import to_continuous, to_discrete
+    from flightid.dynamics.derivatives import DerivativeTable, derivatives
     from flightid.dynamics.handling_qualities import attitude_bandwidth
     from flightid.dynamics.interpretation import Interpretation, interpret
     from flightid.dynamics.lower_order import lower_order
@@ -82,6 +84,9 @@ _HOMES = {
     "ImpulseResponse": "flightid.identification",
     "OrderScan": "flightid.validation",
     "advise": "flightid.identification.advice",
+    "approximate_modes": "flightid.dynamics.approximate_modes",
+    "DerivativeTable": "flightid.dynamics.derivatives",
+    "derivatives": "flightid.dynamics.derivatives",
     "impulse_response": "flightid.identification.impulse_response",
     "scan_orders": "flightid.validation.order_scan",
     "Channel": "flightid.record",
@@ -157,6 +162,7 @@ __all__ = [
     "Channel",
     "CoherentPairs",
     "Comparison",
+    "DerivativeTable",
     "Finding",
     "Fit",
     "FittedParameter",
@@ -197,10 +203,12 @@ __all__ = [
     "Verification",
     "__version__",
     "advise",
+    "approximate_modes",
     "attitude_bandwidth",
     "coherent_pairs",
     "compare_structures",
     "conditioning",
+    "derivatives",
     "estimate_response",
     "excitation",
     "identify",

@@ -1,11 +1,14 @@
 """Dynamics: what a model says of the vehicle's motion, and what it is like to fly."""
 
+from flightid.dynamics.approximate_modes import ApproximateMode, ApproximateModes
+from flightid.dynamics.derivatives import Derivative, DerivativeTable
 from flightid.dynamics.handling_qualities import attitude_bandwidth
 from flightid.dynamics.handling_qualities_result import AttitudeBandwidth
 from flightid.dynamics.lower_order import lower_order
 from flightid.dynamics.lower_order_result import LowerOrder
 from flightid.dynamics.mode_names import NamedMode
 from flightid.dynamics.mode_result import Mode, Modes, Participation
+from flightid.dynamics.nondimensional import FixedWing, Rotorcraft, to_dimensional
 from flightid.dynamics.pilot_cutoff import PilotCutoff, pilot_cutoff
 from flightid.dynamics.quantity import Quantity, quantity_table
 from flightid.dynamics.rating import Rating, rate
@@ -15,7 +18,12 @@ from flightid.dynamics.spread import Propagated, Spread
 from flightid.dynamics.spread_of import spread_of
 
 __all__ = [
+    "ApproximateMode",
+    "ApproximateModes",
     "AttitudeBandwidth",
+    "Derivative",
+    "DerivativeTable",
+    "FixedWing",
     "LowerOrder",
     "Mode",
     "Modes",
@@ -27,6 +35,7 @@ __all__ = [
     "Rating",
     "RatingChart",
     "Region",
+    "Rotorcraft",
     "Spread",
     "attitude_bandwidth",
     "lower_order",
@@ -36,4 +45,5 @@ __all__ = [
     "rating_chart",
     "rating_charts",
     "spread_of",
+    "to_dimensional",
 ]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import cmath
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +15,8 @@ from flightid.dynamics.mode_result import Mode, Modes, Participation
 from flightid.dynamics.participation import UNINVOLVED, Eigenpair, eigenpairs
 from flightid.dynamics.quantity import Quantity
 from flightid.dynamics.spread import NORMAL_95
-from flightid.dynamics.spread_of import spread_of
-from flightid.errors import UnknownNameError
+from flightid.dynamics.state_matrix import StateMatrix, read_states
 from flightid.findings import Finding
-from flightid.identification import Fit
-from flightid.models import LinearSystem, StateSpaceModel
 from flightid.models.discrete_modes import AT_ORIGIN, NO_COUNTERPART
 
 Array = NDArray[np.float64]
@@ -28,18 +24,6 @@ UNFITTED = "does not depend on what was fitted"
 UNSIGNED = "the interval of the real part holds zero: growth and decay are both possible"
 SEEN = 1e-6
 """Size in an output, against the largest, below which the output does not show a mode."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Source:
-    """A matrix with its spread, and what its states are."""
-
-    name: str
-    system: LinearSystem
-    directions: Array | None
-    reason: str
-    physical: bool
-    states: tuple[str, ...]
 
 
 def modes(source: object, *, states: Mapping[str, str] | None = None) -> Modes:
@@ -87,7 +71,7 @@ def modes(source: object, *, states: Mapping[str, str] | None = None) -> Modes:
     >>> round(found.mode("short period").natural_frequency.value, 3)
     3.609
     """
-    read = _read(source, states or {})
+    read = read_states(source, states or {})
     pairs = eigenpairs(np.asarray(read.system.a), read.directions)
     made = sorted((_mode(read, pair) for pair in pairs), key=_order)
     return Modes(
@@ -104,56 +88,7 @@ def _order(mode: Mode) -> tuple[float, float]:
     return (math.inf, 0.0) if value is None else (abs(value), value.real)
 
 
-def _read(source: object, states: Mapping[str, str]) -> _Source:
-    system = LinearSystem.of(source)
-    model = getattr(source, "model", source)
-    for name in states:
-        if name not in system.states:
-            raise UnknownNameError(
-                "there is no such state", found=repr(name), needed=", ".join(system.states)
-            )
-    made_up = tuple(f"x{k + 1}" for k in range(system.order))
-    physical = isinstance(model, StateSpaceModel) or (
-        isinstance(model, LinearSystem) and system.states != made_up
-    )
-    directions, reason = _directions(source)
-    return _Source(
-        getattr(model, "name", "linear system"),
-        system,
-        directions,
-        reason,
-        physical or bool(states),
-        tuple(states.get(name, name) for name in system.states),
-    )
-
-
-def _directions(source: object) -> tuple[Array | None, str]:
-    """Moves of A along independent directions of one standard error each, or why there are none."""
-    spread = spread_of(source)
-    if spread.covariance is None:
-        return None, spread.reason
-    if isinstance(source, Fit) and isinstance(source.model, StateSpaceModel):
-        return _exact_directions(source, source.model), ""
-    ends = [
-        (np.asarray(LinearSystem.of(up).a) - np.asarray(LinearSystem.of(down).a)) / 2.0
-        for up, down in spread.steps()
-    ]
-    order = LinearSystem.of(source).order
-    return np.array(ends).reshape(len(ends), order, order), ""
-
-
-def _exact_directions(fit: Fit, model: StateSpaceModel) -> Array:
-    """From dA = M⁻¹(dF − dM A), without differences."""
-    a, m, by_name = model.state_space()[0], model.matrices().m, model.matrix_derivatives()
-    slopes = np.array(
-        [np.linalg.solve(m, by_name[name].f - by_name[name].m @ a) for name in fit.names]
-    ).reshape(len(fit.names), *a.shape)
-    sizes, turned = np.linalg.eigh(np.asarray(fit.covariance))
-    factor = turned * np.sqrt(np.maximum(sizes, 0.0))
-    return np.asarray(np.einsum("pk,pst->kst", factor, slopes))
-
-
-def _mode(read: _Source, pair: Eigenpair) -> Mode:
+def _mode(read: StateMatrix, pair: Eigenpair) -> Mode:
     step = read.system.sample_time_s
     value, rate, lacking = _continuous(pair.value, step)
     moves = None if pair.value_moves is None or value is None else rate * pair.value_moves
@@ -190,11 +125,9 @@ def _continuous(root: complex, step: float | None) -> tuple[complex | None, comp
     return cmath.log(root) / step, 1.0 / (root * step), ""
 
 
-def _named(read: _Source, pair: Eigenpair, value: complex | None) -> NamedMode:
+def _named(read: StateMatrix, pair: Eigenpair, value: complex | None) -> NamedMode:
     if read.physical:
-        units = dict(read.system.units)
-        named = {new: units.get(old, "1") for old, new in zip(read.system.states, read.states)}  # noqa: B905
-        return name_by_states(value, pair, read.states, named)
+        return name_by_states(value, pair, read.states, read.units)
     shown = np.abs(np.asarray(read.system.c) @ pair.vector)
     seen = [
         name
@@ -204,7 +137,7 @@ def _named(read: _Source, pair: Eigenpair, value: complex | None) -> NamedMode:
     return name_by_outputs(value, seen)
 
 
-def _participations(read: _Source, pair: Eigenpair) -> Iterator[Participation]:
+def _participations(read: StateMatrix, pair: Eigenpair) -> Iterator[Participation]:
     if pair.factors is None:
         return
     shares, share_errors = pair.shares, pair.share_errors
