@@ -1,0 +1,45 @@
+"""Blocks of loops by the names of their signals; `flightid.connect` joins them."""
+
+from flightid.control.loops.block import Block
+from flightid.control.loops.elements import (
+    delay,
+    gain,
+    limiter,
+    rate_limiter,
+    sample_and_hold,
+    sum_of,
+    system,
+)
+from flightid.control.loops.filters import (
+    complementary,
+    high_pass,
+    lead_lag,
+    low_pass,
+    notch,
+    sampled,
+    transfer,
+    washout,
+)
+from flightid.control.loops.interconnection import Interconnection
+from flightid.control.loops.stability import Stability
+
+__all__ = [
+    "Block",
+    "Interconnection",
+    "Stability",
+    "complementary",
+    "delay",
+    "gain",
+    "high_pass",
+    "lead_lag",
+    "limiter",
+    "low_pass",
+    "notch",
+    "rate_limiter",
+    "sample_and_hold",
+    "sampled",
+    "sum_of",
+    "system",
+    "transfer",
+    "washout",
+]

@@ -1,0 +1,199 @@
+"""The linear blocks of a connection as one system; what they cannot hold stays outside as rows.
+
+x' = A x + B v,  signals = C x + D v: the rows v are signals from outside, outputs of blocks that are
+no linear system of the same time, and delayed signals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from flightid.control.loops.block import Block
+from flightid.errors import ModelError
+from flightid.models.linear_system import LinearSystem
+
+Array = NDArray[np.float64]
+SINGULAR = 1e-12
+"""Reciprocal condition number below which an algebraic loop has no solution worth the name."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One driven column of a core.
+
+    Attributes
+    ----------
+    carrier : str
+        Signal whose value drives it.
+    delay_s : float
+        How much later it does, s.
+    """
+
+    carrier: str
+    delay_s: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Core:
+    """Linear blocks joined, driven by rows.
+
+    Attributes
+    ----------
+    a, b, c, d : ndarray
+        Shapes (n, n), (n, n_rows), (n_signals, n), (n_signals, n_rows).
+    rows : tuple of Row
+    signals : tuple of str
+        Carriers that are not computed here, then the outputs of the linear blocks.
+    states : tuple of str
+        ``"block.state"``.
+    """
+
+    a: Array
+    b: Array
+    c: Array
+    d: Array
+    rows: tuple[Row, ...]
+    signals: tuple[str, ...]
+    states: tuple[str, ...]
+
+    def places(self, names: Iterable[str]) -> list[int]:
+        """Rows of C and D by signal."""
+        return [self.signals.index(name) for name in names]
+
+    def delayed_inside(self, given: Sequence[str]) -> list[int]:
+        """Rows whose carrier is not among some signals."""
+        return [place for place, row in enumerate(self.rows) if row.carrier not in given]
+
+    def system(self, outputs: Sequence[str], sample_time_s: float | None = None) -> LinearSystem:
+        """The core by itself: one input a row, delays exact."""
+        names = tuple(f"{row.carrier}@{row.delay_s:g}" for row in self.rows)
+        places = self.places(outputs)
+        return LinearSystem(
+            self.a, self.b, self.c[places], self.d[places], names,
+            tuple(f"y{k}" for k in range(len(places))),
+            [row.delay_s for row in self.rows], self.states, sample_time_s,
+        )  # fmt: skip
+
+
+def assemble(
+    blocks: Sequence[Block], carriers: Sequence[str], late_s: Mapping[str, float] | None = None
+) -> Core:
+    """Join linear blocks of one time.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        All with a `LinearSystem`.
+    carriers : sequence of str
+        Signals that come from elsewhere.
+    late_s : mapping of str to float, optional
+        By how much a signal lags behind its carrier, s: a held one by the computation delay.
+
+    Returns
+    -------
+    Core
+
+    Raises
+    ------
+    ModelError
+        An algebraic loop without a solution.
+    """
+    late = dict(late_s or {})
+    rows: dict[Row, int] = {}
+    for name in carriers:
+        rows.setdefault(Row(name, late.get(name, 0.0)), len(rows))
+    parts = [_part(block).state_space() for block in blocks]
+    given = [name for block in blocks for name in block.outputs]
+    place = {name: number for number, name in enumerate(given)}
+    n_inputs = sum(len(block.inputs) for block in blocks)
+    loops = np.zeros((n_inputs, len(given)))
+    picked: list[tuple[int, int]] = []
+    position = 0
+    for block, (*_, delays) in zip(blocks, parts, strict=True):
+        for name, delay in zip(block.inputs, delays, strict=True):
+            if name in place and delay == 0.0:
+                loops[position, place[name]] = 1.0
+            else:
+                row = Row(name, float(delay) + late.get(name, 0.0))
+                picked.append((position, rows.setdefault(row, len(rows))))
+            position += 1
+    driven = np.zeros((n_inputs, len(rows)))
+    for where, row_place in picked:
+        driven[where, row_place] = 1.0
+    a, b, c, d = (_diagonal([part[k] for part in parts]) for k in range(4))
+    inverse = _inverse(np.eye(len(given)) - d @ loops, given)
+    seen, direct = inverse @ c, inverse @ d @ driven
+    own = np.zeros((len(carriers), len(rows)))
+    for number, name in enumerate(carriers):
+        own[number, rows[Row(name, late.get(name, 0.0))]] = 1.0
+    states = tuple(
+        f"{block.name}.{state}" for block in blocks for state in _part(block).states
+    )
+    return _with_held_delays(
+        Core(
+            a + b @ loops @ seen,
+            b @ (loops @ direct + driven),
+            np.vstack([np.zeros((len(carriers), len(a))), seen]),
+            np.vstack([own, direct]),
+            tuple(rows),
+            (*carriers, *given),
+            states,
+        ),
+        carriers,
+    )
+
+
+def _part(block: Block) -> LinearSystem:
+    if not isinstance(block.part, LinearSystem):
+        raise ModelError("this block is no linear system", found=f"{block!r}: {block}")
+    return block.part
+
+
+def _diagonal(parts: Sequence[Array]) -> Array:
+    return np.asarray(block_diag(*parts) if parts else np.zeros((0, 0)), dtype=np.float64)
+
+
+def _inverse(matrix: Array, names: Sequence[str]) -> Array:
+    if not len(matrix):
+        return matrix
+    _, sizes, directions = np.linalg.svd(matrix)
+    if sizes[-1] < SINGULAR * max(1.0, sizes[0]):
+        share = np.abs(directions[-1])
+        loop = [name for name, size in zip(names, share, strict=True) if size > 0.1 * share.max()]
+        raise ModelError(
+            "an algebraic loop has no solution",
+            found=f"gain of one around {', '.join(loop)}",
+            needed="a loop gain other than one, or dynamics or a delay in the loop",
+        )
+    return np.asarray(np.linalg.inv(matrix))
+
+
+def _with_held_delays(core: Core, carriers: Sequence[str]) -> Core:
+    """Delayed sums of carriers as sums of delayed carriers: what a gain passes on it may pass late."""
+    for number, row in enumerate(core.rows):
+        if row.carrier in carriers:
+            continue
+        place = core.signals.index(row.carrier)
+        sees = np.flatnonzero(core.d[place])
+        if core.c[place].any() or any(core.rows[k].carrier not in carriers for k in sees):
+            continue
+        rows = list(core.rows)
+        b, d = core.b.copy(), core.d.copy()
+        for k in sees:
+            wanted = Row(core.rows[k].carrier, core.rows[k].delay_s + row.delay_s)
+            if wanted not in rows:
+                rows.append(wanted)
+                b, d = (np.column_stack([each, np.zeros(len(each))]) for each in (b, d))
+            b[:, rows.index(wanted)] += core.d[place, k] * core.b[:, number]
+            d[:, rows.index(wanted)] += core.d[place, k] * core.d[:, number]
+        keep = [k for k in range(len(rows)) if k != number]
+        reduced = replace(
+            core, b=b[:, keep], d=d[:, keep], rows=tuple(rows[k] for k in keep)
+        )
+        return _with_held_delays(reduced, carriers)
+    return core

@@ -1,0 +1,154 @@
+"""Roots of loops with delays: x' = A x + B w, z = C x + D w, w_i(t) = z_i(t − τ_i).
+
+They solve det F(s) = 0 with F(s) = s − A − B K(s) C, K(s) = E (I − D E)⁻¹, E = diag e^(−s τ).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+STEPS = 40
+SAME = 1e-7
+"""Distance over size below which two roots are one."""
+TURN_RAD = 0.35
+"""Largest turn of the determinant between two points of the contour."""
+POINTS = 200_000
+"""Most points of the contour."""
+
+
+def refined_roots(a: Array, b: Array, c: Array, d: Array, delays_s: Array, seeds: Complex) -> Complex:
+    """Roots that Newton's method reaches from some seeds, each once.
+
+    Parameters
+    ----------
+    a, b, c, d : ndarray
+        Shapes (n, n), (n, k), (k, n), (k, k).
+    delays_s : ndarray, shape (k,)
+        s.
+    seeds : ndarray of complex
+        rad/s.
+
+    Returns
+    -------
+    ndarray of complex
+        rad/s.
+
+    Reference
+    ---------
+    Guettel & Tisseur, "The nonlinear eigenvalue problem", *Acta Numerica* 26 (2017), section 4.1:
+    Newton's method on the determinant, by the trace of F⁻¹F'.
+    """
+    roots: list[complex] = []
+    # Infinitely many roots lie far left; seeds there are artefacts of the approximation.
+    for seed in seeds:
+        root = _newton(a, b, c, d, delays_s, complex(seed))
+        if root is None or any(abs(root - each) < SAME * max(1.0, abs(root)) for each in roots):
+            continue
+        roots.append(root)
+        if abs(root.imag) > SAME * max(1.0, abs(root)):
+            twin = root.conjugate()
+            if all(abs(twin - each) >= SAME * max(1.0, abs(root)) for each in roots):
+                roots.append(twin)
+    return np.array(roots, dtype=np.complex128)
+
+
+def _newton(a: Array, b: Array, c: Array, d: Array, delays: Array, s: complex) -> complex | None:
+    one, inner = np.eye(len(a)), np.eye(len(delays))
+    for _ in range(STEPS):
+        late = np.exp(np.clip(-s.real * delays, -200.0, 200.0) - 1j * s.imag * delays)
+        e = np.diag(late)
+        try:
+            left = np.linalg.inv(inner - e @ d)
+            slope_k = left @ np.diag(-delays * late) @ np.linalg.inv(inner - d @ e)
+            f = s * one - a - b @ (left @ e) @ c
+            trace = np.trace(np.linalg.solve(f, one - b @ slope_k @ c))
+        except np.linalg.LinAlgError:
+            return s
+        if not np.isfinite(trace) or trace == 0.0:
+            return None
+        step = 1.0 / trace
+        s = complex(s - step)
+        if not np.isfinite(s):
+            return None
+        if abs(step) < 1e-13 * max(1.0, abs(s)):
+            return complex(s.real, 0.0) if abs(s.imag) < 1e-10 * max(1.0, abs(s)) else s
+    return None
+
+
+def line_right_of_axis(a: Array, delays_s: Array) -> float:
+    """Real part, rad/s, up to which a pole is taken to stand on the imaginary axis."""
+    fastest = max(float(np.max(np.abs(np.linalg.eigvals(a)), initial=0.0)), 1.0)
+    return 1e-9 * max(fastest, float(np.max(1.0 / delays_s)))
+
+
+def count_right(
+    a: Array, b: Array, c: Array, d: Array, delays_s: Array, line_rad_s: float
+) -> int | None:
+    """Number of roots right of a line beside the imaginary axis, by the argument principle.
+
+    Parameters
+    ----------
+    a, b, c, d, delays_s : ndarray
+        As for `refined_roots`.
+    line_rad_s : float
+        Real part of the line, above zero.
+
+    Returns
+    -------
+    int or None
+        None where the determinant turns too fast to be followed, or where a direct path around
+        the delays has a gain of one or more.
+
+    Reference
+    ---------
+    Stepan, *Retarded Dynamical Systems* (1989), section 2.2.
+    """
+    direct = float(np.linalg.norm(d, 2)) if d.size else 0.0
+    if direct >= 1.0:
+        return None
+    # Beyond the last point all loops together have a gain below one, so nothing can turn there.
+    weight = float(np.linalg.norm(b, 2) * np.linalg.norm(c, 2))
+    top = 1.5 * (float(np.linalg.norm(a, 2)) + weight / (1.0 - direct)) + 1.0
+    omega = np.concatenate([[0.0], np.geomspace(line_rad_s, top, 600)])
+    parts = (a, b, c, d, delays_s)
+    values = _determinants(*parts, line_rad_s, omega)
+    while True:
+        turns = np.abs(np.angle(values[1:] / values[:-1]))
+        jumps = np.abs(np.log(np.abs(values[1:] / values[:-1])))
+        hidden = (np.diff(omega) * np.max(delays_s) > 0.5) & (np.abs(values[1:] - 1.0) > 0.2)
+        coarse = np.flatnonzero((turns > TURN_RAD) | (jumps > 1.0) | hidden)
+        if not len(coarse):
+            break
+        if len(omega) + len(coarse) > POINTS:
+            return None
+        middle = 0.5 * (omega[coarse] + omega[coarse + 1])
+        values = np.insert(values, coarse + 1, _determinants(*parts, line_rad_s, middle))
+        omega = np.insert(omega, coarse + 1, middle)
+    last = np.linalg.eigvals(_around(*parts, line_rad_s, omega[-1:])[0])
+    # A real system: what happens below zero mirrors what happens above.
+    turned = 2.0 * float(np.sum(np.angle(values[1:] / values[:-1])))
+    turned -= 2.0 * float(np.sum(np.angle(1.0 - last)))
+    turns_whole = turned / (2.0 * np.pi)
+    count = int(np.sum(np.linalg.eigvals(a).real > line_rad_s)) - round(turns_whole)
+    return count if abs(turns_whole - round(turns_whole)) < 0.05 and count >= 0 else None
+
+
+def _around(
+    a: Array, b: Array, c: Array, d: Array, delays: Array, line: float, omega: Array
+) -> Complex:
+    """G(s) E(s) along the line, shape (n_f, k, k)."""
+    s = line + 1j * omega
+    pencil = s[:, None, None] * np.eye(len(a)) - a
+    inner = c @ np.linalg.solve(pencil, np.broadcast_to(b.astype(complex), (len(s), *b.shape))) + d
+    return np.asarray(inner * np.exp(-s[:, None] * delays)[:, None, :])
+
+
+def _determinants(
+    a: Array, b: Array, c: Array, d: Array, delays: Array, line: float, omega: Array
+) -> Complex:
+    """det(I − G(s) E(s)) along the line."""
+    around = _around(a, b, c, d, delays, line, omega)
+    return np.asarray(np.linalg.det(np.eye(len(delays)) - around))

@@ -1,0 +1,128 @@
+"""Linear views of a connection: which blocks a core takes whole, and which stay outside it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from flightid.control.loops.block import Block, Equations, Hold
+from flightid.control.loops.core import Core, Row, assemble
+from flightid.control.loops.elements import static
+from flightid.control.loops.wiring import Wiring
+from flightid.errors import ModelError, OptionError
+from flightid.models.linear_system import LinearSystem
+
+
+def linear_view(block: Block) -> Block:
+    """A block as the linear system that it is near its trim; a hold as its delay."""
+    part = block.part
+    if isinstance(part, LinearSystem):
+        return block
+    if isinstance(part, Equations):
+        return replace(block, part=part.linear)
+    late = (part.sample_time_s / 2.0 + part.delay_s,) if isinstance(part, Hold) else ()
+    found = static(block.name, block.inputs, block.outputs, np.eye(1), late)
+    return replace(found, units=block.units)
+
+
+def continuous_core(wiring: Wiring) -> Core:
+    """All blocks seen as linear in continuous time, delays kept.
+
+    Raises
+    ------
+    ModelError
+        A sampled block.
+    """
+    for block in wiring.blocks:
+        if block.sample_time_s is not None:
+            raise ModelError(
+                "a sampled block has no place in a continuous system",
+                found=f"{block!r}: {block}",
+                needed="continuous blocks",
+                action="use sampled(), or frequency_response()",
+            )
+    return assemble([linear_view(block) for block in wiring.blocks], wiring.inputs)
+
+
+def continuous_system(
+    wiring: Wiring, outputs: tuple[str, ...], pade_order: int | None
+) -> LinearSystem:
+    """One continuous linear system; delays at its inputs exact, those inside as states."""
+    core = continuous_core(wiring)
+    late = [row for row in core.rows if row.delay_s and row.carrier not in wiring.inputs]
+    for name in wiring.inputs:
+        used = _used(core, name, seen=name in outputs)
+        late += [row for row in used if row.delay_s and len(used) > 1]
+    if late and pade_order is None:
+        raise OptionError(
+            "a delay inside the loops has no exact place in a linear system",
+            found=", ".join(f"{row.delay_s:g} s after {row.carrier}" for row in late),
+            needed="an order of Padé's approximation",
+        )
+    if late:
+        core = _with_late_rows(core, late, wiring.inputs, pade_order or 1)
+    return _by_inputs(core, wiring, outputs)
+
+
+def _used(core: Core, name: str, *, seen: bool) -> list[Row]:
+    """Rows of an input that do something, be it to give its own signal where that is seen."""
+    own = core.signals.index(name)
+    used = []
+    for place, row in enumerate(core.rows):
+        column = core.d[:, place].copy()
+        column[own] = column[own] if seen else 0.0
+        if row.carrier == name and (core.b[:, place].any() or column.any()):
+            used.append(row)
+    return used
+
+
+def _with_late_rows(core: Core, late: list[Row], inputs: tuple[str, ...], order: int) -> Core:
+    """The core with some delayed rows made by states."""
+    rest = [row for row in core.rows if row not in late]
+    names = {row: f"{row.carrier} late by {row.delay_s:g} s" for row in core.rows}
+    whole = core.system(core.signals)
+    inner = tuple(f"{name} (core)" for name in core.signals)
+    fed = tuple(names[row] if row in late else _feed(row) for row in core.rows)
+    blocks = [Block("core", fed, inner, replace(whole, delays_s=[0.0] * len(fed)))]
+    for row in late:
+        source = row.carrier if row.carrier in inputs else f"{row.carrier} (core)"
+        made = static("late", (source,), (names[row],), np.eye(1), (row.delay_s,))
+        assert isinstance(made.part, LinearSystem)
+        blocks.append(replace(made, part=made.part.with_pade(order)))
+    carriers = list(dict.fromkeys([*inputs, *(_feed(row) for row in rest)]))
+    joined = assemble(blocks, carriers)
+    return _renamed(joined, core, rest)
+
+
+def _feed(row: Row) -> str:
+    return f"{row.carrier}@{row.delay_s!r}" if row.delay_s else row.carrier
+
+
+def _renamed(joined: Core, core: Core, rest: list[Row]) -> Core:
+    back = {_feed(row): row for row in rest}
+    rows = tuple(back.get(row.carrier, row) for row in joined.rows)
+    places = joined.places(f"{name} (core)" for name in core.signals)
+    states = tuple(name.removeprefix("core.") for name in joined.states)
+    return Core(
+        joined.a, joined.b, joined.c[places], joined.d[places], rows, core.signals, states
+    )
+
+
+def _by_inputs(core: Core, wiring: Wiring, outputs: tuple[str, ...]) -> LinearSystem:
+    """Rows of one input joined to it; at most one of them does anything."""
+    places = core.places(outputs)
+    n_in = len(wiring.inputs)
+    b, d, delays = np.zeros((len(core.a), n_in)), np.zeros((len(places), n_in)), np.zeros(n_in)
+    for number, name in enumerate(wiring.inputs):
+        mine = [k for k, row in enumerate(core.rows) if row.carrier == name]
+        for k in mine:
+            column = core.d[places, k]
+            if core.b[:, k].any() or column.any():
+                b[:, number] += core.b[:, k]
+                d[:, number] += column
+                delays[number] = core.rows[k].delay_s
+    units = {n: wiring.units[n] for n in (*wiring.inputs, *outputs) if n in wiring.units}
+    return LinearSystem(
+        core.a, b, core.c[places], d, wiring.inputs, outputs, delays, core.states, None, units
+    )
