@@ -13,6 +13,9 @@ from flightid.version import VERSION as __version__
 
 if TYPE_CHECKING:
     from flightid import conditioning, excitation, validation
+    from flightid.control import loops
+    from flightid.control.loops.connect import connect
+    from flightid.control.loops.interconnection import Interconnection
     from flightid.control.margins import Margins, margins
     from flightid.dynamics.approximate_modes import approximate_modes
     from flightid.dynamics.continuous import to_continuous, to_discrete
@@ -138,6 +141,9 @@ _HOMES = {
     "compare_structures": "flightid.identification.structures",
     "coherent_pairs": "flightid.responses",
     "conditioning": "flightid.conditioning",
+    "Interconnection": "flightid.control.loops.interconnection",
+    "connect": "flightid.control.loops.connect",
+    "loops": "flightid.control",
     "Verification": "flightid.validation",
     "estimate_response": "flightid.responses",
     "excitation": "flightid.excitation",
@@ -174,6 +180,7 @@ __all__ = [
     "InnovationsFit",
     "InnovationsModel",
     "Inspection",
+    "Interconnection",
     "Interpretation",
     "LinearSystem",
     "LocalMinimum",
@@ -208,6 +215,7 @@ __all__ = [
     "coherent_pairs",
     "compare_structures",
     "conditioning",
+    "connect",
     "derivatives",
     "estimate_response",
     "excitation",
@@ -217,6 +225,7 @@ __all__ = [
     "interpret",
     "library_names",
     "load_model",
+    "loops",
     "lower_order",
     "margins",
     "modes",

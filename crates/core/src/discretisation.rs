@@ -82,7 +82,21 @@ pub fn discretise(
     sample_s: f64,
     hold: Hold,
 ) -> Result<(Sampled, Vec<SampledSlope>), CoreError> {
+    discretise_each(system, slopes, sample_s, &vec![hold; system.delays_s.len()])
+}
+
+/// As `discretise`, with what each input does between samples.
+///
+/// # Errors
+/// As `discretise`, and `Shape` where there is not one hold for each input.
+pub fn discretise_each(
+    system: &StateSpace<'_>,
+    slopes: &[StateSpace<'_>],
+    sample_s: f64,
+    holds: &[Hold],
+) -> Result<(Sampled, Vec<SampledSlope>), CoreError> {
     let (n, m, p) = check(system, sample_s)?;
+    require("holds of the inputs", holds.len(), m)?;
     for slope in slopes {
         check_sizes(slope, n, m, p)?;
     }
@@ -92,14 +106,15 @@ pub fn discretise(
     let mut derived: Vec<_> = (whole.transition.slopes.iter())
         .map(|slope| Sampled { transition: slope.clone(), taps: Vec::new() })
         .collect();
-    let mut known: Vec<(f64, Vec<Weight>)> = Vec::new();
-    for input in 0..m {
+    let mut known: Vec<((f64, Hold), Vec<Weight>)> = Vec::new();
+    for (input, &hold) in holds.iter().enumerate() {
         let delay = system.delays_s[input];
-        // Inputs of one delay share their matrices.
-        if !known.iter().any(|(each, _)| *each == delay) {
-            known.push((delay, weights(&a, &whole, n, sample_s, delay, hold)?));
+        let key = (delay, hold);
+        // Inputs of one delay and hold share their matrices.
+        if !known.iter().any(|(each, _)| *each == key) {
+            known.push((key, weights(&a, &whole, n, sample_s, delay, hold)?));
         }
-        let Some((_, weights)) = known.iter().find(|(each, _)| *each == delay) else { continue };
+        let Some((_, weights)) = known.iter().find(|(each, _)| *each == key) else { continue };
         for weight in weights {
             found.taps.push(weight.tap(system, input, n, p));
             for (k, (slope, into)) in slopes.iter().zip(&mut derived).enumerate() {

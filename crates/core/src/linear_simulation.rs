@@ -2,7 +2,7 @@
 //! the first sample an input is taken to have had the value of that sample.
 
 pub use crate::discretisation::{Hold, StateSpace};
-use crate::discretisation::{Sampled, discretise, split_delay};
+use crate::discretisation::{Sampled, discretise_each, split_delay};
 use crate::error::CoreError;
 use crate::householder::dot;
 
@@ -29,7 +29,19 @@ impl Discrete {
     /// # Errors
     /// As `discretise`.
     pub fn new(system: &StateSpace<'_>, sample_s: f64, hold: Hold) -> Result<Self, CoreError> {
-        let (discrete, _) = discretise(system, &[], sample_s, hold)?;
+        Self::with_holds(system, sample_s, &vec![hold; system.delays_s.len()])
+    }
+
+    /// As `new`, with what each input does between samples.
+    ///
+    /// # Errors
+    /// As `discretise_each`.
+    pub fn with_holds(
+        system: &StateSpace<'_>,
+        sample_s: f64,
+        holds: &[Hold],
+    ) -> Result<Self, CoreError> {
+        let (discrete, _) = discretise_each(system, &[], sample_s, holds)?;
         let (n, m) = (system.a.len().isqrt(), system.delays_s.len());
         let lags = system.delays_s.iter().map(|&delay| split_delay(delay, sample_s).0).collect();
         Ok(Self { n, m, p: system.n_outputs, discrete, lags, c: system.c.to_vec() })
@@ -92,6 +104,15 @@ impl Discrete {
             let u = sample(input, k, tap.ahead);
             next.iter_mut().zip(&tap.state).for_each(|(out, weight)| *out += weight * u);
         }
+    }
+
+    /// Whether the newest sample of an input changes the state, or one of some outputs, at that sample.
+    #[must_use]
+    pub fn acts_at_once(&self, input: usize, outputs: &[usize]) -> bool {
+        self.discrete.taps.iter().filter(|tap| tap.input == input).any(|tap| {
+            (tap.ahead > 0 && tap.state.iter().any(|weight| *weight != 0.0))
+                || (tap.ahead == 0 && outputs.iter().any(|&output| tap.output[output] != 0.0))
+        })
     }
 
     /// Whole samples in the shortest delay; the largest number there is without inputs.

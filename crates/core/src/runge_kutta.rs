@@ -180,7 +180,7 @@ impl Setting {
     }
 
     /// Outputs at a sample.
-    fn measure(
+    pub(crate) fn measure(
         &mut self,
         motion: &Motion,
         sample: usize,
@@ -214,7 +214,7 @@ impl Setting {
     }
 
     /// Advance a state by step number `step` of the record.
-    fn advance(
+    pub(crate) fn advance(
         &mut self,
         motion: &Motion,
         step: usize,

@@ -8,7 +8,7 @@ use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 /// A, B, C, D and the delay of each input, s.
-type Matrices<'py> = (
+pub(crate) type Matrices<'py> = (
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
     PyReadonlyArray2<'py, f64>,
@@ -16,7 +16,7 @@ type Matrices<'py> = (
     PyReadonlyArray1<'py, f64>,
 );
 
-fn system<'a>(matrices: &'a Matrices<'_>) -> PyResult<StateSpace<'a>> {
+pub(crate) fn system<'a>(matrices: &'a Matrices<'_>) -> PyResult<StateSpace<'a>> {
     let (a, b, c, d, delays_s) = matrices;
     Ok(StateSpace {
         a: a.as_slice()?,

@@ -21,6 +21,7 @@ pub mod least_squares;
 pub mod linear_recursion;
 pub mod linear_simulation;
 pub mod lookup_table;
+pub mod loop_simulation;
 pub mod narx;
 pub mod nonlinear_simulation;
 pub mod output_error;
@@ -50,6 +51,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     linear_simulation::register(module)?;
     closed_loop::register(module)?;
     lookup_table::register(module)?;
+    loop_simulation::register(module)?;
     dataflash::register(module)?;
     ulog::register(module)?;
     quadrotor::register(module)?;

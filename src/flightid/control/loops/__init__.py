@@ -1,6 +1,7 @@
 """Blocks of loops by the names of their signals; `flightid.connect` joins them."""
 
 from flightid.control.loops.block import Block
+from flightid.control.loops.digital import sampled
 from flightid.control.loops.elements import (
     delay,
     gain,
@@ -16,11 +17,10 @@ from flightid.control.loops.filters import (
     lead_lag,
     low_pass,
     notch,
-    sampled,
-    transfer,
     washout,
 )
 from flightid.control.loops.interconnection import Interconnection
+from flightid.control.loops.rational import transfer
 from flightid.control.loops.stability import Stability
 
 __all__ = [

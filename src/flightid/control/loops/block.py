@@ -110,7 +110,7 @@ class Block:
 
     def __post_init__(self) -> None:
         for name in (*self.inputs, *self.outputs):
-            if not isinstance(name, str) or not name:
+            if not name:
                 raise ModelError(f"a signal of block {self.name!r} has no name", found=repr(name))
         if len(set(self.outputs)) < len(self.outputs):
             raise ModelError(
@@ -167,7 +167,7 @@ class Block:
 
 
 def _linear_words(system: LinearSystem) -> str:
-    a, _, _, d, delays = system.state_space()
+    _, _, _, d, delays = system.state_space()
     words = []
     if system.order:
         words.append(f"{system.order} state{'' if system.order == 1 else 's'}")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flightid.control.loops.block import Block
-from flightid.control.loops.core import assemble
 from flightid.control.loops.elements import system
 from flightid.control.loops.interconnection import Interconnection
+from flightid.control.loops.linear_core import assemble
 from flightid.control.loops.views import linear_view
 
 
@@ -55,11 +55,11 @@ def connect(
     -------
     >>> import flightid as fid
     >>> roll = fid.LinearSystem([[-4.0]], [[20.0]], [[1.0]], [[0.0]], ("lat",), ("p",))
-    >>> loop = connect([roll, fid.loops.washout("p", "p_w", 0.5),
-    ...                 fid.loops.gain("p_w", "sas", -0.2), fid.loops.sum_of("lat", "stick", "sas")],
+    >>> damper = [fid.loops.washout("p", "p_w", 0.5), fid.loops.gain("p_w", "sas", -0.2)]
+    >>> loop = connect([roll, *damper, fid.loops.sum_of("lat", "stick", "sas")],
     ...                inputs=["stick"], outputs=["p"])
     >>> loop.poles().real.round(3)
-    array([-8.255, -0.242])
+    array([-8.258, -0.242])
     """
     wanted: list[Block] = []
     for place, each in enumerate(blocks):

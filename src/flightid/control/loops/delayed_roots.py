@@ -19,7 +19,9 @@ POINTS = 200_000
 """Most points of the contour."""
 
 
-def refined_roots(a: Array, b: Array, c: Array, d: Array, delays_s: Array, seeds: Complex) -> Complex:
+def refined_roots(
+    a: Array, b: Array, c: Array, d: Array, delays_s: Array, seeds: Complex
+) -> Complex:
     """Roots that Newton's method reaches from some seeds, each once.
 
     Parameters

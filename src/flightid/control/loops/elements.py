@@ -42,6 +42,10 @@ def gain(
     DataError
         A gain is not finite.
 
+    Reference
+    ---------
+    Skogestad & Postlethwaite, *Multivariable Feedback Control*, 2nd ed., section 3.2.
+
     Example
     -------
     >>> gain("q", "lon_sas", -3.0, units={"q": "rad/s", "lon_sas": "in"})
@@ -75,6 +79,10 @@ def sum_of(output: str, *terms: str, units: Mapping[str, str] | None = None) -> 
     OptionError
         No term, or a term twice.
 
+    Reference
+    ---------
+    Skogestad & Postlethwaite, *Multivariable Feedback Control*, 2nd ed., section 3.2.
+
     Example
     -------
     >>> sum_of("e", "r", "-y")
@@ -91,7 +99,7 @@ def sum_of(output: str, *terms: str, units: Mapping[str, str] | None = None) -> 
 
 
 def delay(
-    input: str,  # noqa: A002 — a block has an input and an output
+    input: str,
     output: str,
     delay_s: float,
     *,
@@ -117,6 +125,10 @@ def delay(
     DataError
         A negative delay.
 
+    Reference
+    ---------
+    Franklin, Powell & Workman, *Digital Control of Dynamic Systems*, 3rd ed., section 4.3.3.
+
     Example
     -------
     >>> print(delay("u", "u_late", 0.02))
@@ -126,7 +138,7 @@ def delay(
 
 
 def limiter(
-    input: str,  # noqa: A002
+    input: str,
     output: str,
     high: float,
     low: float | None = None,
@@ -155,6 +167,10 @@ def limiter(
     OptionError
         Limits that leave nothing between them.
 
+    Reference
+    ---------
+    Khalil, *Nonlinear Systems*, 3rd ed., section 7.2 (saturation).
+
     Example
     -------
     >>> print(limiter("sas", "sas_limited", 0.5))
@@ -169,7 +185,7 @@ def limiter(
 
 
 def rate_limiter(
-    input: str,  # noqa: A002
+    input: str,
     output: str,
     rate_per_s: float,
     *,
@@ -195,6 +211,11 @@ def rate_limiter(
     OptionError
         A rate that is not above zero.
 
+    Reference
+    ---------
+    Duda, *Aerospace Science and Technology* 1 (1997), 37–47: rate limiting elements in flight
+    control.
+
     Example
     -------
     >>> print(rate_limiter("u", "u_slow", 2.0))
@@ -207,7 +228,7 @@ def rate_limiter(
 
 
 def sample_and_hold(
-    input: str,  # noqa: A002
+    input: str,
     output: str,
     sample_time_s: float,
     computation_delay_s: float = 0.0,
@@ -258,9 +279,7 @@ def sample_and_hold(
     return Block("sample and hold", (input,), (output,), held, units or {}, alike=True)
 
 
-def system(
-    source: object, *, rename: Mapping[str, str] | None = None, name: str = ""
-) -> Block:
+def system(source: object, *, rename: Mapping[str, str] | None = None, name: str = "") -> Block:
     """Block of a model, a fit or a linear system, by the names and units of its channels.
 
     A nonlinear `StateSpaceModel` is simulated with its equations and seen through its
@@ -286,10 +305,15 @@ def system(
     OptionError
         `rename` names a channel that is not there.
 
+    Reference
+    ---------
+    Stevens, Lewis & Johnson, *Aircraft Control and Simulation*, 3rd ed., section 3.7: linear
+    models about a trim.
+
     Example
     -------
     >>> import flightid as fid
-    >>> system(fid.load_model("rate_integrator"), rename={"tau": "u"}).inputs
+    >>> system(fid.load_model("rate_integrator"), rename={"tau_phi": "u"}).inputs
     ('u',)
     """
     model = getattr(source, "model", source)

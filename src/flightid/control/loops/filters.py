@@ -1,4 +1,4 @@
-"""Blocks with dynamics: filters by corner and damping, lead-lag, any transfer function."""
+"""Blocks with dynamics: filters by corner and damping, lead-lag."""
 
 from __future__ import annotations
 
@@ -7,19 +7,17 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from flightid.control.loops.block import Block
-from flightid.errors import ModelError, OptionError
-from flightid.models.linear_system import LinearSystem
+from flightid.control.loops.rational import observer_form
+from flightid.errors import OptionError
 
 Units = Mapping[str, str] | None
-Array = NDArray[np.float64]
 BUTTERWORTH = float(np.sqrt(0.5))
 
 
 def low_pass(
-    input: str,  # noqa: A002 — a block has an input and an output
+    input: str,
     output: str,
     corner_rad_s: float,
     order: Literal[1, 2] = 1,
@@ -50,6 +48,10 @@ def low_pass(
     OptionError
         A corner or damping that is not above zero, another order.
 
+    Reference
+    ---------
+    Franklin, Powell & Emami-Naeini, *Feedback Control of Dynamic Systems*, 7th ed., section 3.3.
+
     Example
     -------
     >>> low_pass("p", "p_slow", 20.0, 2).part.order
@@ -60,7 +62,7 @@ def low_pass(
 
 
 def high_pass(
-    input: str,  # noqa: A002
+    input: str,
     output: str,
     corner_rad_s: float,
     order: Literal[1, 2] = 1,
@@ -91,6 +93,10 @@ def high_pass(
     OptionError
         A corner or damping that is not above zero, another order.
 
+    Reference
+    ---------
+    Franklin, Powell & Emami-Naeini, *Feedback Control of Dynamic Systems*, 7th ed., section 3.3.
+
     Example
     -------
     >>> high_pass("q", "q_fast", 0.5)
@@ -101,7 +107,7 @@ def high_pass(
 
 
 def washout(
-    input: str,  # noqa: A002
+    input: str,
     output: str,
     corner_rad_s: float,
     *,
@@ -127,6 +133,10 @@ def washout(
     OptionError
         A corner that is not above zero.
 
+    Reference
+    ---------
+    Stevens, Lewis & Johnson, *Aircraft Control and Simulation*, 3rd ed., section 4.4 (yaw damper).
+
     Example
     -------
     >>> washout("r", "r_washed", 0.5)
@@ -136,7 +146,7 @@ def washout(
 
 
 def notch(
-    input: str,  # noqa: A002
+    input: str,
     output: str,
     centre_rad_s: float,
     *,
@@ -168,9 +178,13 @@ def notch(
     OptionError
         A number outside its range.
 
+    Reference
+    ---------
+    Franklin, Powell & Emami-Naeini, *Feedback Control of Dynamic Systems*, 7th ed., section 5.4.3.
+
     Example
     -------
-    >>> abs(notch("p", "q", 100.0, depth=0.1).part.frequency_response([100.0])).item()
+    >>> abs(notch("p", "q", 100.0, depth=0.1).part.frequency_response([100.0])).round(9).item()
     0.1
     """
     if not 0.0 <= depth < 1.0:
@@ -239,7 +253,7 @@ def complementary(
 
 
 def lead_lag(
-    input: str,  # noqa: A002
+    input: str,
     output: str,
     lead_s: float,
     lag_s: float,
@@ -266,133 +280,19 @@ def lead_lag(
     OptionError
         A time outside its range.
 
+    Reference
+    ---------
+    Franklin, Powell & Emami-Naeini, *Feedback Control of Dynamic Systems*, 7th ed., section 6.7.
+
     Example
     -------
-    >>> abs(lead_lag("u", "v", 0.2, 0.1).part.frequency_response([1e6])).item().__round__(6)
+    >>> abs(lead_lag("u", "v", 0.2, 0.1).part.frequency_response([1e6])).round(6).item()
     2.0
     """
     if not (np.isfinite(lead_s) and lead_s >= 0.0 and np.isfinite(lag_s) and lag_s > 0.0):
         raise OptionError("the times of a lead-lag", found=f"{lead_s} s and {lag_s} s",
                           needed="a lead from 0 s up and a lag above 0 s")  # fmt: skip
     return _filter("lead-lag", (input,), output, [[lead_s, 1.0]], [lag_s, 1.0], units)
-
-
-def transfer(
-    input: str,  # noqa: A002
-    output: str,
-    numerator: ArrayLike,
-    denominator: ArrayLike,
-    *,
-    delay_s: float = 0.0,
-    sample_time_s: float | None = None,
-    units: Units = None,
-) -> Block:
-    """Transfer function by its coefficients, in s, or in z where it has a sample time.
-
-    Parameters
-    ----------
-    input, output : str
-        Signals.
-    numerator, denominator : array_like, shapes (n,), (m,)
-        Coefficients, highest power first.
-    delay_s : float
-        Delay, s; whole samples where there is a sample time.
-    sample_time_s : float, optional
-        T, s; continuous when left out.
-    units : mapping of str to str, optional
-        Unit by signal.
-
-    Returns
-    -------
-    Block
-
-    Raises
-    ------
-    ModelError
-        More zeros than poles, or a denominator that is zero.
-
-    Reference
-    ---------
-    Kailath, *Linear Systems* (1980), section 2.1: observer canonical form.
-
-    Example
-    -------
-    >>> transfer("tau", "p", [40.0], [0.2, 1.0], delay_s=0.01).part.poles()
-    array([-5.+0.j])
-    """
-    above = [np.atleast_1d(np.asarray(numerator, dtype=np.float64))]
-    below = np.atleast_1d(np.asarray(denominator, dtype=np.float64))
-    system = _observer_form((input,), output, above, below, delay_s, sample_time_s)
-    return Block("transfer function", (input,), (output,), system, units or {})
-
-
-def sampled(
-    block: Block,
-    sample_time_s: float,
-    method: Literal["tustin", "zero", "first"] = "tustin",
-    *,
-    prewarp_rad_s: float | None = None,
-) -> Block:
-    """The recursion that stands for a continuous block in a digital controller.
-
-    Parameters
-    ----------
-    block : Block
-        Linear and continuous.
-    sample_time_s : float
-        T, s.
-    method : {"tustin", "zero", "first"}
-        Trapezoidal rule; or exact for inputs that are steps or straight lines between samples.
-    prewarp_rad_s : float, optional
-        Where the trapezoidal rule keeps the response exactly, rad/s.
-
-    Returns
-    -------
-    Block
-
-    Raises
-    ------
-    ModelError
-        The block is not linear, or sampled already.
-    OptionError
-        An unknown method, or a frequency to keep that is not between zero and half the rate.
-
-    Reference
-    ---------
-    Franklin, Powell & Workman, *Digital Control of Dynamic Systems*, 3rd ed., section 6.1.
-
-    Example
-    -------
-    >>> print(sampled(low_pass("p", "p_slow", 20.0), 0.01))
-    1 state, every 0.01 s
-    """
-    part = block.part
-    if not isinstance(part, LinearSystem) or part.is_discrete:
-        raise ModelError("this block cannot be sampled", found=f"{block!r}: {block}",
-                         needed="a linear continuous block")  # fmt: skip
-    if method not in ("tustin", "zero", "first"):
-        raise OptionError("the method is not known", found=method, needed="tustin, zero or first")
-    if method != "tustin":
-        return replace(block, part=part.sampled(sample_time_s, method))
-    step = sample_time_s
-    if prewarp_rad_s is not None:
-        if not 0.0 < prewarp_rad_s < np.pi / sample_time_s:
-            raise OptionError("the frequency to keep", found=f"{prewarp_rad_s} rad/s",
-                              needed="between zero and half the sample rate")  # fmt: skip
-        step = 2.0 * np.tan(prewarp_rad_s * sample_time_s / 2.0) / prewarp_rad_s
-    a, b, c, d, delays = part.state_space()
-    half = 0.5 * step * a
-    left = np.linalg.inv(np.eye(part.order) - half)
-    recursion = replace(
-        part,
-        a=left @ (np.eye(part.order) + half),
-        b=step * left @ b,
-        c=c @ left,
-        d=d + 0.5 * step * c @ left @ b,
-        delays_s=delays,
-        sample_time_s=sample_time_s,
-    )
-    return replace(block, part=recursion)
 
 
 def _denominator(corner: float, order: int, damping: float) -> list[float]:
@@ -415,40 +315,5 @@ def _filter(
     below: Sequence[float],
     units: Units,
 ) -> Block:
-    system = _observer_form(inputs, output, [np.array(each) for each in above], np.array(below))
+    system = observer_form(inputs, output, [np.array(each) for each in above], np.array(below))
     return Block(name, inputs, (output,), system, units or {}, alike=True)
-
-
-def _observer_form(
-    inputs: tuple[str, ...],
-    output: str,
-    above: Sequence[Array],
-    below: Array,
-    delay_s: float = 0.0,
-    sample_time_s: float | None = None,
-) -> LinearSystem:
-    """One output of several inputs that share a denominator, with its order of states."""
-    monic = np.trim_zeros(below, "f")
-    if not len(monic):
-        raise ModelError("a denominator is zero", needed="a coefficient that is not zero")
-    order = len(monic) - 1
-    direct, forced = np.zeros((1, len(inputs))), np.zeros((order, len(inputs)))
-    for column, given in enumerate(above):
-        trimmed = np.trim_zeros(given, "f")
-        if len(trimmed) > order + 1:
-            raise ModelError(
-                "a transfer function has more zeros than poles",
-                found=f"degree {len(trimmed) - 1} over {order}",
-                needed="at least as many poles as zeros",
-                action="add the lag of the sensor or filter to the denominator",
-            )
-        whole = np.concatenate([np.zeros(order + 1 - len(trimmed)), trimmed]) / monic[0]
-        direct[0, column] = whole[0]
-        forced[:, column] = whole[1:] - whole[0] * monic[1:] / monic[0]
-    a = np.zeros((order, order))
-    if order:
-        a[:, 0] = -monic[1:] / monic[0]
-        a[:-1, 1:] = np.eye(order - 1)
-    c = np.eye(1, order) if order else np.zeros((1, 0))
-    late = [delay_s] * len(inputs)
-    return LinearSystem(a, forced, c, direct, inputs, (output,), late, sample_time_s=sample_time_s)

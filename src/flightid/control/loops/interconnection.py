@@ -19,9 +19,9 @@ from flightid.control.loops.wiring import Wiring
 from flightid.conventions import Light
 from flightid.errors import OptionError, UnknownNameError
 from flightid.findings import Finding
+from flightid.models.hold_equivalent import Hold as InputHold
 from flightid.models.linear_system import LinearSystem
 from flightid.record import Record
-from flightid.simulation.simulate import Hold as InputHold
 from flightid.table import Column, Table
 
 SCHEMA = "flightid.interconnection/1"
@@ -303,9 +303,7 @@ class Interconnection:
 
     def __repr__(self) -> str:
         """Size on one line."""
-        n = sum(
-            block.part.order for block in self.blocks if isinstance(block.part, LinearSystem)
-        )
+        n = sum(block.part.order for block in self.blocks if isinstance(block.part, LinearSystem))
         ends = f"inputs [{', '.join(self.inputs)}], outputs [{', '.join(self.outputs)}]"
         count = f"{len(self.blocks)} block{'' if len(self.blocks) == 1 else 's'}"
         return f"Interconnection({count}, {ends}, {n} state{'' if n == 1 else 's'})"

@@ -29,9 +29,7 @@ def block_response(block: Block, omega_rad_s: NDArray[np.float64]) -> Complex:
     return np.ones((1, 1, len(omega_rad_s)), dtype=np.complex128)
 
 
-def connected_response(
-    wiring: Wiring, outputs: Sequence[str], omega_rad_s: ArrayLike
-) -> Complex:
+def connected_response(wiring: Wiring, outputs: Sequence[str], omega_rad_s: ArrayLike) -> Complex:
     """H from the inputs from outside to some signals, with all loops closed.
 
     Parameters

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from flightid.control.loops.block import Block, Hold
-from flightid.control.loops.core import Core, assemble
 from flightid.control.loops.elements import static
+from flightid.control.loops.linear_core import Core, assemble
 from flightid.control.loops.views import linear_view
 from flightid.control.loops.wiring import Wiring
 from flightid.errors import ModelError, OptionError
@@ -17,9 +17,7 @@ from flightid.models.linear_system import LinearSystem
 SAME = 1e-9
 
 
-def sampled_system(
-    wiring: Wiring, outputs: tuple[str, ...], sample_time_s: float
-) -> LinearSystem:
+def sampled_system(wiring: Wiring, outputs: tuple[str, ...], sample_time_s: float) -> LinearSystem:
     """The recursion of a connection's signals at multiples of T.
 
     Inputs from outside are held over each sample. Signals are those just after a sample is taken.

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.loops.core import Core
 from flightid.control.loops.delayed_roots import (
     count_right,
     line_right_of_axis,
     refined_roots,
 )
+from flightid.control.loops.linear_core import Core
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.table import Column, Table
@@ -46,7 +46,7 @@ class Stability:
     >>> loop = fid.connect([fid.loops.transfer("e", "y", [2.0], [1.0, 0.0], delay_s=0.1),
     ...                     fid.loops.sum_of("e", "r", "-y")], inputs=["r"], outputs=["y"])
     >>> loop.stability()
-    Stability(stable, 7 poles, slowest -2.592 rad/s)
+    Stability(stable, 4 poles, slowest -2.592 rad/s)
     """
 
     poles: Complex
@@ -86,9 +86,9 @@ class Stability:
         -------
         Table
         """
-        equivalent = self.poles
+        equivalent: Complex = self.poles
         if self.sample_time_s is not None:
-            equivalent = np.log(self.poles.astype(complex) + 1e-300) / self.sample_time_s
+            equivalent = np.asarray(np.log(self.poles + 1e-300) / self.sample_time_s)
         order = np.argsort(-equivalent.real)
         rows = [
             (float(s.real), float(s.imag), float(abs(s)), float(-s.real / abs(s)) if s else None)
@@ -99,7 +99,9 @@ class Stability:
             Column("real", "rad/s"), Column("imaginary", "rad/s"), Column("frequency", "rad/s"),
             Column("damping"),
         )  # fmt: skip
-        return Table("Poles of the closed loops", columns, tuple(rows), tuple(map(str, self.findings)))
+        return Table(
+            "Poles of the closed loops", columns, tuple(rows), tuple(map(str, self.findings))
+        )
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""

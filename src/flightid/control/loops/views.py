@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from flightid.control.loops.block import Block, Equations, Hold
-from flightid.control.loops.core import Core, Row, assemble
 from flightid.control.loops.elements import static
+from flightid.control.loops.linear_core import Core, Row, assemble
 from flightid.control.loops.wiring import Wiring
 from flightid.errors import ModelError, OptionError
 from flightid.models.linear_system import LinearSystem
@@ -51,8 +51,9 @@ def continuous_system(
     """One continuous linear system; delays at its inputs exact, those inside as states."""
     core = continuous_core(wiring)
     late = [row for row in core.rows if row.delay_s and row.carrier not in wiring.inputs]
+    watched = core.places({*outputs, *(row.carrier for row in late)})
     for name in wiring.inputs:
-        used = _used(core, name, seen=name in outputs)
+        used = _used(core, name, watched)
         late += [row for row in used if row.delay_s and len(used) > 1]
     if late and pade_order is None:
         raise OptionError(
@@ -65,16 +66,13 @@ def continuous_system(
     return _by_inputs(core, wiring, outputs)
 
 
-def _used(core: Core, name: str, *, seen: bool) -> list[Row]:
-    """Rows of an input that do something, be it to give its own signal where that is seen."""
-    own = core.signals.index(name)
-    used = []
-    for place, row in enumerate(core.rows):
-        column = core.d[:, place].copy()
-        column[own] = column[own] if seen else 0.0
-        if row.carrier == name and (core.b[:, place].any() or column.any()):
-            used.append(row)
-    return used
+def _used(core: Core, name: str, watched: list[int]) -> list[Row]:
+    """Rows of an input that move a state or a watched signal."""
+    return [
+        row
+        for place, row in enumerate(core.rows)
+        if row.carrier == name and (core.b[:, place].any() or core.d[watched, place].any())
+    ]
 
 
 def _with_late_rows(core: Core, late: list[Row], inputs: tuple[str, ...], order: int) -> Core:
@@ -104,9 +102,7 @@ def _renamed(joined: Core, core: Core, rest: list[Row]) -> Core:
     rows = tuple(back.get(row.carrier, row) for row in joined.rows)
     places = joined.places(f"{name} (core)" for name in core.signals)
     states = tuple(name.removeprefix("core.") for name in joined.states)
-    return Core(
-        joined.a, joined.b, joined.c[places], joined.d[places], rows, core.signals, states
-    )
+    return Core(joined.a, joined.b, joined.c[places], joined.d[places], rows, core.signals, states)
 
 
 def _by_inputs(core: Core, wiring: Wiring, outputs: tuple[str, ...]) -> LinearSystem:

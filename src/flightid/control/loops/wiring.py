@@ -145,7 +145,7 @@ def _units(blocks: tuple[Block, ...], declared: Mapping[str, str]) -> dict[str, 
                 ends = (*block.inputs, *block.outputs)
                 for name in [each for each in ends if each in units]:
                     unit = units[name][0]
-                    fresh |= any([learn(other, unit, repr(block)) for other in ends])
+                    fresh |= bool(sum(learn(other, unit, repr(block)) for other in ends))
     return {name: unit for name, (unit, _) in units.items()}
 
 
@@ -186,5 +186,5 @@ def _check_time(block: Block, times: Mapping[str, float | None]) -> None:
             f"signal {name!r} has another sample time than what reads it",
             found=f"{step:g} s into {block!r} at {own:g} s",
             needed="one sample time",
-            action="sample one of the two anew, with a sample_and_hold and a continuous way between",
+            action="sample one of the two anew: sample_and_hold, then a continuous block",
         )

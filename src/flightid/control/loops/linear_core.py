@@ -1,7 +1,7 @@
 """The linear blocks of a connection as one system; what they cannot hold stays outside as rows.
 
-x' = A x + B v,  signals = C x + D v: the rows v are signals from outside, outputs of blocks that are
-no linear system of the same time, and delayed signals.
+x' = A x + B v,  signals = C x + D v: the rows v are signals from outside, outputs of blocks that
+are no linear system of the same time, and delayed signals.
 """
 
 from __future__ import annotations
@@ -131,10 +131,8 @@ def assemble(
     own = np.zeros((len(carriers), len(rows)))
     for number, name in enumerate(carriers):
         own[number, rows[Row(name, late.get(name, 0.0))]] = 1.0
-    states = tuple(
-        f"{block.name}.{state}" for block in blocks for state in _part(block).states
-    )
-    return _with_held_delays(
+    states = tuple(f"{block.name}.{state}" for block in blocks for state in _part(block).states)
+    return _with_direct_parts(
         Core(
             a + b @ loops @ seen,
             b @ (loops @ direct + driven),
@@ -173,27 +171,42 @@ def _inverse(matrix: Array, names: Sequence[str]) -> Array:
     return np.asarray(np.linalg.inv(matrix))
 
 
-def _with_held_delays(core: Core, carriers: Sequence[str]) -> Core:
-    """Delayed sums of carriers as sums of delayed carriers: what a gain passes on it may pass late."""
+def _with_direct_parts(core: Core, carriers: Sequence[str]) -> Core:
+    """Delayed signals split: what carriers do to them at once comes from delayed carriers.
+
+    A step from outside then stays a step after the delay, and a gain may as well come later.
+    """
     for number, row in enumerate(core.rows):
         if row.carrier in carriers:
             continue
         place = core.signals.index(row.carrier)
-        sees = np.flatnonzero(core.d[place])
-        if core.c[place].any() or any(core.rows[k].carrier not in carriers for k in sees):
-            continue
-        rows = list(core.rows)
-        b, d = core.b.copy(), core.d.copy()
-        for k in sees:
-            wanted = Row(core.rows[k].carrier, core.rows[k].delay_s + row.delay_s)
-            if wanted not in rows:
-                rows.append(wanted)
-                b, d = (np.column_stack([each, np.zeros(len(each))]) for each in (b, d))
-            b[:, rows.index(wanted)] += core.d[place, k] * core.b[:, number]
-            d[:, rows.index(wanted)] += core.d[place, k] * core.d[:, number]
-        keep = [k for k in range(len(rows)) if k != number]
-        reduced = replace(
-            core, b=b[:, keep], d=d[:, keep], rows=tuple(rows[k] for k in keep)
-        )
-        return _with_held_delays(reduced, carriers)
+        own = [int(k) for k in np.flatnonzero(core.d[place]) if core.rows[k].carrier in carriers]
+        if own:
+            return _with_direct_parts(_split(core, number, place, own), carriers)
     return core
+
+
+def _split(core: Core, number: int, place: int, own: Sequence[int]) -> Core:
+    row = core.rows[number]
+    rest_d = core.d[place].copy()
+    rest_d[own] = 0.0
+    moving = f"{row.carrier} (moving part)"
+    rows, signals = [*core.rows], [*core.signals]
+    b, d, c = core.b, core.d, core.c
+    parts = [(Row(core.rows[k].carrier, core.rows[k].delay_s + row.delay_s), core.d[place, k])
+             for k in own]  # fmt: skip
+    if core.c[place].any() or rest_d.any():
+        if moving not in signals:
+            signals.append(moving)
+            c, d = np.vstack([c, c[place]]), np.vstack([d, rest_d])
+        parts.append((Row(moving, row.delay_s), 1.0))
+    for wanted, share in parts:
+        if wanted not in rows:
+            rows.append(wanted)
+            b, d = (np.column_stack([each, np.zeros(len(each))]) for each in (b, d))
+        b, d = b.copy(), d.copy()
+        b[:, rows.index(wanted)] += share * b[:, number]
+        d[:, rows.index(wanted)] += share * d[:, number]
+    keep = [k for k in range(len(rows)) if k != number]
+    kept = tuple(rows[k] for k in keep)
+    return replace(core, b=b[:, keep], c=c, d=d[:, keep], rows=kept, signals=tuple(signals))
