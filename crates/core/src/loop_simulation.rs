@@ -130,7 +130,7 @@ pub fn simulate(
         }
         ports.iter_mut().for_each(|port| port.commit(step, &z));
         std::mem::swap(&mut x, &mut next);
-        if step % kept.every == 0 {
+        if step.is_multiple_of(kept.every) {
             for (place, &signal) in kept.signals.iter().enumerate() {
                 found[place * n_kept + step / kept.every] = z[signal];
             }
@@ -202,12 +202,12 @@ impl Port {
                 .zip(reads)
                 .for_each(|(row, &s)| *row += (z[s] - *row).max(-*most).min(*most)),
             Element::Hold { every } => {
-                if step % *every == 0 {
+                if step.is_multiple_of(*every) {
                     rows.iter_mut().zip(reads).for_each(|(row, &s)| *row = z[s]);
                 }
             }
             Element::Recursion(own) => {
-                if step % own.every == 0 {
+                if step.is_multiple_of(own.every) {
                     let read: Vec<f64> = reads.iter().map(|&s| z[s]).collect();
                     product(&own.c, &own.state, &own.d, &read, rows);
                 }
@@ -232,7 +232,7 @@ impl Port {
     /// Keep what the settled step leaves.
     fn commit(&mut self, step: usize, z: &[f64]) {
         match &mut self.element {
-            Element::Recursion(own) if step % own.every == 0 => {
+            Element::Recursion(own) if step.is_multiple_of(own.every) => {
                 let read: Vec<f64> = self.reads.iter().map(|&s| z[s]).collect();
                 let mut next = vec![0.0; own.state.len()];
                 product(&own.a, &own.state, &own.b, &read, &mut next);
