@@ -78,6 +78,7 @@ pub mod tangent_pattern;
 pub mod tape;
 mod tape_assembly;
 mod tape_derivative;
+pub mod tape_listing;
 mod tape_program;
 pub mod transfer;
 pub mod turbulence;

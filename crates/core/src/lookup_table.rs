@@ -92,6 +92,11 @@ impl LookupTable {
         self.content.axes.len()
     }
 
+    /// Values at the nodes, then slopes along the first axis, along the second, and mixed; row-major.
+    pub fn nodes(&self) -> &[Vec<f64>; 4] {
+        &self.content.nodes
+    }
+
     /// Value or slope at a place.
     pub(crate) fn part<T: Scalar>(&self, part: Part, x: T, y: T) -> T {
         let along = |of: Part, place: T| match of == part {

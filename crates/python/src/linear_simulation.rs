@@ -1,10 +1,11 @@
 //! Binding of linear simulation (Python side: `simulation/simulate.py`).
 
 use crate::error::from_core;
+use flightid_core::discretisation::discretise;
 use flightid_core::linear_simulation::{Discrete, Hold, StateSpace};
 use flightid_core::matrix_exponential::exponential;
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 pub(crate) type States<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
@@ -55,6 +56,42 @@ fn simulate_linear<'py>(
     Ok((matrix(py, states, x0.len(), n_samples)?, matrix(py, outputs, n_outputs, n_samples)?))
 }
 
+type Taps<'py> = Vec<(usize, isize, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)>;
+
+/// discretise_linear(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64], delays_s: NDArray[np.float64], sample_time_s: float, first_order_hold: bool) -> tuple[NDArray[np.float64], list[tuple[int, int, NDArray[np.float64], NDArray[np.float64]]]]
+///
+/// Φ (n, n) and taps of x⁺ = Φ x + Σ state · u, y = C x + Σ output · u with u = input[k + ahead]:
+/// each (input, ahead, state (n,), output (p,)).
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn discretise_linear<'py>(
+    py: Python<'py>,
+    a: PyReadonlyArray2<'py, f64>,
+    b: PyReadonlyArray2<'py, f64>,
+    c: PyReadonlyArray2<'py, f64>,
+    d: PyReadonlyArray2<'py, f64>,
+    delays_s: PyReadonlyArray1<'py, f64>,
+    sample_time_s: f64,
+    first_order_hold: bool,
+) -> PyResult<(Bound<'py, PyArray2<f64>>, Taps<'py>)> {
+    let n = a.as_array().nrows();
+    let system = StateSpace {
+        a: a.as_slice()?,
+        b: b.as_slice()?,
+        c: c.as_slice()?,
+        d: d.as_slice()?,
+        delays_s: delays_s.as_slice()?,
+        n_outputs: c.as_array().nrows(),
+    };
+    let hold = if first_order_hold { Hold::First } else { Hold::Zero };
+    let (found, _) = discretise(&system, &[], sample_time_s, hold).map_err(from_core)?;
+    let taps = found
+        .taps
+        .into_iter()
+        .map(|tap| (tap.input, tap.ahead, tap.state.into_pyarray(py), tap.output.into_pyarray(py)));
+    Ok((matrix(py, found.transition, n, n)?, taps.collect()))
+}
+
 /// matrix_exponential(matrix: NDArray[np.float64]) -> NDArray[np.float64]
 ///
 /// Exponential of a square matrix.
@@ -71,6 +108,7 @@ fn matrix_exponential<'py>(
 /// Add this area to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulate_linear, module)?)?;
+    module.add_function(wrap_pyfunction!(discretise_linear, module)?)?;
     module.add_function(wrap_pyfunction!(matrix_exponential, module)?)?;
     Ok(())
 }

@@ -66,6 +66,13 @@ impl LookupTable {
         let found: Vec<f64> = x.iter().zip(y).map(|(&x, &y)| self.table.at(x, y)).collect();
         Ok(found.into_pyarray(py))
     }
+
+    /// nodes(self) -> list[list[float]]
+    ///
+    /// Values at the nodes, then slopes along the first axis, along the second, and mixed; row-major.
+    fn nodes(&self) -> Vec<Vec<f64>> {
+        self.table.nodes().to_vec()
+    }
 }
 
 /// Add this file's names to the module.

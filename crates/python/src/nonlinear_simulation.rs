@@ -47,10 +47,26 @@ fn simulate_equations<'py>(
     ))
 }
 
+type Lines = Vec<(String, f64, Vec<usize>)>;
+type Places = (Vec<usize>, Vec<(usize, usize, usize)>, Vec<usize>, Vec<usize>);
+
+/// list_equations(model: StateSpace) -> tuple[list[tuple[str, float, list[int]]], tuple[list[int], list[tuple[int, int, int]], list[int], list[int]]]
+///
+/// A model as a list of operations (kind, number, arguments; arguments are places of earlier lines,
+/// an input's its place in ẋ, x, u and the values), and the lines of residuals, factors of ẋ in them
+/// (row, column, line), outputs and delays.
+#[pyfunction]
+fn list_equations(model: &StateSpace) -> PyResult<(Lines, Places)> {
+    let found = model.tape.listing().map_err(from_core)?;
+    let lines = found.lines.into_iter().map(|line| (line.kind, line.number, line.arguments));
+    Ok((lines.collect(), (found.residuals, found.mass, found.outputs, found.delays)))
+}
+
 /// Add this area to the module.
 ///
 /// # Errors
 /// Never in practice; PyO3's own.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(simulate_equations, module)?)
+    module.add_function(wrap_pyfunction!(simulate_equations, module)?)?;
+    module.add_function(wrap_pyfunction!(list_equations, module)?)
 }
