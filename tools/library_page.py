@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import flightid as fid
-from flightid.models import Model, StateSpaceModel
+from flightid.models import Model, StateSpaceModel, load_structure
 
 PAGE = Path(__file__).parent.parent / "docs" / "library.md"
 HEAD = """# Library of models
@@ -69,7 +69,7 @@ def _modes(model: Model) -> list[str]:
 
 def section(name: str) -> str:
     """One model as Markdown."""
-    model = fid.load_model(name)
+    model = load_structure(name)
     rows = [
         [f"`{p.name}`", _number(p.value), p.unit, p.tie or ("" if p.free else "fixed"), p.note]
         for p in model.parameters.values()

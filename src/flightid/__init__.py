@@ -61,9 +61,15 @@ if TYPE_CHECKING:
         StateSpaceModel,
         TransferFunction,
         TransferFunctionModel,
+        from_control,
+        from_scipy,
         library_names,
         load_model,
+        read_system,
+        to_control,
+        to_scipy,
         write_model,
+        write_system,
     )
     from flightid.record import Channel, Record, read_records, write_records
     from flightid.responses import (
@@ -73,6 +79,8 @@ if TYPE_CHECKING:
         coherent_pairs,
         estimate_response,
     )
+    from flightid.simulation.export import Exported
+    from flightid.simulation.export.to_file import export
     from flightid.simulation.simulate import simulate
     from flightid.study import Study, run_study
     from flightid.table import Table
@@ -149,6 +157,14 @@ _HOMES = {
     "excitation": "flightid.excitation",
     "identify": "flightid.identification.identify",
     "inspect_log": "flightid.inspection",
+    "from_control": "flightid.models",
+    "from_scipy": "flightid.models",
+    "to_control": "flightid.models",
+    "to_scipy": "flightid.models",
+    "read_system": "flightid.models",
+    "write_system": "flightid.models",
+    "Exported": "flightid.simulation.export",
+    "export": "flightid.simulation.export.to_file",
     "library_names": "flightid.models",
     "load_model": "flightid.models",
     "read_log": "flightid.logs",
@@ -169,6 +185,7 @@ __all__ = [
     "CoherentPairs",
     "Comparison",
     "DerivativeTable",
+    "Exported",
     "Finding",
     "Fit",
     "FittedParameter",
@@ -219,6 +236,9 @@ __all__ = [
     "derivatives",
     "estimate_response",
     "excitation",
+    "export",
+    "from_control",
+    "from_scipy",
     "identify",
     "impulse_response",
     "inspect_log",
@@ -232,17 +252,21 @@ __all__ = [
     "pilot_cutoff",
     "read_log",
     "read_records",
+    "read_system",
     "reduce",
     "residual_tests",
     "run_study",
     "scan_orders",
     "simulate",
     "to_continuous",
+    "to_control",
     "to_discrete",
+    "to_scipy",
     "validation",
     "verify",
     "write_model",
     "write_records",
+    "write_system",
 ]
 
 

@@ -102,3 +102,7 @@ class StudyError(FlightidError, ValueError):
 
 class FileFormatError(FlightidError, ValueError):
     """A record or model file whose content is not what its name says."""
+
+
+class ExportError(FlightidError, ValueError):
+    """A model that has no counterpart in the format asked for, or a tool that is missing for it."""

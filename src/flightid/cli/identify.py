@@ -56,9 +56,10 @@ def command(
     The exit code is 1 where a verdict is red.
     """
     import flightid
+    from flightid.models import load_structure
     from flightid.progress import progress
 
-    model = flightid.load_model(model_name, axis=axis)
+    model = load_structure(model_name, axis=axis)
     with progress(3, "Identifying") as advance:
         data: FrequencyResponse | list[Record]
         data = records = _records(file, model, span, sid_run)

@@ -67,12 +67,13 @@ def command(
     The records (CSV, Parquet, .mat, netCDF) hold the model's channels by name. The exit code is 1
     where a prediction of MODEL misses its guide, or a residual test that was asked for fails.
     """
-    from flightid import Comparison, load_model, read_records, residual_tests, verify
+    from flightid import Comparison, read_records, residual_tests, verify
+    from flightid.models import load_structure
 
-    chosen = load_model(model, axis=axis)
+    chosen = load_structure(model, axis=axis)
     if values:
         chosen = chosen.with_values(dict(map(_number, values)))
-    models = [chosen, *(load_model(rival, axis=axis) for rival in rivals)]
+    models = [chosen, *(load_structure(rival, axis=axis) for rival in rivals)]
     shared = tuple(name for name in chosen.outputs if all(name in m.outputs for m in models))
     compared = outputs or shared
     flown = [

@@ -5,11 +5,12 @@ State space: `model_tape.rs`, `state_space_fit.rs`.
 
 from flightid.models.blocks import Block
 from flightid.models.builder import ModelBuilder
-from flightid.models.description import Model
+from flightid.models.description import Model, SavedModel
 from flightid.models.innovations import InnovationsModel
 from flightid.models.innovations_prediction import InnovationsPrediction
+from flightid.models.interchange import from_control, from_scipy, to_control, to_scipy
 from flightid.models.linear_system import LinearModel, LinearSystem
-from flightid.models.load import library_names, load_model
+from flightid.models.load import library_names, load_model, load_structure
 from flightid.models.narx import NarxEquation, NarxModel, NarxPrediction
 from flightid.models.narx_terms import Lag, Term
 from flightid.models.parameters import Parameter, Parameters
@@ -21,6 +22,7 @@ from flightid.models.save import write_model
 from flightid.models.statespace import StateSpaceModel
 from flightid.models.statespace_parts import Output, ResponsePair, StateSpaceMatrices
 from flightid.models.subspace_structure import SubspaceStructure
+from flightid.models.system_files import read_system, write_system
 from flightid.models.tables import Axis, TableFunction
 from flightid.models.transfer import TransferFunction, TransferFunctionModel
 
@@ -45,6 +47,7 @@ __all__ = [
     "PolynomialStructure",
     "RecordValue",
     "ResponsePair",
+    "SavedModel",
     "StateSpaceMatrices",
     "StateSpaceModel",
     "SubspaceStructure",
@@ -52,7 +55,14 @@ __all__ = [
     "Term",
     "TransferFunction",
     "TransferFunctionModel",
+    "from_control",
+    "from_scipy",
     "library_names",
     "load_model",
+    "load_structure",
+    "read_system",
+    "to_control",
+    "to_scipy",
     "write_model",
+    "write_system",
 ]

@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from flightid.errors import ModelError
+from flightid.models.innovations import InnovationsModel
+from flightid.models.linear_description import (
+    innovations_from_table,
+    innovations_to_table,
+    system_from_table,
+    system_to_table,
+)
+from flightid.models.linear_system import LinearSystem
+from flightid.models.narx import NarxEquation
+from flightid.models.narx_description import narx_from_table, narx_to_table
 from flightid.models.parameters import Parameters
+from flightid.models.polynomial import PolynomialModel
 from flightid.models.reading import (
     read_parameter,
     read_table,
@@ -17,13 +28,16 @@ from flightid.models.statespace import StateSpaceModel
 from flightid.models.transfer import TransferFunction, TransferFunctionModel
 
 Model = TransferFunctionModel | StateSpaceModel
+"""Models with named parameters."""
+SavedModel = Model | PolynomialModel | InnovationsModel | NarxEquation | LinearSystem
+"""Whatever a file can hold."""
 
 _TOP = {"kind", "name", "source", "note", "inputs", "outputs", "responses", "parameters"}
 _TOP |= {"constraints", "schema"}
 _RESPONSE = {"gain", "numerator", "denominator", "delay"}
 
 
-def model_from_description(content: Mapping[str, object]) -> Model:
+def model_from_description(content: Mapping[str, object]) -> SavedModel:
     """Build a model from a dictionary such as a TOML file gives.
 
     Parameters
@@ -31,11 +45,13 @@ def model_from_description(content: Mapping[str, object]) -> Model:
     content : mapping
         Keys ``kind``, ``name``, ``inputs``, ``outputs``, ``parameters``, ``responses`` and, as
         needed, ``constraints``, ``source``, ``note``; with kind ``"state-space"`` those of
-        `StateSpaceModel.from_dict`.
+        `StateSpaceModel.from_dict`; with ``"polynomial"``, ``"innovations"``, ``"narx"`` or
+        ``"linear"`` those that `model_to_description` writes.
 
     Returns
     -------
-    TransferFunctionModel or StateSpaceModel
+    TransferFunctionModel, StateSpaceModel, PolynomialModel, InnovationsModel, NarxEquation or
+    LinearSystem
 
     Raises
     ------
@@ -50,12 +66,46 @@ def model_from_description(content: Mapping[str, object]) -> Model:
     TransferFunctionModel('transfer functions', 1 response [y/u], 1 parameters, 1 free)
     """
     kind = content.get("kind", "transfer")
-    if kind == "state-space":
-        return StateSpaceModel.from_dict(content)
-    if kind != "transfer":
-        raise ModelError(
-            "kind of model is not known", found=repr(kind), needed="'transfer' or 'state-space'"
-        )
+    read = _READERS.get(kind) if isinstance(kind, str) else None
+    if read is None:
+        known = ", ".join(map(repr, _READERS))
+        raise ModelError("kind of model is not known", found=repr(kind), needed=f"one of {known}")
+    return read(content)
+
+
+def model_to_description(model: SavedModel) -> dict[str, object]:
+    """Plain values of a model with its kind, which `model_from_description` reads.
+
+    Parameters
+    ----------
+    model : TransferFunctionModel, StateSpaceModel, PolynomialModel, InnovationsModel, NarxEquation
+        or LinearSystem
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ModelError
+        Another type.
+    """
+    if isinstance(model, InnovationsModel):
+        return innovations_to_table(model)
+    if isinstance(model, NarxEquation):
+        return narx_to_table(model)
+    if isinstance(model, LinearSystem):
+        return system_to_table(model)
+    if isinstance(model, TransferFunctionModel | StateSpaceModel | PolynomialModel):
+        return model.to_dict()
+    raise ModelError(
+        "this cannot be written as a model",
+        found=type(model).__name__,
+        needed="a model; of a fit its `model`, of a NARX fit its `equation`",
+    )
+
+
+def _transfer(content: Mapping[str, object]) -> TransferFunctionModel:
     require_keys(content, _TOP, "the model")
     inputs = read_texts(read_table(content, "inputs"), "inputs")
     outputs = read_texts(read_table(content, "outputs"), "outputs")
@@ -107,3 +157,13 @@ def _response(
         factors("denominator"),
         read_text(item.get("delay", "0"), f"delay of response {name}"),
     )
+
+
+_READERS: Mapping[str, Callable[[Mapping[str, object]], SavedModel]] = {
+    "transfer": _transfer,
+    "state-space": StateSpaceModel.from_dict,
+    "polynomial": PolynomialModel.from_dict,
+    "innovations": innovations_from_table,
+    "narx": narx_from_table,
+    "linear": system_from_table,
+}

@@ -14,6 +14,7 @@ from flightid.models.delay_states import delays_as_states, shift_registers
 from flightid.models.hold_equivalent import Hold, hold_equivalent
 from flightid.models.innovations import InnovationsModel
 from flightid.models.polynomial import PolynomialModel
+from flightid.models.rational import Rational
 from flightid.models.realisation import Matrices
 
 Array = NDArray[np.float64]
@@ -40,7 +41,7 @@ class LinearModel(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LinearSystem:
+class LinearSystem(Rational):
     """A linear system given by its matrices: dx/dt = A x + B u(t − τ), y = C x + D u(t − τ).
 
     With a sample time it is a recursion: x[k+1] in place of dx/dt.

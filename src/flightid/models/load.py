@@ -7,8 +7,10 @@ import tomllib
 from importlib.resources import files
 from pathlib import Path
 
-from flightid.errors import FileFormatError, OptionError, UnknownNameError
-from flightid.models.description import Model, model_from_description
+from flightid.errors import FileFormatError, ModelError, OptionError, UnknownNameError
+from flightid.models.description import Model, SavedModel, model_from_description
+from flightid.models.statespace import StateSpaceModel
+from flightid.models.transfer import TransferFunctionModel
 
 MAXIMUM_BYTES = 1 << 20
 _LIBRARY_NAME = re.compile(r"[a-z0-9_]+")
@@ -39,7 +41,7 @@ def library_names() -> list[str]:
     return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
-def load_model(source: str | Path, *, axis: str | None = None) -> Model:
+def load_model(source: str | Path, *, axis: str | None = None) -> SavedModel:
     """Load a model from a TOML file, or one of the library by its name.
 
     Parameters
@@ -52,7 +54,8 @@ def load_model(source: str | Path, *, axis: str | None = None) -> Model:
 
     Returns
     -------
-    TransferFunctionModel or StateSpaceModel
+    TransferFunctionModel or StateSpaceModel; from a file also a PolynomialModel, InnovationsModel,
+    NarxEquation or LinearSystem
 
     Raises
     ------
@@ -93,6 +96,24 @@ def load_model(source: str | Path, *, axis: str | None = None) -> Model:
     return _build(_parse(text, name), axis, name)
 
 
+def load_structure(source: str | Path, *, axis: str | None = None) -> Model:
+    """As `load_model`, for a model with named parameters that a fit can start from.
+
+    Raises
+    ------
+    ModelError
+        The file holds a black-box model or bare matrices.
+    """
+    model = load_model(source, axis=axis)
+    if not isinstance(model, TransferFunctionModel | StateSpaceModel):
+        raise ModelError(
+            "this model has no named parameters to fit",
+            found=f"{source}: {type(model).__name__}",
+            needed="kind 'transfer' or 'state-space'",
+        )
+    return model
+
+
 def _read(path: Path) -> str:
     with path.open("rb") as file:
         content = file.read(MAXIMUM_BYTES + 1)
@@ -119,7 +140,7 @@ def _parse(text: str, name: str) -> dict[str, object]:
         ) from error
 
 
-def _build(content: dict[str, object], axis: str | None, name: str) -> Model:
+def _build(content: dict[str, object], axis: str | None, name: str) -> SavedModel:
     axes = content.pop("axes", None)
     if not isinstance(axes, dict):
         if axis is not None:

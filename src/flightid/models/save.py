@@ -9,17 +9,19 @@ from pathlib import Path
 
 from flightid.errors import ModelError
 from flightid.files import write_atomically
-from flightid.models.description import Model
+from flightid.models.description import SavedModel, model_to_description
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def write_model(model: Model, path: str | Path) -> Path:
+def write_model(model: SavedModel, path: str | Path) -> Path:
     """Write a model to a TOML file; `load_model` gives the same model back.
 
     Parameters
     ----------
-    model : StateSpaceModel or TransferFunctionModel
+    model : StateSpaceModel, TransferFunctionModel, PolynomialModel, InnovationsModel, NarxEquation
+        or LinearSystem
+        With all its numbers; of a fit its ``model``, of a NARX fit its ``equation``.
     path : str or Path
         File ending in ``.toml``; its folder must exist. It is written whole or not at all.
 
@@ -31,7 +33,7 @@ def write_model(model: Model, path: str | Path) -> Path:
     Raises
     ------
     ModelError
-        The name of the file does not end in ``.toml``.
+        The name of the file does not end in ``.toml``, or this is no model.
     OSError
         The file cannot be written.
 
@@ -53,7 +55,7 @@ def write_model(model: Model, path: str | Path) -> Path:
     return write_atomically(path, model_as_toml(model))
 
 
-def model_as_toml(model: Model) -> str:
+def model_as_toml(model: SavedModel) -> str:
     """Text of the TOML file.
 
     Example
@@ -62,7 +64,7 @@ def model_as_toml(model: Model) -> str:
     >>> print(model_as_toml(load_model("quadrotor_yaw")).splitlines()[1])
     name = "Quadrotor on a rig, yaw"
     """
-    plain = {key: value for key, value in model.to_dict().items() if key != "schema"}
+    plain = {key: value for key, value in model_to_description(model).items() if key != "schema"}
     kind = {"kind": plain.pop("kind", "transfer")}
     single = {k: v for k, v in plain.items() if not isinstance(v, Mapping) and v not in ("", [])}
     lines = [f"{_key(key)} = {_value(value)}" for key, value in {**kind, **single}.items()]

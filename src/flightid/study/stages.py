@@ -11,7 +11,7 @@ from flightid.errors import StudyError
 from flightid.findings import Finding
 from flightid.identification import Fit, Reduction, identify, reduce
 from flightid.logs import Log, SidRun
-from flightid.models import Model, load_model
+from flightid.models import Model, load_structure
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
 from flightid.study.record_files import load_record
@@ -109,7 +109,7 @@ def load_task(settings: ModelSettings, *, on_records: bool = False) -> Task:
         There is no such library model, or no such parameter in it.
     """
     path = settings.template_path
-    model = load_model(settings.template if path is None else path, axis=settings.axis)
+    model = load_structure(settings.template if path is None else path, axis=settings.axis)
     if len(model.responses) != 1 and not on_records:
         raise StudyError(
             f"model {settings.name!r} has several responses",
@@ -121,7 +121,7 @@ def load_task(settings: ModelSettings, *, on_records: bool = False) -> Task:
     for name, given in settings.parameters.items():
         parameters = parameters.with_parameter(replace(parameters[name], **given))
     rivals = {
-        name: load_model(path if path.endswith(".toml") else name, axis=settings.axis)
+        name: load_structure(path if path.endswith(".toml") else name, axis=settings.axis)
         for name, path in settings.rivals.items()
     }
     return Task(settings, replace(model, parameters=parameters), rivals)

@@ -236,7 +236,9 @@ def _rendered(
         "prefix": prefix,
         "file_stem": stem,
         "sample_time_s": sample_time_s,
-        "places": [(kind, identifiers(entry.name for entry in each)) for kind, each in kinds.items()],
+        "places": [
+            (kind, identifiers(entry.name for entry in each)) for kind, each in kinds.items()
+        ],
         "entries_by_kind": [
             ("states", tables.states),
             ("inputs", tables.inputs),
@@ -250,13 +252,14 @@ def _rendered(
     source = environment.get_template(template).render(texts)
     return CSource(
         prefix, stem, header, source, tables.states, tables.inputs, tables.outputs,
-        tables.parameters, sample_time_s, hold, method, isinstance(words["equations"], EquationCode),
+        tables.parameters, sample_time_s, hold, method,
+        isinstance(words["equations"], EquationCode),
     )  # fmt: skip
 
 
 def c_environment() -> jinja2.Environment:
     """Templates of C; numbers and texts go through the filters, which write literals."""
-    environment = jinja2.Environment(  # noqa: S701 - C, not HTML: the filters below do the quoting
+    environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(_template),
         undefined=jinja2.StrictUndefined,
         trim_blocks=True,
@@ -319,15 +322,11 @@ def _depth_of_delays(model: StateSpaceModel, sample_time_s: float) -> int:
 Tap = tuple[int, int, Sequence[float], Sequence[float]]
 
 
-def _taps(
-    system: LinearSystem, step_s: float, hold: Hold
-) -> tuple[NDArray[np.float64], list[Tap]]:
+def _taps(system: LinearSystem, step_s: float, hold: Hold) -> tuple[NDArray[np.float64], list[Tap]]:
     a, b, c, d, delays = (np.ascontiguousarray(each) for each in system.state_space())
     if not system.is_discrete:
         _require_depth(float(np.max(delays, initial=0.0)) / step_s)
-        transition, found = _native.discretise_linear(
-            a, b, c, d, delays, step_s, hold == "first"
-        )
+        transition, found = _native.discretise_linear(a, b, c, d, delays, step_s, hold == "first")
         return transition, [
             (i, ahead, state.tolist(), output.tolist()) for i, ahead, state, output in found
         ]

@@ -12,7 +12,20 @@ from flightid.simulation.export.names import number_literal
 from flightid.simulation.export.table_code import table_functions
 
 Line = tuple[str, float, list[int]]
-_INFIX = {"add": "+", "subtract": "-", "multiply": "*", "divide": "/"}
+# Ties and kinks as `dual.rs` has them.
+_FORMS = {
+    "add": "{0} + {1}",
+    "subtract": "{0} - {1}",
+    "multiply": "{0} * {1}",
+    "divide": "{0} / {1}",
+    "negate": "-{0}",
+    "minimum": "({1} < {0}) ? {1} : {0}",
+    "maximum": "({1} > {0}) ? {1} : {0}",
+    "less": "({0} < {1}) ? 1.0 : 0.0",
+    "lessequal": "({0} <= {1}) ? 1.0 : 0.0",
+    "sign": "({0} == 0.0) ? 0.0 : (({0} > 0.0) ? 1.0 : -1.0)",
+    "select": "({0} == 0.0) ? {2} : {1}",
+}
 _CALLS = {
     "sin": "sin", "cos": "cos", "tan": "tan", "asin": "asin", "acos": "acos", "atan": "atan",
     "sinh": "sinh", "cosh": "cosh", "tanh": "tanh", "exp": "exp", "log": "log", "sqrt": "sqrt",
@@ -174,26 +187,15 @@ class _Writer:
     def _expression(self, place: int, fixed: bool, at_rest: bool) -> str:
         name, _, arguments = self.lines[place]
         used = [self._name(a, fixed, at_rest) for a in self._used(name, arguments)]
-        if name in _INFIX:
-            return f"{used[0]} {_INFIX[name]} {used[1]}"
-        if name in _CALLS:
-            return f"{_CALLS[name]}({', '.join(used)})"
-        if name == "negate":
-            return f"-{used[0]}"
         if name == "power":
             return self._power(arguments[1], used)
-        if name in ("minimum", "maximum"):
-            sign = "<" if name == "minimum" else ">"
-            return f"({used[1]} {sign} {used[0]}) ? {used[1]} : {used[0]}"
-        if name in ("less", "lessequal"):
-            return f"({used[0]} {'<' if name == 'less' else '<='} {used[1]}) ? 1.0 : 0.0"
-        if name == "sign":
-            return f"({used[0]} == 0.0) ? 0.0 : (({used[0]} > 0.0) ? 1.0 : -1.0)"
-        if name == "select":
-            return f"({used[0]} == 0.0) ? {used[2]} : {used[1]}"
         if name == "table value":
             return f"{self._prefix}_table_{arguments[0]}({', '.join(used)})"
-        raise ModelError("an operation has no counterpart in C", found=name)
+        if name in _CALLS:
+            return f"{_CALLS[name]}({', '.join(used)})"
+        if name not in _FORMS:
+            raise ModelError("an operation has no counterpart in C", found=name)
+        return _FORMS[name].format(*used)
 
     def _power(self, exponent: int, used: list[str]) -> str:
         kind, number, _ = self.lines[exponent]

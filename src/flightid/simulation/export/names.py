@@ -7,9 +7,12 @@ import re
 from collections.abc import Iterable
 
 _KEYWORDS = frozenset(
-    "auto break case char const continue default do double else enum extern float for goto if "
-    "inline int long register restrict return short signed sizeof static struct switch typedef "
-    "union unsigned void volatile while asm fortran bool true false main errno assert".split()
+    re.findall(
+        r"\w+",
+        "auto break case char const continue default do double else enum extern float for goto if "
+        "inline int long register restrict return short signed sizeof static struct switch typedef "
+        "union unsigned void volatile while asm fortran bool true false main errno assert",
+    )
 )
 LONGEST = 48
 """C99 promises 63 significant characters inside a file; ours carry a prefix as well."""
@@ -61,12 +64,12 @@ def identifiers(names: Iterable[str], fallback: str = "value") -> list[str]:
 
 
 def text_literal(text: str) -> str:
-    """A C string literal with the bytes of a text in UTF-8.
+    r"""A C string literal with the bytes of a text in UTF-8.
 
     Example
     -------
     >>> print(text_literal('a"b?' + chr(10)))
-    "a\\042b\\077\\012"
+    "a\042b\077\012"
     """
     plain = set(range(0x20, 0x7F)) - {ord(mark) for mark in '"\\?%'}
     return '"' + "".join(chr(b) if b in plain else f"\\{b:03o}" for b in text.encode()) + '"'

@@ -1,0 +1,69 @@
+"""What an export made: its files, and what to know of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.table import Cell, Column, Table
+
+SCHEMA = "flightid.exported/1"
+
+
+@dataclass(frozen=True)
+class Exported:
+    """Files written by `export`.
+
+    Attributes
+    ----------
+    format : str
+        ``"toml"``, ``"c"``, ``"fmu"``, …
+    files : tuple of Path
+        The first is the one asked for.
+    facts : mapping of str to str
+        What was written and how it is used, by keyword.
+    findings : tuple of Finding
+        What the format could not carry as it is.
+
+    Example
+    -------
+    >>> Exported("c", (Path("roll.c"), Path("roll.h")), {"step": "0.0025 s"})
+    Exported(c: roll.c, roll.h)
+    """
+
+    format: str
+    files: tuple[Path, ...]
+    facts: Mapping[str, str] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+
+    def __repr__(self) -> str:
+        """Format and names of the files on one line, and the number of findings."""
+        names = ", ".join(path.name for path in self.files)
+        doubts = sum(finding.light is not Light.GREEN for finding in self.findings)
+        return f"Exported({self.format}: {names}{f', {doubts} findings' if doubts else ''})"
+
+    def summary(self) -> Table:
+        """Table of the files and facts, findings below."""
+        rows: list[tuple[Cell, ...]] = [("file", str(path)) for path in self.files]
+        rows += [(key, value) for key, value in self.facts.items()]
+        notes = tuple(map(str, self.findings))
+        return Table(
+            f"Exported as {self.format}", (Column("what"), Column("value")), tuple(rows), notes
+        )
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key."""
+        return {
+            "schema": SCHEMA,
+            "format": self.format,
+            "files": [str(path) for path in self.files],
+            "facts": dict(self.facts),
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_() or escape(repr(self))
