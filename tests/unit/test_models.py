@@ -244,7 +244,7 @@ def test_files_are_read_as_data(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"kind": "narx"}, "kind of model is not known"),
+        ({"kind": "magic"}, "kind of model is not known"),
         ({"extra": 1}, "the model has an unknown key"),
         ({"parameters": {}}, r"no table \[parameters\]"),
         ({"parameters": {"K": {"value": "2"}}}, "must be a number"),
