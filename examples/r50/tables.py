@@ -139,54 +139,51 @@ def half(quantity: Quantity) -> float | None:
 
 
 def of_both(both: Mapping[str, Identified]) -> list[Table]:
-    """Ratios of cruise to hover, and the physics."""
-    return [ratios(both), physics(both)]
+    """Ratios of cruise to hover, modes side by side, and the physics."""
+    compared = fid.compare_conditions({name: found.fit for name, found in both.items()})
+    rotors = [rotor(condition, found.fit) for condition, found in both.items()]
+    return [ratios(compared), compared.modes_table(), *rotors]
 
 
-def ratios(both: Mapping[str, Identified]) -> Table:
+def ratios(compared: fid.ConditionComparison) -> Table:
     """Last column of tables 4 and 5: what changes from hover to cruise."""
-    truths = {name: fid.load_model(LIBRARY[name]).parameters for name in both}
-    hover, cruise = (both[name].fit.parameters for name in ("hover", "cruise"))
+    truths = {name: fid.load_model(LIBRARY[name]).parameters for name in compared.conditions}
     rows: list[tuple[Cell, ...]] = []
-    for name in PUBLISHED["hover"]["parameters"]:
-        if name in cruise:
-            published = (truths["cruise"][name].value or 0.0) / (truths["hover"][name].value or 1.0)
-            rows.append((name, published, cruise[name].value / hover[name].value))
-    columns = (Column("parameter"), Column("published", digits=3), Column("identified", digits=3))
-    return Table("Cruise over hover", columns, tuple(rows))
+    for number in compared.parameters:
+        name, ratio = number.name, number.ratios["cruise"]
+        if name not in PUBLISHED["hover"]["parameters"]:
+            continue
+        published = (truths["cruise"][name].value or 0.0) / (truths["hover"][name].value or 1.0)
+        low, high = ratio.interval95 or (None, None)
+        rows.append((name, published, ratio.value, low, high, number.chances.get("cruise")))
+    columns = (
+        Column("parameter"),
+        Column("published", digits=3),
+        Column("identified", digits=3),
+        Column("95 % low", digits=3),
+        Column("95 % high", digits=3),
+        Column("chance", digits=2),
+    )
+    notes = ("chance: of so large a change between equal truths.", *map(str, compared.findings))
+    return Table("Cruise over hover", columns, tuple(rows), notes)
 
 
-def physics(both: Mapping[str, Identified]) -> Table:
+def rotor(condition: str, fit: fid.Fit) -> Table:
     """Time constants, Lock numbers, flapping frequencies and gearing, as the paper does."""
     facts = PUBLISHED["physics"]
+    expected = {f"{axis} gearing": facts["gearing"] for axis in ("lateral", "longitudinal")}
+    if condition == "hover":
+        # Theory from the blade's Lock number, corrected for inflow, and from the bar's.
+        expected |= {
+            "rotor time constant": facts["theory_tau_f"],
+            "bar time constant": facts["theory_tau_s"],
+        }
     speed = facts["rotor_speed_rpm"] * 2.0 * np.pi / 60.0
-    rows: list[tuple[Cell, ...]] = []
-    for condition, found in both.items():
-        mine = _physics(condition, {n: p.value for n, p in found.fit.parameters.items()}, speed)
-        rows += [(condition, *row) for row in mine]
-    note = (
-        "Theory for the time constants in hover, the blade's Lock number corrected for inflow; "
-        f"measured gearing {facts['gearing']}; rotor speed {speed:.1f} rad/s."
-    )
-    columns = (Column("condition"), Column("quantity"), Column("identified"), Column("paper"))
-    return Table("Physics", columns, tuple(rows), (note,))
-
-
-def _physics(condition: str, v: Mapping[str, float], speed: float) -> list[tuple[Cell, ...]]:
-    """Quantity, value from the identified model, value in the paper (theory where it has one)."""
-    facts, published = PUBLISHED["physics"], PUBLISHED[condition]
-    hover = condition == "hover"
-    rows: list[tuple[Cell, ...]] = []
-    for name, what in (("tau_s", "bar"), ("tau_f", "rotor")):
-        theory = facts[f"theory_{name}"] if hover else None
-        lock = 16.0 / (theory * speed) if theory else None
-        rows.append((f"{what} time constant, s (theory)", v[name], theory))
-        rows.append((f"Lock number of the {what}, 16/(tau Omega)", 16.0 / (v[name] * speed), lock))
-    rows.append(("Bell mixer Kd = Bd/Blat", v["Bd"] / v["Blat"], published["gearing"]["Kd"]))
-    rows.append(("Bell mixer Kc = Ac/Alon", abs(v["Ac"] / v["Alon"]), published["gearing"]["Kc"]))
-    for axis, stiffness in (("pitch", v["Ma"]), ("roll", v["Lb"])):
-        root = float(np.sqrt(stiffness))
-        natural, damping = (published.get(k, {}).get(axis) for k in ("natural_rad_s", "damping"))
-        rows.append((f"{axis} flapping frequency, rad/s", root, natural))
-        rows.append((f"{axis} damping ratio 1/(2 tau_s omega)", 0.5 / (v["tau_s"] * root), damping))
-    return rows
+    found = fid.rotor_physics(fit, speed, expected=expected)
+    table = found.summary()
+    gearing = ", ".join(f"{k} {v}" for k, v in PUBLISHED[condition]["gearing"].items())
+    printed = [f"{name} {value}" for name, value in PUBLISHED[condition].get("damping", {}).items()]
+    notes = [f"The paper's gearing from its own fit: {gearing}; ours is the ratio of its table."]
+    if printed:
+        notes.append(f"The paper's damping ratios 1/(2 tau_s omega): {', '.join(printed)}.")
+    return Table(f"Physics, {condition}", table.columns, table.rows, (*table.notes, *notes))

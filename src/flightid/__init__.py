@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from flightid.control.loops.interconnection import Interconnection
     from flightid.control.margins import Margins, margins
     from flightid.dynamics.approximate_modes import approximate_modes
+    from flightid.dynamics.conditions import compare_conditions
+    from flightid.dynamics.conditions_result import ConditionComparison
     from flightid.dynamics.continuous import to_continuous, to_discrete
     from flightid.dynamics.derivatives import DerivativeTable, derivatives
     from flightid.dynamics.handling_qualities import attitude_bandwidth
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
     from flightid.dynamics.mode_result import Modes
     from flightid.dynamics.modes import modes
     from flightid.dynamics.pilot_cutoff import pilot_cutoff
+    from flightid.dynamics.rotor import rotor_physics
+    from flightid.dynamics.rotor_result import RotorPhysics
     from flightid.errors import FlightidError
     from flightid.findings import Finding
     from flightid.identification import (
@@ -130,6 +134,10 @@ _HOMES = {
     "ModelBuilder": "flightid.models",
     "Modes": "flightid.dynamics.mode_result",
     "modes": "flightid.dynamics.modes",
+    "ConditionComparison": "flightid.dynamics.conditions_result",
+    "compare_conditions": "flightid.dynamics.conditions",
+    "RotorPhysics": "flightid.dynamics.rotor_result",
+    "rotor_physics": "flightid.dynamics.rotor",
     "NarxFit": "flightid.identification",
     "NarxModel": "flightid.models",
     "PairResponse": "flightid.responses",
@@ -184,6 +192,7 @@ __all__ = [
     "Channel",
     "CoherentPairs",
     "Comparison",
+    "ConditionComparison",
     "DerivativeTable",
     "Exported",
     "Finding",
@@ -218,6 +227,7 @@ __all__ = [
     "Record",
     "Reduction",
     "ResidualTests",
+    "RotorPhysics",
     "StateSpaceModel",
     "StructureComparison",
     "Study",
@@ -230,6 +240,7 @@ __all__ = [
     "approximate_modes",
     "attitude_bandwidth",
     "coherent_pairs",
+    "compare_conditions",
     "compare_structures",
     "conditioning",
     "connect",
@@ -255,6 +266,7 @@ __all__ = [
     "read_system",
     "reduce",
     "residual_tests",
+    "rotor_physics",
     "run_study",
     "scan_orders",
     "simulate",

@@ -1,6 +1,11 @@
 """Dynamics: what a model says of the vehicle's motion, and what it is like to fly."""
 
 from flightid.dynamics.approximate_modes import ApproximateMode, ApproximateModes
+from flightid.dynamics.conditions_result import (
+    ComparedMode,
+    ComparedNumber,
+    ConditionComparison,
+)
 from flightid.dynamics.derivatives import Derivative, DerivativeTable
 from flightid.dynamics.handling_qualities import attitude_bandwidth
 from flightid.dynamics.handling_qualities_result import AttitudeBandwidth
@@ -14,6 +19,8 @@ from flightid.dynamics.quantity import Quantity, quantity_table
 from flightid.dynamics.rating import Rating, rate
 from flightid.dynamics.rating_charts import RatingChart, Region
 from flightid.dynamics.rating_charts_reading import rating_chart, rating_charts
+from flightid.dynamics.rotor_blades import Blade, effective_lock_number
+from flightid.dynamics.rotor_result import RotorFact, RotorPhysics
 from flightid.dynamics.spread import Propagated, Spread
 from flightid.dynamics.spread_of import spread_of
 
@@ -21,6 +28,10 @@ __all__ = [
     "ApproximateMode",
     "ApproximateModes",
     "AttitudeBandwidth",
+    "Blade",
+    "ComparedMode",
+    "ComparedNumber",
+    "ConditionComparison",
     "Derivative",
     "DerivativeTable",
     "FixedWing",
@@ -35,9 +46,12 @@ __all__ = [
     "Rating",
     "RatingChart",
     "Region",
+    "RotorFact",
+    "RotorPhysics",
     "Rotorcraft",
     "Spread",
     "attitude_bandwidth",
+    "effective_lock_number",
     "lower_order",
     "pilot_cutoff",
     "quantity_table",

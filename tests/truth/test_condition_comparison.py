@@ -1,0 +1,131 @@
+"""Conditions side by side: ratios, their intervals, modes that answer to each other, verdicts."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid import errors
+from flightid.dynamics import Quantity
+from flightid.dynamics.ratios import chance_of, holm, ratio_of
+from tests.closeness import assert_close
+
+
+def _fit(truth: fid.StateSpaceModel, seed: int, error: float = 0.05) -> fid.Fit:
+    omega = np.geomspace(0.05, 25.0, 40)
+    exact = truth.frequency_response(omega)
+    random = np.random.default_rng(seed)
+    noise = random.standard_normal(exact.shape) + 1j * random.standard_normal(exact.shape)
+    data = fid.FrequencyResponse.from_values(
+        omega,
+        exact * (1.0 + error * noise),
+        inputs=truth.inputs,
+        outputs=truth.outputs,
+        units=truth.units,
+        random_error=np.full(exact.shape, error),
+    )
+    return fid.identify(truth, data, n_omega=40)
+
+
+@pytest.fixture(scope="module")
+def compared() -> fid.ConditionComparison:
+    slow = fid.load_model("fixed_wing_lateral")
+    fast = slow.with_values({"Lp": -12.0, "Nbeta": 9.0, "Lr": 3.0})
+    return fid.compare_conditions({"slow": _fit(slow, 1), "fast": _fit(fast, 2)})
+
+
+def test_published_ratios_of_the_r50() -> None:
+    """Tables 4 and 5, last column."""
+    both = {name: fid.load_model(f"r50_{name}") for name in ("hover", "cruise")}
+    found = fid.compare_conditions(both)
+    for name, printed in (
+        ("tau_f", 0.75), ("hcg", 0.78), ("tau_s", 0.76), ("Xu", 2.41), ("Yv", 1.0), ("Lb", 1.28),
+        ("Ma", 1.31), ("Ba", 1.14), ("Bd", 0.93), ("Ab", 0.93), ("Ac", 0.89), ("Zw", 1.65),
+        ("Nv", 13.3), ("Nrfb", 0.8), ("Kr", 1.0), ("Krfb", 0.94), ("Blat", 0.88),
+        ("Blon", 1.45), ("Alat", 0.85), ("Alon", 0.83), ("Zcol", 1.31), ("Nped", 0.8),
+        ("Dlat", 1.06), ("Clon", 0.87), ("tau_ped", 0.59),
+    ):  # fmt: skip
+        value = found[name].ratios["cruise"].value
+        assert_close(value, printed, rtol=0.012, why="printed to two or three digits")
+    assert found.only_parameters["hover"] == (
+        "Lu", "Lv", "Mu", "Mv", "Zb", "Za", "Zr", "Np", "Nw", "Ncol",
+    )  # fmt: skip
+    assert [f.code for f in found.findings] == ["stability-changed"]
+    assert found["tau_f"].ratios["cruise"].interval95 is None
+    assert {m.name for m in found.modes} >= {"heave", "yaw/gyro-feedback"}
+
+
+def test_changes_are_told_from_noise(compared: fid.ConditionComparison) -> None:
+    changed = {f.message.split(":")[0] for f in compared.findings if f.code == "changed"}
+    assert {"Lp", "Nbeta", "Dutch roll, natural frequency"} <= changed
+    assert not changed & {"Nr", "Ybeta", "Laileron", "Clr"}
+    damping = compared["Lp"].ratios["fast"]
+    assert damping.interval95 is not None
+    assert damping.interval95[0] < 12.0 / 8.402 < damping.interval95[1]
+    assert [m.name for m in compared.modes] == ["spiral", "Dutch roll", "roll"]
+    assert json.loads(json.dumps(compared.to_dict()))["conditions"] == ["slow", "fast"]
+    assert "fast / slow" in compared.summary().to_text()
+    assert len(compared.modes_table().rows) == 4
+    assert compared._repr_html_().count("<table") == 2
+
+
+def test_turned_signs_and_lost_stability_are_amber() -> None:
+    slow = fid.load_model("fixed_wing_lateral")
+    turned = slow.with_values({"Np": 0.35, "Lbeta": -4.0})
+    found = fid.compare_conditions({"a": _fit(slow, 1, 0.01), "b": _fit(turned, 2, 0.01)})
+    signs = [f for f in found.findings if f.code == "sign-changed"]
+    assert any(f.message.startswith("Np:") for f in signs)
+    assert {f.light.value for f in signs} == {"amber"}
+    lost = [f.message for f in found.findings if f.code == "stability-changed"]
+    assert lost == ["spiral: unstable in b, stable in the rest", "unstable in b, not in the rest"]
+
+
+def test_ratios_cover_by_fieller() -> None:
+    """Also where the denominator is known to two fifths only, where first order would fail."""
+    random = np.random.default_rng(5)
+    for error in (0.02, 0.2):
+        inside = 0
+        runs = 4000
+        for above, below in zip(
+            random.normal(3.0, error, runs), random.normal(1.0, error, runs), strict=True
+        ):
+            half = 1.959964 * error
+            ratio = ratio_of(
+                Quantity("b", above, "1", (above - half, above + half)),
+                Quantity("a", below, "1", (below - half, below + half)),
+            )
+            if ratio.interval95 is None:
+                # Fieller's set is not bounded there: it holds almost everything.
+                inside += 1
+                continue
+            inside += ratio.interval95[0] <= 3.0 <= ratio.interval95[1]
+        assert 0.94 < inside / runs < 0.96
+
+
+def test_ratios_without_an_answer() -> None:
+    known = Quantity("a", 2.0, "1", (1.0, 3.0))
+    none = Quantity("b", None, "1", None, "not there")
+    assert ratio_of(none, known).reason == "not there"
+    assert ratio_of(known, none).reason == "not there"
+    assert ratio_of(known, Quantity("c", 0.0)).reason == "the denominator is zero"
+    loose = ratio_of(known, Quantity("d", 1.0, "1", (-1.0, 3.0)))
+    assert loose.value == 2.0
+    assert "holds zero" in loose.reason
+    assert chance_of(known, none) is None
+    assert chance_of(Quantity("e", 1.0), Quantity("f", 1.0)) is None
+    assert chance_of(Quantity("e", 1.0, "1", (1.0, 1.0)), Quantity("f", 1.0)) is None
+    assert holm({"a": 0.04, "b": 0.04}) == set()
+    assert holm({"a": 0.02, "b": 0.04}) == {"a", "b"}
+
+
+def test_refused(compared: fid.ConditionComparison) -> None:
+    with pytest.raises(errors.OptionError, match="a comparison needs two conditions"):
+        fid.compare_conditions({"hover": fid.load_model("r50_hover")})
+    box = fid.PolynomialModel("y", ("u",), 0.1, a=[1.0, -0.5], b=[[1.0]])
+    with pytest.raises(errors.ModelError, match="condition b has no named parameters"):
+        fid.compare_conditions({"a": fid.load_model("r50_hover"), "b": box})
+    with pytest.raises(errors.UnknownNameError, match="there is no such common parameter"):
+        compared["Zw"]
