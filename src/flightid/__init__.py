@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from flightid.control.loops.connect import connect
     from flightid.control.loops.interconnection import Interconnection
     from flightid.control.margins import Margins, margins
+    from flightid.control.pid_design import PidDesign
+    from flightid.control.tune import tune_pid
+    from flightid.control.tuning_requirements import TuningRequirements
     from flightid.dynamics.approximate_modes import approximate_modes
     from flightid.dynamics.conditions import compare_conditions
     from flightid.dynamics.conditions_result import ConditionComparison
@@ -142,6 +145,9 @@ _HOMES = {
     "NarxModel": "flightid.models",
     "PairResponse": "flightid.responses",
     "Parameter": "flightid.models",
+    "PidDesign": "flightid.control.pid_design",
+    "TuningRequirements": "flightid.control.tuning_requirements",
+    "tune_pid": "flightid.control.tune",
     "Parameters": "flightid.models",
     "PolynomialFit": "flightid.identification",
     "PolynomialModel": "flightid.models",
@@ -222,6 +228,7 @@ __all__ = [
     "PairResponse",
     "Parameter",
     "Parameters",
+    "PidDesign",
     "PolynomialFit",
     "PolynomialModel",
     "Record",
@@ -234,6 +241,7 @@ __all__ = [
     "Table",
     "TransferFunction",
     "TransferFunctionModel",
+    "TuningRequirements",
     "Verification",
     "__version__",
     "advise",
@@ -274,6 +282,7 @@ __all__ = [
     "to_control",
     "to_discrete",
     "to_scipy",
+    "tune_pid",
     "validation",
     "verify",
     "write_model",

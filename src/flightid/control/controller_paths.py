@@ -107,8 +107,11 @@ class ControllerPaths:
         gains = self.loop.gains
         moving = {self.loop.names[role] for role in RATE_ROLES if role in self.loop.names}
         rest = sum(
-            (gains[name] * term for name, term in zip(names, terms, strict=True)
-             if name not in moving),
+            (
+                gains[name] * term
+                for name, term in zip(names, terms, strict=True)
+                if name not in moving
+            ),
             np.zeros(len(omega_rad_s), dtype=np.complex128),
         )
         return np.vstack([self._chosen(terms, names), rest]) * self._late(omega_rad_s)

@@ -18,15 +18,20 @@ from scipy.optimize import linprog
 from flightid.control.loop_problem import TARGET, Judged, LoopProblem
 
 Array = NDArray[np.float64]
-GRID_P, GRID_I, GRID_D, GRID_A = 12, 6, 5, 5
+Linear = tuple[Array, Array, Array, Array]
+"""Limits, levels and their slopes."""
+GRID_P, GRID_I, GRID_D, GRID_A = 20, 6, 5, 4
 CHUNK = 96
-STARTS = 3
+STARTS = 2
 ROUNDS = 8
 HEADROOM = 2e-3
 """Slack kept in the search, for rounding of gains and frequencies between grid points."""
 STEP = 1e-4
-FIRST_REACH, SMALLEST_REACH = 0.25, 1e-5
-ITERATIONS = 50
+FIRST_REACH, SMALLEST_REACH = 0.25, 1e-4
+SMALLEST_GAIN, SHRINK = 1e-6, 0.4
+ITERATIONS = 60
+FAR = 1.0
+"""Slack beyond the least one at which a limit takes no part in a step."""
 PENALTY = 50.0
 """Loss of merit for a violated limit, in e-folds of the objective."""
 LARGEST_TD_S, TIME_SCALE_S = 0.5, 0.1
@@ -82,7 +87,8 @@ def search(problem: LoopProblem, active: list[int], advance: Callable[[int], Non
     """
     space = _Space.of(problem)
     coarse = space.grid()
-    judged = _judge_all(problem, coarse, active, advance)
+    # The estimate alone tells where to begin: no start need hold for every plant.
+    judged = _judge_all(problem, coarse, active[:1], advance)
     starts = _starts(coarse, *judged, problem.requirements.has_target)
     rows, best = list(active), None
     for _ in range(ROUNDS):
@@ -104,7 +110,7 @@ def steps(problem: LoopProblem) -> int:
 
 @dataclass(frozen=True, eq=False)
 class _Space:
-    """Gains by their logarithms and times: log P, log(I/P), D/P and log A, each inside the ranges."""
+    """Gains as log P, log(I/P), D/P and log A, each inside the ranges."""
 
     kinds: tuple[str, ...]
     low: Array
@@ -139,26 +145,26 @@ class _Space:
 
     def to_point(self, gains: Array) -> Array:
         """Gains (n_gains,) to a point."""
-        p = gains[self.kinds.index("P")]
-        to = {
-            "P": np.log,
-            "A": np.log,
-            "I": lambda i: np.log(max(i, TINY_GAIN) / p),
-            "D": lambda d: d / p / TIME_SCALE_S,
-        }
-        return np.array([to[kind](gain) for kind, gain in zip(self.kinds, gains, strict=True)])
+        return np.array(
+            [self._point(kind, gain, gains) for kind, gain in zip(self.kinds, gains, strict=True)]
+        )
+
+    def _point(self, kind: str, gain: float, gains: Array) -> float:
+        p = float(gains[self.kinds.index("P")])
+        if kind == "I":
+            return float(np.log(max(gain, TINY_GAIN) / p))
+        return gain / p / TIME_SCALE_S if kind == "D" else float(np.log(gain))
 
     def to_gains(self, points: Array) -> Array:
         """Points (n, n_gains) to gains inside the ranges."""
         p = np.exp(points[:, self.kinds.index("P")])
-        to = {
-            "P": np.exp,
-            "A": np.exp,
-            "I": lambda x: p * np.exp(x),
-            "D": lambda x: p * x * TIME_SCALE_S,
-        }
-        columns = [to[kind](x) for kind, x in zip(self.kinds, points.T, strict=True)]
-        return np.clip(np.column_stack(columns), self.low, self.high)
+        columns = []
+        for kind, x in zip(self.kinds, points.T, strict=True):
+            if kind == "D":
+                columns.append(p * x * TIME_SCALE_S)
+            else:
+                columns.append(p * np.exp(x) if kind == "I" else np.exp(x))
+        return np.asarray(np.clip(np.column_stack(columns), self.low, self.high))
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest point."""
@@ -187,11 +193,17 @@ def _judge_all(
 
 
 def _starts(coarse: Array, slack: Array, objective: Array, has_target: bool) -> list[Array]:
-    """The best candidates of the grid: feasible ones by objective, else those that come nearest."""
+    """Best candidates of the grid, no two of one shape; where none is feasible, the nearest."""
     feasible = slack >= 0.0
-    merit = np.where(feasible & (not has_target), 10.0 + objective, np.minimum(slack, 5.0))
-    order = np.argsort(-merit, kind="stable")
-    return [coarse[k] for k in order[:STARTS]]
+    merit = np.where(feasible & (not has_target), 100.0 + objective, np.minimum(slack, 5.0))
+    chosen: dict[tuple[float, ...], Array] = {}
+    for k in np.argsort(-merit, kind="stable"):
+        # Ratios of the rate loop's gains: optima hide from a search in another shape.
+        shape = tuple(np.round(coarse[k, 1:3] / coarse[k, 0], 6))
+        chosen.setdefault(shape, coarse[k])
+        if len(chosen) == STARTS:
+            break
+    return list(chosen.values())
 
 
 def _refined(problem: LoopProblem, space: _Space, starts: list[Array], rows: list[int]) -> Array:
@@ -214,10 +226,15 @@ def _split(judged: Judged) -> tuple[Array, Array]:
     n = judged.slack.shape[1]
     slack = judged.slack - HEADROOM - 2.0 * ~judged.stable[None]
     targets = np.array([name.startswith(TARGET) for name in judged.names])
+    margins = np.hstack(
+        [
+            slack[~targets].transpose(1, 0, 2).reshape(n, -1),
+            np.moveaxis(judged.peaks, 0, -1).reshape(n, -1) - HEADROOM,
+        ]
+    )
     if not targets.any():
-        return slack.transpose(1, 0, 2).reshape(n, -1), judged.objective
-    limits = slack[targets].transpose(1, 0, 2).reshape(n, -1)
-    return limits, slack[~targets][1:].transpose(1, 0, 2).reshape(n, -1)
+        return margins, judged.objective
+    return slack[targets].transpose(1, 0, 2).reshape(n, -1), margins
 
 
 def _climb(problem: LoopProblem, space: _Space, start: Array, rows: list[int]) -> Array:
@@ -226,31 +243,46 @@ def _climb(problem: LoopProblem, space: _Space, start: Array, rows: list[int]) -
     point, reach = np.clip(space.to_point(start), low, high), FIRST_REACH
     merit = float(_merits(problem, space.to_gains(point[None]), rows)[0])
     for _ in range(ITERATIONS):
-        limits, levels, *slopes = _linearised(problem, space, point, rows)
-        step = _linear_step(
-            limits,
-            levels,
-            *slopes,
-            np.maximum(low - point, -reach),
-            np.minimum(high - point, reach),
-        )
-        if step is None or np.abs(step).max() < 1e-6:
+        linear = _linearised(problem, space, point, rows)
+        box = np.maximum(low - point, -reach), np.minimum(high - point, reach)
+        step = _linear_step(linear, *box)
+        if step is None or np.abs(step).max() < SMALLEST_REACH:
             break
         trial = float(_merits(problem, space.to_gains((point + step)[None]), rows)[0])
-        if trial > merit + 1e-7:
+        if trial <= merit + SMALLEST_GAIN:
+            step = _linear_step(_corrected(problem, space, point, rows, linear, step), *box)
+            if step is not None:
+                trial = float(_merits(problem, space.to_gains((point + step)[None]), rows)[0])
+        if step is not None and trial > merit + SMALLEST_GAIN:
             full = np.abs(step).max() > 0.99 * reach
             point, merit = point + step, trial
             reach = min(2.0 * reach, 1.0) if full else reach
         else:
-            reach *= 0.35
+            reach *= SHRINK
             if reach < SMALLEST_REACH:
                 break
     return np.asarray(space.to_gains(point[None])[0])
 
 
-def _linearised(
-    problem: LoopProblem, space: _Space, point: Array, rows: list[int]
-) -> tuple[Array, Array, Array, Array]:
+def _corrected(
+    problem: LoopProblem,
+    space: _Space,
+    point: Array,
+    rows: list[int],
+    linear: Linear,
+    step: Array,
+) -> Linear:
+    """The linear problem with the curvature that a rejected step has met.
+
+    Without it steps along a curved limit leave it and are refused, however good they are.
+    """
+    _, _, limit_slopes, level_slopes = linear
+    met = _split(problem.judge(space.to_gains((point + step)[None]), rows))
+    limits, levels = met[0][0], met[1][0]
+    return limits - limit_slopes @ step, levels - level_slopes @ step, limit_slopes, level_slopes
+
+
+def _linearised(problem: LoopProblem, space: _Space, point: Array, rows: list[int]) -> Linear:
     """Limits and levels at a point, and their slopes, shapes (n,) and (n, n_gains)."""
     points = np.vstack([point, point + STEP * np.eye(len(point))])
     limits, levels = _split(problem.judge(space.to_gains(points), rows))
@@ -262,15 +294,13 @@ def _linearised(
     )
 
 
-def _linear_step(
-    limits: Array,
-    levels: Array,
-    limit_slopes: Array,
-    level_slopes: Array,
-    low: Array,
-    high: Array,
-) -> Array | None:
+def _linear_step(linear: Linear, low: Array, high: Array) -> Array | None:
     """Step that raises the lowest level, violations penalised; None where there is none."""
+    limits, levels, limit_slopes, level_slopes = linear
+    near = limits < limits.min() + FAR
+    limits, limit_slopes = limits[near], limit_slopes[near]
+    low_levels = levels < levels.min() + FAR
+    levels, level_slopes = levels[low_levels], level_slopes[low_levels]
     n = limit_slopes.shape[1]
     # Unknowns: the step, the level t, the violation v >= 0.
     above = np.vstack(

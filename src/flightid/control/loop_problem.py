@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 TINY = 1e-12
 DISTURBANCE_WEIGHT = 0.2
+LOWEST_PEAK_RAD_S, PEAK_BANDS = 0.5, 20
 FULL, NONE = 1.0, -20.0
 """Slack of a requirement that sets no limit, for lack of a crossing; and the least that counts."""
 RATE, WHOLE, ANGLE = "rate loop", "whole loop", "angle loop"
@@ -118,6 +119,9 @@ class Judged:
     stable : ndarray of bool, shape (n_candidates, n_plants)
     noise : ndarray, shape (n_candidates, n_plants)
         Output over gyro noise, rms; rms output where the noise is known.
+    peaks : ndarray, shape (n_loops, n_candidates, n_plants, n_bands)
+        Slack of the sensitivity peak by bands of frequency: where two peaks are equally high, the
+        highest alone has an edge that a search would stick to.
     """
 
     names: tuple[str, ...]
@@ -126,6 +130,7 @@ class Judged:
     metrics: dict[str, LoopMetrics]
     stable: NDArray[np.bool_]
     noise: Array
+    peaks: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +212,15 @@ class LoopProblem:
             metrics,
             stable,
             noise,
+            np.array([self._peaks(omega, loop) for _, loop in loops.named()]),
         )
+
+    def _peaks(self, omega: Array, loop: Complex) -> Array:
+        start = int(np.searchsorted(omega, LOWEST_PEAK_RAD_S))
+        edges = np.unique(np.linspace(start, len(omega), PEAK_BANDS, endpoint=False).astype(int))
+        least = np.minimum.reduceat(np.abs(1.0 + loop), edges, axis=-1)
+        peak = self.requirements.peak
+        return np.asarray(np.clip(1.0 + np.log(least) / np.log(peak), NONE, FULL))
 
     def _noise(self, omega: Array, gain: Array) -> Array:
         """Rms of the output for the noise of the gyro, over the band of the sampled loop."""

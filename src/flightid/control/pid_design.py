@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from flightid.control.autopilots import AxisLoop
-from flightid.control.gain_files import write_gain_files
 from flightid.control.promises import Promise
 from flightid.control.tuning_requirements import TuningRequirements
 from flightid.control.tuning_responses import ResponseBand
-from flightid.errors import DataError, UnknownNameError
+from flightid.errors import UnknownNameError
 from flightid.findings import Finding
 from flightid.table import Cell, Column, Table
 
@@ -189,8 +187,11 @@ class PidDesign:
             Column("unit"),
         )
         rows: list[tuple[Cell, ...]] = [
-            (c.name, c.flown, c.new if self.exists else None, c.ratio if self.exists else None)
-            + (c.low, c.high, c.unit)
+            (
+                *(c.name, c.flown),
+                *((c.new, c.ratio) if self.exists else (None, None)),
+                *(c.low, c.high, c.unit),
+            )
             for c in self.changes
         ]
         return Table(f"Gains of {self.axis}", columns, tuple(rows), self._words())
@@ -213,8 +214,10 @@ class PidDesign:
         for each in self.promises:
             low, high = each.interval95 or (None, None)
             rows.append(
-                (each.loop, each.name, each.required, each.nominal, low, high, each.worst)
-                + (each.unit, each.flown, each.flown_worst)
+                (
+                    *(each.loop, each.name, each.required, each.nominal, low, high, each.worst),
+                    *(each.unit, each.flown, each.flown_worst),
+                )
             )
         note = (
             f"Worst: of {self.n_plants} plants drawn from what the data allow; "
@@ -236,8 +239,10 @@ class PidDesign:
             Column("stable"),
         )
         rows = tuple(
-            (k, *(stage.gains[name] for name in names))
-            + (stage.phase_margin_deg, stage.gain_margin_db, stage.stable)
+            (
+                *(k, *(stage.gains[name] for name in names)),
+                *(stage.phase_margin_deg, stage.gain_margin_db, stage.stable),
+            )
             for k, stage in enumerate(self.stages, 1)
         )
         return Table(f"Steps for {self.axis}", columns, rows)
@@ -250,39 +255,6 @@ class PidDesign:
     def summary(self) -> Table:
         """Gains, with the verdicts below; `promise_table` has the margins."""
         return self.gain_table()
-
-    def write(self, path: str | Path) -> tuple[Path, ...]:
-        """Write the gains as the autopilot's parameter files, and the flown ones to go back to.
-
-        One file for each step (``name-1.param``, … where there are several), and
-        ``name-rollback.param``; ``.params`` for PX4.
-
-        Parameters
-        ----------
-        path : str or Path
-            Name of the file, with the autopilot's ending.
-
-        Returns
-        -------
-        tuple of Path
-            What was written, the rollback last.
-
-        Raises
-        ------
-        DataError
-            There are no gains that meet the requirements.
-        OSError
-            A file cannot be written.
-        """
-        if not self.exists:
-            raise DataError(
-                "no gains meet the requirements, so none are written",
-                found=", ".join(self.binding),
-                action="relax a requirement that cannot be met, or identify better",
-            )
-        steps = [stage.gains for stage in self.stages]
-        before = {change.name: change.flown for change in self.changes}
-        return write_gain_files(Path(path), self.flown.autopilot, steps, before)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""

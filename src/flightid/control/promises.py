@@ -54,9 +54,7 @@ class Promise:
 
     def __repr__(self) -> str:
         """Loop, name and numbers on one line."""
-        values = [
-            "none" if each is None else f"{each:.4g}" for each in (self.nominal, self.worst)
-        ]
+        values = ["none" if each is None else f"{each:.4g}" for each in (self.nominal, self.worst)]
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"Promise({self.loop}: {self.name} {values[0]}{unit}, worst {values[1]})"
 
@@ -135,8 +133,9 @@ def promises(
                 _interval(values),
                 _worst(values, kind.more),
                 _number(before[0]) if steady and before is not None else None,
-                _worst(before, kind.more) if before is not None and old is not None
-                and bool(old.stable.all()) else None,
+                _worst(before, kind.more)
+                if before is not None and old is not None and bool(old.stable.all())
+                else None,
                 *_requirement(problem, new, loop, kind),
             )
         )
@@ -174,10 +173,10 @@ def _requirement(problem: LoopProblem, judged: Judged, loop: str, kind: _Kind) -
         if loop != ANGLE and problem.crossover_limit_rad_s is not None:
             texts.append(f"≤ {problem.crossover_limit_rad_s:.4g}")
             names.append("identified band")
-    if kind.name == "disturbance bandwidth" and loop == "rate loop":
-        if need.disturbance_bandwidth_rad_s is not None:
-            texts.append(f"≥ {need.disturbance_bandwidth_rad_s:g}")
-            names.append(f"{TARGET} disturbance bandwidth")
+    target = need.disturbance_bandwidth_rad_s
+    if kind.name == "disturbance bandwidth" and loop == "rate loop" and target is not None:
+        texts.append(f"≥ {target:g}")
+        names.append(f"{TARGET} disturbance bandwidth")
     rows = [judged.slack[judged.names.index(name), 0] for name in names if name in judged.names]
     return " and ".join(texts), all(bool((row >= 0.0).all()) for row in rows)
 

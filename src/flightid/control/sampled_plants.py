@@ -18,7 +18,7 @@ Complex = NDArray[np.complex128]
 ON_CIRCLE = 1e-9
 LOWEST_RAD_S, KNEE_RAD_S = 1e-5, 0.05
 TAIL_POINTS = 40
-BELOW_NYQUIST = 1.0 - 1e-9
+BELOW_NYQUIST = 1.0 - 1e-4
 """At half the sample rate itself filters are exactly zero."""
 
 
@@ -255,11 +255,11 @@ def plants_of_axis(
     back = c * inner[:, :, others] + o * outer[:, :, others]
     open_loop = np.eye(len(others)) + back[..., others]
     answer = -np.linalg.solve(open_loop, back[..., [place]])
-    seen = [
+    seen_rate, seen_angle = (
         (each[:, :, [place]][..., others] @ answer)[..., 0, 0] + each[:, :, place, place]
         for each in (inner, outer)
-    ]
-    return Plants(omega_rad_s, *seen, np.linalg.det(open_loop), unstable)
+    )
+    return Plants(omega_rad_s, seen_rate, seen_angle, np.linalg.det(open_loop), unstable)
 
 
 def whole_loop(rate: Complex, angle: Complex, loops: AxisLoops) -> Complex:

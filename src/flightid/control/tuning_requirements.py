@@ -119,7 +119,7 @@ class TuningRequirements:
         """Largest sensitivity, whichever way it is asked for."""
         if self.disturbance_peak_db is None:
             return self.sensitivity_peak
-        return min(self.sensitivity_peak, 10.0 ** (self.disturbance_peak_db / 20.0))
+        return float(min(self.sensitivity_peak, 10.0 ** (self.disturbance_peak_db / 20.0)))
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""

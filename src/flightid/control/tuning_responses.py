@@ -14,7 +14,12 @@ from flightid.control.sampled_plants import BELOW_NYQUIST, AxisLoops, SampledPla
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-SHOWN_S = {"rate step": 1.0, "angle step": 2.0, "disturbance to rate": 2.0, "disturbance to angle": 4.0}
+SHOWN_S = {
+    "rate step": 1.0,
+    "angle step": 2.0,
+    "disturbance to rate": 2.0,
+    "disturbance to angle": 4.0,
+}
 UNITS = {
     "rate step": "rad/s",
     "angle step": "rad",
@@ -104,7 +109,7 @@ def responses(
     found = {}
     for name, pulse in pulses.items():
         n = min(count, 1 + round((shown_s or SHOWN_S[name]) / step))
-        found[name] = (step * np.arange(n), np.cumsum(pulse, axis=1)[:, :n])
+        found[name] = (np.arange(n, dtype=np.float64) * step, np.cumsum(pulse, axis=1)[:, :n])
     return found
 
 

@@ -1,0 +1,214 @@
+"""Gains of one axis: results, refusals, and what is said where nothing can be had."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.control.autopilots import axis_loop
+from flightid.control.tuning_requirements import TuningRequirements
+from flightid.control.worst_case import content_of_worst, least_share
+from flightid.conventions import Light
+from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
+from flightid.findings import Finding
+from tests.closeness import assert_close
+
+FLOWN = axis_loop("arducopter", "roll", loop_rate_hz=400.0).with_gains(
+    ATC_RAT_RLL_P=0.08, ATC_RAT_RLL_I=0.08, ATC_RAT_RLL_D=0.002
+)
+NEED = TuningRequirements(noise_growth=4.0)
+
+
+def _fit(**values: float) -> fid.Fit:
+    known = {"Ltphi": 140.0, "Lp": -3.4, "T_m": 0.045, "tau": 0.012} | values
+    model = fid.load_model("rate_motor_lag", axis="roll").with_values(known)
+    omega = np.geomspace(0.5, 90.0, 40)
+    data = fid.FrequencyResponse.from_values(
+        omega,
+        model.frequency_response(omega),
+        inputs=model.inputs,
+        outputs=model.outputs,
+        units=model.units,
+        random_error=np.full((1, 1, 40), 0.03),
+    )
+    return fid.identify(model, data, correct_bias=False)
+
+
+@pytest.fixture(scope="module")
+def fit() -> fid.Fit:
+    return _fit()
+
+
+@pytest.fixture(scope="module")
+def design(fit: fid.Fit) -> fid.PidDesign:
+    return fid.tune_pid(fit, gains=FLOWN, requirements=NEED, draws=60)
+
+
+def test_gains_meet_every_requirement_for_fresh_plants(design: fid.PidDesign) -> None:
+    assert design.exists
+    assert design.n_plants == 61
+    assert design.share_met > 0.85
+    for loop in ("rate loop", "whole loop"):
+        assert (design.promise(loop, "phase margin").worst or 0.0) > 44.0
+        assert (design.promise(loop, "sensitivity peak").worst or 9.0) < 2.04
+    assert (design.promise("angle loop", "phase margin").worst or 0.0) > 59.0
+    assert (design.promise("rate loop", "crossover").worst or 99.0) < 30.5
+    assert design.binding
+
+
+def test_worst_lies_beyond_nominal_and_the_flown_gains_stand_beside(design: fid.PidDesign) -> None:
+    for each in design.promises:
+        if None in (each.nominal, each.worst, each.interval95):
+            continue
+        low, high = each.interval95 or (0.0, 0.0)
+        assert low <= high
+        assert each.worst is not None
+        assert min(low, each.worst) <= (each.nominal or 0.0) <= max(high, each.worst)
+    crossover = design.promise("rate loop", "crossover")
+    assert crossover.flown is not None
+    assert crossover.nominal is not None
+    assert crossover.nominal > 1.2 * crossover.flown
+
+
+def test_steps_never_exceed_the_limit_and_end_at_the_new_gains(design: fid.PidDesign) -> None:
+    before = {change.name: change.flown for change in design.changes}
+    for stage in design.stages:
+        assert stage.stable
+        for name, value in stage.gains.items():
+            assert 1 / 2.002 <= value / before[name] <= 2.002
+        before = dict(stage.gains)
+    assert before == design.gains
+
+
+def test_responses_settle_at_the_set_point(design: fid.PidDesign) -> None:
+    step = design.response("rate step")
+    assert_close(step.estimate[-1], 1.0, atol=0.05, why="one second after a step of the rate")
+    assert np.all(step.low <= step.estimate)
+    assert np.all(step.estimate <= step.high)
+    hit = design.response("disturbance to angle")
+    assert abs(hit.estimate[-1]) < 0.3 * np.abs(hit.estimate).max()
+    assert hit.flown is not None
+    assert np.abs(hit.estimate).max() < np.abs(hit.flown).max()
+
+
+def test_the_result_shows_itself(design: fid.PidDesign) -> None:
+    assert repr(design).startswith("PidDesign(roll: ATC_RAT_RLL_P")
+    assert design.to_dict()["schema"] == "flightid.pid_design/1"
+    assert "Binding: " in str(design.summary())
+    assert "95 % confidence" in str(design.promise_table())
+    assert len(design.stage_table().rows) == len(design.stages)
+    assert "<table>" in design._repr_html_()
+    with pytest.raises(UnknownNameError, match="no such promise"):
+        design.promise("rate loop", "luck")
+    with pytest.raises(UnknownNameError, match="no such response"):
+        design.response("luck")
+
+
+def test_a_target_is_reached_with_all_the_margin_there_is(fit: fid.Fit) -> None:
+    need = dataclasses.replace(NEED, crossover_rad_s=12.0)
+    design = fid.tune_pid(fit, gains=FLOWN, requirements=need, draws=40, angle_loop=False)
+    crossover = design.promise("rate loop", "crossover")
+    assert design.exists
+    assert_close(crossover.worst or 0.0, 12.0, rtol=0.02, why="no more bandwidth than asked for")
+    assert (design.promise("rate loop", "phase margin").worst or 0.0) > 60.0
+
+
+def test_hopeless_plants_have_no_gains_and_it_is_said_why() -> None:
+    slow = _fit(tau=0.2)
+    need = dataclasses.replace(NEED, crossover_rad_s=15.0)
+    design = fid.tune_pid(slow, gains=FLOWN, requirements=need, draws=20)
+    assert not design.exists
+    assert design.findings[0].light is Light.RED
+    assert design.findings[0].code == "no-gains"
+    assert "target crossover" in design.findings[0].message
+    assert design.loop is design.flown
+    assert "no gains" in repr(design)
+    assert "Cannot be met together" in str(design.summary())
+    assert design.stages == ()
+
+
+def test_what_flew_must_be_stable_in_the_model() -> None:
+    wild = _fit(Ltphi=3000.0)
+    design = fid.tune_pid(wild, gains=FLOWN, requirements=NEED, draws=20)
+    assert any(f.code == "flown-unstable" and f.light is Light.RED for f in design.findings)
+
+
+def test_models_without_errors_are_refused_or_taken_as_they_are(fit: fid.Fit) -> None:
+    with pytest.raises(DataError, match="whose errors are not known"):
+        fid.tune_pid(fit.model, gains=FLOWN)
+    design = fid.tune_pid(fit.model, gains=FLOWN, requirements=NEED, nominal=True)
+    codes = {finding.code for finding in design.findings}
+    assert {"no-uncertainty", "band-unknown"} <= codes
+    assert design.content == 0.0
+    assert "errors are not known" in str(design.promise_table())
+
+
+def test_red_evidence_is_refused(fit: fid.Fit) -> None:
+    class Bad:
+        findings = (Finding("theil", Light.RED, "misses"),)
+
+    with pytest.raises(DataError, match="the verification is red"):
+        fid.tune_pid(fit, gains=FLOWN, verification=Bad())
+    red = dataclasses.replace(fit, findings=(Finding("cost", Light.RED, "cost 900"),))
+    with pytest.raises(DataError, match="the fit is red"):
+        fid.tune_pid(red, gains=FLOWN)
+
+
+def test_a_reversed_command_is_refused_unless_it_is_said() -> None:
+    system = fid.LinearSystem([[-3.0]], [[-140.0]], [[1.0]], [[0.0]], ("tau_phi",), ("p",), [0.03])
+    with pytest.raises(ModelError, match="answers a positive command with a negative rate"):
+        fid.tune_pid(system, gains=FLOWN, nominal=True)
+    design = fid.tune_pid(system, gains=FLOWN, nominal=True, sign=-1, requirements=NEED)
+    assert design.exists
+    with pytest.raises(OptionError, match="sign is not known"):
+        fid.tune_pid(system, gains=FLOWN, nominal=True, sign=2)
+
+
+def test_discrete_models_need_the_samples_of_the_loop() -> None:
+    system = fid.LinearSystem(
+        [[0.9]], [[1.0]], [[1.0]], [[0.0]], ("tau_phi",), ("p",), sample_time_s=0.01
+    )
+    with pytest.raises(ModelError, match="samples are not those of the loop"):
+        fid.tune_pid(system, gains=FLOWN, nominal=True)
+
+
+def test_noise_bounds_the_gains(fit: fid.Fit) -> None:
+    options = {"gains": FLOWN, "draws": 20, "angle_loop": False}
+    free = fid.tune_pid(fit, requirements=dataclasses.replace(NEED, noise_growth=None), **options)
+    quiet = fid.tune_pid(
+        fit, requirements=TuningRequirements(output_noise_rms=0.002), gyro_noise=0.01, **options
+    )
+    assert quiet.exists
+    assert "output noise" in quiet.binding
+    assert (quiet.promise("output", "noise, rms").worst or 1.0) <= 0.00201
+    assert quiet.gains["ATC_RAT_RLL_D"] < free.gains["ATC_RAT_RLL_D"]
+    for bad in (-1.0, ([1.0, 2.0], [1.0])):
+        with pytest.raises(OptionError, match="gyro_noise"):
+            fid.tune_pid(fit, gyro_noise=bad, **options)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"objective": "luck"}, "objective is not known"),
+        ({"phase_margin_deg": -1.0}, "phase_margin_deg has no meaning"),
+        ({"phase_margin_deg": 95.0}, "leaves no bandwidth"),
+        ({"step_limit": 1.0}, "must leave room"),
+    ],
+)
+def test_requirements_without_meaning_are_refused(changes: dict, said: str) -> None:
+    with pytest.raises(OptionError, match=said):
+        TuningRequirements(**changes)
+
+
+def test_statements_about_content() -> None:
+    assert_close(content_of_worst(59) ** 59, 0.05, rtol=1e-12, why="Wilks")
+    assert_close(least_share(59, 59), content_of_worst(59), rtol=1e-9, why="all of them good")
+    assert least_share(0, 10) == 0.0
+    with pytest.raises(OptionError, match="counts do not fit"):
+        least_share(3, 2)
+    with pytest.raises(OptionError, match="no statement about content"):
+        content_of_worst(0)
