@@ -14,6 +14,11 @@ from flightid.version import VERSION as __version__
 if TYPE_CHECKING:
     from flightid import conditioning, excitation, validation
     from flightid.control import loops
+    from flightid.control.disk_margin import DiskMargin, disk_margin
+    from flightid.control.disturbance_rejection import (
+        DisturbanceRejection,
+        disturbance_rejection,
+    )
     from flightid.control.loops.connect import connect
     from flightid.control.loops.interconnection import Interconnection
     from flightid.control.margins import Margins, margins
@@ -129,6 +134,10 @@ _HOMES = {
     "to_discrete": "flightid.dynamics.continuous",
     "LinearSystem": "flightid.models",
     "LocalMinimum": "flightid.identification",
+    "DiskMargin": "flightid.control.disk_margin",
+    "disk_margin": "flightid.control.disk_margin",
+    "DisturbanceRejection": "flightid.control.disturbance_rejection",
+    "disturbance_rejection": "flightid.control.disturbance_rejection",
     "Margins": "flightid.control.margins",
     "margins": "flightid.control.margins",
     "Log": "flightid.logs",
@@ -200,6 +209,8 @@ __all__ = [
     "Comparison",
     "ConditionComparison",
     "DerivativeTable",
+    "DiskMargin",
+    "DisturbanceRejection",
     "Exported",
     "Finding",
     "Fit",
@@ -253,6 +264,8 @@ __all__ = [
     "conditioning",
     "connect",
     "derivatives",
+    "disk_margin",
+    "disturbance_rejection",
     "estimate_response",
     "excitation",
     "export",

@@ -336,12 +336,17 @@ def measured_up(loop: Loop) -> tuple[Array, LoopMetrics]:
     return omega, loop_metrics(omega, values, unstable_poles=loop.unstable_poles)
 
 
+def drawn_points(loop: Loop, omega: Array) -> Array:
+    """Frequencies for a picture: of a model some, of a measurement all."""
+    if loop.measured or len(omega) <= DRAWN_POINTS:
+        return omega
+    return np.asarray(omega[np.linspace(0, len(omega) - 1, DRAWN_POINTS).astype(int)])
+
+
 def _carried(loop: Loop, omega: Array) -> tuple[list[tuple[Any, Quantity]], LoopCurve]:
     """Every number with its interval, and the curve with its standard errors."""
     names = [name for _, name, _ in QUANTITIES]
-    drawn = omega
-    if not loop.measured and len(omega) > DRAWN_POINTS:
-        drawn = omega[np.unique(np.linspace(0, len(omega) - 1, DRAWN_POINTS).astype(int))]
+    drawn = drawn_points(loop, omega)
     centre = loop.of(loop.spread.estimate, drawn)
 
     def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever the spread is of
