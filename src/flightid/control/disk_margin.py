@@ -70,7 +70,7 @@ class DiskMargin:
     >>> import flightid as fid
     >>> loop = fid.LinearSystem([[0.0]], [[4.0]], [[1.0]], [[0.0]], ("e",), ("y",), [0.1])
     >>> fid.disk_margin(loop)
-    DiskMargin(y: 0.9963, gain -9.54 to 9.54 dB, phase 53 deg)
+    DiskMargin(y: 1.028, gain -9.87 to 9.87 dB, phase 54.4 deg)
     """
 
     channels: tuple[str, ...]
