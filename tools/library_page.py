@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import flightid as fid
+from flightid.dynamics import Mode
 from flightid.models import Model, StateSpaceModel, load_structure
 
 PAGE = Path(__file__).parent.parent / "docs" / "library.md"
@@ -49,22 +50,19 @@ def _channels(model: Model) -> list[str]:
     return ["  \n".join(lines)]
 
 
-def _mode(value: complex) -> str:
-    if abs(value) < 1e-4:  # a repeated integrator, split by rounding
-        return "0"
-    if abs(value.imag) < 1e-9:
-        return f"{value.real:.4g}"
-    size = abs(value)
-    return f"{value.real:.4g} ± {value.imag:.4g}j (ω = {size:.4g}, ζ = {-value.real / size:.3g})"
+def _mode(mode: Mode) -> str:
+    value = mode.root
+    if not mode.is_pair:
+        return f"{mode.name} {value.real:.4g}"
+    place = f"{value.real:.4g} ± {value.imag:.4g}j"
+    size, damping = abs(value), -value.real / abs(value)
+    return f"{mode.name} {place} (ω = {size:.4g}, ζ = {damping:.3g})"
 
 
 def _modes(model: Model) -> list[str]:
     if not isinstance(model, StateSpaceModel):
         return []
-    modes = [
-        _mode(value) for value in model.eigenvalues() if value.imag >= 0.0 or abs(value) < 1e-4
-    ]
-    return ["", f"Eigenvalues, rad/s: {'; '.join(modes)}."]
+    return ["", f"Modes, rad/s: {'; '.join(map(_mode, fid.modes(model)))}."]
 
 
 def section(name: str) -> str:

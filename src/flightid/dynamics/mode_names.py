@@ -176,9 +176,7 @@ def name_by_states(
     words = [word_of(name, units.get(name, "1")) for name in names]
     shares = pair.shares
     if not len(shares):
-        moving = np.abs(pair.vector)
-        word = words[int(np.argmax(moving))].word
-        return NamedMode(f"chain of integrators at {word}", character_of(value), "")
+        return NamedMode("chain of integrators", character_of(value), "")
     weights = _Weights(words, shares, {name: abs(z) for name, z in zip(names, pair.vector)})  # noqa: B905
     name = _pair_name(weights) if pair.is_pair else _real_name(weights, value)
     order = [k for k in np.argsort(-shares) if shares[k] >= SHOWN]

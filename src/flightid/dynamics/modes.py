@@ -83,9 +83,12 @@ def modes(source: object, *, states: Mapping[str, str] | None = None) -> Modes:
     )
 
 
-def _order(mode: Mode) -> tuple[float, float]:
+def _order(mode: Mode) -> tuple[float, float, str]:
+    """Slowest first; equal to rounding by name, so that every machine lists them alike."""
     value = mode.eigenvalue
-    return (math.inf, 0.0) if value is None else (abs(value), value.real)
+    if value is None:
+        return math.inf, 0.0, mode.name
+    return float(f"{abs(value):.9g}"), float(f"{value.real:.9g}"), mode.name
 
 
 def _mode(read: StateMatrix, pair: Eigenpair) -> Mode:
