@@ -33,6 +33,34 @@ def test_quadratic_functions_keep_the_slope() -> None:
     assert_close(found.stderr[0], 6.0 * 0.3, rtol=1e-12, why="central differences of a square")
 
 
+def test_steps_stay_inside_the_bounds() -> None:
+    """A delay known to twice its size still has its error, and no step makes it negative."""
+    seen = []
+    low, high = np.array([1.95, -np.inf]), np.array([9.0, np.inf])
+    tight = Spread(np.array([2.0, 3.0]), COVARIANCE, lambda x: x, (low, high))
+    found = tight.propagate(lambda x: [seen.append(x[0]) or x[0] + x[1], x[0]])
+    assert min(seen) >= 1.95
+    assert found.covariance is not None
+    assert_close(found.covariance[0, 0], 0.15, rtol=1e-7, why="0.04 + 2·0.01 + 0.09")
+    assert_close(found.covariance[1, 1], 0.04, rtol=1e-7, why="linear")
+    ends = np.array(list(tight.steps(2.0)))
+    assert ends[..., 0].min() == 1.95
+    truth = fid.load_model("rate_first_order").with_values({"tau": 0.001})
+    omega = np.geomspace(0.5, 20.0, 30)
+    data = fid.FrequencyResponse.from_values(
+        omega,
+        truth.frequency_response(omega),
+        inputs=truth.inputs,
+        outputs=truth.outputs,
+        units=truth.units,
+        random_error=np.full((1, 1, 30), 0.1),
+    )
+    spread = spread_of(fid.identify(truth, data))
+    late = spread.propagate(lambda model: model.parameters["tau"].value)
+    assert late.stderr is not None
+    assert late.stderr[0] > 0.001
+
+
 def test_draws_have_the_covariance_and_keep_the_bounds() -> None:
     drawn = np.array(_pair().draws(4000, seed=3))
     assert_close(np.cov(drawn.T), COVARIANCE, rtol=0.1, atol=0.003, why="4000 draws")

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 NORMAL_95 = 1.959963984540054
 NEGLIGIBLE = 1e-14
 """Share of the largest eigenvalue of a covariance below which a direction is rounding."""
+INSIDE = 1.0 - 1e-9
+"""Keeps steps off the bounds by more than rounding."""
 TRIES = 100
 """Draws for each one that has to lie inside the bounds."""
 
@@ -140,12 +142,51 @@ class Spread(Generic[T]):
         return f"Spread({n} number{'' if n == 1 else 's'}, covariance {known})"
 
     def steps(self, scale: float = 1.0) -> Iterator[tuple[T, T]]:
-        """Pairs of things one standard deviation up and down each independent direction."""
+        """Pairs of things one standard deviation up and down each independent direction.
+
+        One that would leave the bounds stops at them.
+        """
         for direction in self._factor.T:
-            yield (
-                self.make(self.centre + scale * direction),
-                self.make(self.centre - scale * direction),
-            )
+            ends = (self.centre + scale * direction, self.centre - scale * direction)
+            if self.bounds is not None:
+                ends = (np.clip(ends[0], *self.bounds), np.clip(ends[1], *self.bounds))
+            yield self.make(ends[0]), self.make(ends[1])
+
+    def slopes(self, function: Callable[[T], ArrayLike]) -> Array:
+        """Moves of a function's values by one standard deviation along each independent direction.
+
+        Central differences over ± one standard deviation; over less where that would leave the
+        bounds, as for a delay known to its own size.
+
+        Parameters
+        ----------
+        function : callable
+            From the thing to k numbers.
+
+        Returns
+        -------
+        ndarray, shape (n_directions, k)
+        """
+        found = []
+        for direction in self._factor.T:
+            share = self._room(direction)
+            ends = [
+                np.atleast_1d(
+                    np.asarray(function(self.make(self.centre + sign * share * direction)), float)
+                )
+                for sign in (1.0, -1.0)
+            ]
+            found.append((ends[0] - ends[1]) / (2.0 * share))
+        return np.array(found)
+
+    def _room(self, direction: Array) -> float:
+        """Share of a direction that stays inside the bounds, up and down; one where all does."""
+        if self.bounds is None:
+            return 1.0
+        room = np.minimum(self.bounds[1] - self.centre, self.centre - self.bounds[0])
+        moving = direction != 0.0
+        shares = INSIDE * room[moving] / np.abs(direction[moving])
+        return float(np.min(shares, initial=1.0))
 
     def propagate(self, function: Callable[[T], ArrayLike]) -> Propagated:
         """Values and covariance of what is computed from the thing.
@@ -174,12 +215,8 @@ class Spread(Generic[T]):
         values = np.atleast_1d(np.asarray(function(self.estimate), dtype=np.float64))
         if not self.known:
             return Propagated(values, None, self.reason)
-        covariance = np.zeros((len(values), len(values)))
-        for up, down in self.steps():
-            ends = [np.atleast_1d(np.asarray(function(each), dtype=float)) for each in (up, down)]
-            slope = (ends[0] - ends[1]) / 2.0
-            covariance += np.outer(slope, slope)
-        return Propagated(values, covariance)
+        slopes = self.slopes(function).reshape(-1, len(values))
+        return Propagated(values, slopes.T @ slopes)
 
     def draws(self, count: int, seed: int = 0) -> list[T]:
         """Things drawn from the normal distribution of the estimate, inside the bounds.

@@ -125,12 +125,9 @@ def _directions(source: object) -> tuple[Array | None, str]:
         return None, spread.reason
     if isinstance(source, Fit) and isinstance(source.model, StateSpaceModel):
         return _exact_directions(source, source.model), ""
-    ends = [
-        (np.asarray(LinearSystem.of(up).a) - np.asarray(LinearSystem.of(down).a)) / 2.0
-        for up, down in spread.steps()
-    ]
     order = LinearSystem.of(source).order
-    return np.array(ends).reshape(len(ends), order, order), ""
+    slopes = spread.slopes(lambda model: np.asarray(LinearSystem.of(model).a).ravel())
+    return slopes.reshape(-1, order, order), ""
 
 
 def _exact_directions(fit: Fit, model: StateSpaceModel) -> Array:
