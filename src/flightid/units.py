@@ -200,3 +200,37 @@ def exponents(unit: str) -> dict[str, float]:
             total = result.get(str(base), 0.0) + float(str(power)) * float(str(inner))
             result[str(base)] = total
     return {name: power for name, power in result.items() if name != "radian" and power != 0.0}
+
+
+@cache
+def si_base(unit: str) -> tuple[float, dict[str, float]]:
+    """A unit as a factor times powers of SI base units and the radian.
+
+    Returns
+    -------
+    tuple of float and dict of str to float
+
+    Raises
+    ------
+    UnitError
+        The unit is not known.
+
+    Example
+    -------
+    >>> si_base("N*m/W"), si_base("ft")
+    ((1.0, {'second': 1.0}), (0.3048, {'meter': 1.0}))
+    """
+    found = _registry().Quantity(1.0, _parse(unit)).to_base_units()
+    powers = {str(name): float(str(power)) for name, power in found.unit_items()}
+    return round_off(float(found.magnitude)), powers
+
+
+def round_off(factor: float) -> float:
+    """A factor without the last digits that its computation left: 0.3048, not 0.30479999999999996.
+
+    Example
+    -------
+    >>> round_off(0.30479999999999996)
+    0.3048
+    """
+    return float(f"{factor:.15g}")

@@ -24,6 +24,7 @@ from flightid.models import (
 from flightid.models.system_files import MATLAB_RECIPE
 from flightid.simulation.export.c import export_c
 from flightid.simulation.export.exported import Exported
+from flightid.simulation.export.fmu import export_fmu
 
 FORMATS = {
     ".toml": "toml",
@@ -32,7 +33,10 @@ FORMATS = {
     ".npz": "npz",
     ".c": "c",
     ".h": "c",
+    ".fmu": "fmu",
 }
+
+_WRITERS: Mapping[str, Callable[..., Exported]] = {"c": export_c, "fmu": export_fmu}
 
 
 def export(
@@ -52,13 +56,16 @@ def export(
     path : str or Path
         File to write; its folder must exist.
     format : str, optional
-        ``"toml"`` (flightid's own), ``"mat"``, ``"json"``, ``"npz"`` (matrices), or ``"c"``
-        (portable C99, two files). Left out: by the suffix.
+        ``"toml"`` (flightid's own), ``"mat"``, ``"json"``, ``"npz"`` (matrices), ``"c"``
+        (portable C99, two files) or ``"fmu"`` (FMI 3.0). Left out: by the suffix.
     name : str, optional
         Of the model in the file; left out: the file's name.
     **options
         Of the format. C: ``sample_time_s``, ``hold`` ("zero" or "first"), ``substeps``,
-        ``tunable`` (equations with parameters to change, instead of exact samples).
+        ``tunable`` (equations with parameters to change, instead of exact samples). FMU:
+        ``sample_time_s`` (the internal step), ``interfaces`` (of "model-exchange" and
+        "co-simulation"), ``pade_order`` (for delays in model exchange), ``substeps``,
+        ``compile`` (False: sources alone).
 
     Returns
     -------
@@ -78,7 +85,8 @@ def export(
 
     Reference
     ---------
-    ISO/IEC 9899:1999 (C99).
+    ISO/IEC 9899:1999 (C99); Modelica Association, *Functional Mock-up Interface Specification*,
+    version 3.0.2.
 
     Example
     -------
@@ -96,8 +104,8 @@ def export(
         raise OptionError("format of an export is not known", found=format or place.name,
                           needed=f"one of {known}")  # fmt: skip
     model = model_of(source)
-    if chosen == "c":
-        return _called(export_c, model, place, name or place.stem, options=options)
+    if chosen in _WRITERS:
+        return _called(_WRITERS[chosen], model, place, name or place.stem, options=options)
     if options:
         raise OptionError(f"format {chosen} has no such options", found=", ".join(options))
     return _toml(model, place) if chosen == "toml" else _matrices(source, model, place, chosen)
