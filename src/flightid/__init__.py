@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from flightid.dynamics.continuous import to_continuous, to_discrete
     from flightid.dynamics.derivatives import DerivativeTable, derivatives
     from flightid.dynamics.handling_qualities import attitude_bandwidth
+    from flightid.dynamics.handling_qualities_table import handling_qualities
     from flightid.dynamics.interpretation import Interpretation, interpret
     from flightid.dynamics.lower_order import lower_order
     from flightid.dynamics.mode_result import Modes
@@ -127,6 +128,7 @@ _HOMES = {
     "Inspection": "flightid.inspection",
     "Interpretation": "flightid.dynamics.interpretation",
     "attitude_bandwidth": "flightid.dynamics.handling_qualities",
+    "handling_qualities": "flightid.dynamics.handling_qualities_table",
     "lower_order": "flightid.dynamics.lower_order",
     "pilot_cutoff": "flightid.dynamics.pilot_cutoff",
     "interpret": "flightid.dynamics.interpretation",
@@ -271,6 +273,7 @@ __all__ = [
     "export",
     "from_control",
     "from_scipy",
+    "handling_qualities",
     "identify",
     "impulse_response",
     "inspect_log",

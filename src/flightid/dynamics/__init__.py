@@ -9,6 +9,7 @@ from flightid.dynamics.conditions_result import (
 from flightid.dynamics.derivatives import Derivative, DerivativeTable
 from flightid.dynamics.handling_qualities import attitude_bandwidth
 from flightid.dynamics.handling_qualities_result import AttitudeBandwidth
+from flightid.dynamics.handling_qualities_table import HandlingQualities, handling_qualities
 from flightid.dynamics.lower_order import lower_order
 from flightid.dynamics.lower_order_result import LowerOrder
 from flightid.dynamics.mode_names import NamedMode
@@ -35,6 +36,7 @@ __all__ = [
     "Derivative",
     "DerivativeTable",
     "FixedWing",
+    "HandlingQualities",
     "LowerOrder",
     "Mode",
     "Modes",
@@ -52,6 +54,7 @@ __all__ = [
     "Spread",
     "attitude_bandwidth",
     "effective_lock_number",
+    "handling_qualities",
     "lower_order",
     "pilot_cutoff",
     "quantity_table",

@@ -24,6 +24,8 @@ NONLINEAR = 0.1
 """Difference of both phase delays, over the larger, beyond which the phase is no line."""
 SMALLEST_DELAY_S = 0.002
 COHERENT = 0.6
+LEADING_DEG = 45.0
+"""Phase at the beginning of the band above which a control may have the other sign."""
 MOST_POINTS = 160
 """Measured points that carry errors: more say the same again."""
 Array = NDArray[np.float64]
@@ -182,6 +184,10 @@ def _is_nonlinear(values: Array) -> bool:
 def _judge(curve: Curve, values: Array, nonlinear: bool, response_type: str) -> tuple[Finding, ...]:
     crossing, margin, gain, delay, slope = values
     found = []
+    if curve.degrees[0] > LEADING_DEG:
+        text = f"the phase begins at {curve.degrees[0]:.0f}°, ahead of the control"
+        action = "sign=-1 if the control pulls the other way; begin the band above slow modes"
+        found.append(Finding("sign-doubtful", Light.AMBER, text, action))
     if np.isnan(gain):
         text = "the gain is never 6 dB above that at ω_180 below it"
         action = "begin the band lower; a response that is flat there has no gain bandwidth"

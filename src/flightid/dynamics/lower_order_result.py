@@ -222,8 +222,8 @@ DERIVED = (
     ("T_theta2", "T_θ2", "s"),
     ("decay", "ζω", "rad/s"),
     ("time_to_double", "time to double of the spiral", "s"),
-    ("n_alpha", "n/α", "1/rad"),
-    ("cap", "control anticipation parameter [1/(g s²)]", "1"),
+    ("n_alpha", "n/α", "g/rad"),
+    ("cap", "control anticipation parameter", "1/(g s²)"),
 )
 
 
@@ -234,7 +234,7 @@ def _derived_quantity(
         return Quantity(label, None, unit, None, "the spiral is stable and never doubles")
     if drawn is None:
         return Quantity(label, value, unit, None, reason)
-    low, high = np.quantile(drawn, [0.025, 0.975])
+    low, high = np.quantile(drawn, [0.025, 0.975], method="inverted_cdf")
     if not (np.isfinite(low) and np.isfinite(high)):
         return Quantity(
             label, value, unit, None, "not determined everywhere within its uncertainty"

@@ -23,7 +23,7 @@ SCHEMA = "flightid.pilot_cutoff/1"
 TAPER = 0.1
 """Share of a record in its two cosine ends: steep spectra leak without it."""
 NORMAL_95 = 1.959963984540054
-NEIGHBOURHOOD = 1.35
+NEIGHBOURHOOD = 1.6
 """The density at the cut-off is the mean from the cut-off over this to the cut-off times this."""
 FIRST_HARMONICS = 3
 FEWEST_PERIODS = 25.0

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.conventions import Light
+from flightid.dynamics.quantity import Quantity
 from flightid.dynamics.rating_charts import RatingChart
 from flightid.errors import DataError
 from flightid.findings import Finding
@@ -80,6 +81,14 @@ class Rating:
         return f"at best {words}" if self.at_best else words
 
     @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """The chart's quantities with their 95 % intervals."""
+        return tuple(
+            _quantity(self.chart, name, value, self.samples.get(name))
+            for name, value in self.values.items()
+        )
+
+    @property
     def findings(self) -> tuple[Finding, ...]:
         """The level as a verdict."""
         light = Light.AMBER
@@ -87,9 +96,7 @@ class Rating:
             light = Light.GREEN
         elif self.level > 2 or self.level > len(self.chart.regions):
             light = Light.RED
-        shown = ", ".join(
-            f"{self.chart.labels[name]} {value:.3g}" for name, value in self.values.items()
-        )
+        shown = ", ".join(f"{each.name} {_shown(each)}" for each in self.quantities)
         subject = f"{self.subject}: " if self.subject else ""
         text = f"{subject}{self.text} by {self.chart.standard} ({self.chart.title}; {shown})"
         action = "" if self.possible == (1,) else _advice(self)
@@ -177,6 +184,24 @@ def normal_draws(values: ArrayLike, covariance: ArrayLike | None, seed: int = 0)
     factor = directions * np.sqrt(np.maximum(sizes, 0.0))
     noise = np.random.default_rng(seed).standard_normal((len(centre), DRAWS))
     return np.asarray(centre[:, None] + factor @ noise)
+
+
+def _quantity(chart: RatingChart, name: str, value: float, drawn: Array | None) -> Quantity:
+    label, unit = chart.labels[name], chart.units[name]
+    if not np.isfinite(value):
+        return Quantity(label, None, unit, None, "without end")
+    if drawn is None:
+        return Quantity(label, value, unit, None, "no covariance")
+    low, high = np.quantile(drawn, [DOUBT, 1.0 - DOUBT], method="inverted_cdf")
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return Quantity(label, value, unit, None, "without end within its uncertainty")
+    return Quantity(label, value, unit, (float(low), float(high)))
+
+
+def _shown(quantity: Quantity) -> str:
+    if quantity.value is None:
+        return quantity.reason
+    return f"{quantity.value:.3g}" + (f" {quantity.unit}" if quantity.unit != "1" else "")
 
 
 def _advice(rating: Rating) -> str:
