@@ -14,6 +14,8 @@ from flightid.version import VERSION as __version__
 if TYPE_CHECKING:
     from flightid import conditioning, excitation, validation
     from flightid.control import loops
+    from flightid.control.closed_loop import close_loop
+    from flightid.control.closed_loop_result import ClosedLoop
     from flightid.control.disk_margin import DiskMargin, disk_margin
     from flightid.control.disturbance_rejection import (
         DisturbanceRejection,
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from flightid.control.loops.connect import connect
     from flightid.control.loops.interconnection import Interconnection
     from flightid.control.margins import Margins, margins
+    from flightid.control.open_loop import open_loop
     from flightid.control.pid_design import PidDesign
     from flightid.control.tune import tune_pid
     from flightid.control.tuning_requirements import TuningRequirements
@@ -175,6 +178,9 @@ _HOMES = {
     "coherent_pairs": "flightid.responses",
     "conditioning": "flightid.conditioning",
     "Interconnection": "flightid.control.loops.interconnection",
+    "ClosedLoop": "flightid.control.closed_loop_result",
+    "close_loop": "flightid.control.closed_loop",
+    "open_loop": "flightid.control.open_loop",
     "connect": "flightid.control.loops.connect",
     "loops": "flightid.control",
     "Verification": "flightid.validation",
@@ -207,6 +213,7 @@ _HOMES = {
 __all__ = [
     "Advice",
     "Channel",
+    "ClosedLoop",
     "CoherentPairs",
     "Comparison",
     "ConditionComparison",
@@ -260,6 +267,7 @@ __all__ = [
     "advise",
     "approximate_modes",
     "attitude_bandwidth",
+    "close_loop",
     "coherent_pairs",
     "compare_conditions",
     "compare_structures",
@@ -284,6 +292,7 @@ __all__ = [
     "lower_order",
     "margins",
     "modes",
+    "open_loop",
     "pilot_cutoff",
     "read_log",
     "read_records",

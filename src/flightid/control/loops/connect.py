@@ -63,7 +63,7 @@ def connect(
     """
     wanted: list[Block] = []
     for place, each in enumerate(blocks):
-        wanted += _blocks_of(each, place)
+        wanted += blocks_of(each, place)
     given = tuple(signal for block in wanted for signal in block.outputs)
     made = Interconnection(
         tuple(wanted), tuple(inputs), tuple(given if outputs is None else outputs), name
@@ -72,7 +72,8 @@ def connect(
     return made
 
 
-def _blocks_of(each: object, place: int) -> list[Block]:
+def blocks_of(each: object, place: int) -> list[Block]:
+    """Blocks of one part of a connection; signals inside an interconnection get its name."""
     if isinstance(each, Block):
         return [each]
     if isinstance(each, Interconnection):

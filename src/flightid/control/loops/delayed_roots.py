@@ -46,7 +46,7 @@ def refined_roots(
     roots: list[complex] = []
     # Infinitely many roots lie far left; seeds there are artefacts of the approximation.
     for seed in seeds:
-        root = _newton(a, b, c, d, delays_s, complex(seed))
+        root = newton_root(a, b, c, d, delays_s, complex(seed))
         if root is None or any(abs(root - each) < SAME * max(1.0, abs(root)) for each in roots):
             continue
         roots.append(root)
@@ -57,7 +57,10 @@ def refined_roots(
     return np.array(roots, dtype=np.complex128)
 
 
-def _newton(a: Array, b: Array, c: Array, d: Array, delays: Array, s: complex) -> complex | None:
+def newton_root(
+    a: Array, b: Array, c: Array, d: Array, delays: Array, s: complex
+) -> complex | None:
+    """The root that Newton's method reaches from one seed; None where it reaches none."""
     one, inner = np.eye(len(a)), np.eye(len(delays))
     for _ in range(STEPS):
         late = np.exp(np.clip(-s.real * delays, -200.0, 200.0) - 1j * s.imag * delays)

@@ -49,7 +49,8 @@ def sampled(
 
     Example
     -------
-    >>> print(sampled(low_pass("p", "p_slow", 20.0), 0.01))
+    >>> import flightid as fid
+    >>> print(sampled(fid.loops.low_pass("p", "p_slow", 20.0), 0.01))
     1 state, every 0.01 s
     """
     part = block.part

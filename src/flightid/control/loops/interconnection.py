@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +14,13 @@ from flightid.control.loops.elements import gain, sum_of
 from flightid.control.loops.response import connected_response
 from flightid.control.loops.sampled_loop import sampled_system
 from flightid.control.loops.simulation import simulate_connection
-from flightid.control.loops.stability import Stability, by_poles, with_delays
+from flightid.control.loops.stability import (
+    Parts,
+    Stability,
+    by_poles,
+    delayed_parts,
+    with_delays,
+)
 from flightid.control.loops.views import continuous_core, continuous_system
 from flightid.control.loops.wiring import Wiring
 from flightid.conventions import Light
@@ -78,6 +85,11 @@ class Interconnection:
     def units(self) -> dict[str, str]:
         """Unit by signal, as far as it is known."""
         return dict(self.wiring.units)
+
+    @property
+    def order(self) -> int:
+        """Number of states, without those of nonlinear models and of delays."""
+        return sum(b.part.order for b in self.blocks if isinstance(b.part, LinearSystem))
 
     @property
     def sample_time_s(self) -> float | None:
@@ -168,14 +180,25 @@ class Interconnection:
         -------
         Stability
         """
+        return self._stability
+
+    @cached_property
+    def _stability(self) -> Stability:
         if self.sample_time_s is not None:
             return by_poles(self.sampled().poles(), self.sample_time_s)
-        core = continuous_core(self.wiring)
-        inside = core.delayed_inside(self.inputs)
-        if not inside:
+        parts = self.delayed_parts()
+        if parts is None:
+            core = continuous_core(self.wiring)
             return by_poles(np.linalg.eigvals(core.a).astype(np.complex128), None)
-        seeds = self.with_outputs(*self.signals).linear_system(STABILITY_ORDER).poles()
-        return with_delays(core, self.inputs, seeds)
+        approximate = self.with_outputs(*self.signals).linear_system(STABILITY_ORDER)
+        return with_delays(parts, approximate.poles())
+
+    def delayed_parts(self) -> Parts | None:
+        """A, B, C, D and delays of what goes around inside; None where no delay does."""
+        if self.sample_time_s is not None:
+            return None
+        core = continuous_core(self.wiring)
+        return delayed_parts(core, self.inputs) if core.delayed_inside(self.inputs) else None
 
     def poles(self) -> NDArray[np.complex128]:
         """Poles of `stability`: rad/s, or in the z plane."""
@@ -303,7 +326,7 @@ class Interconnection:
 
     def __repr__(self) -> str:
         """Size on one line."""
-        n = sum(block.part.order for block in self.blocks if isinstance(block.part, LinearSystem))
+        n = self.order
         ends = f"inputs [{', '.join(self.inputs)}], outputs [{', '.join(self.outputs)}]"
         count = f"{len(self.blocks)} block{'' if len(self.blocks) == 1 else 's'}"
         return f"Interconnection({count}, {ends}, {n} state{'' if n == 1 else 's'})"

@@ -18,9 +18,11 @@ from flightid.findings import Finding
 from flightid.table import Column, Table
 
 Complex = NDArray[np.complex128]
+Array = NDArray[np.float64]
+Parts = tuple[Array, Array, Array, Array, Array]
 SCHEMA = "flightid.loop_stability/1"
-SEED_ORDER = 6
-"""Order of the approximation from whose poles the exact ones are found."""
+SEEDS_A_DELAY = 4
+"""Poles looked for beside those of the states, for each delay."""
 NEUTRAL = 1e-9
 """Real part over size below which a pole stands still on the imaginary axis."""
 
@@ -128,14 +130,21 @@ def by_poles(poles: Complex, sample_time_s: float | None) -> Stability:
     return Stability(_sorted(poles), sample_time_s, int(unstable.sum()))
 
 
-def with_delays(core: Core, inputs: tuple[str, ...], seeds: Complex) -> Stability:
-    """Stability of a core with delayed rows inside: poles found, and counted without finding them.
+def delayed_parts(core: Core, inputs: tuple[str, ...]) -> Parts:
+    """A, B, C, D and delays of what goes around inside: x' = A x + B w, z = C x + D w, w late z."""
+    inside = core.delayed_inside(inputs)
+    delays = np.array([core.rows[k].delay_s for k in inside])
+    reads = core.places(core.rows[k].carrier for k in inside)
+    return core.a, core.b[:, inside], core.c[reads], core.d[np.ix_(reads, inside)], delays
+
+
+def with_delays(parts: Parts, seeds: Complex) -> Stability:
+    """Stability with delays inside: poles found, and counted without finding them.
 
     Parameters
     ----------
-    core : Core
-    inputs : tuple of str
-        Signals from outside.
+    parts : tuple of ndarray
+        Of `delayed_parts`.
     seeds : ndarray of complex
         Poles of an approximation, rad/s.
 
@@ -143,12 +152,10 @@ def with_delays(core: Core, inputs: tuple[str, ...], seeds: Complex) -> Stabilit
     -------
     Stability
     """
-    inside = core.delayed_inside(inputs)
-    delays = np.array([core.rows[k].delay_s for k in inside])
-    reads = core.places(core.rows[k].carrier for k in inside)
-    parts = (core.a, core.b[:, inside], core.c[reads], core.d[np.ix_(reads, inside)], delays)
-    poles = refined_roots(*parts, seeds=seeds)
-    line = line_right_of_axis(core.a, delays)
+    # The approximation's fastest poles are its own, and take longest to lead anywhere.
+    kept = seeds[np.argsort(-seeds.real)][: len(parts[0]) + SEEDS_A_DELAY * len(parts[4])]
+    poles = refined_roots(*parts, seeds=kept)
+    line = line_right_of_axis(parts[0], parts[4])
     counted = count_right(*parts, line)
     found = int(np.sum(poles.real > line))
     findings = []
