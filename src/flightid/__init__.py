@@ -14,6 +14,17 @@ from flightid.version import VERSION as __version__
 if TYPE_CHECKING:
     from flightid import conditioning, excitation, validation
     from flightid.control import loops
+    from flightid.control.autopilots.axis_loop import AxisLoop
+    from flightid.control.autopilots.from_log import axis_loop_of
+    from flightid.control.autopilots.make import axis_loop
+    from flightid.control.autopilots.parameter_files import (
+        read_parameters,
+        write_param,
+        write_params,
+    )
+    from flightid.control.autopilots.px4_autotune import px4_autotune_gains
+    from flightid.control.autopilots.replay import replay
+    from flightid.control.autopilots.replay_result import Replay
     from flightid.control.closed_loop import close_loop
     from flightid.control.closed_loop_result import ClosedLoop
     from flightid.control.disk_margin import DiskMargin, disk_margin
@@ -107,6 +118,15 @@ if TYPE_CHECKING:
 
 # Name -> the module that holds it (a public module is its own home).
 _HOMES = {
+    "AxisLoop": "flightid.control.autopilots.axis_loop",
+    "Replay": "flightid.control.autopilots.replay_result",
+    "axis_loop": "flightid.control.autopilots.make",
+    "axis_loop_of": "flightid.control.autopilots.from_log",
+    "px4_autotune_gains": "flightid.control.autopilots.px4_autotune",
+    "read_parameters": "flightid.control.autopilots.parameter_files",
+    "replay": "flightid.control.autopilots.replay",
+    "write_param": "flightid.control.autopilots.parameter_files",
+    "write_params": "flightid.control.autopilots.parameter_files",
     "Advice": "flightid.identification",
     "ImpulseResponse": "flightid.identification",
     "OrderScan": "flightid.validation",
@@ -212,6 +232,7 @@ _HOMES = {
 
 __all__ = [
     "Advice",
+    "AxisLoop",
     "Channel",
     "ClosedLoop",
     "CoherentPairs",
@@ -253,6 +274,7 @@ __all__ = [
     "PolynomialModel",
     "Record",
     "Reduction",
+    "Replay",
     "ResidualTests",
     "RotorPhysics",
     "StateSpaceModel",
@@ -267,6 +289,8 @@ __all__ = [
     "advise",
     "approximate_modes",
     "attitude_bandwidth",
+    "axis_loop",
+    "axis_loop_of",
     "close_loop",
     "coherent_pairs",
     "compare_conditions",
@@ -294,10 +318,13 @@ __all__ = [
     "modes",
     "open_loop",
     "pilot_cutoff",
+    "px4_autotune_gains",
     "read_log",
+    "read_parameters",
     "read_records",
     "read_system",
     "reduce",
+    "replay",
     "residual_tests",
     "rotor_physics",
     "run_study",
@@ -311,6 +338,8 @@ __all__ = [
     "validation",
     "verify",
     "write_model",
+    "write_param",
+    "write_params",
     "write_records",
     "write_system",
 ]

@@ -27,7 +27,7 @@ def _run(
     gains: RateGains, target: np.ndarray, measured: np.ndarray, limited: np.ndarray
 ) -> np.ndarray:
     signals = (target.astype(float), measured.astype(float), limited)
-    return _native.ardupilot_pid(gains.to_native(), 0.0025, *signals, None, 1.0, True)
+    return _native.ardupilot_pid(gains.to_native(), 0.0025, *signals, None, 1.0, None, True)
 
 
 def _plain(

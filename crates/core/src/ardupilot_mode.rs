@@ -153,6 +153,16 @@ pub fn to_euler([w, x, y, z]: [f64; 4]) -> [f64; 3] {
     ]
 }
 
+/// Rate target (rad/s) for an angle error (rad): proportional, and beyond the error where braking at
+/// `acceleration` (rad/s²; 0 is no bound) would begin too late, the square root of it.
+pub fn square_root_law(error: f64, gain: f64, acceleration: f64) -> f64 {
+    let linear = acceleration / (gain * gain);
+    if acceleration <= 0.0 || error.abs() <= linear {
+        return gain * error;
+    }
+    error.signum() * (2.0 * acceleration * (error.abs() - 0.5 * linear)).sqrt()
+}
+
 impl AttitudeGains {
     /// Body-rate targets (rad/s) that turn the attitude to the target: P on the rotation vector,
     /// with the square-root law beyond the error where it would ask for more than the acceleration.
@@ -170,14 +180,7 @@ impl AttitudeGains {
         let per_vector = if size > 1e-12 { 2.0 * size.atan2(scalar.abs()) / size } else { 2.0 };
         std::array::from_fn(|i| {
             let error = sign * per_vector * vector[i];
-            let (gain, limit) = (self.angle_p[i], self.acceleration_rad_s2[i]);
-            let linear = limit / (gain * gain);
-            let rate = if limit <= 0.0 || error.abs() <= linear {
-                gain * error
-            } else {
-                error.signum() * (2.0 * limit * (error.abs() - 0.5 * linear)).sqrt()
-            };
-            rate as f32
+            square_root_law(error, self.angle_p[i], self.acceleration_rad_s2[i]) as f32
         })
     }
 }

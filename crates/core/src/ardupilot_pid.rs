@@ -148,6 +148,12 @@ impl<F: Float + FloatConst> Pid<F> {
         Self { leak: Some([share, floor]), ..self }
     }
 
+    /// Go on from a loop of which target, error, derivative (all filtered) and integrator are known.
+    pub fn resumed(self, [target, error, derivative, integrator]: [F; 4]) -> Self {
+        let last_pd = error * self.gains.p + derivative * self.gains.d;
+        Self { target, error, derivative, integrator, last_pd, started: true, ..self }
+    }
+
     /// One loop: target and measured rate in rad/s; with `limited` the integrator may only shrink.
     pub fn update(&mut self, target: F, measured: F, limited: bool) -> PidTerms<F> {
         let (g, dt) = (self.gains, self.dt);
@@ -268,6 +274,18 @@ mod tests {
         let mut pid = Pid::new(gains(), 0.1);
         let terms = pid.update(1.0, 0.0, false);
         assert!(((terms.p + terms.d).abs() - 0.1).abs() < 1e-6);
+    }
+
+    #[test]
+    fn goes_on_from_a_known_loop() {
+        let gains = PidGains { d: 0.01, fltd: 20.0, ..gains() };
+        let mut first = Pid::new(gains, 0.1);
+        first.update(0.1, 0.0, false);
+        let known = first.update(0.2, 0.05, false);
+        let state = [known.target, known.error, known.d / gains.d, known.i];
+        let mut second = Pid::new(gains, 0.1).resumed(state);
+        let (a, b) = (first.update(0.1, 0.3, false), second.update(0.1, 0.3, false));
+        assert!((a.d - b.d).abs() < 1e-7 && (a.i - b.i).abs() < 1e-7 && (a.p - b.p).abs() < 1e-7);
     }
 
     #[test]

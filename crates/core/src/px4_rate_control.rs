@@ -86,6 +86,11 @@ impl<F: Float + FloatConst> RateControl<F> {
         Self { gains, dt, integral: zero, last_rate: zero, output: zero, started: false }
     }
 
+    /// Go on from a loop of which integral and rate are known.
+    pub fn resumed(self, [integral, rate]: [F; 2]) -> Self {
+        Self { integral, last_rate: rate, started: true, ..self }
+    }
+
     /// One loop.
     pub fn update(&mut self, x: RateInputs<F>) -> RateTerms<F> {
         let g = self.gains;
@@ -221,6 +226,12 @@ mod tests {
         let terms = control.update(RateInputs { rate: 0.02, ..inputs(0.1) });
         assert_eq!(terms.i, 0.0);
         assert!((terms.d + 0.01 * 0.02 / 0.01).abs() < 1e-15);
+    }
+
+    #[test]
+    fn goes_on_from_a_known_loop() {
+        let mut control = RateControl::new(gains(), 0.01).resumed([0.02, 0.1]);
+        assert_eq!(control.update(inputs(0.0)).i, 0.02);
     }
 
     #[test]

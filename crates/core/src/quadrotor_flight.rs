@@ -55,7 +55,8 @@ pub const COLUMNS: &str = "time_s gyro_x gyro_y gyro_z gyro_mean_x gyro_mean_y g
     pitch_pid_d pitch_pid_ff pitch_pid_d_ff yaw_pid_target yaw_pid_error yaw_pid_p yaw_pid_i \
     yaw_pid_d yaw_pid_ff yaw_pid_d_ff sid_axis sid_time_s sid_target sid_frequency_hz p q r \
     north_m east_m down_m u_m_s v_m_s w_m_s thrust_1_n thrust_2_n thrust_3_n thrust_4_n \
-    gust_u_m_s gust_p_rad_s sid_applied";
+    gust_u_m_s gust_p_rad_s sid_applied pid_limited roll_pid_dmod pitch_pid_dmod yaw_pid_dmod \
+    roll_pid_slew_rate pitch_pid_slew_rate yaw_pid_slew_rate";
 
 /// What happens in one flight.
 #[derive(Debug, Clone, Copy)]
@@ -122,6 +123,8 @@ struct Acted {
     mixed: Mixed,
     /// The injected target that this loop's output holds.
     applied: f32,
+    /// The limit flag that the controllers saw.
+    was_limited: bool,
 }
 
 impl Loop<'_> {
@@ -140,10 +143,20 @@ impl Loop<'_> {
         }
         let throttle = self.throttle(x) + self.injection.throttle;
         let mixed = self.autopilot.mixer.mix(output, throttle);
-        self.limited = mixed.limited;
+        let was_limited = std::mem::replace(&mut self.limited, mixed.limited);
         let gyro_mean = std::array::from_fn(|i| 0.5 * (gyro[i] + last[i]));
         let applied = self.injection.target;
-        Ok(Acted { gyro, gyro_mean, filtered, terms, output, throttle, mixed, applied })
+        Ok(Acted {
+            gyro,
+            gyro_mean,
+            filtered,
+            terms,
+            output,
+            throttle,
+            mixed,
+            applied,
+            was_limited,
+        })
     }
 
     fn throttle(&self, x: &State) -> f64 {
@@ -206,6 +219,9 @@ impl Loop<'_> {
         rows.extend(&x[..6]);
         rows.extend(&x[13..N_STATES]);
         rows.extend([gust.velocity_m_s[0], gust.rate_rad_s[0], f64::from(a.applied)]);
+        rows.push(f64::from(u8::from(a.was_limited)));
+        rows.extend(a.terms.map(|t| f64::from(t.dmod)));
+        rows.extend(a.terms.map(|t| f64::from(t.slew_rate)));
     }
 }
 

@@ -2,6 +2,7 @@
 //! runs in the firmware's single precision or, for linear views, in double.
 
 use crate::group::read;
+use flightid_core::ardupilot_mode::square_root_law;
 use flightid_core::ardupilot_pid::{Pid, PidGains};
 use flightid_core::gyro_filter::low_pass;
 use flightid_core::notch_filter::{Section, ardupilot_notch, ardupilot_quality, px4_notch};
@@ -70,6 +71,7 @@ struct PidRun<'a> {
     limited: &'a [bool],
     leak: Option<[f64; 2]>,
     slew_scale: f64,
+    start: Option<[f64; 4]>,
 }
 
 impl PidRun<'_> {
@@ -78,6 +80,9 @@ impl PidRun<'_> {
             Pid::new(gains, narrow(self.loop_time_s)).with_slew_scale(narrow(self.slew_scale));
         if let Some([share, floor]) = self.leak {
             pid = pid.with_leak(narrow(share), narrow(floor));
+        }
+        if let Some(start) = self.start {
+            pid = pid.resumed(start.map(narrow));
         }
         let inputs = self.target.iter().zip(self.measured).zip(self.limited);
         inputs
@@ -89,10 +94,11 @@ impl PidRun<'_> {
     }
 }
 
-/// ardupilot_pid(gains: dict[str, Any], loop_time_s: float, target: NDArray[np.float64], measured: NDArray[np.float64], limited: NDArray[np.bool_], leak: tuple[float, float] | None, slew_scale: float, single_precision: bool) -> NDArray[np.float64]
+/// ardupilot_pid(gains: dict[str, Any], loop_time_s: float, target: NDArray[np.float64], measured: NDArray[np.float64], limited: NDArray[np.bool_], leak: tuple[float, float] | None, slew_scale: float, start: tuple[float, float, float, float] | None, single_precision: bool) -> NDArray[np.float64]
 ///
 /// Terms of ArduPilot's rate PID, (n, 9): filtered target, filtered error, P, I, D, FF, D_FF, factor
-/// and rate of the slew limiter.
+/// and rate of the slew limiter. `start`: filtered target, error, derivative and integrator of the loop
+/// before; at rest where left out.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 fn ardupilot_pid<'py>(
@@ -104,11 +110,12 @@ fn ardupilot_pid<'py>(
     limited: PyReadonlyArray1<'py, bool>,
     leak: Option<[f64; 2]>,
     slew_scale: f64,
+    start: Option<[f64; 4]>,
     single_precision: bool,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (target, measured) = (target.as_slice()?, measured.as_slice()?);
     let limited = limited.as_slice()?;
-    let run = PidRun { loop_time_s, target, measured, limited, leak, slew_scale };
+    let run = PidRun { loop_time_s, target, measured, limited, leak, slew_scale, start };
     let values = if single_precision {
         let gains = pid_gains::<f32>(gains)?;
         py.detach(|| run.rows(gains))
@@ -131,8 +138,12 @@ fn px4_rows<F: Float + FloatConst>(
     loop_time_s: f64,
     signals: [&[f64]; 4],
     flags: &[bool],
+    start: Option<[f64; 2]>,
 ) -> Vec<f64> {
     let mut control = RateControl::new(gains, narrow(loop_time_s));
+    if let Some(start) = start {
+        control = control.resumed(start.map(narrow));
+    }
     let [setpoint, rate, acceleration, thrust] = signals;
     flags
         .chunks_exact(3)
@@ -151,10 +162,11 @@ fn px4_rows<F: Float + FloatConst>(
         .collect()
 }
 
-/// px4_rate_control(gains: dict[str, Any], loop_time_s: float, signals: NDArray[np.float64], flags: NDArray[np.bool_], single_precision: bool) -> NDArray[np.float64]
+/// px4_rate_control(gains: dict[str, Any], loop_time_s: float, signals: NDArray[np.float64], flags: NDArray[np.bool_], start: tuple[float, float] | None, single_precision: bool) -> NDArray[np.float64]
 ///
 /// Terms of PX4's rate controller, (n, 5): P, I, D, FF, output. Signals are (4, n): set-point, rate,
-/// acceleration, thrust; flags (n, 3): saturated upwards, downwards, landed.
+/// acceleration, thrust; flags (n, 3): saturated upwards, downwards, landed. `start`: integral and rate of
+/// the loop before.
 #[pyfunction]
 fn px4_rate_control<'py>(
     py: Python<'py>,
@@ -162,6 +174,7 @@ fn px4_rate_control<'py>(
     loop_time_s: f64,
     signals: PyReadonlyArray2<'py, f64>,
     flags: PyReadonlyArray2<'py, bool>,
+    start: Option<[f64; 2]>,
     single_precision: bool,
 ) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let (values, flags) = (signals.as_slice()?, flags.as_slice()?);
@@ -172,10 +185,10 @@ fn px4_rate_control<'py>(
     let signals = std::array::from_fn(|row| &values[row * n..(row + 1) * n]);
     let found = if single_precision {
         let gains = rate_gains::<f32>(gains)?;
-        py.detach(|| px4_rows(gains, loop_time_s, signals, flags))
+        py.detach(|| px4_rows(gains, loop_time_s, signals, flags, start))
     } else {
         let gains = rate_gains::<f64>(gains)?;
-        py.detach(|| px4_rows(gains, loop_time_s, signals, flags))
+        py.detach(|| px4_rows(gains, loop_time_s, signals, flags, start))
     };
     rows(py, found, 5)
 }
@@ -271,6 +284,21 @@ fn gyro_low_pass_section(sample_rate_hz: f64, cutoff_hz: f64) -> Option<(f64, f6
     low_pass(sample_rate_hz, cutoff_hz).map(Into::into)
 }
 
+/// square_root_law(error_rad: NDArray[np.float64], gain_1_s: float, acceleration_rad_s2: float) -> NDArray[np.float64]
+///
+/// Rate targets (rad/s) of ArduPilot's angle controller.
+#[pyfunction]
+#[pyo3(name = "square_root_law")]
+fn square_root_laws<'py>(
+    py: Python<'py>,
+    error_rad: PyReadonlyArray1<'py, f64>,
+    gain_1_s: f64,
+    acceleration_rad_s2: f64,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let law = |&error: &f64| square_root_law(error, gain_1_s, acceleration_rad_s2);
+    Ok(error_rad.as_slice()?.iter().map(law).collect::<Vec<f64>>().into_pyarray(py))
+}
+
 /// Add this area to the module.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(ardupilot_pid, module)?)?;
@@ -280,5 +308,6 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(ardupilot_notch_quality, module)?)?;
     module.add_function(wrap_pyfunction!(px4_notch_section, module)?)?;
     module.add_function(wrap_pyfunction!(gyro_low_pass_section, module)?)?;
+    module.add_function(wrap_pyfunction!(square_root_laws, module)?)?;
     Ok(())
 }

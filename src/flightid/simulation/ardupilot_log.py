@@ -157,8 +157,9 @@ def _controllers(writer: DataflashWriter, flight: Flight, time_us: NDArray[np.in
         columns |= {
             "DFF": flight[f"{axis}_pid_d_ff"],
             "Act": flight[f"gyro_filtered_{letter}"],
-            "Dmod": 1.0,
-            "Flags": flight["limited"],
+            "Dmod": flight[f"{axis}_pid_dmod"],
+            "SRate": flight[f"{axis}_pid_slew_rate"],
+            "Flags": flight["pid_limited"],
         }
         writer.add(message, time_us, columns)
 

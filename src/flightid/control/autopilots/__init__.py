@@ -1,6 +1,7 @@
 """Autopilots' own controllers: exact structure, exact discrete time, their own parameter names."""
 
-from flightid.control.autopilots.axis_loop import AxisLoop, LoopFlags, LoopRun
+from flightid.control.autopilots.axis_loop import AxisLoop, LoopFlags, LoopRun, LoopState
+from flightid.control.autopilots.from_log import axis_loop_of, parameters_at
 from flightid.control.autopilots.make import AUTOPILOTS, axis_loop
 from flightid.control.autopilots.parameter_files import (
     GainChange,
@@ -11,6 +12,8 @@ from flightid.control.autopilots.parameter_files import (
 )
 from flightid.control.autopilots.parameter_table import AXES, GainRange, defaults, gain_ranges
 from flightid.control.autopilots.px4_autotune import Px4AutotuneGains, px4_autotune_gains
+from flightid.control.autopilots.replay import replay
+from flightid.control.autopilots.replay_result import Replay, TermReplay
 
 __all__ = [
     "AUTOPILOTS",
@@ -20,13 +23,19 @@ __all__ = [
     "GainRange",
     "LoopFlags",
     "LoopRun",
+    "LoopState",
     "Px4AutotuneGains",
+    "Replay",
+    "TermReplay",
     "WrittenParameters",
     "axis_loop",
+    "axis_loop_of",
     "defaults",
     "gain_ranges",
+    "parameters_at",
     "px4_autotune_gains",
     "read_parameters",
+    "replay",
     "write_param",
     "write_params",
 ]

@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid import _native
-from flightid.control.autopilots.axis_loop import AxisLoop, Gyro, LoopFlags, LoopRun, samples
+from flightid.control.autopilots.axis_loop import (
+    AxisLoop,
+    Gyro,
+    LoopFlags,
+    LoopRun,
+    LoopState,
+    samples,
+)
 from flightid.control.autopilots.filters import (
     Omega,
     Response,
@@ -94,6 +103,7 @@ class ArduPilotLoop(AxisLoop):
             np.ascontiguousarray(np.atleast_2d(limited.T).any(axis=0)),
             leak,
             slew_scale,
+            _start(flags),
             single_precision,
         )
         return dict(zip(PID_COLUMNS, rows.T, strict=True))
@@ -118,8 +128,30 @@ class ArduPilotLoop(AxisLoop):
         )
         return LoopRun(output, terms, rate)
 
+    def without_target_filter(self) -> Self:
+        """Copy for set-points that were logged behind the target's filters."""
+        off = {self.names["fltt"]: 0.0}
+        return replace(self.with_gains(off), target_notch=NOTCH_OFF)
+
+    def state(self, logged: Mapping[str, float], setpoint_rad_s: float) -> LoopState:
+        """State of the loop from its logged terms, those of PIDR by name."""
+        d = self.values["d"]
+        return LoopState(
+            target=logged.get("Tar", setpoint_rad_s),
+            error=logged.get("Err", 0.0),
+            derivative=logged["D"] / d if d else 0.0,
+            integrator=logged["I"],
+        )
+
     @abstractmethod
     def _terms(
         self, setpoint: np.ndarray, rate: np.ndarray, flags: LoopFlags, single_precision: bool
     ) -> dict[str, np.ndarray]:
         """Terms of every loop under the names of PIDR."""
+
+
+def _start(flags: LoopFlags) -> tuple[float, float, float, float] | None:
+    start = flags.start
+    if start is None:
+        return None
+    return start.target, start.error, start.derivative, start.integrator

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from flightid.control.autopilots.ardupilot_loop import ArduPilotLoop
-from flightid.control.autopilots.axis_loop import LoopFlags
+from flightid.control.autopilots.axis_loop import LoopFlags, LoopState
 from flightid.control.autopilots.filters import Omega, Response, difference_response
 from flightid.errors import OptionError
 
@@ -66,6 +67,12 @@ class ArduPlaneLoop(ArduPilotLoop):
                 "no angle controller on this axis", found=self.axis, needed="roll, pitch"
             )
         return 1 / max(self.values["angle_tc"], 0.1)
+
+    def state(self, logged: Mapping[str, float], setpoint_rad_s: float) -> LoopState:
+        """State of the loop: PIDR holds its terms in degrees and an unfiltered target."""
+        terms = {name: logged[name] / DEGREES for name in ("D", "I")}
+        terms["Err"] = logged.get("Err", 0.0)
+        return super().state(terms, setpoint_rad_s * self.airspeed_scale**2)
 
     def _feedback_terms(self, omega: Omega) -> dict[str, Response]:
         gain = DEGREES * self.airspeed_scale**2

@@ -26,6 +26,29 @@ Samples = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class LoopState:
+    """State of a controller after a loop, in the units of its inside.
+
+    Attributes
+    ----------
+    target, error : float
+        Filtered target and error, rad/s (planes: times the square of the airspeed scaling).
+    derivative : float
+        Filtered derivative of the error, rad/s² (PX4 does not keep it).
+    integrator : float
+        Integrator.
+    rate : float
+        Filtered rate, rad/s, which PX4's old controller differences.
+    """
+
+    target: float = 0.0
+    error: float = 0.0
+    derivative: float = 0.0
+    integrator: float = 0.0
+    rate: float = 0.0
+
+
+@dataclass(frozen=True)
 class LoopFlags:
     """What else than set-point and rate a loop looks at; left out: false, and full thrust.
 
@@ -39,12 +62,15 @@ class LoopFlags:
         Thrust set-point 0…1; PX4's controller until 2017 integrates only with thrust.
     acceleration : ndarray, shape (n,)
         Filtered angular acceleration, rad/s², as PX4 logs it; left out: made from the rate.
+    start : LoopState
+        State of the loop before the first sample; left out: at rest.
     """
 
     limited: NDArray[np.bool_] | None = None
     landed: NDArray[np.bool_] | None = None
     thrust: Samples | None = None
     acceleration: Samples | None = None
+    start: LoopState | None = None
 
 
 @dataclass(frozen=True)
@@ -96,6 +122,15 @@ class AxisLoop(ABC):
         Parameters that the vehicle's firmware did not have.
     unmodelled : tuple of str
         What of the vehicle's settings this view leaves out, one sentence each.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> loop = fid.axis_loop("arducopter", "roll", loop_rate_hz=400.0)
+    >>> loop.ranges["ATC_RAT_RLL_D"]
+    GainRange(0 to 0.05 1/(rad/s^2) by 0.0005, default 0.0036)
+    >>> abs(loop.feedback([50.0])).round(3)
+    array([0.247])
     """
 
     axis: Axis
@@ -159,6 +194,10 @@ class AxisLoop(ABC):
                 )
         values = {**self.values, **{roles[n]: float(v) for n, v in changed.items()}}
         return replace(self, values=values)
+
+    def with_notes(self, notes: tuple[str, ...]) -> Self:
+        """Copy with more sentences in `unmodelled`."""
+        return replace(self, unmodelled=self.unmodelled + notes)
 
     def feedback(
         self, omega_rad_s: ArrayLike, *, gyro: Gyro = "raw", hold: bool = True

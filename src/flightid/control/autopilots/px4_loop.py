@@ -94,9 +94,10 @@ class Px4Loop(AxisLoop):
         gains = self._gains | {"output_cutoff_hz": self._output_cutoff_hz, "old": self.old}
         if any(len(signal) != n for signal in (acceleration, thrust)):
             raise ShapeError("acceleration and thrust need a value for each loop", needed=n)
+        start = None if flags.start is None else (flags.start.integrator, flags.start.rate)
         signals = np.ascontiguousarray([setpoint, rate, acceleration, thrust], dtype=np.float64)
         rows = _native.px4_rate_control(
-            gains, 1 / self.loop_rate_hz, signals, marks, single_precision
+            gains, 1 / self.loop_rate_hz, signals, marks, start, single_precision
         )
         return dict(zip(("P", "I", "D", "FF", "output"), rows.T, strict=True))
 
