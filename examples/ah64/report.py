@@ -13,11 +13,12 @@ from flightid.files import write_atomically
 from flightid.plot import look
 from flightid.plot.fit import estimates_of, fit_figure, parameter_intervals
 from flightid.plot.frequency_response import Curve, bode
+from flightid.plot.modes import pole_map
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Document, Figure, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.html import to_html
-from flightid.report.modes import modes_blocks
+from flightid.report.modes import modes_blocks, physics_blocks
 from flightid.report.reduction import reduction_blocks
 from flightid.report.verification import verification_blocks
 
@@ -112,4 +113,15 @@ def _fit(fit: fid.Fit) -> tuple[Block, ...]:
     picture = figure_block(
         parameter_intervals(drawn), "Estimates with 95 % intervals, in percent of the truth."
     )
-    return (*result_blocks(fit), *modes_blocks(fid.modes(fit)), picture, *pictures)
+    return (*result_blocks(fit), *_modes(fit), picture, *pictures)
+
+
+def _modes(fit: fid.Fit) -> tuple[Block, ...]:
+    """Modes, the hovering cubics beside them, derivatives; and the map with the truth."""
+    caption = "Eigenvalues of the identified and of the flown vehicle, with 95 % regions."
+    both = {"identified": fid.modes(fit), "truth": fid.modes(truth())}
+    return (
+        *modes_blocks(both["identified"]),
+        figure_block(pole_map(both), caption),
+        *physics_blocks(fid.approximate_modes(fit), fid.derivatives(fit)),
+    )

@@ -15,9 +15,11 @@ import tables
 
 import flightid as fid
 from flightid.plot.fit import fit_figure
+from flightid.plot.modes import pole_map
 from flightid.report.content import Document, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.html import to_html
+from flightid.report.modes import physics_blocks
 from flightid.report.verification import verification_blocks
 
 SHOWN = ("p/lat", "p/lon", "q/lat", "q/lon", "r/ped", "az/col")
@@ -47,6 +49,16 @@ def section(condition: str, found: identification.Identified, *, full: bool, see
                 figure_block(fit_figure(found.fit, name), f"{name}: flights and identified model.")
                 for name in shown
             ),
+            figure_block(
+                pole_map(
+                    {
+                        "identified": fid.modes(found.fit),
+                        "published": fid.modes(fid.load_model(flights.LIBRARY[condition])),
+                    }
+                ),
+                "Eigenvalues with 95 % regions, beside the published model's.",
+            ),
+            *physics_blocks(None, fid.derivatives(found.fit)),
             *verification_blocks(verification),
         ),
     )

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import flightid as fid
 from flightid.plot.modes import CHI_SQUARE_95, pole_map
-from flightid.report.content import Figure, Lights, TableBlock
-from flightid.report.modes import modes_blocks
+from flightid.report.content import Document, Figure, Lights, TableBlock
+from flightid.report.html import to_html
+from flightid.report.modes import modes_blocks, physics_blocks
+from flightid.study.model_section import model_section
+from flightid.study.settings import ModelSettings
+from flightid.study.stages import Identified
 from tests.closeness import assert_close
 
 
@@ -62,3 +67,42 @@ def test_report_blocks() -> None:
     assert parts.folded
     box = fid.PolynomialModel("y", ("u",), 0.1, a=[1.0, 0.5], b=[[1.0]])
     assert len(modes_blocks(fid.modes(box))) == 2
+
+
+def test_physics_blocks_are_folded_and_may_be_missing() -> None:
+    model = fid.load_model("fixed_wing_lateral")
+    blocks = physics_blocks(fid.approximate_modes(model), fid.derivatives(model))
+    tables = [block for block in blocks if isinstance(block, TableBlock)]
+    assert len(tables) == 2
+    assert all(table.folded for table in tables)
+    assert isinstance(blocks[0], Lights)
+    assert physics_blocks(None, None) == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "there", "missing"),
+    [
+        ("fixed_wing_lateral", ["Modes of", "Approximate modes of", "Derivatives of"], []),
+        ("quadrotor_yaw", ["Modes of", "Derivatives of"], []),
+        ("rate_first_order", [], ["Modes of"]),
+    ],
+)
+def test_studies_show_modes_of_state_space_fits(
+    name: str, there: list[str], missing: list[str]
+) -> None:
+    truth = fid.load_model(name)
+    omega = np.geomspace(0.1, 25.0, 40)
+    exact = truth.frequency_response(omega)
+    data = fid.FrequencyResponse.from_values(
+        omega,
+        exact,
+        inputs=truth.inputs,
+        outputs=truth.outputs,
+        units=truth.units,
+        random_error=np.full(exact.shape, 0.05),
+    )
+    settings = ModelSettings(name, name, None, (), (), None)
+    item = Identified(settings, {"composite": data}, {"composite": fid.identify(truth, data)}, {})
+    page = to_html(Document("study", "", (model_section(item, None),)))
+    assert all(f"{title} {truth.name}" in page for title in there)
+    assert not any(title in page for title in missing)

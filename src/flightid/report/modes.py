@@ -10,7 +10,7 @@ from flightid.report.content import Block, TableBlock
 from flightid.report.figures import figure_block
 
 if TYPE_CHECKING:
-    from flightid.dynamics import Modes
+    from flightid.dynamics import ApproximateModes, DerivativeTable, Modes
 
 CAPTION = (
     "Eigenvalues with their 95 % regions; rays of equal damping ratio ζ, circles of equal natural "
@@ -36,4 +36,25 @@ def modes_blocks(found: Modes) -> tuple[Block, ...]:
     parts = found.participation_table()
     if parts.rows:
         blocks.append(TableBlock(parts, folded=True))
+    return tuple(blocks)
+
+
+def physics_blocks(
+    found: ApproximateModes | None, derivatives: DerivativeTable | None
+) -> tuple[Block, ...]:
+    """Approximate modes and derivatives, folded away; nothing where a model has neither.
+
+    Parameters
+    ----------
+    found : ApproximateModes or None
+    derivatives : DerivativeTable or None
+
+    Returns
+    -------
+    tuple of Block
+    """
+    blocks: list[Block] = []
+    for result in (found, derivatives):
+        if result is not None:
+            blocks += result_blocks(result, folded=True)
     return tuple(blocks)

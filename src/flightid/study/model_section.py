@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from flightid.dynamics.approximate_modes import approximate_modes
+from flightid.dynamics.derivatives import derivatives
 from flightid.dynamics.modes import modes
+from flightid.errors import ModelError
 from flightid.models import StateSpaceModel
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
@@ -12,13 +16,13 @@ from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Figure, Lights, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.fitted_record import record_figures
-from flightid.report.modes import modes_blocks
+from flightid.report.modes import modes_blocks, physics_blocks
 from flightid.report.reduction import reduction_blocks
 from flightid.report.verification import verification_blocks
 from flightid.table import Cell, Column, Table
 
 if TYPE_CHECKING:
-    from flightid.identification import FittedParameter
+    from flightid.identification import Fit, FittedParameter
     from flightid.study.stages import Identified
     from flightid.study.truth import Truth
 
@@ -56,10 +60,21 @@ def model_section(item: Identified, truth: Truth | None) -> Section:
         for name, verification in item.verifications.items()
     ]
     if isinstance(item.fit.model, StateSpaceModel):
-        parts.insert(0, Section("Modes", modes_blocks(modes(item.fit))))
+        parts.insert(0, Section("Modes and derivatives", _physics(item.fit)))
     if item.reduction is not None:
         parts.insert(0, Section("Reduction of the structure", reduction_blocks(item.reduction)))
     return Section(item.settings.name, tuple(blocks), tuple(parts))
+
+
+def _physics(fit: Fit) -> tuple[Block, ...]:
+    """Modes of any model; approximations and derivatives of those that have them."""
+    approximations, table = None, None
+    # A rig's or a filter's states fit no textbook formula, and coefficients are no derivatives.
+    with suppress(ModelError):
+        approximations = approximate_modes(fit)
+    with suppress(ModelError):
+        table = derivatives(fit)
+    return (*modes_blocks(modes(fit)), *physics_blocks(approximations, table))
 
 
 def _bode_figure(item: Identified, truth: Truth | None) -> Figure:
