@@ -41,7 +41,7 @@ SPINNING = fid.LinearSystem(
 @pytest.mark.parametrize("skew", [-1.0, -0.3, 0.0, 0.7, 1.0])
 def test_single_loop_is_a_distance(skew):
     found = fid.disk_margin(siso(), skew=skew)
-    omega = np.geomspace(0.1, 100.0, 2_000_001)
+    omega = np.geomspace(1e-4, 100.0, 2_000_001)
     loop = 4.0 * np.exp(-0.1j * omega) / (1j * omega)
     alpha = 1 / np.max(np.abs(1 / (1 + loop) + 0.5 * (skew - 1)))
     assert_close(found.alpha.value, alpha, rtol=1e-6, why="dense search")
@@ -51,6 +51,13 @@ def test_single_loop_is_a_distance(skew):
         assert found.gain_fall.value is None
     else:
         assert_close(found.gain_fall.value, -20 * np.log10(low), rtol=1e-5, why="its other end")
+
+
+def test_one_loop_takes_a_known_law():
+    plain = fid.disk_margin(siso(4.0))
+    for law in (2.0, lambda s: 2.0 + 0.0 * s):
+        found = fid.disk_margin(siso(2.0), controller=law)
+        assert_close(found.alpha.value, plain.alpha.value, rtol=1e-9, why="the same loop")
 
 
 def test_skew_of_the_sensitivity_is_the_modulus_margin():
@@ -220,7 +227,7 @@ def test_what_makes_no_disk_is_refused():
         fid.disk_margin(SPINNING, skew=np.inf)
     with pytest.raises(OptionError, match="band_rad_s has no meaning"):
         fid.disk_margin(SPINNING, band_rad_s=(1.0, 0.5))
-    with pytest.raises(ModelError, match="the controller of several loops is not a model"):
+    with pytest.raises(ShapeError, match="the controller does not fit the plant"):
         fid.disk_margin(SPINNING, controller=3.0)
     with pytest.raises(ModelError, match="the loop has no frequency response"):
         fid.disk_margin(3.0)

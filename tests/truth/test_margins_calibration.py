@@ -9,6 +9,7 @@ import pytest
 from scipy import signal
 
 import flightid as fid
+from flightid.dynamics.spread_of import spread_of
 from flightid.responses.uncertainty import Known
 from tests.closeness import assert_close
 
@@ -141,6 +142,8 @@ def test_intervals_of_fits_cover():
             omega_rad_s=OMEGA,
         )
         fit = fid.identify(model, response, hold="zero")
-        found = fid.margins(fit, controller=lambda s: law(np.exp(s * STEP_S)))
+        # The plant as the controller sees it: held inputs, samples out.
+        sampled = spread_of(fit).then(lambda m: fid.LinearSystem.of(m).sampled(STEP_S))
+        found = fid.margins(sampled, controller=lambda s: law(np.exp(s * STEP_S)))
         covered(found, truth, MARGINS, hits)
     judge(hits, "fits")

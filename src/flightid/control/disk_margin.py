@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flightid.control.disk_geometry import gain_limits, phase_limit_deg
 from flightid.control.loop_grid import zoomed
 from flightid.control.loop_metrics import loop_metrics
-from flightid.control.loop_source import Responding
+from flightid.control.loop_source import Controller
 from flightid.control.margin_findings import guide_finding
 from flightid.control.margins import GAIN_GUIDE_DB, PHASE_GUIDE_DEG
 from flightid.control.matrix_loop import At, MatrixLoop, equivalent_loop, read_loops
@@ -132,7 +132,7 @@ def disk_margin(
     outputs: Sequence[str] | str | None = None,
     inputs: Sequence[str] | str | None = None,
     *,
-    controller: Responding | None = None,
+    controller: Controller | None = None,
     at: At = "outputs",
     skew: float = 0.0,
     band_rad_s: tuple[float, float] | None = None,
@@ -152,7 +152,8 @@ def disk_margin(
     outputs, inputs : str or sequence of str, optional
         Channels of `loop`; left out: the controller's, or all.
     controller : model, optional
-        From plant outputs to plant inputs, for negative feedback: u = −K y.
+        From plant outputs to plant inputs, for negative feedback: u = −K y. For one loop also a
+        function of s = jω, values, or a number.
     at : {"outputs", "inputs", "both"}
         Where loops are broken: all plant outputs, all plant inputs, or all of both at once.
     skew : float
@@ -174,7 +175,7 @@ def disk_margin(
     UnknownNameError
         There is no such channel.
     ModelError
-        The loop or the controller has no frequency response.
+        The loop has no frequency response.
     ShapeError
         Numbers of channels that do not fit.
     DataError

@@ -80,10 +80,15 @@ def margin_findings(
     tuple of Finding
     """
     found = [*stability_findings(loop, metrics)]
+    # What an unstable loop has to give back is no margin that a guide could judge.
     guides = (
-        ("phase_margin", phase_guide_deg, "take gain or lag out of the loop"),
-        ("gain_margin", gain_guide_db, "lower the gain"),
-        ("gain_reduction_margin", gain_guide_db, "raise the gain"),
+        ()
+        if metrics.unstable_poles > 0.0
+        else (
+            ("phase_margin", phase_guide_deg, "take gain or lag out of the loop"),
+            ("gain_margin", gain_guide_db, "lower the gain"),
+            ("gain_reduction_margin", gain_guide_db, "raise the gain"),
+        )
     )
     for key, guide, action in guides:
         quantity = made[key]

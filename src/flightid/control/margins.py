@@ -25,7 +25,7 @@ GAIN_GUIDE_DB = 6.0
 """MIL-F-9490D table III and its successors, for modes between 0.06 Hz and the first elastic one."""
 ZOOMS = (1e-3, 1e-5)
 """Ratios at which points are put beside what was found, round by round."""
-DRAWN_POINTS = 240
+DRAWN_POINTS = 400
 FAR_DB = 40.0
 """Beyond which a passage of the negative axis is not listed."""
 QUANTITIES = (

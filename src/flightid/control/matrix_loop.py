@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from flightid.control.loop_grid import Roots, loop_grid, roots_of
-from flightid.control.loop_source import Responding
+from flightid.control.loop_source import Controller, Responding, known_values
 from flightid.dynamics.spread import Spread
 from flightid.dynamics.spread_of import spread_of
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
 from flightid.responses import FrequencyResponse
+from flightid.responses.arithmetic import Known
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -49,12 +50,25 @@ class MatrixLoop:
     measured: bool
 
 
+@dataclass(frozen=True, eq=False)
+class KnownLaw:
+    """A controller of one loop given as function of s, values or a number."""
+
+    law: Known
+    outputs: tuple[str, ...] = ("law",)
+    inputs: tuple[str, ...] = ("law",)
+
+    def frequency_response(self, omega_rad_s: ArrayLike) -> Complex:
+        """Response, shape (1, 1, n_f)."""
+        return known_values(self.law, np.asarray(omega_rad_s, dtype=np.float64))[None, None]
+
+
 def read_loops(
     source: object,
     outputs: Sequence[str] | None,
     inputs: Sequence[str] | None,
     *,
-    controller: Responding | None,
+    controller: Controller | None,
     at: At,
     band_rad_s: tuple[float, float] | None,
     unstable_poles: int | None,
@@ -66,7 +80,7 @@ def read_loops(
     OptionError
         An unknown place to break the loops, or a place without a controller.
     ModelError
-        The source or the controller has no frequency response.
+        The source has no frequency response.
     UnknownNameError
         There is no such channel.
     ShapeError
@@ -79,11 +93,7 @@ def read_loops(
             "loops without a controller are broken where they are", found=at, needed="controller=…"
         )
     if controller is not None and not isinstance(controller, Responding):
-        raise ModelError(
-            "the controller of several loops is not a model",
-            found=type(controller).__name__,
-            needed="a model from plant outputs to plant inputs",
-        )
+        controller = KnownLaw(controller)
     if band_rad_s is not None and not 0.0 < band_rad_s[0] < band_rad_s[1] < np.inf:
         raise OptionError("band_rad_s has no meaning", found=band_rad_s, needed="0 < low < high")
     measured = isinstance(source, FrequencyResponse)
