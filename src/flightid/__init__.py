@@ -108,6 +108,7 @@ if TYPE_CHECKING:
     )
     from flightid.simulation.export import Exported
     from flightid.simulation.export.to_file import export
+    from flightid.simulation.noise import Noise
     from flightid.simulation.simulate import simulate
     from flightid.study import Study, run_study
     from flightid.table import Table
@@ -215,6 +216,7 @@ _HOMES = {
     "read_system": "flightid.models",
     "write_system": "flightid.models",
     "Exported": "flightid.simulation.export",
+    "Noise": "flightid.simulation.noise",
     "export": "flightid.simulation.export.to_file",
     "library_names": "flightid.models",
     "load_model": "flightid.models",
@@ -264,6 +266,7 @@ __all__ = [
     "Modes",
     "NarxFit",
     "NarxModel",
+    "Noise",
     "OrderScan",
     "Output",
     "PairResponse",

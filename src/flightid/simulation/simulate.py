@@ -15,6 +15,13 @@ from flightid.models import LinearModel, LinearSystem, StateSpaceModel
 from flightid.models.hold_equivalent import Hold
 from flightid.models.linear_recursion import run_recursion
 from flightid.record import Channel, Record, Step
+from flightid.simulation.noise import (
+    NOISE_PARTS,
+    Noise,
+    between_samples,
+    disturbed_equations,
+    linear_disturbance,
+)
 from flightid.simulation.nonlinear import run_equations, start_of
 
 
@@ -28,6 +35,7 @@ def simulate(
     input_bias: Mapping[str, float] | None = None,
     output_bias: Mapping[str, float] | None = None,
     units: Mapping[str, str] | None = None,
+    noise: Noise | None = None,
 ) -> Record:
     """Drive a model with the inputs of a record.
 
@@ -64,6 +72,9 @@ def simulate(
         Constant added to an output, in its unit.
     units : mapping of str to str, optional
         Units of the outputs; taken from the record's channel of the same name when left out.
+    noise : Noise, optional
+        White noise and gusts on the way, exact at the samples for a linear model, and errors of the
+        sensors.
 
     Returns
     -------
@@ -73,7 +84,7 @@ def simulate(
     Raises
     ------
     UnknownNameError
-        The record lacks an input.
+        The record lacks an input, or noise is asked for on what the model does not have.
     OptionError
         Another hold, a bias for a channel that the model does not have, or substeps for a model
         that is discretised exactly.
@@ -110,22 +121,47 @@ def simulate(
     driven = data.matrix(names) + _biases(input_bias, names)
     first = hold == "first"
     if isinstance(model, StateSpaceModel) and not model.is_linear:
-        _, computed = run_equations(
-            model,
-            driven,
-            data.sample_time_s,
-            first_order_hold=first,
-            initial_state=initial_state,
-            substeps=substeps,
-        )
+        computed = _run_nonlinear(model, driven, data, first, initial_state, substeps, noise)
     else:
         if substeps is not None:
             raise OptionError(
                 "a linear model has no substeps: its discretisation is exact", found=substeps
             )
         computed = _run_linear(model, driven, data.sample_time_s, initial_state, first)
-    computed += _biases(output_bias, outputs)
-    return _as_record(data, names, dict(zip(outputs, computed, strict=True)), units, hold)
+        if noise is not None and noise.moves:
+            computed = computed + linear_disturbance(
+                model, noise, data.sample_time_s, data.n_samples
+            )
+    if noise is not None:
+        computed = computed + noise.on_sensors(outputs, data.n_samples)
+    computed = computed + _biases(output_bias, outputs)
+    made = dict(zip(outputs, computed, strict=True))
+    return _as_record(data, names, made, units, hold, noise)
+
+
+def _run_nonlinear(
+    model: StateSpaceModel,
+    driven: NDArray[np.float64],
+    data: Record,
+    first: bool,
+    initial_state: ArrayLike | Mapping[str, float] | None,
+    substeps: int | None,
+    noise: Noise | None,
+) -> NDArray[np.float64]:
+    """Outputs of a nonlinear model, disturbed or not, shape (p, n_samples)."""
+    step, parts = data.sample_time_s, 1
+    if noise is not None and noise.moves:
+        # Straight lines between values of white noise would take its high frequencies away: with
+        # that hold the noise has several values in a sample.
+        parts = NOISE_PARTS if first else 1
+        driven, step = between_samples(driven, parts), step / parts
+        model, added = disturbed_equations(model, noise, step, driven.shape[1])
+        driven = np.vstack([driven, added])
+    _, computed = run_equations(
+        model, driven, step, first_order_hold=first, initial_state=initial_state,
+        substeps=substeps,
+    )  # fmt: skip
+    return computed[:, ::parts]
 
 
 def _run_linear(
@@ -202,10 +238,12 @@ def _as_record(
     computed: Mapping[str, NDArray[np.float64]],
     units: Mapping[str, str] | None,
     hold: Hold,
+    noise: Noise | None,
 ) -> Record:
     known = data.channels
+    options = {"hold": hold} if noise is None else {"hold": hold, "noise": repr(noise)}
     channels = [known[name] for name in inputs]
     for name in computed:
         given = (units or {}).get(name) or (known[name].unit if name in known else "1")
         channels.append(Channel(name, given, Role.OUTPUT, "simulated"))
-    return data.replace(computed, channels=channels, step=Step("simulate", {"hold": hold}))
+    return data.replace(computed, channels=channels, step=Step("simulate", options))
