@@ -16,7 +16,7 @@ from flightid.errors import FlightidError
 
 ORDER = ("inspect", "design", "response", "identify", "verify", "simulate", "report", "run")
 """Verbs in the order of the work, as help lists them; others follow in alphabetical order."""
-NOT_VERBS = frozenset({"bar", "output", "program"})
+NOT_VERBS = frozenset({"bar", "output", "pairs", "program"})
 
 
 class Verbs(click.Group):

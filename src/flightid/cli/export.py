@@ -1,0 +1,74 @@
+"""``flightid export``: a model for another tool."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from flightid.cli.output import emit, json_option
+from flightid.cli.pairs import numbers
+
+
+@click.command()
+@click.argument("model")
+@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
+@click.option("--format", help="Left out: by the suffix of FILE.")
+@click.option("--name", help="Of the model in FILE; left out: the file's name.")
+@click.option("--axis", type=click.Choice(["roll", "pitch", "yaw"]), help="Of a library model.")
+@click.option("--value", "values", multiple=True, help="NAME=NUMBER: another parameter value.")
+@click.option("--rate", type=float, help="Steps a second of C, internal steps of an FMU, Hz.")
+@click.option("--hold", type=click.Choice(["zero", "first"]), help="Inputs between samples, in C.")
+@click.option("--substeps", type=click.IntRange(1), help="Runge-Kutta steps in a sample.")
+@click.option("--tunable", is_flag=True, help="C with parameters to change.")
+@click.option(
+    "--interface",
+    "interfaces",
+    multiple=True,
+    type=click.Choice(["model-exchange", "co-simulation"]),
+    help="Of an FMU; may be repeated. Left out: both where the model allows it.",
+)
+@click.option("--pade-order", type=click.IntRange(1), help="Approximate delays in an FMU.")
+@click.option("--sources-only", is_flag=True, help="An FMU without a binary.")
+@json_option
+def command(
+    model: str,
+    file: Path,
+    format: str | None,
+    name: str | None,
+    axis: str | None,
+    values: tuple[str, ...],
+    rate: float | None,
+    hold: str | None,
+    substeps: int | None,
+    tunable: bool,
+    interfaces: tuple[str, ...],
+    pade_order: int | None,
+    sources_only: bool,
+    as_json: bool,
+) -> None:
+    """Write MODEL, a .toml file or a library name, to FILE.
+
+    The suffix of FILE chooses: .toml (flightid), .mat (MATLAB), .json, .npz (matrices), .c
+    (portable C99), .fmu (FMI 3.0).
+    """
+    from flightid import export, load_model
+    from flightid.models import load_structure
+
+    changed = numbers("--value", values)
+    chosen = (
+        load_structure(model, axis=axis).with_values(changed)
+        if changed
+        else load_model(model, axis=axis)
+    )
+    given: dict[str, object] = {
+        "sample_time_s": None if rate is None else 1.0 / rate,
+        "hold": hold,
+        "substeps": substeps,
+        "tunable": tunable or None,
+        "interfaces": interfaces or None,
+        "pade_order": pade_order,
+        "compile": False if sources_only else None,
+    }
+    options = {key: value for key, value in given.items() if value is not None}
+    emit(export(chosen, file, format, name=name, **options), as_json=as_json)
