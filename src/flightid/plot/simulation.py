@@ -25,7 +25,10 @@ def simulated_history(simulated: Record, measured: Record | None = None) -> go.F
     plotly.graph_objects.Figure
     """
     panels = [
-        Panel(_titled(simulated, name), (Trace("input", simulated.time_s, simulated[name]),))
+        Panel(
+            _titled(simulated, name),
+            (Trace("input", simulated.time_s, simulated[name], colour=look.GREEN),),
+        )
         for name in simulated.inputs
     ]
     for name in simulated.outputs:
