@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from flightid.control.open_loop import open_loop
     from flightid.control.pid_design import PidDesign
     from flightid.control.tune import tune_pid
+    from flightid.control.tune_axes import tune
+    from flightid.control.tuning import Tuning
     from flightid.control.tuning_requirements import TuningRequirements
     from flightid.dynamics.approximate_modes import approximate_modes
     from flightid.dynamics.conditions import compare_conditions
@@ -182,6 +184,8 @@ _HOMES = {
     "Parameter": "flightid.models",
     "PidDesign": "flightid.control.pid_design",
     "TuningRequirements": "flightid.control.tuning_requirements",
+    "Tuning": "flightid.control.tuning",
+    "tune": "flightid.control.tune_axes",
     "tune_pid": "flightid.control.tune",
     "Parameters": "flightid.models",
     "PolynomialFit": "flightid.identification",
@@ -286,6 +290,7 @@ __all__ = [
     "Table",
     "TransferFunction",
     "TransferFunctionModel",
+    "Tuning",
     "TuningRequirements",
     "Verification",
     "__version__",
@@ -337,6 +342,7 @@ __all__ = [
     "to_control",
     "to_discrete",
     "to_scipy",
+    "tune",
     "tune_pid",
     "validation",
     "verify",

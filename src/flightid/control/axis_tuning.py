@@ -14,7 +14,7 @@ from flightid.control.controller_paths import ControllerPaths, standing
 from flightid.control.gain_search import Found, search
 from flightid.control.gain_search import steps as search_steps
 from flightid.control.loop_problem import ANGLE, LoopProblem, Plants
-from flightid.control.pid_design import GainChange, Stage
+from flightid.control.pid_design import Stage, TunedGain
 from flightid.control.promises import Promise, promises
 from flightid.control.sampled_plants import AxisLoops, SampledPlants, loop_grid, plants_of_axis
 from flightid.control.tuning_evidence import Evidence
@@ -95,6 +95,8 @@ class AxisResult:
         Which fresh plants meet every requirement.
     flown_stable : ndarray of bool or None
         Which of them the flown gains hold stable, the estimate first.
+    problem : LoopProblem
+        With the fresh plants.
     """
 
     found: Found
@@ -102,6 +104,7 @@ class AxisResult:
     promises: tuple[Promise, ...]
     met: NDArray[np.bool_]
     flown_stable: NDArray[np.bool_]
+    problem: LoopProblem
 
 
 def problem_of(
@@ -174,7 +177,7 @@ def tune_axis(
     loop = paths.with_parameters(paths.parameters(found.gains))
     fresh = problem_of(setting, setting.judged.axis(place, loops, setting.gyro), paths, limit)
     made, met = promises(fresh, paths.gains_of(loop), before)
-    return AxisResult(found, loop, made, met, fresh.judge(before[None]).stable[0])
+    return AxisResult(found, loop, made, met, fresh.judge(before[None]).stable[0], fresh)
 
 
 def axis_steps(setting: Setting, loop: AxisLoop) -> int:
@@ -185,11 +188,11 @@ def axis_steps(setting: Setting, loop: AxisLoop) -> int:
     return search_steps(LoopProblem(plants, paths, paths.kinds, low, high, setting.requirements))
 
 
-def changes_of(paths: ControllerPaths, new: AxisLoop) -> tuple[GainChange, ...]:
+def changes_of(paths: ControllerPaths, new: AxisLoop) -> tuple[TunedGain, ...]:
     """Each parameter before and after."""
     ranges, before, after = paths.loop.ranges, paths.loop.gains, new.gains
     return tuple(
-        GainChange(
+        TunedGain(
             name, ranges[name].unit, before[name], after[name], ranges[name].low, ranges[name].high
         )
         for name in paths.names
@@ -200,7 +203,7 @@ def stages_of(
     setting: Setting,
     loops: list[AxisLoop],
     place: int,
-    changes: tuple[GainChange, ...],
+    changes: tuple[TunedGain, ...],
     limit: float,
 ) -> tuple[Stage, ...]:
     """Steps from the flown gains to the new ones, no ratio above the limit, each judged."""
@@ -225,7 +228,7 @@ def stages_of(
     return tuple(stages)
 
 
-def _between(change: GainChange, share: float) -> float:
+def _between(change: TunedGain, share: float) -> float:
     """On the way from flown to new: by ratio, and by difference where one is zero."""
     if share >= 1.0:
         return change.new

@@ -60,6 +60,17 @@ class Plants:
             unstable=self.unstable[rows],
         )
 
+    def thinned(self, stride: int) -> Plants:
+        """The plants at every so many frequencies, the highest among them."""
+        kept = np.arange(len(self.omega_rad_s) - 1, -1, -stride)[::-1]
+        return replace(
+            self,
+            omega_rad_s=self.omega_rad_s[kept],
+            rate=self.rate[:, kept],
+            angle=self.angle[:, kept],
+            rest=self.rest[:, kept],
+        )
+
 
 class Paths(Protocol):
     """The controller's paths at given frequencies, linear in its gains but for the last."""
@@ -164,6 +175,10 @@ class LoopProblem:
     crossover_limit_rad_s: float | None = None
     noise_psd: Array | None = None
     noise_limit: float | None = None
+
+    def with_plants(self, plants: Plants) -> LoopProblem:
+        """The same requirements on other plants; the noise must be white."""
+        return replace(self, plants=plants)
 
     @property
     def has_angle(self) -> bool:

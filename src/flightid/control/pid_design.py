@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
 
-from flightid.control.autopilots import AxisLoop
+from flightid.control.autopilots import AxisLoop, GainChange, write_param, write_params
+from flightid.control.loop_problem import LoopProblem
 from flightid.control.promises import Promise
 from flightid.control.tuning_requirements import TuningRequirements
 from flightid.control.tuning_responses import ResponseBand
-from flightid.errors import UnknownNameError
+from flightid.errors import DataError, UnknownNameError
 from flightid.findings import Finding
 from flightid.table import Cell, Column, Table
 
@@ -17,7 +20,7 @@ SCHEMA = "flightid.pid_design/1"
 
 
 @dataclass(frozen=True)
-class GainChange:
+class TunedGain:
     """One parameter before and after.
 
     Attributes
@@ -30,7 +33,7 @@ class GainChange:
 
     Example
     -------
-    >>> GainChange("ATC_RAT_RLL_P", "1/(rad/s)", 0.1, 0.15, 0.01, 0.5).ratio
+    >>> TunedGain("ATC_RAT_RLL_P", "1/(rad/s)", 0.1, 0.15, 0.01, 0.5).ratio
     1.4999999999999998
     """
 
@@ -77,7 +80,7 @@ class PidDesign:
         The axis as flown, and with the new gains (as flown where there are none).
     exists : bool
         Whether gains meet the requirements for the plants that the data allow.
-    changes : tuple of GainChange
+    changes : tuple of TunedGain
     requirements : TuningRequirements
     promises : tuple of Promise
         Margins and bandwidths with their spread, beside those of the flown gains; of the nearest
@@ -93,6 +96,8 @@ class PidDesign:
         where the uncertainty is not known.
     share_met : float
         Lower 95 % bound of the share of plants that meet every requirement.
+    problem : LoopProblem
+        The axis with the plants that the promises are for: what pictures are drawn from.
     n_plants : int
         Plants that the promises rest on, the search having seen none of them.
     findings : tuple of Finding
@@ -113,7 +118,7 @@ class PidDesign:
     flown: AxisLoop
     loop: AxisLoop
     exists: bool
-    changes: tuple[GainChange, ...]
+    changes: tuple[TunedGain, ...]
     requirements: TuningRequirements
     promises: tuple[Promise, ...]
     binding: tuple[str, ...]
@@ -122,6 +127,7 @@ class PidDesign:
     content: float
     share_met: float
     n_plants: int
+    problem: LoopProblem
     findings: tuple[Finding, ...] = ()
     provenance: Mapping[str, object] = field(default_factory=dict)
 
@@ -256,6 +262,35 @@ class PidDesign:
         """Gains, with the verdicts below; `promise_table` has the margins."""
         return self.gain_table()
 
+    def write(self, path: str | Path, *, overwrite: bool = False) -> tuple[Path, ...]:
+        """Write the gains as the autopilot's parameter files, and the flown ones to go back to.
+
+        One file for each step (``name-1.param``, … where there are several), each with a file
+        ``….rollback.param`` of the flown values; QGroundControl's layout for PX4.
+
+        Parameters
+        ----------
+        path : str or Path
+            Name of the file, usually ``*.param`` or, for PX4, ``*.params``.
+        overwrite : bool
+            Whether files that exist may be replaced.
+
+        Returns
+        -------
+        tuple of Path
+            What was written, step by step.
+
+        Raises
+        ------
+        DataError
+            There are no gains that meet the requirements.
+        OptionError
+            A file is already there.
+        OSError
+            A file cannot be written.
+        """
+        return write_steps(path, [self], overwrite=overwrite)
+
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""
         return {
@@ -283,3 +318,42 @@ class PidDesign:
 
     def _repr_html_(self) -> str:
         return self.gain_table()._repr_html_() + self.promise_table()._repr_html_()
+
+
+def write_steps(
+    path: str | Path, designs: Sequence[PidDesign], *, overwrite: bool = False
+) -> tuple[Path, ...]:
+    """Write the steps of several axes together; an axis that arrives earlier stays there.
+
+    Raises
+    ------
+    DataError
+        An axis has no gains.
+    """
+    for design in designs:
+        if not design.exists:
+            raise DataError(
+                f"no gains of {design.axis} meet the requirements, so none are written",
+                found=", ".join(design.binding),
+                action="relax a requirement that cannot be met, or identify better",
+            )
+    final, count = Path(path), max(len(design.stages) for design in designs)
+    write = write_params if designs[0].flown.autopilot.startswith("px4") else write_param
+    written = []
+    for k in range(count):
+        changes = chain.from_iterable(
+            _step_changes(each, min(k, len(each.stages) - 1)) for each in designs
+        )
+        name = final if count == 1 else final.with_name(f"{final.stem}-{k + 1}{final.suffix}")
+        notes = [f"flightid: step {k + 1} of {count}; fly each before the next"]
+        made = write(name, changes, notes=notes, overwrite=overwrite)
+        written += [each for each in (made.path, made.rollback) if each is not None]
+    return tuple(written)
+
+
+def _step_changes(design: PidDesign, step: int) -> list[GainChange]:
+    flown = design.flown.gains
+    return [
+        GainChange(name, value, flown[name], f"{design.axis}")
+        for name, value in design.stages[step].gains.items()
+    ]

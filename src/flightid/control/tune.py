@@ -245,6 +245,7 @@ def design_of(
         content_of_worst(count - 1) if known else 0.0,
         least_share(int(result.met.sum()), count) if known else 0.0,
         count,
+        result.problem,
         (
             verdict(result, known),
             *remarks(result, flown, changes, stages, couplings),

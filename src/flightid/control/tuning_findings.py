@@ -8,7 +8,7 @@ import numpy as np
 
 from flightid.control.autopilots import AxisLoop
 from flightid.control.axis_tuning import AxisResult
-from flightid.control.pid_design import GainChange, Stage
+from flightid.control.pid_design import Stage, TunedGain
 from flightid.control.worst_case import least_share
 from flightid.conventions import Light
 from flightid.findings import Finding
@@ -62,7 +62,7 @@ def advice(binding: Sequence[str]) -> str:
 def remarks(
     result: AxisResult,
     flown: AxisLoop,
-    changes: Sequence[GainChange],
+    changes: Sequence[TunedGain],
     stages: Sequence[Stage],
     couplings: Sequence[str],
 ) -> Iterator[Finding]:
@@ -73,7 +73,7 @@ def remarks(
     result : AxisResult
     flown : AxisLoop
         The axis as flown.
-    changes, stages : sequence of GainChange and of Stage
+    changes, stages : sequence of TunedGain and of Stage
     couplings : sequence of str
         Other rates of the model that no loop of the design closes.
     """
