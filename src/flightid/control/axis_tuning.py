@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
 from flightid.control.autopilots.axis_loop import Gyro
-from flightid.control.controller_paths import ControllerPaths, standing
+from flightid.control.controller_paths import ControllerPaths, loop_responses, standing
 from flightid.control.gain_search import Found, search
 from flightid.control.gain_search import steps as search_steps
 from flightid.control.loop_problem import ANGLE, LoopProblem, Plants
@@ -42,10 +42,12 @@ class PlantSet:
     angle: Complex
 
     @classmethod
-    def of(cls, sampled: SampledPlants, points: int) -> PlantSet:
+    def of(
+        cls, sampled: SampledPlants, points: int, loops: Sequence[AxisLoop], gyro: Gyro
+    ) -> PlantSet:
         """Evaluate plants on a grid of the loop."""
         omega = loop_grid(sampled.sample_time_s, points)
-        return cls(sampled, omega, *sampled.responses(omega))
+        return cls(sampled, omega, *loop_responses(sampled, omega, loops, gyro))
 
     def axis(self, place: int, loops: list[AxisLoop], gyro: Gyro) -> Plants:
         """Plants of one axis with the other loops closed."""

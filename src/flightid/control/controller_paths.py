@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
 from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.sampled_plants import SampledPlants
 from flightid.errors import OptionError
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 RATE_ROLES = ("p", "i", "d")
+SLOW_RAD_S = 1.0
+"""Where a filter's phase is its delay."""
 LEAST_SHARE = 1e-3
 """Of the upper end of a range: the least P, I or angle gain that a logarithm can start from."""
 
@@ -136,6 +139,23 @@ class ControllerPaths:
                 if role in self.loop.names
             ]
         )
+
+
+def loop_responses(
+    plants: SampledPlants, omega_rad_s: Array, loops: Sequence[AxisLoop], gyro: Gyro
+) -> tuple[Complex, Complex]:
+    """Rates and angles over outputs, each (n, n_axes, n_axes, n_f), as the controllers see them.
+
+    The estimator's angle does not pass the gyro filter, so an angle from filtered rates is given
+    back the filter's delay.
+    """
+    rate, angle = plants.responses(omega_rad_s)
+    if gyro == "raw":
+        return rate, angle
+    low = np.array([SLOW_RAD_S])
+    delays = [-float(np.angle(loop.gyro_response(low))[0]) / SLOW_RAD_S for loop in loops]
+    lead = np.exp(1j * np.outer(delays, omega_rad_s))
+    return rate, angle * lead[None, :, None, :]
 
 
 def has_angle_loop(loop: AxisLoop) -> bool:

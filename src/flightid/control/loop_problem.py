@@ -177,8 +177,11 @@ class LoopProblem:
     noise_limit: float | None = None
 
     def with_plants(self, plants: Plants) -> LoopProblem:
-        """The same requirements on other plants; the noise must be white."""
-        return replace(self, plants=plants)
+        """The same requirements on other plants, at their frequencies."""
+        known = self.plants.omega_rad_s
+        psd = self.noise_psd
+        moved = None if psd is None else np.interp(plants.omega_rad_s, known, psd)
+        return replace(self, plants=plants, noise_psd=moved)
 
     @property
     def has_angle(self) -> bool:

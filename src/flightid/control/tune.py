@@ -156,8 +156,8 @@ def tune_pid(
     )
     setting = make_setting(
         evidence,
+        [flown],
         *channels,
-        step,
         need,
         rate,
         angle_loop and has_angle_loop(flown),
@@ -172,9 +172,9 @@ def tune_pid(
 
 def make_setting(
     evidence: Evidence,
+    loops: list[AxisLoop],
     outputs: list[str],
     inputs: list[str],
-    step: float,
     requirements: TuningRequirements,
     gyro: Gyro,
     with_angle: bool,
@@ -190,6 +190,7 @@ def make_setting(
     OptionError
         A sign that is none.
     """
+    step = 1.0 / loops[0].loop_rate_hz
     if any(sign not in (-1, 1) for sign in signs):
         raise OptionError("sign is not known", found=signs, needed="1 or -1")
 
@@ -202,8 +203,8 @@ def make_setting(
     judged = sampled((evidence.estimate, *evidence.fresh))
     return Setting(
         evidence,
-        PlantSet.of(searched, SEARCH_POINTS),
-        PlantSet.of(judged, JUDGED_POINTS),
+        PlantSet.of(searched, SEARCH_POINTS, loops, gyro),
+        PlantSet.of(judged, JUDGED_POINTS, loops, gyro),
         gyro,
         with_angle,
         requirements,

@@ -131,9 +131,9 @@ def tune(
         )  # fmt: skip
         setting = make_setting(
             evidence,
+            flown,
             [CHANNELS[axis][1] for axis in axes],
             [CHANNELS[axis][0] for axis in axes],
-            1.0 / flown[0].loop_rate_hz,
             needs[0],
             rate,
             angle_loop and all(map(has_angle_loop, flown)),

@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
 from flightid.control.autopilots.axis_loop import Gyro
-from flightid.control.controller_paths import ControllerPaths, has_angle_loop, standing
+from flightid.control.controller_paths import (
+    ControllerPaths,
+    has_angle_loop,
+    loop_responses,
+    standing,
+)
 from flightid.control.sampled_plants import BELOW_NYQUIST, AxisLoops, SampledPlants, plants_of_axis
 
 Array = NDArray[np.float64]
@@ -121,7 +126,8 @@ def _pulses(
     omega[0], omega[-1] = LIKE_ZERO * omega[1], BELOW_NYQUIST * omega[-1]
     pairs = [standing(loop, omega, gyro) for loop in loops]
     closed = AxisLoops(*(np.array(each) for each in zip(*pairs, strict=True)))
-    axis = plants_of_axis(*plants.responses(omega), omega, plants.unstable, place, closed)
+    seen = loop_responses(plants, omega, loops, gyro)
+    axis = plants_of_axis(*seen, omega, plants.unstable, place, closed)
     rate = closed.feedback[place] * axis.rate
     whole = rate + closed.outer[place] * axis.angle
     paths = ControllerPaths(loops[place], gyro, has_angle_loop(loops[place]))

@@ -1,0 +1,191 @@
+"""Several axes: coupled ones together, files step by step, pictures and report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.control.autopilots import AxisLoop, axis_loop, read_parameters
+from flightid.control.sampled_plants import SampledPlants, sample_plants
+from flightid.conventions import Light
+from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.plot.tuning import gain_map, nichols, time_responses
+from flightid.report.content import Document
+from flightid.report.html import to_html
+from flightid.report.tuning import tuning_section
+from tests.closeness import assert_close
+
+STEP_S = 1 / 400
+NEED = fid.TuningRequirements(noise_growth=None)
+
+
+def _coupled(strength: float) -> fid.LinearSystem:
+    """Roll and pitch with a lag each, and effects of each command on the other axis."""
+    lag, effect = 25.0, np.array([[140.0, strength * 120.0], [-strength * 140.0, 120.0]])
+    a = np.zeros((4, 4))
+    a[:2, :2], a[2:, :2], a[2:, 2:] = -lag * np.eye(2), effect, np.diag([-4.0, -5.0])
+    b = np.vstack([lag * np.eye(2), np.zeros((2, 2))])
+    c = np.hstack([np.zeros((2, 2)), np.eye(2)])
+    return fid.LinearSystem(
+        a, b, c, np.zeros((2, 2)), ("tau_phi", "tau_theta"), ("p", "q"), [0.01, 0.01]
+    )
+
+
+def _loops(*axes: str) -> dict[str, AxisLoop]:
+    return {
+        axis: axis_loop("arducopter", axis, loop_rate_hz=400.0).with_gains(
+            {
+                name: value * 0.6
+                for name, value in axis_loop("arducopter", axis, loop_rate_hz=400.0).gains.items()
+                if name.endswith(("_P", "_I", "_D"))
+            }
+            | {"INS_GYRO_FILTER": 0.0}
+        )
+        for axis in axes
+    }
+
+
+def _largest_pole(plants: SampledPlants, loops: list[AxisLoop]) -> float:
+    """Of two ArduCopter axes around a sampled plant, by stepping each state of the whole once."""
+    system, n = plants.systems[0], len(plants.systems[0].a)
+    whole = int(plants.delays[0][0])
+    size = n + 2 * whole + 2 * 6
+
+    def advance(x: np.ndarray) -> np.ndarray:
+        state, pipe = x[:n], x[n : n + 2 * whole].reshape(2, whole)
+        memory = x[n + 2 * whole :].reshape(2, 6)
+        seen, out, kept = np.asarray(system.c) @ state, np.zeros(2), np.zeros((2, 6))
+        for axis, loop in enumerate(loops):
+            v = loop.values
+            alpha = {
+                role: 1.0 if v[role] <= 0 else STEP_S / (STEP_S + 1 / (2 * np.pi * v[role]))
+                for role in ("fltt", "flte", "fltd")
+            }
+            waiting, target, error, slope, integral, _ = memory[axis]
+            target += alpha["fltt"] * (waiting - target)
+            new = error + alpha["flte"] * ((target - seen[axis]) - error)
+            slope += alpha["fltd"] * ((new - error) / STEP_S - slope)
+            integral += v["i"] * new * STEP_S
+            out[axis] = v["p"] * new + integral + v["d"] * slope
+            kept[axis] = [-loop.angle_gain_1_s * seen[2 + axis], target, new, slope, integral, 0.0]
+        applied = pipe[:, 0] if whole else out
+        moved = np.hstack([pipe[:, 1:], out[:, None]]) if whole else pipe
+        after = np.asarray(system.a) @ state + np.asarray(system.b) @ applied
+        return np.concatenate([after, moved.ravel(), kept.ravel()])
+
+    matrix = np.column_stack([advance(column) for column in np.eye(size)])
+    return float(np.abs(np.linalg.eigvals(matrix)).max())
+
+
+@pytest.fixture(scope="module")
+def tuning() -> fid.Tuning:
+    plant = _coupled(0.4)
+    return fid.tune(
+        {"roll": plant, "pitch": plant},
+        gains=_loops("roll", "pitch"),
+        requirements=NEED,
+        rate="raw",
+        band_rad_s=(0.5, 100.0),
+        nominal=True,
+    )
+
+
+def test_coupled_axes_are_stable_together_by_their_poles(tuning: fid.Tuning) -> None:
+    assert tuning.exists
+    plants = sample_plants(
+        [_coupled(0.4)], ["p", "q"], ["tau_phi", "tau_theta"], STEP_S, hold_in_model=True
+    )
+    loops = [tuning[axis].loop for axis in ("roll", "pitch")]
+    assert _largest_pole(plants, loops) < 1.0
+    (together,) = tuning.together
+    assert together.all_stable
+    assert together.coupling is not None
+    assert together.coupling > 0.2
+    assert (together.worst_disk_margin or 0.0) > 0.3
+    assert any(f.code == "together" and f.light is Light.GREEN for f in tuning.findings)
+
+
+def test_coupling_costs_what_designing_alone_does_not_see(tuning: fid.Tuning) -> None:
+    plant, alone = _coupled(0.4), _coupled(0.0)
+    options = {"requirements": NEED, "rate": "raw", "band_rad_s": (0.5, 100.0), "nominal": True}
+    single = fid.tune_pid(plant, gains=_loops("roll")["roll"], **options)
+    free = fid.tune_pid(alone, gains=_loops("roll")["roll"], **options)
+    assert any(finding.code == "couplings" for finding in single.findings)
+    assert_close(
+        single.gains["ATC_RAT_RLL_P"], free.gains["ATC_RAT_RLL_P"], rtol=1e-2,
+        why="one loop closed alone does not feel the other axis",
+    )  # fmt: skip
+    ratio = tuning.gains["ATC_RAT_RLL_P"] / free.gains["ATC_RAT_RLL_P"]
+    assert abs(ratio - 1.0) > 0.02
+
+
+def test_steps_of_all_axes_are_written_together(tuning: fid.Tuning, tmp_path: Path) -> None:
+    written = tuning.write(tmp_path / "gains.param")
+    last = [path for path in written if "rollback" not in path.name][-1]
+    got = read_parameters(last)
+    assert set(got) == set(tuning.gains)
+    for name, value in tuning.gains.items():
+        assert_close(got[name], value, rtol=1e-6, why="single precision of the file")
+    back = read_parameters(next(path for path in written if "rollback" in path.name))
+    assert back == pytest.approx(
+        {name: tuning[axis].flown.gains[name] for axis in ("roll", "pitch")
+         for name in tuning[axis].gains}, rel=1e-6
+    )  # fmt: skip
+    with pytest.raises(OptionError, match="already there"):
+        tuning.write(tmp_path / "gains.param")
+
+
+def test_nothing_is_written_where_there_are_no_gains(tmp_path: Path) -> None:
+    slow = fid.LinearSystem([[-1.0]], [[140.0]], [[1.0]], [[0.0]], ("tau_phi",), ("p",), [0.4])
+    design = fid.tune_pid(
+        slow, gains=_loops("roll")["roll"], nominal=True,
+        requirements=fid.TuningRequirements(crossover_rad_s=20.0, noise_growth=None),
+    )  # fmt: skip
+    with pytest.raises(DataError, match="so none are written"):
+        design.write(tmp_path / "roll.param")
+    assert not list(tmp_path.iterdir())
+
+
+def test_pictures_and_report_show_every_loop(tuning: fid.Tuning) -> None:
+    design = tuning["roll"]
+    assert len({trace.name for trace in time_responses(design).data if trace.name}) == 2
+    titles = {note.text for note in nichols(design).layout.annotations}
+    assert {"rate loop", "whole loop", "angle loop"} <= titles
+    drawn = gain_map(design)
+    line = next(trace for trace in drawn.data if trace.name == "all requirements met")
+    assert np.nanmax(line.z) > 0.0
+    with pytest.raises(UnknownNameError, match="no such gain"):
+        gain_map(design, up="X")
+    page = to_html(Document("Gains", "", (tuning_section(tuning),)))
+    assert "Coupled axes closed together" in page
+    assert "Roll gains" in page
+
+
+def test_the_result_shows_itself(tuning: fid.Tuning) -> None:
+    assert repr(tuning).startswith("Tuning(roll: ATC_RAT_RLL_P")
+    assert tuning.to_dict()["schema"] == "flightid.tuning/1"
+    assert "pitch: Binding" in str(tuning.summary())
+    assert "roll and pitch" in str(tuning.together_table())
+    with pytest.raises(UnknownNameError, match="no such axis"):
+        tuning["yaw"]
+
+
+@pytest.mark.parametrize("fits", [{}, {"heave": None}])
+def test_axes_that_cannot_be_tuned_are_refused(fits: dict[str, object]) -> None:
+    with pytest.raises(OptionError, match="axes to tune"):
+        fid.tune(fits, gains={})
+
+
+def test_parameters_by_name_stand_for_loops() -> None:
+    plant = fid.load_model("rate_integrator", axis="yaw").with_values({"Ntpsi": 40.0, "tau": 0.03})
+    loop = axis_loop("px4_multicopter", "yaw", loop_rate_hz=400.0)
+    made = fid.tune(
+        {"yaw": plant}, gains=loop.gains | {"IMU_GYRO_RATEMAX": 400.0},
+        autopilot="px4_multicopter", nominal=True,
+        requirements=fid.TuningRequirements(noise_growth=None), angle_loop=False,
+    )  # fmt: skip
+    assert made["yaw"].exists
+    assert set(made.gains) == {"MC_YAWRATE_P", "MC_YAWRATE_I", "MC_YAWRATE_D"}
