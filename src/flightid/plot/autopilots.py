@@ -42,9 +42,7 @@ def controller(loop: AxisLoop, omega_rad_s: NDArray[np.float64] | None = None) -
     for name, term, colour in zip(names, terms, colours, strict=False):
         if gains[name] != 0:
             curves.append(Curve(name, omega, gains[name] * term, colour, "dot"))
-    made = bode(curves, unit=f"{loop.output_unit}/(rad/s)")
-    made.update_layout(title=f"{loop.autopilot}, {loop.axis}")
-    return made
+    return bode(curves, unit=f"{loop.output_unit}/(rad/s)")
 
 
 def replay(result: Replay) -> go.Figure:
@@ -69,7 +67,10 @@ def replay(result: Replay) -> go.Figure:
         moves = name in result.logged and np.std(result.logged[name]) > QUIET_SHARE * largest
         if moves:
             panels.append(_pair(result, name, look.axis_title(name, unit)))
-    return time_histories(panels)
+    made = time_histories(panels)
+    # A difference of rounding errors reads better as 5e-8 than with a letter for nano.
+    made.update_yaxes(exponentformat="e", row=2)
+    return made
 
 
 def _pair(result: Replay, name: str, title: str) -> Panel:

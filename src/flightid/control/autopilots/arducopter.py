@@ -6,13 +6,17 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from flightid import _native
 from flightid.control.autopilots.ardupilot_loop import ArduPilotLoop
 from flightid.control.autopilots.axis_loop import LoopFlags
 from flightid.control.autopilots.filters import Omega, Response, delay_operator, difference_response
 
 LEAK_SHARE = 0.02
 """Part of the excess over ILMI that a helicopter's integrator loses in each loop."""
+BOUNDS_DEG_S2, YAW_BOUNDS_DEG_S2 = (40.0, 720.0), (10.0, 120.0)
+"""Accelerations that the angle controller may plan with."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -38,6 +42,28 @@ class ArduCopterLoop(ArduPilotLoop):
     def angle_gain_1_s(self) -> float:
         """ATC_ANG_xxx_P, 1/s; the square-root law takes over at large errors."""
         return self.values["angle_p"]
+
+    def rate_setpoint(self, angle_error_rad: ArrayLike) -> np.ndarray:
+        """Rate set-point of an angle error: proportional, and its square root where that brakes.
+
+        The law plans with half of ATC_ACCEL_x_MAX, not below 40 nor above 720 deg/s² (yaw: 10 and
+        120); without the parameter it stays proportional.
+
+        Parameters
+        ----------
+        angle_error_rad : array_like, shape (n,)
+            Component of the attitude error's rotation vector, rad.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+            rad/s.
+        """
+        error = np.ascontiguousarray(np.atleast_1d(angle_error_rad), dtype=np.float64)
+        most = np.radians(self.values["acceleration"] / 100.0)
+        bounds = YAW_BOUNDS_DEG_S2 if self.axis == "yaw" else BOUNDS_DEG_S2
+        planned = float(np.clip(most / 2, *np.radians(bounds))) if most > 0 else 0.0
+        return _native.square_root_law(error, self.angle_gain_1_s, planned)
 
     def _feedback_terms(self, omega: Omega) -> dict[str, Response]:
         return self._pid_terms(omega)
