@@ -15,7 +15,7 @@ def missing() -> list[str]:
             "name another with `make PYTHON=python3.12 …`"
         )
     if shutil.which("cargo") is None:
-        found.append("no Rust toolchain (cargo) on the path: install Rust 1.88 or newer")
+        found.append("no Rust toolchain (cargo) on the path: install Rust 1.89 or newer")
     if not any(shutil.which(name) for name in ("cc", "gcc", "clang")):
         found.append("no C compiler (cc) on the path: Rust needs one to link")
     return found

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 import flightid as fid
-from flightid.errors import OptionError
 from tests.closeness import assert_close
 
 
@@ -62,6 +60,14 @@ def test_options_overrule_the_model() -> None:
     assert record.bias["p"].status == "fixed"
 
 
-def test_bounds_of_a_free_number_are_refused() -> None:
-    with pytest.raises(OptionError, match="the initial of p has bounds, which a fit to records"):
-        fid.identify(_model(p={"min": 0.0, "max": 1.0}), _record())
+def test_bounds_of_a_free_number_are_held() -> None:
+    start = _model(p={"min": -1.0, "max": 0.2}).with_values({"Lp": -3.0, "L": 15.0})
+    fit = fid.identify(start, _record(), hold="zero")
+    found = fit.records[0].initial_state["p"]
+    assert (found.value, found.status) == (0.2, "at bound")
+    assert found.interval95 is None
+    assert "would move it further" in found.reason
+    wide = _model(p={"min": -1.0, "max": 1.0}).with_values({"Lp": -3.0, "L": 15.0})
+    inside = fid.identify(wide, _record(), hold="zero").records[0].initial_state["p"]
+    assert_close(inside.value, 0.3, rtol=1e-5, why="no noise, bounds out of the way")
+    assert inside.status == "free"

@@ -5,33 +5,60 @@
 //! Reference: Golub & Van Loan, *Matrix Computations*, 4th ed., §4.2.9 and §5.3.
 
 use crate::output_error::LANES;
+use crate::widest::widest;
 
 /// Below this share of its own length a column counts as a combination of those before it.
 const DEPENDENT: f64 = 1e-13;
 
-/// gram += rowsᵀ rows on and above the diagonal of tiles; `stride` is a multiple of `LANES`.
-pub fn add_rows(gram: &mut [f64], rows: &[f64], stride: usize) {
+/// gram += rowsᵀ rows on and above the diagonal of tiles, over the first of each `every` rows;
+/// `stride` is a multiple of `LANES`.
+pub fn add_rows(gram: &mut [f64], rows: &[f64], stride: usize, every: usize) {
+    widest(
+        #[inline(always)]
+        || add_rows_here(gram, rows, stride, every),
+    );
+}
+
+#[inline(always)]
+fn add_rows_here(gram: &mut [f64], rows: &[f64], stride: usize, every: usize) {
     for first in (0..stride).step_by(LANES) {
-        for second in (first..stride).step_by(LANES) {
-            let mut tile = [[0.0; LANES]; LANES];
-            for row in rows.chunks_exact(stride) {
-                let (Some(left), Some(right)) =
-                    (row[first..].first_chunk::<LANES>(), row[second..].first_chunk::<LANES>())
-                else {
-                    continue;
-                };
-                for (line, factor) in tile.iter_mut().zip(left) {
-                    for (entry, value) in line.iter_mut().zip(right) {
-                        *entry += factor * value;
-                    }
-                }
+        let mut second = first;
+        while second + 2 * LANES <= stride {
+            add_tile::<{ 2 * LANES }>(gram, rows, (stride, every), first, second);
+            second += 2 * LANES;
+        }
+        if second < stride {
+            add_tile::<LANES>(gram, rows, (stride, every), first, second);
+        }
+    }
+}
+
+/// A few columns times a few more, the sums in registers.
+#[inline(always)]
+fn add_tile<const W: usize>(
+    gram: &mut [f64],
+    rows: &[f64],
+    (stride, every): (usize, usize),
+    first: usize,
+    second: usize,
+) {
+    let mut tile = [[0.0; W]; LANES];
+    for row in rows.chunks(every * stride) {
+        let (Some(left), Some(right)) =
+            (row[first..].first_chunk::<LANES>(), row[second..].first_chunk::<W>())
+        else {
+            continue;
+        };
+        for (line, factor) in tile.iter_mut().zip(left) {
+            for (entry, value) in line.iter_mut().zip(right) {
+                *entry += factor * value;
             }
-            for (offset, line) in tile.iter().enumerate() {
-                let start = (first + offset) * stride + second;
-                for (entry, value) in gram[start..start + LANES].iter_mut().zip(line) {
-                    *entry += value;
-                }
-            }
+        }
+    }
+    for (offset, line) in tile.iter().enumerate() {
+        let start = (first + offset) * stride + second;
+        for (entry, value) in gram[start..start + W].iter_mut().zip(line) {
+            *entry += value;
         }
     }
 }
@@ -125,7 +152,7 @@ mod tests {
     #[test]
     fn elimination_and_triangle_solve_least_squares() {
         let mut gram = vec![0.0; 16];
-        add_rows(&mut gram, &rows(), 4);
+        add_rows(&mut gram, &rows(), 4, 1);
         let found = eliminate(&mut gram.clone(), 1, 4);
         let (mut r, mut q) = (vec![0.0; 4], vec![0.0; 2]);
         triangle(&found.rest, 2, &mut r, &mut q);
@@ -142,7 +169,7 @@ mod tests {
         let double: Vec<f64> =
             rows().chunks_exact(4).flat_map(|row| [row[1], row[1], row[0], row[3]]).collect();
         let mut gram = vec![0.0; 16];
-        add_rows(&mut gram, &double, 4);
+        add_rows(&mut gram, &double, 4, 1);
         let found = eliminate(&mut gram, 2, 4);
         assert_eq!(found.kept, [true, false]);
         assert_eq!(found.step(&[0.0], 1.0)[1], 0.0);

@@ -14,12 +14,13 @@ use rayon::prelude::*;
 
 use crate::dense_problem::Dense;
 use crate::error::CoreError;
-use crate::gram::triangle;
+use crate::gram::{Elimination, triangle};
 use crate::joint_objective::Joint;
 use crate::least_squares::{Objective, Options, Point, Problem, Termination};
 use crate::levenberg_marquardt::search;
 use crate::output_error_weights::{Moments, Noise, Weights};
-use crate::record_pass::{RecordPass, Task};
+use crate::record_data::{RecordData, same};
+use crate::record_pass::{Part, RecordPass, Task};
 
 /// Which derivatives a run must give beside the outputs.
 #[derive(Debug, Clone, Copy)]
@@ -88,58 +89,6 @@ pub trait Trajectories: Sync {
     ) -> Result<(), CoreError>;
 }
 
-/// One record's measurements, the start of its own numbers, and which of them are free.
-#[derive(Debug, Clone, Default)]
-pub struct RecordData {
-    /// Measured outputs, sample by sample (n_samples × n_outputs).
-    pub measured: Vec<f64>,
-    /// Initial state.
-    pub initial: Vec<f64>,
-    /// Added to each input.
-    pub shift: Vec<f64>,
-    /// Added to each output.
-    pub bias: Vec<f64>,
-    /// Entries of the initial state that are free.
-    pub free_initial: Vec<usize>,
-    /// Inputs whose shift is free.
-    pub free_shift: Vec<usize>,
-    /// Outputs whose bias is free.
-    pub free_bias: Vec<usize>,
-}
-
-impl RecordData {
-    /// Numbers of this record that are free.
-    pub fn n_free(&self) -> usize {
-        self.free_initial.len() + self.free_shift.len() + self.free_bias.len()
-    }
-
-    /// The values of the free numbers: initial states, shifts, biases.
-    pub fn free_values(&self) -> Vec<f64> {
-        let parts = [
-            (&self.free_initial, &self.initial),
-            (&self.free_shift, &self.shift),
-            (&self.free_bias, &self.bias),
-        ];
-        parts.iter().flat_map(|(places, from)| places.iter().map(|&k| from[k])).collect()
-    }
-
-    /// Initial state, shifts and biases with these values of the free numbers.
-    pub fn moved(&self, values: &[f64]) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-        let (mut initial, mut shift, mut bias) =
-            (self.initial.clone(), self.shift.clone(), self.bias.clone());
-        let mut values = values.iter();
-        let mut place = |places: &[usize], into: &mut [f64]| {
-            for (&k, &value) in places.iter().zip(values.by_ref()) {
-                into[k] = value;
-            }
-        };
-        place(&self.free_initial, &mut initial);
-        place(&self.free_shift, &mut shift);
-        place(&self.free_bias, &mut bias);
-        (initial, shift, bias)
-    }
-}
-
 /// Where a fit ended.
 #[derive(Debug, Clone)]
 pub struct Estimate {
@@ -165,6 +114,10 @@ pub struct OutputError<'a, T: Trajectories> {
     data: &'a [RecordData],
     weights: Weights,
     passes: Vec<RecordPass>,
+    /// The records' own numbers are found by one least squares.
+    settles: bool,
+    /// One pass serves cost, weights and linearisation.
+    gathers: bool,
     /// θ of the last linearisation.
     theta: Vec<f64>,
     /// Calls of `cost` since then.
@@ -186,23 +139,16 @@ impl<'a, T: Trajectories> OutputError<'a, T> {
         let (p, shifts) = (trajectories.n_outputs(), trajectories.n_shifts());
         same("records", data.len(), lengths.len())?;
         for (record, (each, &n)) in data.iter().zip(lengths).enumerate() {
-            let states = trajectories.n_initial(record);
-            same("measured values", each.measured.len(), n * p)?;
-            same("initial state", each.initial.len(), states)?;
-            same("input shifts", each.shift.len(), shifts)?;
-            same("output biases", each.bias.len(), p)?;
-            let limits =
-                [(&each.free_initial, states), (&each.free_shift, shifts), (&each.free_bias, p)];
-            for (places, needed) in limits {
-                if let Some(&found) = places.iter().find(|&&k| k >= needed) {
-                    return Err(CoreError::Shape { what: "index of a free number", found, needed });
-                }
-            }
+            each.require(n, p, trajectories.n_initial(record), shifts)?;
         }
         let weights = Weights::new(noise, data, p)?;
         let passes = data.iter().map(RecordPass::new).collect();
         let theta = Vec::new();
-        Ok(Self { trajectories, data, weights, passes, theta, tried: 0, moments: None })
+        let is_free = data.iter().all(|each| each.limits.is_empty());
+        let settles = trajectories.is_affine() && is_free;
+        let gathers = settles && !noise.full && noise.limit.is_infinite();
+        let (tried, moments) = (0, None);
+        Ok(Self { trajectories, data, weights, passes, settles, gathers, theta, tried, moments })
     }
 
     /// Run a task on every record, in parallel, the answers in the order of the records.
@@ -228,6 +174,59 @@ impl<'a, T: Trajectories> OutputError<'a, T> {
         Ok(Moments::total(found))
     }
 
+    fn follow(&mut self, change: &[f64], share: f64) {
+        let each = self.passes.iter_mut().zip(self.data);
+        each.for_each(|(pass, data)| pass.follow(data, change, share));
+    }
+
+    /// Run at the trial numbers, keeping what `weigh` needs.
+    fn gather(&mut self, theta: &[f64]) -> Result<Moments, CoreError> {
+        let shared = self.trajectories.share(theta, true)?;
+        let weights = self.weights.clone();
+        let found = self.all(|trajectories, data, k, pass| {
+            pass.gather(&Task { trajectories, shared: &shared, data, record: k, weights: &weights })
+        })?;
+        Ok(Moments::total(found))
+    }
+
+    /// Normal equations of each record, from `gather`.
+    fn weigh(&self) -> Vec<Elimination> {
+        let n = self.trajectories.n_parameters();
+        let each = self.passes.iter().zip(self.data);
+        each.map(|(pass, data)| pass.weigh(data, &self.weights, n)).collect()
+    }
+
+    /// What each record adds to the normal equations.
+    fn parts(&mut self, x: &[f64]) -> Result<Vec<Part>, CoreError> {
+        let weights = self.weights.clone();
+        if self.gathers {
+            let found = self.weigh().into_iter().zip(&mut self.passes);
+            return Ok(found.map(|(each, pass)| pass.keep_gathered(each, &weights)).collect());
+        }
+        let shared = self.trajectories.share(x, true)?;
+        self.all(|trajectories, data, k, pass| {
+            let task = Task { trajectories, shared: &shared, data, record: k, weights: &weights };
+            pass.linearise(&task)
+        })
+    }
+
+    /// As `begin`, in passes that serve the first linearisation too.
+    fn begin_gathering(&mut self, x: &[f64]) -> Result<(), CoreError> {
+        let mut moments = self.gather(x)?;
+        if self.data.iter().any(|each| each.n_free() > 0) && moments.is_finite() {
+            self.weights.update(&moments)?;
+            let found = self.weigh();
+            for (pass, found) in self.passes.iter_mut().zip(found) {
+                pass.elimination = found;
+            }
+            self.follow(&vec![0.0; x.len()], 1.0);
+            moments = self.gather(x)?;
+        }
+        require_finite(&moments)?;
+        self.moments = Some(moments);
+        Ok(())
+    }
+
     /// Free numbers of the records, before the elimination of the last linearisation.
     pub fn own(&self) -> Vec<Vec<f64>> {
         self.passes.iter().map(|pass| pass.own.clone()).collect()
@@ -240,9 +239,8 @@ impl<'a, T: Trajectories> OutputError<'a, T> {
         termination: Termination,
     ) -> Result<Estimate, CoreError> {
         // What the last linearisation left for the records' own numbers.
-        if self.trajectories.is_affine() {
-            let still = vec![0.0; theta.len()];
-            self.passes.iter_mut().for_each(|pass| pass.follow(&still, 1.0));
+        if self.settles {
+            self.follow(&vec![0.0; theta.len()], 1.0);
             self.passes.iter_mut().for_each(RecordPass::accept);
         }
         let moments = self.take_moments(&theta)?;
@@ -266,17 +264,15 @@ impl<T: Trajectories> Objective for OutputError<'_, T> {
     }
 
     fn begin(&mut self, x: &[f64]) -> Result<(), CoreError> {
+        if self.gathers {
+            return self.begin_gathering(x);
+        }
         for _ in 0..2 {
             // From the start values of the records' own numbers to their best at this θ.
             let moments = self.take_moments(x)?;
-            if !moments.is_finite() {
-                return Err(CoreError::NotFinite {
-                    what: "the model's outputs at the start",
-                    index: 0,
-                });
-            }
+            require_finite(&moments)?;
             self.weights.update(&moments)?;
-            if !self.trajectories.is_affine() {
+            if !self.settles {
                 break;
             }
             self.cost(x)?;
@@ -286,21 +282,28 @@ impl<T: Trajectories> Objective for OutputError<'_, T> {
     }
 
     fn cost(&mut self, x: &[f64]) -> Result<f64, CoreError> {
-        let shared = self.trajectories.share(x, false)?;
         let change: Vec<f64> = match self.theta.len() {
             0 => vec![0.0; x.len()],
             _ => x.iter().zip(&self.theta).map(|(new, old)| new - old).collect(),
         };
         // Where damping of θ alone cannot tame the records' own numbers, their step shrinks as well.
         let share = 0.5_f64.powi(self.tried as i32);
-        let affine = self.trajectories.is_affine();
-        let share = if affine { 1.0 } else { share };
+        let settles = self.settles;
+        let share = if settles { 1.0 } else { share };
         self.tried += 1;
+        self.follow(&change, share);
+        if self.gathers {
+            let moments = self.gather(x)?;
+            let beside: f64 = self.weigh().iter().map(|each| each.beside).sum();
+            let cost = moments.cost - beside;
+            self.moments = Some(moments);
+            return Ok(cost);
+        }
+        let shared = self.trajectories.share(x, false)?;
         let weights = self.weights.clone();
         let found = self.all(|trajectories, data, k, pass| {
-            pass.follow(&change, share);
             let task = Task { trajectories, shared: &shared, data, record: k, weights: &weights };
-            if affine && data.n_free() > 0 {
+            if settles && data.n_free() > 0 {
                 pass.settle(&task).map(|cost| (cost, None))
             } else {
                 pass.trial_moments(&task).map(|moments| (moments.cost, Some(moments)))
@@ -321,12 +324,7 @@ impl<T: Trajectories> Objective for OutputError<'_, T> {
             None => self.take_moments(x)?,
         };
         self.weights.update(&moments)?;
-        let shared = self.trajectories.share(x, true)?;
-        let weights = self.weights.clone();
-        let found = self.all(|trajectories, data, k, pass| {
-            let task = Task { trajectories, shared: &shared, data, record: k, weights: &weights };
-            pass.linearise(&task)
-        })?;
+        let found = self.parts(x)?;
         let n = x.len();
         let mut gram = vec![0.0; (n + 1) * (n + 1)];
         (point.beside, point.cost) = (0.0, 0.0);
@@ -379,6 +377,7 @@ pub fn fit_from<T: Trajectories, P: Problem + Clone + Sync>(
     }
 }
 
-fn same(what: &'static str, found: usize, needed: usize) -> Result<(), CoreError> {
-    if found == needed { Ok(()) } else { Err(CoreError::Shape { what, found, needed }) }
+fn require_finite(moments: &Moments) -> Result<(), CoreError> {
+    let what = "the model's outputs at the start";
+    if moments.is_finite() { Ok(()) } else { Err(CoreError::NotFinite { what, index: 0 }) }
 }

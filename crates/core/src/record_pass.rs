@@ -3,8 +3,10 @@
 
 use crate::error::CoreError;
 use crate::gram::{Elimination, add_rows, eliminate};
-use crate::output_error::{RecordData, Trajectories, Wanted};
+use crate::output_error::{Trajectories, Wanted};
 use crate::output_error_weights::{Moments, Weights};
+use crate::output_sums::{BiasSums, OutputSums};
+use crate::record_data::RecordData;
 
 /// What a pass needs beside its buffers.
 pub struct Task<'a, T: Trajectories> {
@@ -31,6 +33,8 @@ pub struct RecordPass {
     pub elimination: Elimination,
     scratch: Vec<f64>,
     gram: Vec<f64>,
+    /// Of the trial numbers, by `gather`.
+    sums: OutputSums,
 }
 
 /// What one record adds to the normal equations.
@@ -44,12 +48,6 @@ pub struct Part {
     pub cost: f64,
 }
 
-/// Sums that bias columns need: for each whitened output Σ w and Σ √w · row.
-struct BiasSums {
-    weight: Vec<f64>,
-    rows: Vec<f64>,
-}
-
 impl RecordPass {
     /// From the record's start values.
     pub fn new(data: &RecordData) -> Self {
@@ -60,15 +58,19 @@ impl RecordPass {
             elimination: Elimination::default(),
             scratch: Vec::new(),
             gram: Vec::new(),
+            sums: OutputSums::default(),
         }
     }
 
     /// Move the trial numbers along with a change of θ since the last linearisation.
-    pub fn follow(&mut self, change: &[f64], share: f64) {
+    pub fn follow(&mut self, data: &RecordData, change: &[f64], share: f64) {
         self.trial.clone_from(&self.own);
         if !self.elimination.kept.is_empty() {
             let step = self.elimination.step(change, share);
             self.trial.iter_mut().zip(step).for_each(|(value, each)| *value += each);
+            for (value, &(low, high)) in self.trial.iter_mut().zip(&data.limits) {
+                *value = value.clamp(low, high);
+            }
         }
     }
 
@@ -169,6 +171,51 @@ impl RecordPass {
         Ok(part)
     }
 
+    /// Run with derivatives at the trial numbers and keep what outputs sum up to.
+    ///
+    /// # Errors
+    /// As the model's run.
+    pub fn gather<T: Trajectories>(&mut self, task: &Task<'_, T>) -> Result<Moments, CoreError> {
+        let data = task.data;
+        let p = task.trajectories.n_outputs();
+        let wanted = Wanted { theta: true, initial: &data.free_initial, shift: &data.free_shift };
+        let stride = wanted.stride(task.trajectories.n_parameters());
+        let (initial, shift, bias) = data.moved(&self.trial);
+        let has_bias = !data.free_bias.is_empty();
+        let sums = &mut self.sums;
+        sums.clear(p, stride);
+        let mut sink = |first: usize, rows: &mut [f64]| {
+            let measured = &data.measured[first * p..];
+            for (sample, z) in rows.chunks_exact_mut(p * stride).zip(measured.chunks_exact(p)) {
+                for (row, (b, z)) in sample.chunks_exact_mut(stride).zip(bias.iter().zip(z)) {
+                    row[0] += b - z;
+                }
+            }
+            sums.add(rows, has_bias);
+        };
+        let (trajectories, scratch) = (task.trajectories, &mut self.scratch);
+        let (shared, record) = (task.shared, task.record);
+        trajectories.run(shared, record, &initial, &shift, &wanted, scratch, &mut sink)?;
+        Ok(self.sums.moments(task.weights))
+    }
+
+    /// Normal equations from what `gather` kept, the record's own numbers eliminated.
+    pub fn weigh(&self, data: &RecordData, weights: &Weights, n_theta: usize) -> Elimination {
+        let (gram, sums) = self.sums.weighed(weights);
+        let stride = gram.len().isqrt();
+        let mut ordered = sums.ordered(&gram, stride, n_theta, data, weights.inverse());
+        eliminate(&mut ordered, data.n_free(), data.n_free() + n_theta + 1)
+    }
+
+    /// Keep an elimination from `weigh`. The cost is that with the own numbers at their best, where
+    /// `follow` takes them.
+    pub fn keep_gathered(&mut self, found: Elimination, weights: &Weights) -> Part {
+        let cost = self.sums.moments(weights).cost - found.beside;
+        let part = Part { rest: found.rest.clone(), beside: 0.0, cost };
+        self.elimination = found;
+        part
+    }
+
     fn normal_equations<T: Trajectories>(
         &mut self,
         task: &Task<'_, T>,
@@ -206,7 +253,7 @@ impl RecordPass {
                     }
                 }
             }
-            add_rows(gram, rows, stride);
+            add_rows(gram, rows, stride, 1);
         };
         let (trajectories, scratch) = (task.trajectories, &mut self.scratch);
         trajectories.run(
@@ -220,6 +267,7 @@ impl RecordPass {
         )?;
         let mut ordered = sums.ordered(&self.gram, stride, n_theta, data, weights.inverse());
         let width = data.n_free() + n_theta + 1;
+        data.hold(values, &mut ordered, width);
         Ok((eliminate(&mut ordered, data.n_free(), width), cost))
     }
 }

@@ -3,7 +3,8 @@
 use flightid_core::linear_output_error::Driven;
 use flightid_core::motion::Motion;
 use flightid_core::nonlinear_output_error::{EquationTrajectories, Passage};
-use flightid_core::output_error::{RecordData, Wanted};
+use flightid_core::output_error::Wanted;
+use flightid_core::record_data::RecordData;
 use flightid_core::shooting::Plan;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
@@ -76,7 +77,7 @@ impl EquationRecords {
         Ok(Self { model, motion, substeps, plans })
     }
 
-    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
+    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
     ///
     /// As `StateSpace.fit_records`.
     #[allow(clippy::too_many_arguments)]
@@ -100,7 +101,7 @@ impl EquationRecords {
         fit(py, &model, &record_data(&records, own)?, noise, beside.as_ref(), search)
     }
 
-    /// run_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]], first_order_hold: bool, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    /// run_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], first_order_hold: bool, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     ///
     /// As `StateSpace.run_record`, for the record at a place.
     #[allow(clippy::too_many_arguments, clippy::type_complexity)]
@@ -121,7 +122,7 @@ impl EquationRecords {
         run(py, &model, &record_data(&records, vec![own])?, 0, &theta, with_slopes)
     }
 
-    /// start_of_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]], first_order_hold: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    /// start_of_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], first_order_hold: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     ///
     /// State at the first sample, and its derivatives by the free values, the record's free initial
     /// numbers and its free shifts, shape (n_states, columns).

@@ -5,8 +5,9 @@ use flightid_core::CoreError;
 use flightid_core::least_squares::{Options, Problem};
 use flightid_core::linear_output_error::{Driven, LinearFamily, LinearTrajectories};
 use flightid_core::linear_simulation::Hold;
-use flightid_core::output_error::{Estimate, RecordData, Trajectories, Wanted, fit_from};
+use flightid_core::output_error::{Estimate, Trajectories, Wanted, fit_from};
 use flightid_core::output_error_weights::Noise;
+use flightid_core::record_data::RecordData;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
 };
@@ -17,7 +18,8 @@ use crate::interrupt;
 
 /// Inputs and outputs (channels × samples) and sample time of one record.
 pub type Flown<'py> = (PyReadonlyArray2<'py, f64>, PyReadonlyArray2<'py, f64>, f64);
-/// Initial state, input shifts, output biases of one record, and which entries of each are free.
+/// Initial state, input shifts, output biases of one record, which entries of each are free, and the
+/// bounds of those, none or one for each.
 pub type Own<'py> = (
     PyReadonlyArray1<'py, f64>,
     PyReadonlyArray1<'py, f64>,
@@ -25,6 +27,7 @@ pub type Own<'py> = (
     Vec<usize>,
     Vec<usize>,
     Vec<usize>,
+    Vec<(f64, f64)>,
 );
 /// Rows are starts; lower and upper bounds; most steps.
 pub type SearchArguments<'py> =
@@ -82,7 +85,8 @@ pub fn record_data(records: &[Flown<'_>], own: Vec<Own<'_>>) -> PyResult<Vec<Rec
     records
         .iter()
         .zip(own)
-        .map(|((_, outputs, _), (initial, shift, bias, free_initial, free_shift, free_bias))| {
+        .map(|((_, outputs, _), own)| {
+            let (initial, shift, bias, free_initial, free_shift, free_bias, limits) = own;
             Ok(RecordData {
                 measured: outputs.as_array().t().iter().copied().collect(),
                 initial: initial.as_slice()?.to_vec(),
@@ -91,6 +95,7 @@ pub fn record_data(records: &[Flown<'_>], own: Vec<Own<'_>>) -> PyResult<Vec<Rec
                 free_initial,
                 free_shift,
                 free_bias,
+                limits,
             })
         })
         .collect()

@@ -240,7 +240,7 @@ impl StateSpace {
         search(py, model, &data, whitening, &wanted)
     }
 
-    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
+    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
     ///
     /// Output error from each start (θ, objective, noise covariance, each record's own numbers and
     /// whether they are determined, iterations, termination), or the words of the error that stopped
@@ -270,7 +270,7 @@ impl StateSpace {
         output_error::fit(py, &trajectories, &data, noise, beside.as_ref(), search)
     }
 
-    /// run_record(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int]], first_order_hold: bool, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    /// run_record(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], first_order_hold: bool, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     ///
     /// Outputs (n_outputs, n_samples) without bias and, if asked, their derivatives by θ, free
     /// initial states and free shifts (n_outputs, n_samples, columns).

@@ -15,7 +15,6 @@ from flightid.identification.record_statistics import (
 )
 
 Array = NDArray[np.float64]
-_ROUNDING = 1e-9
 
 
 def coloured_covariance(
@@ -50,8 +49,5 @@ def coloured_covariance(
     triangle = triangle_of(blocks)
     covariance, _, _, freedom = covariances(blocks, triangle)
     plain = np.diag(information_inverse(triangle))
-    # Of data without noise, rounding alone is left, and that may be negative.
-    lift = np.maximum(_ROUNDING * plain - np.diag(covariance), 0.0)
-    covariance = covariance + np.diag(lift)
     inflation = float(np.max(np.sqrt(np.diag(covariance) / plain), initial=1.0))
     return covariance, freedom, inflation

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import OptionError
 from flightid.identification.record_options import FREE, RecordOptions
 from flightid.models import Model, RecordValue, StateSpaceModel
 
@@ -34,11 +33,6 @@ def declared_numbers(
     Returns
     -------
     dict of str to RecordValue
-
-    Raises
-    ------
-    OptionError
-        A free number has bounds, which this fit cannot hold.
     """
     left_to_model = {
         "initial": isinstance(options.initial_state, str) and options.initial_state == FREE,
@@ -48,30 +42,24 @@ def declared_numbers(
     if not isinstance(model, StateSpaceModel) or not left_to_model[kind]:
         return {}
     declared = model.initial if kind == "initial" else model.biases
-    found = {name: item for name, item in declared.items() if name in names}
-    for name, item in found.items():
-        if item.free and (np.isfinite(item.minimum) or np.isfinite(item.maximum)):
-            raise OptionError(
-                f"the {kind} of {name} has bounds, which a fit to records does not hold",
-                found=f"{item.minimum:g} to {item.maximum:g}",
-                needed="a free number without bounds, or a held one",
-                action="leave min and max out of the model file, or set free = false",
-            )
-    return found
+    return {name: item for name, item in declared.items() if name in names}
 
 
 def with_declared(
     values: Array, free: Sequence[int], names: Sequence[str], declared: Declared
-) -> tuple[Array, list[int]]:
-    """Values and free places with the declared ones in their place.
+) -> tuple[Array, list[int], list[tuple[float, float]]]:
+    """Values, free places and their bounds, with the declared ones in their place.
 
     Returns
     -------
     tuple
     """
     filled, places = values.copy(), set(free)
+    limits: dict[int, tuple[float, float]] = {}
     for name, item in declared.items():
         place = list(names).index(name)
         filled[place] = item.value
         (places.add if item.free else places.discard)(place)
-    return filled, sorted(places)
+        limits[place] = (item.minimum, item.maximum)
+    ordered = sorted(places)
+    return filled, ordered, [limits.get(place, (-np.inf, np.inf)) for place in ordered]

@@ -15,7 +15,7 @@ from scipy.linalg import schur
 
 from flightid import _native
 from flightid.conventions import Light
-from flightid.errors import DataError, SingularError
+from flightid.errors import DataError, OptionError, SingularError
 from flightid.findings import Finding
 from flightid.identification.record_setup import OwnNumbers, RecordSet
 from flightid.models import Model, StateSpaceModel
@@ -131,8 +131,21 @@ def _placed(numbers: OwnNumbers, segments: Segments) -> OwnNumbers:
     if not n_growing:
         return numbers
     n = len(ends)
+    others = numbers.limits[len(numbers.free_initial) :]
+    if np.any(np.isfinite(numbers.limits[: len(numbers.free_initial)])):
+        raise OptionError(
+            "initial states have bounds, which a fit of an unstable model does not hold",
+            found="a record in which a mode grows too far to start from its first sample",
+            needed="initial states without bounds: they follow from both ends of the record",
+            action="leave min and max of initial states out of the model, or use a shorter record",
+        )
     first, last = ends[: n - n_growing] @ guesses[0], ends[n - n_growing :] @ guesses[-1]
-    return replace(numbers, initial=np.concatenate([first, last]), free_initial=list(range(n)))
+    return replace(
+        numbers,
+        initial=np.concatenate([first, last]),
+        free_initial=list(range(n)),
+        limits=[*((-np.inf, np.inf) for _ in range(n)), *others] if others else [],
+    )
 
 
 def judge_runs(runs: EquationRuns | None) -> list[Finding]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,8 @@ from flightid.units import require_match
 
 Array = NDArray[np.float64]
 NativeRecord = tuple[Array, Array, float]
-NativeOwn = tuple[Array, Array, Array, list[int], list[int], list[int]]
+Limits = list[tuple[float, float]]
+NativeOwn = tuple[Array, Array, Array, list[int], list[int], list[int], Limits]
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,8 @@ class OwnNumbers:
     initial, shift, bias : ndarray
         Initial state, input shifts, output biases.
     free_initial, free_shift, free_bias : list of int
+    limits : list of tuple of float
+        Least and largest value of each free number, in that order; empty where none has bounds.
     start : tuple of ndarray, optional
         Where `initial` is no initial state but conditions at both ends: the state at the first
         sample, shape (n_states,), and its derivatives by the free parameters, initial numbers and
@@ -45,6 +48,7 @@ class OwnNumbers:
     free_initial: list[int]
     free_shift: list[int]
     free_bias: list[int]
+    limits: Limits = field(default_factory=list)
     start: tuple[Array, Array] | None = None
 
     @property
@@ -57,6 +61,7 @@ class OwnNumbers:
             self.free_initial,
             self.free_shift,
             self.free_bias,
+            self.limits,
         )
 
     @property
@@ -72,7 +77,7 @@ class OwnNumbers:
         for part, where in zip(parts, places, strict=True):
             part[where] = values[start : start + len(where)]
             start += len(where)
-        return OwnNumbers(parts[0], parts[1], parts[2], *places)
+        return OwnNumbers(parts[0], parts[1], parts[2], *places, self.limits)
 
 
 @dataclass(frozen=True)
@@ -195,7 +200,10 @@ def prepare_records(
                 ),
             )
         )
-        own.append(OwnNumbers(initial[0], shift[0], bias[0], initial[1], shift[1], bias[1]))
+        limits = [*initial[2], *shift[2], *bias[2]]
+        if not np.any(np.isfinite(limits)):
+            limits = []
+        own.append(OwnNumbers(initial[0], shift[0], bias[0], initial[1], shift[1], bias[1], limits))
     _require_length(model, records, own)
     return RecordSet(model, records, arrays, offsets, own, states, options.hold == "first")
 

@@ -30,6 +30,8 @@ from flightid.models import Model, StateSpaceModel
 Array = NDArray[np.float64]
 Own = tuple[dict[str, FittedParameter], dict[str, FittedParameter], dict[str, FittedParameter]]
 UNDETERMINED = "the record does not tell it apart from the others of its own numbers"
+AT_BOUND = "at bound: the record would move it further"
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -262,7 +264,7 @@ def covariances(
         gain = np.vstack([np.zeros((m, len(turned))), turned.T])
         direct = np.vstack([back.T, -turned.T @ through.T])
         others = shared - gain.T @ noise @ gain
-        own.append(direct.T @ noise @ direct + through @ others @ through.T)
+        own.append(_lifted(direct.T @ noise @ direct + through @ others @ through.T, back @ back.T))
         crossed.append(direct.T @ noise @ gain - through @ others)
     diagonals = np.diagonal(variances, axis1=1, axis2=2)
     doubt = sum(
@@ -271,7 +273,13 @@ def covariances(
     # Errors that are known leave no doubt, nor does a residual that vanishes.
     doubtful = doubt > 0.0
     freedom = np.where(doubtful, np.diag(shared) ** 2 / np.where(doubtful, doubt, 1.0), np.inf)
-    return shared, own, crossed, np.asarray(freedom)
+    return _lifted(shared, information_inverse(triangle)), own, crossed, np.asarray(freedom)
+
+
+def _lifted(covariance: Array, plain: Array) -> Array:
+    """Of data without noise, rounding alone is left, and that may be negative."""
+    lift = np.maximum(_ROUNDING * np.diag(plain) - np.diag(covariance), 0.0)
+    return np.asarray(covariance + np.diag(lift))
 
 
 def start_errors(
@@ -337,8 +345,11 @@ def _own_numbers(
             if place not in places:
                 part[name] = FittedParameter(name, unit, value, "fixed", reason="fixed")
                 continue
-            error = float(errors[start + places.index(place)])
-            if np.isnan(error):
+            number = start + places.index(place)
+            error = float(errors[number])
+            if np.isnan(error) and numbers.limits and value in numbers.limits[number]:
+                part[name] = FittedParameter(name, unit, value, "at bound", reason=AT_BOUND)
+            elif np.isnan(error):
                 part[name] = FittedParameter(name, unit, value, "free", reason=UNDETERMINED)
             else:
                 interval = interval95(value, error)
