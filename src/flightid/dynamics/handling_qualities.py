@@ -79,7 +79,8 @@ def attitude_bandwidth(
     Assumes
     -------
     A phase that begins between −270° and 90°. Intervals of first order, from the covariance of
-    parameters or of the measured response: biased where coherence is low near ω_180 or its double.
+    parameters or of the measured response: biased where coherence is low near ω_180 or its double,
+    and by what windows blur, which only a fit takes out.
     Of several passages through −180° the first counts, which noise makes earlier.
 
     Reference
@@ -226,18 +227,28 @@ def _judge(curve: Curve, values: Array, nonlinear: bool, response_type: str) -> 
 
 
 def _coherence(data: object, pair: Pair, values: Array) -> tuple[Finding, ...]:
-    """Warning where the numbers rest on points of low coherence."""
+    """Warnings on a measured response: windows, and points of low coherence."""
     if not isinstance(data, FrequencyResponse):
         return ()
     measured = data.pair(pair.output, pair.input)
+    found = _windows(data)
     low, high = 0.95 * float(np.nanmin(values[:3])), 2.0 * float(values[0])
     inside = (measured.omega_rad_s >= low) & (measured.omega_rad_s <= high)
     if not np.any(inside) or np.min(measured.coherence[inside]) >= COHERENT:
-        return ()
+        return found
     place = np.flatnonzero(inside)[np.argmin(measured.coherence[inside])]
     text = (
         f"coherence falls to {measured.coherence[place]:.2f} at "
         f"{measured.omega_rad_s[place]:.3g} rad/s, between bandwidth and twice ω_180"
     )
     action = f"excite these frequencies more; below {COHERENT:g} the phase is a guess"
-    return (Finding("low-coherence", Light.AMBER, text, action),)
+    return (*found, Finding("low-coherence", Light.AMBER, text, action))
+
+
+def _windows(data: FrequencyResponse) -> tuple[Finding, ...]:
+    """Warning that an estimate is blurred, which no interval holds."""
+    if not data.window_s:
+        return ()
+    text = "read from a response that windows blur; its intervals hold random errors alone"
+    action = "read it from a model fitted to the response: identify takes the windows out"
+    return (Finding("windows-blur", Light.AMBER, text, action),)
