@@ -10,6 +10,8 @@ from scipy.optimize import brentq
 
 import flightid as fid
 from flightid.dynamics import attitude_bandwidth
+from flightid.dynamics.handling_qualities import bandwidth_numbers
+from flightid.dynamics.handling_qualities_curve import Curve, Pair, smoother_of
 from flightid.dynamics.rating_charts_reading import rating_chart
 from flightid.errors import DataError, OptionError, UnknownNameError
 from tests.closeness import assert_close
@@ -189,6 +191,24 @@ def test_phase_that_is_no_line_is_said_and_its_slope_counts() -> None:
     assert "phase-nonlinear" in [finding.code for finding in found.findings]
 
 
+def test_smoothing_keeps_parabolas_and_averages_noise() -> None:
+    omega = np.geomspace(1.0, 10.0, 40)
+    logs = np.log(omega)
+    given = fid.FrequencyResponse.from_values(
+        omega, 1.0 / omega, inputs=["lat"], outputs=["phi"], random_error=np.full((1, 1, 40), 0.03)
+    )
+    pair = Pair("phi", "lat", 0.1, 100.0)
+    smoother = smoother_of(given, pair)
+    assert smoother is not None
+    parabola = 3.0 - 2.0 * logs + 0.7 * logs**2
+    assert_close(smoother @ parabola, parabola, rtol=1e-9, why="local parabolas hold it")
+    middle = np.sum(smoother[20] ** 2)
+    assert 0.1 < middle < 0.5
+    without = fid.FrequencyResponse.from_values(omega, 1.0 / omega, inputs=["lat"], outputs=["phi"])
+    assert smoother_of(without, pair) is None
+    assert smoother_of(given.select(omega=omega[:4]), pair) is None
+
+
 def test_low_coherence_and_several_crossings_are_said() -> None:
     response = measured(0.1, 0.3, 200)
     omega = response.omega_rad_s
@@ -268,14 +288,16 @@ def test_intervals_of_a_measured_response_are_those_of_its_errors() -> None:
     )
     found = attitude_bandwidth(given, "phi", "lat")
     random = np.random.default_rng(3)
+    pair = Pair("phi", "lat", 0.1, 100.0)
+    smoother = smoother_of(given, pair)
     drawn = []
-    for _ in range(400):
+    for _ in range(500):
         noise = random.standard_normal((2, 60)) * 0.01
         values = response.response[0, 0] * (1.0 + noise[0] + 1j * noise[1])
         one = fid.FrequencyResponse.from_values(
             response.omega_rad_s, values, inputs=["lat"], outputs=["phi"]
         )
-        drawn.append(attitude_bandwidth(one, "phi", "lat").spread.values)
+        drawn.append(bandwidth_numbers(Curve.of(one, pair, smoother)))
     scatter = np.std(drawn, axis=0)
     assert found.spread.stderr is not None
-    assert_close(found.spread.stderr, scatter, rtol=0.12, why="scatter of 400 noisy responses")
+    assert_close(found.spread.stderr, scatter, rtol=0.12, why="scatter of 500 noisy responses")

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.dynamics.handling_qualities_curve import Curve, Pair
+from flightid.dynamics.handling_qualities_curve import Curve, Pair, smoother_of
 from flightid.dynamics.handling_qualities_result import AttitudeBandwidth
 from flightid.dynamics.spread import Propagated
 from flightid.dynamics.spread_of import spread_of
@@ -49,8 +49,9 @@ def attitude_bandwidth(
     Parameters
     ----------
     source : Fit, FrequencyResponse, model, LinearSystem, or a black-box fit
-        Measured points are joined by straight lines of dB and degrees over log frequency; a model
-        is evaluated where it is needed. Fits and measured responses give intervals.
+        Measured points with known errors are smoothed by local parabolas over a third of their
+        frequency, and joined by straight lines of dB and degrees over log frequency; a model is
+        evaluated where it is needed. Fits and measured responses give intervals.
     output, input : str
         Attitude and control.
     band_rad_s : tuple of float
@@ -105,12 +106,13 @@ def attitude_bandwidth(
         if given not in known:
             raise OptionError(f"{name} is not known", found=given, needed=" or ".join(known))
     if isinstance(source, FrequencyResponse):
-        data: object = source.select(outputs=[output], inputs=[input])
-        curve = Curve.of(data, pair)
+        chosen = source.select(outputs=[output], inputs=[input])
+        data: object = chosen
+        curve = Curve.of(chosen, pair, smoother_of(chosen, pair))
     else:
         data = source
         curve = Curve.of(spread_of(source).estimate, pair)
-    values = _numbers(curve)
+    values = bandwidth_numbers(curve)
     if not np.all(np.isfinite(values[:2])):
         raise DataError(
             f"{output}/{input} has no bandwidth in the band",
@@ -133,7 +135,7 @@ def _pair(output: str, control: str, band: tuple[float, float], output_is: str, 
     return Pair(output, control, low, high, output_is == "rate", sign)
 
 
-def _numbers(curve: Curve) -> Array:
+def bandwidth_numbers(curve: Curve) -> Array:
     """ω_180, phase bandwidth, gain bandwidth, phase delay by two points and by the slope."""
     crossing = curve.falls_through(-180.0)
     margin = curve.falls_through(PHASE_MARGIN_DEG - 180.0)
@@ -149,10 +151,12 @@ def _numbers(curve: Curve) -> Array:
 
 def _spread(data: object, pair: Pair, values: Array) -> Propagated:
     """Covariance of the numbers, about the values of the whole curve."""
+    smoother = None
     if isinstance(data, FrequencyResponse):
         data = _thinned(data, pair, values)
+        smoother = smoother_of(data, pair)
     found = spread_of(data, pair.output, pair.input).propagate(
-        lambda thing: _numbers(Curve.of(thing, pair))
+        lambda thing: bandwidth_numbers(Curve.of(thing, pair, smoother))
     )
     return Propagated(values, found.covariance, found.reason)
 
@@ -160,8 +164,8 @@ def _spread(data: object, pair: Pair, values: Array) -> Propagated:
 def _thinned(response: FrequencyResponse, pair: Pair, values: Array) -> FrequencyResponse:
     """The part of a measured response that the numbers depend on, at most `MOST_POINTS` of it."""
     omega = response.omega_rad_s
-    first = 0.8 * float(np.nanmin(values[:3]))
-    inside = np.flatnonzero((omega >= pair.low) & (omega <= min(pair.high, 2.2 * values[0])))
+    first = 0.6 * float(np.nanmin(values[:3]))
+    inside = np.flatnonzero((omega >= pair.low) & (omega <= min(pair.high, 2.75 * values[0])))
     near = inside[omega[inside] >= first]
     below = inside[omega[inside] < first]
     keep = (

@@ -18,6 +18,10 @@ SLOPE_POINTS = 200
 DEGREES_PER_RADIAN = 57.3
 """As the standard writes it in the definition of phase delay."""
 BELOW_NYQUIST = 0.999
+SMOOTHED = 0.3
+"""Reach of a local parabola over measured points, in the logarithm of frequency."""
+FEWEST_NEAR = 6
+"""Points that a parabola goes through at least."""
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
@@ -68,8 +72,15 @@ class Curve:
     exact: Callable[[float], complex] | None
 
     @classmethod
-    def of(cls, thing: object, pair: Pair) -> Curve:
+    def of(cls, thing: object, pair: Pair, smoother: Array | None = None) -> Curve:
         """Curve of a response, a model or a system.
+
+        Parameters
+        ----------
+        thing : FrequencyResponse, model or system
+        pair : Pair
+        smoother : ndarray, shape (n, n), optional
+            Of measured decibels and degrees, from `smoother_of`.
 
         Raises
         ------
@@ -98,9 +109,12 @@ class Curve:
                 found=f"{np.count_nonzero(values)} between {pair.low:g} and {pair.high:g} rad/s",
                 needed="two or more, none of them zero",
             )
+        decibels = 20.0 * np.log10(np.abs(values))
         degrees = np.degrees(np.unwrap(np.angle(values)))
         degrees -= 360.0 * np.ceil((degrees[0] - 90.0) / 360.0)
-        return cls(omega, 20.0 * np.log10(np.abs(values)), degrees, exact)
+        if smoother is not None:
+            decibels, degrees = smoother @ decibels, smoother @ degrees
+        return cls(omega, decibels, degrees, exact)
 
     def at(self, omega: float) -> tuple[float, float]:
         """Decibels and degrees at one frequency: of a model exactly, else between neighbours."""
@@ -154,6 +168,34 @@ class Curve:
         left = float(self.omega[place])
         right = float(self.omega[min(place + 1, len(self.omega) - 1)])
         return float(brentq(lambda at: self.at(at)[part] - level, left, right, xtol=1e-12))
+
+
+def smoother_of(response: FrequencyResponse, pair: Pair) -> Array | None:
+    """Local parabolas over log frequency through the measured points of the band.
+
+    A crossing read off two noisy neighbours has the slope of their noise. None where the points
+    have no errors, or are few.
+
+    Reference
+    ---------
+    Cleveland, "Robust locally weighted regression", *J. American Statistical Association* 74
+    (1979), section 2, without its iterations.
+    """
+    measured = response.pair(pair.output, pair.input)
+    inside = (measured.omega_rad_s >= pair.low) & (measured.omega_rad_s <= pair.high)
+    error = measured.random_error[inside]
+    logs = np.log(measured.omega_rad_s[inside])
+    if len(logs) < FEWEST_NEAR or not np.all(error > 0.0):
+        return None
+    rows = np.zeros((len(logs), len(logs)))
+    for place, centre in enumerate(logs):
+        away = np.abs(logs - centre)
+        reach = max(SMOOTHED, 1.001 * float(np.partition(away, FEWEST_NEAR - 1)[FEWEST_NEAR - 1]))
+        near = np.flatnonzero(away < reach)
+        weights = (1.0 - (away[near] / reach) ** 3) ** 1.5 / error[near]
+        basis = np.vander((logs[near] - centre) / reach, 3, increasing=True)
+        rows[place, near] = np.linalg.pinv(weights[:, None] * basis)[0] * weights
+    return rows
 
 
 def _evaluator(thing: object, pair: Pair) -> tuple[Callable[[Array], Complex], float]:
