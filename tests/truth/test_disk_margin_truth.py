@@ -41,7 +41,7 @@ SPINNING = fid.LinearSystem(
 @pytest.mark.parametrize("skew", [-1.0, -0.3, 0.0, 0.7, 1.0])
 def test_single_loop_is_a_distance(skew):
     found = fid.disk_margin(siso(), skew=skew)
-    omega = np.geomspace(1e-4, 100.0, 2_000_001)
+    omega = np.geomspace(1e-4, 100.0, 300_001)
     loop = 4.0 * np.exp(-0.1j * omega) / (1j * omega)
     alpha = 1 / np.max(np.abs(1 / (1 + loop) + 0.5 * (skew - 1)))
     assert_close(found.alpha.value, alpha, rtol=1e-6, why="dense search")

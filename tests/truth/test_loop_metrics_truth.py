@@ -215,3 +215,19 @@ def test_what_is_no_loop_is_refused():
         loop_metrics([1.0, 2.0, 3.0], [1.0, 0.0, 1.0])
     with pytest.raises(ShapeError, match="unstable_poles does not fit"):
         loop_metrics(OMEGA, np.ones((2, len(OMEGA))), unstable_poles=[1, 2, 3])
+
+
+def test_delay_takes_the_long_way_where_phase_leads():
+    # Both crossovers lie at phases between 0 and 20°: delay has to turn them by 200° to −180°.
+    loop = 2.65 * S**2 / (S + 1) ** 3
+    found = loop_metrics(OMEGA, loop)
+    assert -180.0 < -found.phase_margin_deg < -150.0
+    crossings = np.flatnonzero(np.diff(np.sign(np.abs(loop) - 1.0)))
+    assert len(crossings) == 2
+    phase = 180.0 + np.degrees(np.angle(loop[crossings]))
+    assert np.all(phase > 180.0)
+    expected = np.min(np.radians(phase) / OMEGA[crossings])
+    assert_close(found.delay_margin_s, expected, rtol=3e-3, why="(180° + φ)/ω")
+    for share, stable in ((0.98, True), (1.02, False)):
+        late = loop * np.exp(-S * share * found.delay_margin_s)
+        assert bool(loop_metrics(OMEGA, late).is_stable) == stable

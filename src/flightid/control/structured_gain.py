@@ -13,11 +13,11 @@ from flightid.errors import DataError, ShapeError
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-POWERS = (1, 2, 4, 8, 16, 32, 64, 128, 256)
-"""Schatten norms 2p that lead from the Frobenius norm to the largest singular value."""
+POWERS = (2, 16, 128, 1024)
+"""Schatten norms 2p that lead to the largest singular value."""
 STEPS = 12
 HALVINGS = 20
-SETTLED = 1e-9
+SETTLED = 1e-4
 DIFFERENCE = 1e-5
 LARGEST_STEP = 2.0
 """Of a logarithm of a scaling."""
