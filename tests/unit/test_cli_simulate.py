@@ -156,5 +156,11 @@ def test_export_from_the_command_line(tmp_path: Path, capsys) -> None:
     words = ["export", "short_period", str(unit), "--rate", "100", "--sources-only"]
     assert run([*words, "--interface", "co-simulation"]) == 0
     assert "co-simulation" in capsys.readouterr().out
+    aero = tmp_path / "aero.xml"
+    words = ["export", "fixed_wing_lateral", str(aero), "--mass", "1247", "--inertia", "ixx=1421"]
+    words += ["--inertia", "iyy=4067", "--inertia", "izz=4786", "--trim", "u=53.645"]
+    assert run([*words, "--property", "rudder=fcs/rudder-left-pos-rad"]) == 0
+    assert "fcs/rudder-left-pos-rad" in aero.read_text()
+    capsys.readouterr()
     assert run(["export", "short_period", str(tmp_path / "sp.xyz")]) == 2
     assert "format of an export is not known" in capsys.readouterr().err

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from flightid.cli.output import emit, json_option
-from flightid.cli.pairs import numbers
+from flightid.cli.pairs import numbers, pairs
 
 
 @click.command()
@@ -30,6 +30,10 @@ from flightid.cli.pairs import numbers
 )
 @click.option("--pade-order", type=click.IntRange(1), help="Approximate delays in an FMU.")
 @click.option("--sources-only", is_flag=True, help="An FMU without a binary.")
+@click.option("--mass", type=float, help="For JSBSim, kg.")
+@click.option("--inertia", multiple=True, help="ixx=KG_M2 and so on, for JSBSim.")
+@click.option("--trim", multiple=True, help="u=M_PER_S, theta=RAD and so on, for JSBSim.")
+@click.option("--property", "properties", multiple=True, help="INPUT=PROPERTY of JSBSim.")
 @json_option
 def command(
     model: str,
@@ -45,12 +49,16 @@ def command(
     interfaces: tuple[str, ...],
     pade_order: int | None,
     sources_only: bool,
+    mass: float | None,
+    inertia: tuple[str, ...],
+    trim: tuple[str, ...],
+    properties: tuple[str, ...],
     as_json: bool,
 ) -> None:
     """Write MODEL, a .toml file or a library name, to FILE.
 
     The suffix of FILE chooses: .toml (flightid), .mat (MATLAB), .json, .npz (matrices), .c
-    (portable C99), .fmu (FMI 3.0).
+    (portable C99), .fmu (FMI 3.0), .xml (JSBSim aerodynamics).
     """
     from flightid import export, load_model
     from flightid.models import load_structure
@@ -69,6 +77,10 @@ def command(
         "interfaces": interfaces or None,
         "pade_order": pade_order,
         "compile": False if sources_only else None,
+        "mass_kg": mass,
+        "inertia_kg_m2": numbers("--inertia", inertia) or None,
+        "trim": numbers("--trim", trim) or None,
+        "properties": pairs("--property", properties) or None,
     }
     options = {key: value for key, value in given.items() if value is not None}
     emit(export(chosen, file, format, name=name, **options), as_json=as_json)

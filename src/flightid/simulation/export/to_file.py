@@ -25,6 +25,7 @@ from flightid.models.system_files import MATLAB_RECIPE
 from flightid.simulation.export.c import export_c
 from flightid.simulation.export.exported import Exported
 from flightid.simulation.export.fmu import export_fmu
+from flightid.simulation.export.jsbsim import export_jsbsim
 
 FORMATS = {
     ".toml": "toml",
@@ -34,9 +35,14 @@ FORMATS = {
     ".c": "c",
     ".h": "c",
     ".fmu": "fmu",
+    ".xml": "jsbsim",
 }
 
-_WRITERS: Mapping[str, Callable[..., Exported]] = {"c": export_c, "fmu": export_fmu}
+_WRITERS: Mapping[str, Callable[..., Exported]] = {
+    "c": export_c,
+    "fmu": export_fmu,
+    "jsbsim": export_jsbsim,
+}
 
 
 def export(
@@ -57,7 +63,8 @@ def export(
         File to write; its folder must exist.
     format : str, optional
         ``"toml"`` (flightid's own), ``"mat"``, ``"json"``, ``"npz"`` (matrices), ``"c"``
-        (portable C99, two files) or ``"fmu"`` (FMI 3.0). Left out: by the suffix.
+        (portable C99, two files), ``"fmu"`` (FMI 3.0) or ``"jsbsim"`` (aerodynamics in .xml).
+        Left out: by the suffix.
     name : str, optional
         Of the model in the file; left out: the file's name.
     **options
@@ -65,7 +72,8 @@ def export(
         ``tunable`` (equations with parameters to change, instead of exact samples). FMU:
         ``sample_time_s`` (the internal step), ``interfaces`` (of "model-exchange" and
         "co-simulation"), ``pade_order`` (for delays in model exchange), ``substeps``,
-        ``compile`` (False: sources alone).
+        ``compile`` (False: sources alone). JSBSim: ``mass_kg``, ``inertia_kg_m2``, ``trim``,
+        ``properties``.
 
     Returns
     -------
