@@ -129,3 +129,12 @@ def test_refused(compared: fid.ConditionComparison) -> None:
         fid.compare_conditions({"a": fid.load_model("r50_hover"), "b": box})
     with pytest.raises(errors.UnknownNameError, match="there is no such common parameter"):
         compared["Zw"]
+
+
+def test_modes_without_common_states_do_not_answer_to_each_other() -> None:
+    both = {n: fid.load_model(f"fixed_wing_{n}") for n in ("longitudinal", "lateral")}
+    found = fid.compare_conditions(both)
+    assert found.modes == ()
+    assert found.only_modes["longitudinal"] == ("phugoid", "short period")
+    assert found.only_modes["lateral"] == ("spiral", "Dutch roll", "roll")
+    assert found.modes_table().rows == ()
