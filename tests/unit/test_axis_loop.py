@@ -223,3 +223,34 @@ def test_planes_have_no_angle_controller_for_yaw(autopilot: str) -> None:
         loop.angle([1.0])
     roll = axis_loop(autopilot, "roll", loop_rate_hz=100.0)
     assert_close(roll.angle([1.0]).real, [1 / roll.values["angle_tc"]], rtol=1e-3, why="1/TCONST")
+
+
+def test_a_helicopters_integrator_leaks_two_percent_a_loop_down_to_its_floor() -> None:
+    loop = axis_loop("arduheli", "roll", loop_rate_hz=400.0)
+    only = {name: 0.0 for name in loop.gains if name[-2:] in ("_P", "_D", "FF")}
+    loop = loop.with_gains(only | {"ATC_RAT_RLL_I": 0.5, "ATC_RAT_RLL_ILMI": 0.0})
+    growth = 0.5 * 0.1 / 400.0
+    settled = loop.run(np.full(4000, 0.1), np.zeros(4000)).output[-1]
+    assert_close(settled, growth / 0.02, rtol=1e-4, why="leak and growth in balance")
+    held = loop.with_gains(ATC_RAT_RLL_ILMI=0.05).run(np.full(8000, 0.1), np.zeros(8000))
+    assert_close(held.output[-1], 0.05 + growth / 0.02, rtol=1e-3, why="only the excess leaks")
+
+
+def test_double_and_triple_notches_stand_beside_the_centre() -> None:
+    notch = {
+        "INS_HNTCH_ENABLE": 1.0, "INS_HNTCH_MODE": 0.0, "INS_HNTCH_FREQ": 80.0,
+        "INS_HNTCH_BW": 40.0, "INS_HNTCH_ATT": 40.0, "INS_HNTCH_HMNCS": 1.0,
+    }  # fmt: skip
+    spread = 40.0 / (32 * 80.0)
+    for options, offsets in ((0.0, [0.0]), (1.0, [-spread, spread]), (16.0, [0, -spread, spread])):
+        sections, _ = ardupilot_notches(notch | {"INS_HNTCH_OPTS": options}, 2000.0)
+        # b1 = −2 cos(ω0) s and 1 + a2 = 2 s, with s = 1/(1 + α); α = sin(ω0)/(2 Q).
+        centers = [np.arccos(-b1 / (1 + a2)) * 2000 / (2 * np.pi) for _, b1, _, _, a2 in sections]
+        expected = 80.0 * (1 + np.array(offsets))
+        assert_close(centers, expected, rtol=1e-9, why="bandwidth over 32 to each side")
+        octaves = 2 * np.log2(80.0 / (80.0 - 20.0 / len(offsets)))
+        quality = 2 ** (octaves / 2) / (2**octaves - 1)
+        alpha = (1 - sections[0][4]) / (1 + sections[0][4])
+        exact = np.sin(2 * np.pi * expected[0] / 2000) / (2 * quality)
+        assert_close(alpha, exact, rtol=1e-9, why="each takes its share of the bandwidth")
+    assert ardupilot_notches(notch | {"INS_HNTCH_FREQ": 970.0}, 2000.0)[0] == ()
