@@ -182,3 +182,26 @@ def test_a_controller_may_be_given_in_every_form():
         assert_close(three.phase_margin.value, one.phase_margin.value, rtol=1e-4, why="measured")
     flipped = fid.margins(integrator(-4.0), controller=-1.0)
     assert_close(flipped.phase_margin.value, 90 - np.degrees(0.4), rtol=1e-9, why="adding junction")
+
+
+def test_a_connection_broken_at_a_signal_is_the_loop():
+    blocks = fid.loops
+    closed = fid.connect(
+        [
+            blocks.sum_of("e", "r", "-y"),
+            blocks.transfer("e", "u", [4.0], [1.0, 0.0]),
+            blocks.delay("u", "y", 0.1),
+        ],
+        inputs=["r"],
+        outputs=["y"],
+    )
+    direct = fid.margins(integrator())
+    for signal in ("e", "u", "y"):
+        found = fid.margins(closed.broken_at(signal))
+        for one, two in zip(found.quantities, direct.quantities, strict=True):
+            assert (one.value is None) == (two.value is None)
+            if one.value is not None:
+                assert_close(one.value, two.value, rtol=1e-6, why=f"{one.name} at {signal}")
+    assert found.is_stable == closed.is_stable
+    disk = fid.disk_margin(closed.broken_at("e")).alpha.value
+    assert_close(disk, fid.disk_margin(integrator()).alpha.value, rtol=1e-6, why="one loop")

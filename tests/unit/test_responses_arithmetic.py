@@ -58,6 +58,7 @@ def _numeric(function, response: FrequencyResponse) -> np.ndarray:
         lambda h: arithmetic.differentiate(h, -2),
         lambda h: arithmetic.close_loop(h, lambda s: 0.3 + 0.1 * s),
         lambda h: arithmetic.open_loop(h, 0.4),
+        arithmetic.loop_of_sensitivity,
         lambda h: arithmetic.peel_loop(h, lambda s: 1 / (0.05 * s + 1), -0.3),
     ],
 )

@@ -160,7 +160,8 @@ def disturbance_rejection(
     Assumes
     -------
     A linear loop. The peak of a noisy measurement is biased upwards: it is the highest of many
-    points. Intervals are carried by first order.
+    points. The resolution of windows moves the bandwidth of a measurement, by half a standard error
+    in simulated flights of a minute. Intervals are carried by first order.
 
     Reference
     ---------
