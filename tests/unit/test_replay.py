@@ -138,7 +138,7 @@ def test_a_set_point_that_acts_later_is_noticed(tmp_path: Path) -> None:
     assert "unexpected-lag" in [finding.code for finding in found.findings]
 
 
-def _px4_log(path: Path, *, integral: bool = True) -> tuple[Log, np.ndarray]:
+def _px4_log(path: Path, *, saturated: bool = False) -> tuple[Log, np.ndarray]:
     """A modern PX4 log whose torque set-point is what the controller makes of its inputs."""
     loop = axis_loop("px4_multicopter", "roll", loop_rate_hz=400.0)
     n = 2000
@@ -146,7 +146,9 @@ def _px4_log(path: Path, *, integral: bool = True) -> tuple[Log, np.ndarray]:
     setpoint = 0.8 * np.sin(5 * t) + 0.3 * np.sin(17 * t)
     rate = 0.7 * np.sin(5 * t - 0.3)
     acceleration = 0.7 * 5 * np.cos(5 * t - 0.35)
-    run = loop.run(setpoint, rate, LoopFlags(acceleration=acceleration))
+    short = np.where(saturated & (t % 1.0 > 0.4), 0.1 * np.sign(setpoint), 0.0)
+    limited = np.column_stack([short > 0, short < 0])
+    run = loop.run(setpoint, rate, LoopFlags(acceleration=acceleration, limited=limited))
     builder = UlogBuilder()
     builder.format("vehicle_rates_setpoint:uint64_t timestamp;float roll;float[3] thrust_body;")
     builder.format(
@@ -155,11 +157,15 @@ def _px4_log(path: Path, *, integral: bool = True) -> tuple[Log, np.ndarray]:
     )
     builder.format("vehicle_torque_setpoint:uint64_t timestamp;float[3] xyz;")
     builder.format("rate_ctrl_status:uint64_t timestamp;float rollspeed_integ;")
+    builder.format(
+        "control_allocator_status:uint64_t timestamp;float[3] unallocated_torque;"
+        "bool torque_setpoint_achieved;"
+    )
     builder.format("vehicle_status:uint64_t timestamp;uint8_t vehicle_type;")
     for name, value in {**loop.gains, "IMU_GYRO_RATEMAX": 400}.items():
         builder.parameter(name, value)
     names = ("vehicle_rates_setpoint", "vehicle_angular_velocity", "vehicle_torque_setpoint")
-    for number, name in enumerate((*names, "rate_ctrl_status")[: 3 + integral]):
+    for number, name in enumerate((*names, "rate_ctrl_status", "control_allocator_status")):
         builder.announce(name, number)
     builder.announce("vehicle_status", 9).sample(9, "QB", 1_000_000, 1)
     for k in range(n):
@@ -167,14 +173,15 @@ def _px4_log(path: Path, *, integral: bool = True) -> tuple[Log, np.ndarray]:
         builder.sample(0, "Q4f", us, setpoint[k], 0, 0, -0.5)
         builder.sample(1, "QQ6f", us, us, rate[k], 0, 0, acceleration[k], 0, 0)
         builder.sample(2, "Q3f", us, run.output[k], 0, 0)
-        if integral:
-            builder.sample(3, "Qf", us, run.terms["I"][k])
+        builder.sample(3, "Qf", us, run.terms["I"][k])
+        builder.sample(4, "Q3fB", us, short[k], 0, 0, int(short[k] == 0))
     path.write_bytes(bytes(builder))
     return fid.read_log(path), run.output
 
 
-def test_px4_torque_is_reproduced_from_its_topics(tmp_path: Path) -> None:
-    log, output = _px4_log(tmp_path / "a.ulg")
+@pytest.mark.parametrize("saturated", [False, True])
+def test_px4_torque_is_reproduced_from_its_topics(tmp_path: Path, saturated: bool) -> None:
+    log, output = _px4_log(tmp_path / "a.ulg", saturated=saturated)
     loop = axis_loop_of(log, "roll")
     assert (loop.autopilot, loop.loop_rate_hz) == ("px4_multicopter", 400.0)
     found = replay(log, "roll")

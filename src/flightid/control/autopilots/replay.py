@@ -36,6 +36,10 @@ COARSE = 7
 FINE_S = 5e-5
 MOVES = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 GAP_LOOPS = 1.5
+HALF_STAMP_S = 5e-7
+"""Stamps count microseconds; rounding must not move a row to the loop before its own."""
+SMALLEST = float(np.finfo(np.float32).eps)
+"""PX4 calls its allocation saturated from this unallocated torque on."""
 
 
 @dataclass(frozen=True)
@@ -254,7 +258,7 @@ def _sampled(signal: Signal, time_s: Samples) -> Samples:
 
 
 def _held(signal: Signal, time_s: Samples) -> Samples:
-    rows = np.searchsorted(signal.time_s, time_s, side="right") - 1
+    rows = np.searchsorted(signal.time_s, time_s + HALF_STAMP_S, side="right") - 1
     return np.asarray(signal.values[np.maximum(rows, 0)])
 
 
@@ -264,6 +268,9 @@ def _flags(
     limited = None
     if signals.flags is not None:
         limited = (_held(signals.flags, grid_s).astype(int) & LIMIT) > 0
+    elif signals.unallocated is not None:
+        missing = _held(signals.unallocated, grid_s)
+        limited = np.column_stack([missing > SMALLEST, missing < -SMALLEST])
     return LoopFlags(
         limited=limited,
         landed=None if signals.landed is None else _held(signals.landed, grid_s) > 0,

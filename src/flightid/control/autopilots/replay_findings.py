@@ -154,6 +154,11 @@ def _rate(c: Circumstances) -> list[Finding]:
 
 def _limits(c: Circumstances) -> list[Finding]:
     found = []
+    if c.signals.unallocated is not None:
+        share = float(np.mean(c.signals.unallocated.values != 0))
+        if share > 0:
+            text = f"the allocation could not give the torque in {share:.0%} of its rows"
+            found.append(Finding("limit-flag", Light.AMBER, text, "choose a span without limits"))
     if c.signals.flags is not None:
         bits = c.signals.flags.values.astype(int)
         limited = float(np.mean((bits & LIMIT) > 0))

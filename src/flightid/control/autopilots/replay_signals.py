@@ -55,6 +55,8 @@ class AxisSignals:
         Bits of PIDR.Flags.
     thrust, acceleration, landed : Signal or None
         What else the controller looks at.
+    unallocated : Signal or None
+        Torque that the allocation could not give (PX4); zero where it gave all.
     paired : bool
         Set-point, rate and terms stand on the same rows.
     """
@@ -68,6 +70,7 @@ class AxisSignals:
     thrust: Signal | None = None
     acceleration: Signal | None = None
     landed: Signal | None = None
+    unallocated: Signal | None = None
     paired: bool = False
     extra: dict[str, str] = field(default_factory=dict)
 
@@ -254,8 +257,19 @@ def _px4(log: Log, loop: AxisLoop, span_s: tuple[float, float] | None) -> AxisSi
         acceleration=acceleration
         or _optional(log, "vehicle_angular_acceleration", f"xyz[{place}]"),
         landed=_optional(log, "vehicle_land_detected", "landed"),
+        unallocated=_unallocated(log, place),
         extra=extra,
     )
+
+
+def _unallocated(log: Log, place: int) -> Signal | None:
+    message = "control_allocator_status"
+    missing = _optional(log, message, f"unallocated_torque[{place}]")
+    achieved = _optional(log, message, "torque_setpoint_achieved")
+    if missing is None or achieved is None:
+        return None
+    values = np.where(achieved.values > 0, 0.0, missing.values)
+    return Signal(missing.time_s, values, missing.source)
 
 
 def _table(log: Log, message: str) -> LogTable:
