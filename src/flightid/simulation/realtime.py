@@ -1,0 +1,267 @@
+"""A pilot flies a model: a fixed step beside the clock, inputs and outputs by UDP."""
+
+from __future__ import annotations
+
+import json
+import math
+import socket
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Protocol, Self
+
+import numpy as np
+
+from flightid.errors import DataError, OptionError
+from flightid.record import Record
+from flightid.simulation.stepper import Stepper
+from flightid.table import Column, Table
+
+MAXIMUM_DATAGRAM = 8192
+MAXIMUM_FRAMES = 10_000_000
+SCHEMA = "flightid.flown_session/1"
+
+
+class Clock(Protocol):
+    """What time it is, and waiting."""
+
+    def now(self) -> float:
+        """Seconds from any origin; never goes back."""
+
+    def sleep(self, seconds: float) -> None:
+        """Wait."""
+
+
+class SystemClock:
+    """The machine's monotonic clock."""
+
+    def now(self) -> float:
+        """Seconds."""
+        return time.monotonic()
+
+    def sleep(self, seconds: float) -> None:
+        """Wait."""
+        time.sleep(seconds)
+
+
+@dataclass(frozen=True, eq=False)
+class FlownSession:
+    """A flight in real time.
+
+    Attributes
+    ----------
+    record : Record
+        Inputs of the pilot and outputs of the model.
+    late_frames : int
+        Frames that began later than their instant by more than a tenth of a sample.
+    worst_late_s : float
+        Longest delay of a frame, s.
+    """
+
+    record: Record
+    late_frames: int
+    worst_late_s: float
+
+    def __repr__(self) -> str:
+        """Frames and late ones on one line."""
+        return f"FlownSession({self.record.n_samples} frames, {self.late_frames} late)"
+
+    def summary(self) -> Table:
+        """Table of the frames."""
+        rows = (
+            ("frames", float(self.record.n_samples), ""),
+            ("late frames", float(self.late_frames), ""),
+            ("worst delay", 1e3 * self.worst_late_s, "ms"),
+        )
+        return Table(repr(self), (Column("what"), Column("value"), Column("unit")), rows)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key."""
+        return {
+            "schema": SCHEMA,
+            "frames": self.record.n_samples,
+            "late_frames": self.late_frames,
+            "worst_late_s": self.worst_late_s,
+        }
+
+
+def fly_in_real_time(
+    stepper: Stepper,
+    pilot: Callable[[float, Mapping[str, float]], Mapping[str, float]],
+    *,
+    duration_s: float,
+    show: Callable[[float, Mapping[str, float]], None] | None = None,
+    clock: Clock | None = None,
+) -> FlownSession:
+    """Step a model beside a clock; frames that come late are counted, none is left out.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    pilot : callable
+        Takes the time, s, and the last outputs; returns inputs by name.
+    duration_s : float
+        Of the flight, s.
+    show : callable, optional
+        Takes the time and the outputs, each frame.
+    clock : Clock, optional
+        Left out: the machine's.
+
+    Returns
+    -------
+    FlownSession
+
+    Raises
+    ------
+    OptionError
+        A duration without meaning.
+    DataError
+        The model diverges, or the pilot gives what is no number.
+    UnknownNameError
+        The pilot moves what is no input.
+
+    Example
+    -------
+    >>> from flightid.models import LinearSystem
+    >>> lag = LinearSystem([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ("u",), ("y",))
+    >>> fly_in_real_time(Stepper(lag, 0.01), lambda t, y: {"u": 1.0}, duration_s=0.05).record
+    Record('flown', 5 samples, 100 Hz, 0.05 s, inputs [u], outputs [y])
+    """
+    beat, step = clock or SystemClock(), stepper.sample_time_s
+    count = round(duration_s / step) if math.isfinite(duration_s) else 0
+    if not 2 <= count <= MAXIMUM_FRAMES:
+        raise OptionError(
+            "the flight has no usable length",
+            found=f"{duration_s:g} s",
+            needed="two samples or more",
+        )
+    given = np.empty((len(stepper.inputs), count))
+    found = np.empty((len(stepper.outputs), count))
+    outputs: Mapping[str, float] = dict.fromkeys(stepper.outputs, 0.0)
+    start, late_frames, worst = beat.now(), 0, 0.0
+    for k in range(count):
+        wait = start + k * step - beat.now()
+        if wait > 0.0:
+            beat.sleep(wait)
+        else:
+            worst = max(worst, -wait)
+            late_frames += -wait > 0.1 * step
+        inputs = {**stepper.rest, **pilot(k * step, outputs)}
+        outputs = stepper.step(inputs)
+        given[:, k] = [inputs[name] for name in stepper.inputs]
+        found[:, k] = list(outputs.values())
+        if show is not None:
+            show(k * step, outputs)
+    record = Record.from_arrays(
+        np.arange(count) * step,
+        inputs=dict(zip(stepper.inputs, given, strict=True)),
+        outputs=dict(zip(stepper.outputs, found, strict=True)),
+        name="flown",
+    )
+    return FlownSession(record, late_frames, worst)
+
+
+class UdpLink:
+    """A pilot and a cockpit on the other end of UDP.
+
+    Datagrams in are JSON objects of numbers by input, such as ``{"lat": 0.1}``; the newest counts
+    and holds until the next. Datagrams out are JSON, or lines of tab-separated numbers that
+    FlightGear's generic protocol reads.
+
+    Parameters
+    ----------
+    inputs : sequence of str
+        What may be moved.
+    listen : tuple of str and int, optional
+        Address and port to listen at; port 0 takes a free one.
+    send : tuple of str and int, optional
+        Where outputs go.
+    style : {"json", "flightgear"}
+        Of datagrams out.
+
+    Raises
+    ------
+    OptionError
+        Another style.
+    OSError
+        The port is taken.
+
+    Example
+    -------
+    >>> with UdpLink(["lat"]) as link:
+    ...     link.pilot(0.0, {})
+    {}
+    """
+
+    def __init__(
+        self,
+        inputs: Sequence[str],
+        *,
+        listen: tuple[str, int] | None = None,
+        send: tuple[str, int] | None = None,
+        style: str = "json",
+    ) -> None:
+        if style not in ("json", "flightgear"):
+            raise OptionError("style is not known", found=style, needed="'json' or 'flightgear'")
+        self._inputs, self._style, self._send = tuple(inputs), style, send
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._listens = listen is not None
+        if listen is not None:
+            self._socket.bind(listen)
+        self._held: dict[str, float] = {}
+        self.rejected = 0
+
+    @property
+    def port(self) -> int:
+        """Where it listens."""
+        return int(self._socket.getsockname()[1])
+
+    def pilot(self, time_s: float, outputs: Mapping[str, float]) -> dict[str, float]:
+        """Inputs of the newest datagrams; damaged ones are counted in `rejected`."""
+        del time_s, outputs
+        while self._listens:
+            try:
+                data = self._socket.recv(MAXIMUM_DATAGRAM)
+            except (BlockingIOError, ConnectionError):
+                break
+            try:
+                self._held |= self._read(data)
+            except (ValueError, RecursionError):
+                self.rejected += 1
+        return dict(self._held)
+
+    def _read(self, data: bytes) -> dict[str, float]:
+        content = json.loads(data.decode("utf-8"))
+        if not isinstance(content, dict):
+            raise DataError("a datagram holds no table")
+        found = {}
+        for name, value in content.items():
+            known = name in self._inputs and isinstance(value, int | float)
+            if not known or isinstance(value, bool) or not abs(value) < 1e12:
+                raise DataError("a datagram moves what is no input", found=name)
+            found[name] = float(value)
+        return found
+
+    def show(self, time_s: float, outputs: Mapping[str, float]) -> None:
+        """Send the outputs; a cockpit that is not there does not stop the flight."""
+        if self._send is None:
+            return
+        if self._style == "json":
+            text = json.dumps({"time_s": time_s, **outputs})
+        else:
+            text = "\t".join(f"{value:.9g}" for value in outputs.values()) + "\n"
+        try:
+            self._socket.sendto(text.encode(), self._send)
+        except OSError:
+            self.rejected += 1
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:  # fmt: skip
+        self._socket.close()

@@ -1,0 +1,176 @@
+"""A model advanced one sample at a time, for whoever does not know its inputs beforehand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.models import LinearSystem, StateSpaceModel
+from flightid.simulation.nonlinear import run_equations, start_of
+
+Array = NDArray[np.float64]
+
+
+class Stepper:
+    """A model at a fixed rate: inputs of an instant in, outputs of that instant out.
+
+    Inputs are steps between samples. A linear model is exact, delays included. Equations take
+    Runge-Kutta steps on the mean of their delayed input over a sample.
+
+    Parameters
+    ----------
+    model : StateSpaceModel, or what `LinearSystem.of` takes
+        Nonlinear ones take inputs whole, linear ones as departures.
+    sample_time_s : float
+        s.
+    feedback : mapping of str to mapping of str to float, optional
+        Stability augmentation: by input the gain on each output, added to the pilot's input from
+        the outputs of the last sample.
+    limits : mapping of str to (float, float), optional
+        Lowest and highest value of an input, after the augmentation.
+
+    Raises
+    ------
+    OptionError
+        A sample time that is not positive or not the discrete model's own, or limits that cross.
+    UnknownNameError
+        Feedback or limits of channels that the model does not have.
+
+    Example
+    -------
+    >>> lag = LinearSystem([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ("u",), ("y",))
+    >>> stepper = Stepper(lag, 0.1)
+    >>> stepper.step({"u": 1.0})["y"], round(stepper.step({"u": 1.0})["y"], 6)
+    (0.0, 0.095163)
+    """
+
+    def __init__(
+        self,
+        model: object,
+        sample_time_s: float,
+        *,
+        feedback: Mapping[str, Mapping[str, float]] | None = None,
+        limits: Mapping[str, tuple[float, float]] | None = None,
+    ) -> None:
+        if not (np.isfinite(sample_time_s) and sample_time_s > 0.0):
+            raise OptionError("the sample time is not positive", found=sample_time_s)
+        self.sample_time_s = sample_time_s
+        is_whole = isinstance(model, StateSpaceModel) and not model.is_linear
+        self._plant = (
+            _Equations(model, sample_time_s)
+            if isinstance(model, StateSpaceModel) and is_whole
+            else _Samples(LinearSystem.of(model), sample_time_s)
+        )
+        self.inputs, self.outputs = self._plant.inputs, self._plant.outputs
+        self.rest = self._plant.rest
+        self._gains = np.zeros((len(self.inputs), len(self.outputs)))
+        for name, row in (feedback or {}).items():
+            for output, gain in row.items():
+                self._gains[_place("input", name, self.inputs),
+                            _place("output", output, self.outputs)] = gain  # fmt: skip
+        self._low = np.full(len(self.inputs), -np.inf)
+        self._high = -self._low
+        for name, (low, high) in (limits or {}).items():
+            if not low < high:
+                raise OptionError(f"limits of {name} cross", found=(low, high))
+            place = _place("input", name, self.inputs)
+            self._low[place], self._high[place] = low, high
+        self._last = np.zeros(len(self.outputs))
+
+    def step(self, inputs: Mapping[str, float]) -> dict[str, float]:
+        """Advance one sample.
+
+        Parameters
+        ----------
+        inputs : mapping of str to float
+            The pilot's, in their units; those left out rest (at the trim of a nonlinear model).
+
+        Returns
+        -------
+        dict of str to float
+            Outputs at this instant.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such input.
+        DataError
+            An input is not finite, or the model diverges.
+        """
+        given = np.array([self.rest[name] for name in self.inputs])
+        for name, value in inputs.items():
+            given[_place("input", name, self.inputs)] = value
+        if not np.all(np.isfinite(given)):
+            raise DataError("an input is not finite", found=str(dict(inputs)))
+        driven = np.clip(given + self._gains @ self._last, self._low, self._high)
+        found = self._plant.step(driven)
+        if not np.all(np.abs(found) < 1e30):
+            raise DataError("the model diverges", found=str(dict(inputs)))
+        self._last = found
+        return dict(zip(self.outputs, found.tolist(), strict=True))
+
+
+class _Samples:
+    """A linear system, sampled exactly."""
+
+    def __init__(self, system: LinearSystem, sample_time_s: float) -> None:
+        step = system.sample_time_s
+        if step is not None and abs(step / sample_time_s - 1.0) > 1e-9:
+            raise OptionError(
+                "a discrete model has a sample time of its own", found=sample_time_s, needed=step
+            )
+        whole = system.sampled(sample_time_s) if step is None else system.with_pade()
+        self.inputs, self.outputs = system.inputs, system.outputs
+        self.rest = dict.fromkeys(self.inputs, 0.0)
+        self._a, self._b, self._c, self._d, _ = whole.state_space()
+        self._x = np.zeros(whole.order)
+
+    def step(self, u: Array) -> Array:
+        y = self._c @ self._x + self._d @ u
+        self._x = self._a @ self._x + self._b @ u
+        return np.asarray(y)
+
+
+class _Equations:
+    """A nonlinear model, two samples at a time."""
+
+    def __init__(self, model: StateSpaceModel, sample_time_s: float) -> None:
+        self.inputs, self.outputs = model.inputs, model.outputs
+        self.rest = {name: float(model.trim.get(name, 0.0)) for name in model.inputs}
+        late = model.matrices().delays_s / sample_time_s
+        self._lag, self._part = np.floor(late).astype(int), late - np.floor(late)
+        self._model = replace(model, delays={}, blocks=(), bare=None)
+        self._step_s = sample_time_s
+        self._x = start_of(model, None)
+        self._past: Array | None = None
+
+    def step(self, u: Array) -> Array:
+        depth = int(self._lag.max(initial=0)) + 2
+        if self._past is None:
+            self._past = np.repeat(u[:, None], depth, axis=1)
+        self._past = np.hstack([u[:, None], self._past[:, :-1]])
+        rows = np.arange(len(u))
+        newer, older = self._past[rows, self._lag], self._past[rows, self._lag + 1]
+        seen = np.where(self._part > 0.0, older, newer)
+        mean = newer + self._part * (older - newer)
+        states, outputs = run_equations(
+            self._model, np.column_stack([mean, mean]), self._step_s, first_order_hold=False,
+            initial_state=self._x, substeps=None,
+        )  # fmt: skip
+        if np.any(seen != mean):
+            _, outputs = run_equations(
+                self._model, seen[:, None], self._step_s, first_order_hold=False,
+                initial_state=self._x, substeps=None,
+            )  # fmt: skip
+        self._x = np.ascontiguousarray(states[:, 1])
+        return np.asarray(outputs[:, 0])
+
+
+def _place(kind: str, name: str, known: tuple[str, ...]) -> int:
+    if name not in known:
+        raise UnknownNameError(f"there is no such {kind}", found=name, needed=", ".join(known))
+    return known.index(name)
