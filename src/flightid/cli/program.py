@@ -14,7 +14,7 @@ import flightid.cli
 from flightid.cli.output import Exit, note
 from flightid.errors import FlightidError
 
-ORDER = ("inspect", "design", "response", "identify", "verify", "simulate", "report", "run")
+ORDER = ("inspect", "design", "response", "identify", "verify", "tune", "simulate", "report", "run")
 """Verbs in the order of the work, as help lists them; others follow in alphabetical order."""
 NOT_VERBS = frozenset({"bar", "output", "pairs", "program"})
 

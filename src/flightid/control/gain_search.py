@@ -338,7 +338,7 @@ def _violating(judged: Judged, rows: list[int]) -> list[int]:
 def _report(problem: LoopProblem, gains: Array) -> Found:
     judged = problem.judge(gains[None])
     least = dict(zip(judged.names, judged.slack[:, 0].min(axis=1), strict=True))
-    exists = min(least.values()) >= 0.0
+    exists = bool(min(least.values()) >= 0.0)
     edge = EDGE if exists else 0.0
     binding = tuple(name for name, slack in least.items() if slack < edge + 2 * HEADROOM)
     at_range = tuple(

@@ -12,6 +12,7 @@ from flightid.plot.fit import Estimate, parameter_intervals
 from flightid.report.blocks import provenance
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
+from flightid.report.tuning import tuning_section
 from flightid.study.black_box_section import (
     black_box_in_short,
     black_box_section,
@@ -43,12 +44,14 @@ def study_document(study: Study) -> Document:
     settings = study.settings
     models = [model_section(item, study.truth) for item in study.identified]
     models += map(black_box_section, study.black_boxes)
+    gains = () if study.tuning is None else (tuning_section(study.tuning),)
     return Document(
         settings.title,
         settings.aircraft,
         (
             Section("Result", tuple(_result(study))),
             *models,
+            *gains,
             Section(
                 "The records" if study.inspection is None else "The log",
                 tuple(_source_blocks(study)),

@@ -10,7 +10,7 @@ from pathlib import Path
 from flightid.errors import StudyError
 from flightid.files import sha256_of_file
 from flightid.inspection import Inspection, inspect_log
-from flightid.logs import read_log
+from flightid.logs import Log, read_log
 from flightid.progress import progress
 from flightid.record import Record
 from flightid.report.html import to_html
@@ -32,12 +32,17 @@ from flightid.study.stages import (
 )
 from flightid.study.study import Study
 from flightid.study.truth import Truth
+from flightid.study.tuning import TuneSettings, tune_models
 
 FLIGHT_LOG = "flight.bin"
 
 
 def run_study(
-    path: str | Path, *, output: str | Path | None = None, log: str | Path | None = None
+    path: str | Path,
+    *,
+    output: str | Path | None = None,
+    log: str | Path | None = None,
+    tune: bool = False,
 ) -> Study:
     """Carry out a study file: log or records, responses, models, verification, report.
 
@@ -51,6 +56,8 @@ def run_study(
         Folder to write; default: ``<study>-output`` beside the study file.
     log : str or Path, optional
         Log to read instead of the one that the study names.
+    tune : bool
+        Tune gains with the usual requirements where the study does not say any.
 
     Returns
     -------
@@ -86,6 +93,8 @@ def run_study(
         for asked in settings.black_boxes:
             boxes.append(identify_black_box(asked, taken.records))
             advance(3)
+        wanted = settings.tune or (TuneSettings() if tune else None)
+        tuning = None if wanted is None else tune_models(identified, taken.log, wanted)
         files = {item.name: sha256_of_file(item) for item in (source, *taken.files)}
         study = Study(
             settings,
@@ -96,6 +105,7 @@ def run_study(
             tuple(boxes),
             taken.truth,
             files,
+            tuning,
         )
         _write(study, folder)
         advance()
@@ -110,6 +120,7 @@ class _Taken:
     files: tuple[Path, ...]
     inspection: Inspection | None = None
     truth: Truth | None = None
+    log: Log | None = None
 
 
 def _take(settings: Settings, tasks: list[Task], given: Path | None, folder: Path) -> _Taken:
@@ -125,7 +136,7 @@ def _take(settings: Settings, tasks: list[Task], given: Path | None, folder: Pat
     flown, truth = _obtain_log(settings, given, folder)
     opened = read_log(flown)
     records = cut_records(opened, settings, needed)
-    return _Taken(records, (flown,), inspect_log(opened), truth)
+    return _Taken(records, (flown,), inspect_log(opened), truth, opened)
 
 
 def _obtain_log(settings: Settings, given: Path | None, folder: Path) -> tuple[Path, Truth | None]:

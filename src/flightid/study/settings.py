@@ -19,6 +19,7 @@ from flightid.study.reading import TOP, TableReader
 from flightid.study.record_files import RecordFile, read_record_file
 from flightid.study.reducing import ReduceSettings, read_reduce
 from flightid.study.references import require_references
+from flightid.study.tuning import TuneSettings, read_tune
 
 MAXIMUM_BYTES = 1 << 20
 METHODS = ("composite", "local_polynomial", "instrument")
@@ -157,6 +158,8 @@ class Settings:
         Whether a prediction starts at rest or from a state that is solved for.
     reduce : ReduceSettings or None
         How structures are reduced after their fit; None: not at all.
+    tune : TuneSettings or None
+        How the autopilot's gains are tuned; None: not at all.
     """
 
     title: str
@@ -178,6 +181,7 @@ class Settings:
     seed: int
     initial: Literal["trim", "fit"]
     reduce: ReduceSettings | None = None
+    tune: TuneSettings | None = None
 
     @property
     def on_records(self) -> bool:
@@ -234,6 +238,7 @@ def read_settings(path: Path) -> Settings:
     check.finish()
     on_records = method != FITS[0]
     reducing = root.maybe(lambda key: read_reduce(root.table(key)), "reduce")
+    tuning = root.maybe(lambda key: read_tune(root.table(key)), "tune")
     readers = root.tables("model")
     models = tuple(
         _model(reader, path.parent, on_records=on_records, reduced=reducing is not None)
@@ -267,6 +272,7 @@ def read_settings(path: Path) -> Settings:
         seed,
         initial,
         reducing,
+        tuning,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from flightid.control.tuning import Tuning
 from flightid.findings import Finding
 from flightid.inspection import Inspection
 from flightid.record import Record
@@ -44,6 +45,8 @@ class Study:
         What should have been found, where the flight was simulated.
     files : mapping of str to str
         SHA-256 of what was read, by file name.
+    tuning : Tuning or None
+        Gains, where the study asks for them.
 
     Example
     -------
@@ -60,6 +63,7 @@ class Study:
     black_boxes: tuple[BlackBox, ...] = ()
     truth: Truth | None = None
     files: Mapping[str, str] = field(default_factory=dict)
+    tuning: Tuning | None = None
 
     @cached_property
     def document(self) -> Document:
@@ -82,7 +86,7 @@ class Study:
         -------
         dict
             Keys ``schema``, ``title``, ``files``, ``inspection``, ``models``,
-            ``black_boxes``, ``truth``, ``findings``, ``report``.
+            ``black_boxes``, ``tuning``, ``truth``, ``findings``, ``report``.
         """
         return {
             "schema": SCHEMA,
@@ -91,6 +95,7 @@ class Study:
             "inspection": None if self.inspection is None else self.inspection.to_dict(),
             "models": [item.to_dict() for item in self.identified],
             "black_boxes": [item.to_dict() for item in self.black_boxes],
+            "tuning": None if self.tuning is None else self.tuning.to_dict(),
             "truth": None if self.truth is None else self.truth.to_dict(),
             "findings": [finding.to_dict() for finding in self.findings],
             "report": to_dict(self.document),

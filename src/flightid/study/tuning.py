@@ -1,0 +1,119 @@
+"""What a study file may say about gains, and the stage that tunes them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
+
+from flightid.control.autopilots import axis_loop_of
+from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.tune import CHANNELS, DRAWS
+from flightid.control.tune_axes import tune
+from flightid.control.tuning import Tuning
+from flightid.control.tuning_requirements import OBJECTIVES, TuningRequirements
+from flightid.errors import StudyError
+from flightid.study.reading import TableReader
+
+if TYPE_CHECKING:
+    from flightid.logs import Log
+    from flightid.study.stages import Identified
+
+
+@dataclass(frozen=True)
+class TuneSettings:
+    """How gains are tuned; see `flightid.tune`.
+
+    Attributes
+    ----------
+    requirements : TuningRequirements
+    rate : {"filtered", "raw"}
+        Which rate the models end at.
+    angle_loop : bool
+    draws, seed : int
+    """
+
+    requirements: TuningRequirements = field(default_factory=TuningRequirements)
+    rate: Gyro = "filtered"
+    angle_loop: bool = True
+    draws: int = DRAWS
+    seed: int = 0
+
+
+def read_tune(reader: TableReader) -> TuneSettings:
+    """Read the table ``[tune]``.
+
+    Raises
+    ------
+    StudyError
+        A key is unknown, or a value does not fit.
+    OptionError
+        Requirements that contradict each other.
+    """
+    usual, given = TuneSettings(), {}
+    for each in fields(TuningRequirements):
+        if each.name != "objective":
+            given[each.name] = reader.maybe(reader.positive, each.name)
+    asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    asked["objective"] = reader.choice("objective", OBJECTIVES, usual.requirements.objective)
+    rate = reader.choice("rate", ("filtered", "raw"), usual.rate)
+    made = TuneSettings(
+        TuningRequirements(**asked),
+        "raw" if rate == "raw" else "filtered",
+        reader.flag("angle_loop", usual.angle_loop),
+        reader.integer("draws", usual.draws, minimum=1),
+        reader.integer("seed", usual.seed),
+    )
+    reader.finish()
+    return made
+
+
+def tune_models(
+    identified: Iterable[Identified], log: Log | None, settings: TuneSettings
+) -> Tuning | None:
+    """Tune every axis whose rate a model of the study predicts from its command.
+
+    Parameters
+    ----------
+    identified : iterable of Identified
+    log : Log or None
+        The flight, which holds the gains that flew.
+    settings : TuneSettings
+
+    Returns
+    -------
+    Tuning or None
+        None where no model is of a rate to its command.
+
+    Raises
+    ------
+    StudyError
+        The study reads records, which hold no gains.
+    """
+    fits, checks = {}, {}
+    for item in identified:
+        for axis, (command, rate) in CHANNELS.items():
+            model = item.fit.model
+            if command in model.inputs and rate in model.outputs and axis not in fits:
+                fits[axis] = item.fit
+                checks[axis] = tuple(
+                    each for each in item.verifications.values() if hasattr(each, "findings")
+                )
+    if not fits:
+        return None
+    if log is None:
+        raise StudyError(
+            "gains cannot be tuned from records alone",
+            needed="a log, which holds the gains that flew",
+            action="take [tune] out, or call flightid.tune with the gains",
+        )
+    return tune(
+        fits,
+        gains={axis: axis_loop_of(log, axis) for axis in fits},
+        requirements=settings.requirements,
+        rate=settings.rate,
+        angle_loop=settings.angle_loop,
+        verifications=checks,
+        draws=settings.draws,
+        seed=settings.seed,
+    )

@@ -1,0 +1,97 @@
+"""Gains in studies and from the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from flightid.cli.program import run
+from flightid.errors import StudyError
+from flightid.study.settings import read_settings
+from flightid.study.tuning import TuneSettings, tune_models
+
+STUDY = """
+[study]
+title = "Roll"
+[flight]
+simulate = "quadrotor"
+seed = 4
+log_every = 4
+[[flight.sweep]]
+axis = 10
+start_s = 5.0
+start_hz = 0.1
+stop_hz = 12.0
+record_s = 60.0
+fade_out_s = 1.0
+leave_after_s = 75.0
+[[segment]]
+name = "sweep"
+sid_axis = 10
+[response]
+method = "instrument"
+windows_s = [20]
+n_frequencies = 40
+[[model]]
+name = "Roll rate"
+template = "rate_motor_lag"
+axis = "roll"
+identify = "sweep"
+band_rad_s = [2.0, 60.0]
+parameters.T_m = { maximum = 0.15 }
+[tune]
+noise_growth = 3.0
+draws = 40
+angle_loop = false
+"""
+
+
+@pytest.fixture
+def study(tmp_path: Path) -> Path:
+    path = tmp_path / "roll.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    return path
+
+
+def test_a_study_is_tuned_from_its_log_and_the_steps_are_written(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "gains.param"
+    code = run(["--quiet", "tune", str(study), "--write", str(target), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert code == 0, told["findings"]
+    assert told["schema"] == "flightid.tuning/1"
+    gains = told["axes"]["roll"]["gains"]
+    assert gains["ATC_RAT_RLL_P"]["flown"] == pytest.approx(0.09)
+    assert gains["ATC_RAT_RLL_P"]["new"] > 0.1
+    assert list(tmp_path.glob("gains*.rollback.param"))
+    results = json.loads((tmp_path / "roll-output" / "results.json").read_text(encoding="utf-8"))
+    assert results["tuning"]["axes"]["roll"]["exists"]
+    assert "Roll gains" in (tmp_path / "roll-output" / "report.txt").read_text(encoding="utf-8")
+
+
+def test_settings_are_read_and_checked(study: Path) -> None:
+    asked = read_settings(study).tune
+    assert asked is not None
+    assert asked.requirements.noise_growth == 3.0
+    assert asked.draws == 40
+    study.write_text(STUDY + "luck = 1\n", encoding="utf-8")
+    with pytest.raises(StudyError, match="there is no key 'luck'"):
+        read_settings(study)
+
+
+def test_records_alone_hold_no_gains() -> None:
+    class Model:
+        inputs, outputs = ("tau_phi",), ("p",)
+
+    class Item:
+        class fit:  # noqa: N801
+            model = Model()
+
+        verifications: dict[str, object] = {}  # noqa: RUF012
+
+    with pytest.raises(StudyError, match="cannot be tuned from records alone"):
+        tune_models([Item()], None, TuneSettings())  # type: ignore[list-item]
+    assert tune_models([], None, TuneSettings()) is None
