@@ -1,73 +1,226 @@
-"""A rate-feedback augmentation closed around two models, flown through the same doublets."""
+"""An augmentation of limited authority closed around model and vehicle, and taken out of flights.
+
+Each axis adds washed-out rate feedback and a share of the high-passed stick, within a tenth of the
+actuator's travel. The form is the paper's; all numbers are ours.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
-from flights import AMPLITUDES_IN, SAMPLE_RATE_HZ, truth
+from flights import AMPLITUDES_IN, INPUTS, SAMPLE_RATE_HZ, truth
 
 import flightid as fid
+from flightid.errors import FlightidError
 from flightid.excitation import doublet
-from flightid.simulation import FlightConditions, fly_closed_loop
 from flightid.table import Column
 
-WASHOUT_RAD_S = 0.5
-GAINS = {"lon": ("q", 3.0), "lat": ("p", 1.2), "ped": ("r", 2.0)}
-"""Stick inches for a rad/s of the own rate."""
-DELAY_S = 0.02
-NOISE = FlightConditions(noise={"p": 0.002, "q": 0.002, "r": 0.002})
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis of the augmentation.
+
+    Attributes
+    ----------
+    rate, attitude : str
+        What it feeds back, and what the pilot sees.
+    gain_in_s : float
+        Stick inches for a rad/s.
+    ahead : float
+        Inches for an inch of high-passed stick.
+    travel_in : float
+        Half of the actuator's travel, inches of stick.
+    """
+
+    rate: str
+    attitude: str
+    gain_in_s: float
+    ahead: float
+    travel_in: float
 
 
-def rate_feedback() -> fid.LinearSystem:
-    """Washed-out rate feedback, -K s/(s + a), one axis each; no authority limit."""
-    gains = np.array([gain for _, gain in GAINS.values()])
-    n = len(GAINS)
-    return fid.LinearSystem(
-        -WASHOUT_RAD_S * np.eye(n),
-        np.eye(n),
-        np.diag(gains * WASHOUT_RAD_S),
-        -np.diag(gains),
-        tuple(rate for rate, _ in GAINS.values()),
-        tuple(GAINS),
-        np.full(n, DELAY_S),
-    )
+AXES = {
+    "lon": Axis("q", "theta", 3.0, 0.25, 5.0),
+    "lat": Axis("p", "phi", 1.2, 0.25, 4.5),
+    "ped": Axis("r", "r", 2.0, 0.15, 3.0),
+}
+AUTHORITY = 0.1
+RATE_WASHOUT_RAD_S, STICK_WASHOUT_RAD_S = 0.25, 1.0
+SENSOR_RAD_S, DELAY_S = 60.0, 0.02
+NOISE_RAD_S = 0.002
+LENGTH_S = 14.0
+BAND_RAD_S = (0.8, 60.0)
+"""Above the slow modes, which the pilot holds."""
 
 
-def compare(model: fid.StateSpaceModel) -> tuple[fid.Table, dict[str, float]]:
-    """Fly the truth and a model with the augmentation on, and compare rates.
+def augmentation(*, noisy: bool = False) -> list[fid.loops.Block]:
+    """Sensor, washouts, gains, limit and computation delay of the three axes.
 
     Parameters
     ----------
-    model : StateSpaceModel
-        The identified model.
+    noisy : bool
+        Sensors with noise, which comes from outside as ``"<rate>_noise"`` and is logged.
+    """
+    make, blocks = fid.loops, []
+    for stick, axis in AXES.items():
+        rate, law = axis.rate, f"{stick}_law"
+        seen = f"{rate}_seen" if noisy else rate
+        if noisy:
+            blocks.append(make.sum_of(seen, rate, f"{rate}_noise"))
+        blocks += [
+            make.low_pass(seen, f"{rate}_gyro", SENSOR_RAD_S),
+            make.washout(f"{rate}_gyro", f"{rate}_washed", RATE_WASHOUT_RAD_S),
+            make.washout(stick, f"{stick}_washed", STICK_WASHOUT_RAD_S),
+            make.gain(
+                (f"{rate}_washed", f"{stick}_washed"),
+                law,
+                [[-axis.gain_in_s, axis.ahead]],
+                units={f"{rate}_washed": "rad/s", law: "in"},
+            ),
+            make.delay(law, f"{law}_late", DELAY_S),
+            make.limiter(f"{law}_late", stick, AUTHORITY * axis.travel_in),
+        ]
+    return blocks
+
+
+@dataclass(frozen=True)
+class Augmented:
+    """What the augmentation does.
+
+    Attributes
+    ----------
+    flights : Table
+        Vehicle beside model through the same doublets.
+    theil : dict of str to float
+        By ``"rate/stick"``.
+    closed : ClosedLoop
+        Around the identified model.
+    margins : Table
+        Loops broken at the actuators, the others closed.
+    bandwidth : Table
+        With the augmentation off and on.
+    opened : Verification
+        The bare model on the augmented flights, the augmentation taken out of them.
+    """
+
+    flights: fid.Table
+    theil: dict[str, float]
+    closed: fid.ClosedLoop
+    margins: fid.Table
+    bandwidth: fid.Table
+    opened: fid.Verification
+
+
+def augment(fit: fid.Fit) -> Augmented:
+    """Close the augmentation around the identified model and hold it against augmented flights.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of the bare vehicle.
 
     Returns
     -------
-    Table and dict
-        By stick, and the Theil coefficient by ``"rate/stick"``.
+    Augmented
     """
-    theil: dict[str, float] = {}
-    rows = []
-    for name, (rate, _) in GAINS.items():
-        shape = doublet(
-            amplitude=AMPLITUDES_IN[name],
-            step_s=1.0,
-            sample_rate_hz=SAMPLE_RATE_HZ,
-            tail_s=6.0,
-            name=name,
-            unit="in",
-        )
-        flown = fly_closed_loop(truth(), rate_feedback(), shape, conditions=NOISE, seed=7)
-        ours = fly_closed_loop(model, rate_feedback(), shape)
-        found = float(fid.validation.theil(flown[rate], ours[rate]))
-        theil[f"{rate}/{name}"] = found
-        peak = float(np.max(np.abs(ours[rate]))), float(np.max(np.abs(flown[rate])))
-        rows.append((name, rate, *peak, found))
+    closed = fid.close_loop(fit, augmentation(), name="AH-64 with augmentation", draws=100)
+    vehicle = fid.close_loop(truth(), augmentation(noisy=True), draws=0).loops
+    flown = {stick: _fly(vehicle, stick, seed) for seed, stick in enumerate(AXES)}
+    table, theil = _beside(closed.loops, flown)
+    verified = fid.verify(
+        fit,
+        [fid.open_loop(record, augmentation()) for record in flown.values()],
+        outputs=tuple(axis.rate for axis in AXES.values()),
+    )
+    assert isinstance(verified, fid.Verification)
+    return Augmented(table, theil, closed, _margins(closed), _bandwidths(fit, closed), verified)
+
+
+def _sticks(moved: str, noise: float = 0.0, seed: int = 0) -> fid.Record:
+    shape = doublet(
+        amplitude=AMPLITUDES_IN[moved],
+        step_s=1.0,
+        sample_rate_hz=SAMPLE_RATE_HZ,
+        lead_s=0.5,
+        tail_s=LENGTH_S - 2.5,
+        name=moved,
+        unit="in",
+    )
+    random, n = np.random.default_rng(seed), shape.n_samples
+    hands = {name: np.zeros(n) for name in INPUTS} | dict(shape.by_name)
+    gyros = {f"{axis.rate}_noise": noise * random.standard_normal(n) for axis in AXES.values()}
+    units = dict.fromkeys(INPUTS, "in") | dict.fromkeys(gyros, "rad/s")
+    return fid.Record.from_arrays(
+        shape.time_s, inputs={**hands, **gyros}, units=units, name=f"doublet of {moved}"
+    )
+
+
+def _fly(loops: fid.Interconnection, stick: str, seed: int) -> fid.Record:
+    """What a log holds of an augmented flight: sticks and noisy rates."""
+    seen = [f"{axis.rate}_seen" for axis in AXES.values()]
+    flown = loops.simulate(_sticks(stick, NOISE_RAD_S, 7 + seed), outputs=seen)
+    return fid.Record.from_arrays(
+        flown.time_s,
+        inputs={name: flown[name] for name in INPUTS},
+        outputs={axis.rate: flown[f"{axis.rate}_seen"] for axis in AXES.values()},
+        units=dict.fromkeys(INPUTS, "in") | {axis.rate: "rad/s" for axis in AXES.values()},
+        name=f"augmented doublet of {stick}",
+    )
+
+
+def _beside(
+    loops: fid.Interconnection, flown: dict[str, fid.Record]
+) -> tuple[fid.Table, dict[str, float]]:
+    theil, rows = {}, []
+    for stick, record in flown.items():
+        axis = AXES[stick]
+        ours = loops.simulate(record, outputs=[axis.rate, f"{stick}_controller"])
+        found = float(fid.validation.theil(record[axis.rate], ours[axis.rate]))
+        theil[f"{axis.rate}/{stick}"] = found
+        share = np.abs(ours[f"{stick}_controller"]) >= AUTHORITY * axis.travel_in * (1 - 1e-9)
+        peaks = (float(np.max(np.abs(each[axis.rate]))) for each in (ours, record))
+        rows.append((stick, axis.rate, *peaks, 100.0 * float(np.mean(share)), found))
     columns = (
         Column("stick"),
         Column("rate"),
         Column("peak, model", "rad/s", 3),
         Column("peak, vehicle", "rad/s", 3),
+        Column("at its limit", "% of the time", 2),
         Column("Theil coefficient", digits=3),
     )
-    title = "Doublets with washed-out rate feedback closed around model and vehicle"
+    title = "Doublets with the augmentation on: model beside vehicle"
     return fid.Table(title, columns, tuple(rows)), theil
+
+
+def _margins(closed: fid.ClosedLoop) -> fid.Table:
+    rows = []
+    for stick, found in closed.margins(band_rad_s=(0.3, 100.0)).items():
+        wanted = (found.crossover, found.phase_margin, found.gain_margin, found.delay_margin)
+        rows.append((f"at {stick}", *(each.text for each in wanted)))
+    columns = tuple(
+        Column(name)
+        for name in ("loop broken", "crossover", "phase margin", "gain margin", "delay margin")
+    )
+    return fid.Table("Margins of the augmentation, 95 % intervals", columns, tuple(rows))
+
+
+def _bandwidths(fit: fid.Fit, closed: fid.ClosedLoop) -> fid.Table:
+    rows = []
+    for stick, axis in AXES.items():
+        kind = "rate" if axis.attitude == axis.rate else "attitude"
+        for name, source in (("off", fit), ("on", closed.spread)):
+            try:
+                found = fid.attitude_bandwidth(
+                    source, axis.attitude, stick, output_is=kind, band_rad_s=BAND_RAD_S
+                )
+            except FlightidError as error:
+                rows.append((f"{axis.attitude}/{stick}", name, None, None, str(error)))
+                continue
+            numbers = (found.bandwidth.text, found.quantities[4 if found.nonlinear else 3].text)
+            rows.append((f"{axis.attitude}/{stick}", name, *numbers, ""))
+    columns = tuple(
+        Column(name) for name in ("response", "augmentation", "bandwidth", "phase delay", "note")
+    )
+    table = fid.Table("Bandwidth and phase delay, 95 % intervals", columns, tuple(rows))
+    return table.without_empty_columns()

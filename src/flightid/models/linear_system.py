@@ -136,7 +136,7 @@ class LinearSystem(Rational):
         Parameters
         ----------
         source : TransferFunctionModel, StateSpaceModel, PolynomialModel, InnovationsModel, a fit of
-            one, LinearSystem, or another `LinearModel`
+            one, LinearSystem, another `LinearModel`, or an interconnection
             Nonlinear state-space models are linearised at their trim; noise models are left out.
 
         Returns
@@ -187,6 +187,9 @@ class LinearSystem(Rational):
                 getattr(source, "sample_time_s", None),
                 units,
             )
+        joined = getattr(source, "linear_system", None)
+        if callable(joined):
+            return cls.of(joined())
         model = getattr(source, "model", None)
         if model is None or model is source:
             raise ModelError(

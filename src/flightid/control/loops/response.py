@@ -3,80 +3,138 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flightid.control.loops.block import Block, Equations, Hold
+from flightid.control.loops.block import Block, Hold
+from flightid.control.loops.linear_core import Core, assemble
+from flightid.control.loops.views import linear_view
 from flightid.control.loops.wiring import Wiring
 from flightid.errors import DataError
 from flightid.models.linear_system import LinearSystem
 
 Complex = NDArray[np.complex128]
+Array = NDArray[np.float64]
 
 
-def block_response(block: Block, omega_rad_s: NDArray[np.float64]) -> Complex:
-    """H of one block, shape (n_outputs, n_inputs, n_f); what is not linear as a gain of one."""
+@dataclass(frozen=True, eq=False)
+class Responding:
+    """What the response of a connection is computed from.
+
+    Attributes
+    ----------
+    core : Core
+        All continuous blocks.
+    ports : tuple of Block
+        Holds and sampled blocks.
+    inputs : tuple of str
+        Signals from outside.
+    """
+
+    core: Core
+    ports: tuple[Block, ...]
+    inputs: tuple[str, ...]
+
+    @classmethod
+    def of(cls, wiring: Wiring) -> Responding:
+        """Sort the blocks of a connection."""
+        ports = tuple(b for b in wiring.blocks if isinstance(b.part, Hold) or b.sample_time_s)
+        inside = [linear_view(block) for block in wiring.blocks if block not in ports]
+        given = [name for block in ports for name in block.outputs]
+        return cls(assemble(inside, [*wiring.inputs, *given]), ports, wiring.inputs)
+
+    def at(self, outputs: Sequence[str], omega_rad_s: ArrayLike) -> Complex:
+        """H from the inputs from outside to some signals, with all loops closed.
+
+        Parameters
+        ----------
+        outputs : sequence of str
+            Signals.
+        omega_rad_s : array_like, shape (n_f,)
+            rad/s.
+
+        Returns
+        -------
+        ndarray of complex, shape (n_outputs, n_inputs, n_f)
+
+        Raises
+        ------
+        DataError
+            A frequency where a block has a pole, or the closed loops have one.
+        """
+        omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=np.float64))
+        try:
+            found = self._closed(self.core.places(outputs), omega)
+        except np.linalg.LinAlgError:
+            found = np.full(1, np.nan, dtype=np.complex128)
+        if not np.all(np.isfinite(found)):
+            raise DataError(
+                "the connection has no finite response at these frequencies",
+                found=f"{omega.min():g} to {omega.max():g} rad/s",
+                needed="frequencies that are not poles of the blocks or of the closed loops",
+            )
+        return np.asarray(np.moveaxis(found, 0, -1))
+
+    def _closed(self, places: list[int], omega: Array) -> Complex:
+        """Rows driven from outside, by delays and by ports, shape (n_f, n_outputs, n_inputs)."""
+        core, rows = self.core, self.core.rows
+        given = [name for block in self.ports for name in block.outputs]
+        inside = core.delayed_inside([*self.inputs, *given])
+        reads = [name for block in self.ports for name in block.inputs]
+        # What goes around: late signals, then outputs of ports; each may drive several rows.
+        around = [*(rows[k].carrier for k in inside), *reads]
+        watched = sorted({*places, *core.places(around)})
+        by_row = self._driven(watched, omega)
+        late = np.exp(-1j * omega[:, None] * [row.delay_s for row in rows])
+        by_row = by_row * late[:, None, :]
+        place = {signal: k for k, signal in enumerate(watched)}
+        outside = np.zeros((len(rows), len(self.inputs)))
+        looped = np.zeros((len(rows), len(inside) + len(given)))
+        for k, row in enumerate(rows):
+            if row.carrier in self.inputs:
+                outside[k, self.inputs.index(row.carrier)] = 1.0
+            elif row.carrier in given:
+                looped[k, len(inside) + given.index(row.carrier)] = 1.0
+            else:
+                looped[k, inside.index(k)] = 1.0
+        seen = [place[core.signals.index(name)] for name in around]
+        direct, back = by_row @ outside, by_row @ looped
+        shares = self._port_responses(len(inside), len(given), len(reads), omega)
+        loop = shares @ back[:, seen]
+        driven = np.linalg.solve(np.eye(loop.shape[1]) - loop, shares @ direct[:, seen])
+        wanted = [place[each] for each in places]
+        return np.asarray(direct[:, wanted] + back[:, wanted] @ driven)
+
+    def _driven(self, watched: list[int], omega: Array) -> Complex:
+        """Signals by row, delays left out, shape (n_f, n_watched, n_rows)."""
+        core = self.core
+        pencil = 1j * omega[:, None, None] * np.eye(len(core.a)) - core.a
+        states = np.linalg.solve(
+            pencil, np.broadcast_to(core.b.astype(complex), (len(omega), *core.b.shape))
+        )
+        return np.asarray(core.c[watched] @ states + core.d[watched])
+
+    def _port_responses(self, n_late: int, n_given: int, n_reads: int, omega: Array) -> Complex:
+        """From what goes around to what it drives: ones for late signals, then the ports."""
+        shares = np.zeros((len(omega), n_late + n_given, n_late + n_reads), dtype=np.complex128)
+        shares[:, :n_late, :n_late] = np.eye(n_late)
+        row, column = n_late, n_late
+        for block in self.ports:
+            p, m = len(block.outputs), len(block.inputs)
+            found = np.moveaxis(_port_response(block, omega), -1, 0)
+            shares[:, row : row + p, column : column + m] = found
+            row, column = row + p, column + m
+        return shares
+
+
+def _port_response(block: Block, omega: Array) -> Complex:
+    """H of a hold or a sampled block, shape (n_outputs, n_inputs, n_f)."""
     part = block.part
     if isinstance(part, LinearSystem):
-        return part.frequency_response(omega_rad_s)
-    if isinstance(part, Equations):
-        return part.linear.frequency_response(omega_rad_s)
-    if isinstance(part, Hold):
-        half = omega_rad_s * part.sample_time_s / 2.0
-        held = np.sinc(half / np.pi) * np.exp(-1j * (half + omega_rad_s * part.delay_s))
-        return np.asarray(held[None, None, :])
-    return np.ones((1, 1, len(omega_rad_s)), dtype=np.complex128)
-
-
-def connected_response(wiring: Wiring, outputs: Sequence[str], omega_rad_s: ArrayLike) -> Complex:
-    """H from the inputs from outside to some signals, with all loops closed.
-
-    Parameters
-    ----------
-    wiring : Wiring
-    outputs : sequence of str
-        Signals.
-    omega_rad_s : array_like, shape (n_f,)
-        rad/s.
-
-    Returns
-    -------
-    ndarray of complex, shape (n_outputs, n_inputs, n_f)
-
-    Raises
-    ------
-    DataError
-        A frequency where a block has a pole, or the closed loops have one.
-    """
-    omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=np.float64))
-    given = list(wiring.sources)
-    row = {name: place for place, name in enumerate(given)}
-    column = {name: place for place, name in enumerate(wiring.inputs)}
-    around = np.zeros((len(omega), len(given), len(given)), dtype=np.complex128)
-    driven = np.zeros((len(omega), len(given), len(column)), dtype=np.complex128)
-    for block in wiring.blocks:
-        rows = [row[name] for name in block.outputs]
-        own = np.moveaxis(block_response(block, omega), -1, 0)
-        for number, name in enumerate(block.inputs):
-            if name in row:
-                around[:, rows, row[name]] += own[:, :, number]
-            else:
-                driven[:, rows, column[name]] += own[:, :, number]
-    try:
-        solved = np.linalg.solve(np.eye(len(given)) - around, driven)
-    except np.linalg.LinAlgError as error:
-        raise DataError(
-            "the connection has no finite response at these frequencies",
-            found=f"{omega.min():g} to {omega.max():g} rad/s",
-            needed="frequencies that are not poles of the closed loops",
-        ) from error
-    found_rows = []
-    for name in outputs:
-        if name in row:
-            found_rows.append(solved[:, row[name]].T)
-        else:
-            unit = np.zeros((len(column), len(omega)), dtype=np.complex128)
-            unit[column[name]] = 1.0
-            found_rows.append(unit)
-    return np.asarray(found_rows).reshape(len(outputs), len(column), len(omega))
+        return part.frequency_response(omega)
+    assert isinstance(part, Hold)
+    half = omega * part.sample_time_s / 2.0
+    held = np.sinc(half / np.pi) * np.exp(-1j * (half + omega * part.delay_s))
+    return np.asarray(held[None, None, :])
