@@ -1,7 +1,8 @@
 """An augmentation of limited authority closed around model and vehicle, and taken out of flights.
 
 Each axis adds washed-out rate feedback and a share of the high-passed stick, within a tenth of the
-actuator's travel. The form is the paper's; all numbers are ours.
+actuator's travel: that form is the paper's. Attitude feedback, against a hovering vehicle's slow
+oscillation, and all numbers are ours.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ class Axis:
         What it feeds back, and what the pilot sees.
     gain_in_s : float
         Stick inches for a rad/s.
+    hold_in : float
+        Stick inches for a rad of attitude.
     ahead : float
         Inches for an inch of high-passed stick.
     travel_in : float
@@ -36,14 +39,15 @@ class Axis:
     rate: str
     attitude: str
     gain_in_s: float
+    hold_in: float
     ahead: float
     travel_in: float
 
 
 AXES = {
-    "lon": Axis("q", "theta", 3.0, 0.25, 5.0),
-    "lat": Axis("p", "phi", 1.2, 0.25, 4.5),
-    "ped": Axis("r", "r", 2.0, 0.15, 3.0),
+    "lon": Axis("q", "theta", 3.0, 4.0, 0.25, 5.0),
+    "lat": Axis("p", "phi", 1.2, 2.0, 0.25, 4.5),
+    "ped": Axis("r", "r", 2.0, 0.0, 0.15, 3.0),
 }
 AUTHORITY = 0.1
 RATE_WASHOUT_RAD_S, STICK_WASHOUT_RAD_S = 0.25, 1.0
@@ -54,17 +58,24 @@ BAND_RAD_S = (0.8, 60.0)
 """Above the slow modes, which the pilot holds."""
 
 
-def augmentation(*, noisy: bool = False) -> list[fid.loops.Block]:
+def augmentation(*, hold: bool = True, noisy: bool = False) -> list[fid.loops.Block]:
     """Sensor, washouts, gains, limit and computation delay of the three axes.
 
     Parameters
     ----------
+    hold : bool
+        With attitude feedback.
     noisy : bool
         Sensors with noise, which comes from outside as ``"<rate>_noise"`` and is logged.
     """
     make, blocks = fid.loops, []
     for stick, axis in AXES.items():
         rate, law = axis.rate, f"{stick}_law"
+        read = [f"{rate}_washed", f"{stick}_washed"]
+        gains = [-axis.gain_in_s, axis.ahead]
+        if hold and axis.hold_in:
+            read.append(axis.attitude)
+            gains.append(-axis.hold_in)
         seen = f"{rate}_seen" if noisy else rate
         if noisy:
             blocks.append(make.sum_of(seen, rate, f"{rate}_noise"))
@@ -72,12 +83,7 @@ def augmentation(*, noisy: bool = False) -> list[fid.loops.Block]:
             make.low_pass(seen, f"{rate}_gyro", SENSOR_RAD_S),
             make.washout(f"{rate}_gyro", f"{rate}_washed", RATE_WASHOUT_RAD_S),
             make.washout(stick, f"{stick}_washed", STICK_WASHOUT_RAD_S),
-            make.gain(
-                (f"{rate}_washed", f"{stick}_washed"),
-                law,
-                [[-axis.gain_in_s, axis.ahead]],
-                units={f"{rate}_washed": "rad/s", law: "in"},
-            ),
+            make.gain(read, law, [gains], units={f"{rate}_washed": "rad/s", law: "in"}),
             make.delay(law, f"{law}_late", DELAY_S),
             make.limiter(f"{law}_late", stick, AUTHORITY * axis.travel_in),
         ]
@@ -94,8 +100,10 @@ class Augmented:
         Vehicle beside model through the same doublets.
     theil : dict of str to float
         By ``"rate/stick"``.
+    rates : ClosedLoop
+        Around the identified model, without attitude feedback.
     closed : ClosedLoop
-        Around the identified model.
+        The whole augmentation around the identified model.
     margins : Table
         Loops broken at the actuators, the others closed.
     bandwidth : Table
@@ -106,6 +114,7 @@ class Augmented:
 
     flights: fid.Table
     theil: dict[str, float]
+    rates: fid.ClosedLoop
     closed: fid.ClosedLoop
     margins: fid.Table
     bandwidth: fid.Table
@@ -124,7 +133,8 @@ def augment(fit: fid.Fit) -> Augmented:
     -------
     Augmented
     """
-    closed = fid.close_loop(fit, augmentation(), name="AH-64 with augmentation", draws=100)
+    rates = fid.close_loop(fit.model, augmentation(hold=False), name="AH-64 with rate feedback")
+    closed = fid.close_loop(fit, augmentation(), name="AH-64 with augmentation", draws=20)
     vehicle = fid.close_loop(truth(), augmentation(noisy=True), draws=0).loops
     flown = {stick: _fly(vehicle, stick, seed) for seed, stick in enumerate(AXES)}
     table, theil = _beside(closed.loops, flown)
@@ -134,7 +144,8 @@ def augment(fit: fid.Fit) -> Augmented:
         outputs=tuple(axis.rate for axis in AXES.values()),
     )
     assert isinstance(verified, fid.Verification)
-    return Augmented(table, theil, closed, _margins(closed), _bandwidths(fit, closed), verified)
+    marked, bands = _margins(closed), _bandwidths(fit, closed)
+    return Augmented(table, theil, rates, closed, marked, bands, verified)
 
 
 def _sticks(moved: str, noise: float = 0.0, seed: int = 0) -> fid.Record:
@@ -158,13 +169,16 @@ def _sticks(moved: str, noise: float = 0.0, seed: int = 0) -> fid.Record:
 
 def _fly(loops: fid.Interconnection, stick: str, seed: int) -> fid.Record:
     """What a log holds of an augmented flight: sticks and noisy rates."""
-    seen = [f"{axis.rate}_seen" for axis in AXES.values()]
+    seen = [*(f"{axis.rate}_seen" for axis in AXES.values()), "phi", "theta"]
     flown = loops.simulate(_sticks(stick, NOISE_RAD_S, 7 + seed), outputs=seen)
     return fid.Record.from_arrays(
         flown.time_s,
         inputs={name: flown[name] for name in INPUTS},
-        outputs={axis.rate: flown[f"{axis.rate}_seen"] for axis in AXES.values()},
-        units=dict.fromkeys(INPUTS, "in") | {axis.rate: "rad/s" for axis in AXES.values()},
+        outputs={
+            **{axis.rate: flown[f"{axis.rate}_seen"] for axis in AXES.values()},
+            **{name: flown[name] for name in ("phi", "theta")},
+        },
+        units={name: truth().units[name] for name in (*INPUTS, "p", "q", "r", "phi", "theta")},
         name=f"augmented doublet of {stick}",
     )
 
@@ -195,7 +209,7 @@ def _beside(
 
 def _margins(closed: fid.ClosedLoop) -> fid.Table:
     rows = []
-    for stick, found in closed.margins(band_rad_s=(0.3, 100.0)).items():
+    for stick, found in closed.margins(band_rad_s=(0.2, 40.0)).items():
         wanted = (found.crossover, found.phase_margin, found.gain_margin, found.delay_margin)
         rows.append((f"at {stick}", *(each.text for each in wanted)))
     columns = tuple(
@@ -215,12 +229,25 @@ def _bandwidths(fit: fid.Fit, closed: fid.ClosedLoop) -> fid.Table:
                     source, axis.attitude, stick, output_is=kind, band_rad_s=BAND_RAD_S
                 )
             except FlightidError as error:
-                rows.append((f"{axis.attitude}/{stick}", name, None, None, str(error)))
+                # An unstable vehicle has no bandwidth: its phase begins below -135 degrees.
+                rows.append((f"{axis.attitude}/{stick}", name, None, None, error.problem))
                 continue
-            numbers = (found.bandwidth.text, found.quantities[4 if found.nonlinear else 3].text)
+            numbers = (found.bandwidth.text, found.quantities[5 if found.nonlinear else 4].text)
             rows.append((f"{axis.attitude}/{stick}", name, *numbers, ""))
     columns = tuple(
         Column(name) for name in ("response", "augmentation", "bandwidth", "phase delay", "note")
     )
     table = fid.Table("Bandwidth and phase delay, 95 % intervals", columns, tuple(rows))
     return table.without_empty_columns()
+
+
+def tables_of(found: Augmented) -> tuple[fid.Table, ...]:
+    """What is printed and reported."""
+    return (
+        found.rates.summary(),
+        found.closed.summary(),
+        found.margins,
+        found.bandwidth,
+        found.flights,
+        found.opened.summary(),
+    )

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from augmentation import compare
+from augmentation import Augmented, augment, tables_of
 from flights import INPUTS, OUTPUTS, fly_manoeuvres, fly_sweeps, truth
 from report import write
 from structures import SUPERFLUOUS, candidate, linearised_full_envelope
@@ -43,9 +43,8 @@ class Results:
         Six degrees of freedom and inflow.
     comparison : Comparison
         Against the stand-in of the linearised full-envelope model.
-    augmented : Table
-        Doublets with rate feedback closed.
-    augmented_theil : dict of str to float
+    augmented : Augmented
+        The vehicle with an augmentation of limited authority.
     """
 
     response: fid.FrequencyResponse
@@ -54,8 +53,7 @@ class Results:
     reduction: fid.Reduction
     fit: fid.Fit
     comparison: fid.Comparison
-    augmented: fid.Table
-    augmented_theil: dict[str, float]
+    augmented: Augmented
 
 
 def main() -> None:
@@ -74,7 +72,8 @@ def main() -> None:
     inside, count = inside_of(found.fit)
     print(f"truth inside the 95 % interval: {inside} of {count}")
     print(found.comparison.summary())
-    print(found.augmented)
+    for table in tables_of(found.augmented):
+        print(table)
     print(f"wrote {write(found, options.output)}")
 
 
@@ -121,7 +120,7 @@ def study(seed: int, *, short: bool = False) -> Results:
         outputs=OUTPUTS,
         response=response,
     )
-    return Results(response, coherent, heave, reduction, fit, comparison, *compare(fit.model))
+    return Results(response, coherent, heave, reduction, fit, comparison, augment(fit))
 
 
 def _heave() -> fid.StateSpaceModel:

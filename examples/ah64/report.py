@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from augmentation import tables_of
 from flights import truth
 
 import flightid as fid
@@ -57,7 +58,7 @@ def write(found: Results, folder: Path) -> Path:
                 "Verification beside a linearised full-envelope model",
                 verification_blocks(found.comparison),
             ),
-            Section("With rate feedback", (TableBlock(found.augmented),)),
+            Section("Augmented", tuple(TableBlock(each) for each in tables_of(found.augmented))),
         ),
     )
     return write_atomically(folder / "report.html", to_html(document))

@@ -73,10 +73,14 @@ def test_the_unstable_helicopter_is_found_and_beats_its_rival(tmp_path: Path) ->
     assert costs[1] < 0.5 * costs[0], "inflow explains what a delay cannot"
     assert re.search(r"'identified' better in [678], worse in 0", said)
     theil = [
-        float(row.split()[-1]) for row in said.splitlines() if re.match(r"(lon|lat|ped) ", row)
+        float(row.split()[-1])
+        for row in said.splitlines()
+        if re.match(r"(lon|lat|ped) +[pqr] ", row)
     ]
     assert len(theil) == 3
-    assert max(theil) < 0.1, "with rate feedback closed"
+    assert max(theil) < 0.1, "with the augmentation on"
+    assert "0 of 20 drawn vehicles are unstable" in said
+    assert len(re.findall(r"^at (?:lon|lat|ped) .* deg ", said, re.MULTILINE)) == 3
     assert (tmp_path / "ah64-output" / "report.html").stat().st_size > 100_000
 
 

@@ -135,8 +135,11 @@ def _poles(
     stability = estimate.stability()
     count = max(1, estimate.order)
     step = stability.sample_time_s
-    kept = np.sort_complex(-stability.poles)[:count] * -1.0 if step is None else stability.poles
-    kept = kept[kept.imag >= 0.0]
+    poles = stability.poles
+    # A pole at the origin of the z plane is a pure delay.
+    growth = poles.real if step is None else np.abs(poles)
+    order = np.argsort(-growth)[:count]
+    kept = poles[[k for k in order if poles[k].imag >= 0.0 and (step is None or growth[k] > 1e-6)]]
 
     def numbers(thing: Interconnection) -> np.ndarray[Any, np.dtype[np.float64]]:
         found = followed_poles(thing, kept)

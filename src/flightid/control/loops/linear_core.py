@@ -181,7 +181,8 @@ def _with_direct_parts(core: Core, carriers: Sequence[str]) -> Core:
             continue
         place = core.signals.index(row.carrier)
         own = [int(k) for k in np.flatnonzero(core.d[place]) if core.rows[k].carrier in carriers]
-        if own:
+        still = not core.c[place].any() and not core.d[place].any()
+        if own or still:
             return _with_direct_parts(_split(core, number, place, own), carriers)
     return core
 
