@@ -164,7 +164,7 @@ def ratios(compared: fid.ConditionComparison) -> Table:
         Column("95 % high", digits=3),
         Column("chance", digits=2),
     )
-    notes = ("chance: of so large a change between equal truths.", *map(str, compared.findings))
+    notes = ("chance: of so large a change between equal truths.", *compared.verdicts)
     return Table("Cruise over hover", columns, tuple(rows), notes)
 
 

@@ -67,7 +67,10 @@ def test_changes_are_told_from_noise(compared: fid.ConditionComparison) -> None:
     assert damping.interval95[0] < 12.0 / 8.402 < damping.interval95[1]
     assert [m.name for m in compared.modes] == ["spiral", "Dutch roll", "roll"]
     assert json.loads(json.dumps(compared.to_dict()))["conditions"] == ["slow", "fast"]
-    assert "fast / slow" in compared.summary().to_text()
+    shown = compared.summary().to_text()
+    assert "fast / slow" in shown
+    assert "Changed beyond noise: " in shown
+    assert "[green]" not in shown
     assert len(compared.modes_table().rows) == 4
     assert compared._repr_html_().count("<table") == 2
 

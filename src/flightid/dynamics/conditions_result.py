@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from flightid.conventions import Light
 from flightid.dynamics.mode_result import Mode
 from flightid.dynamics.quantity import Quantity
 from flightid.errors import UnknownNameError
@@ -130,7 +131,14 @@ class ConditionComparison:
             if alone
         ]
         title = "Parameters, " + " and ".join(self.conditions)
-        return self._table(title, self.parameters, (*notes, *map(str, self.findings)))
+        return self._table(title, self.parameters, (*notes, *self.verdicts))
+
+    @property
+    def verdicts(self) -> tuple[str, ...]:
+        """What changed beyond noise in one sentence, and each finding that asks for something."""
+        changed = [f.message.split(":")[0] for f in self.findings if f.code == "changed"]
+        said = [f"Changed beyond noise: {'; '.join(changed)}."] if changed else []
+        return (*said, *(str(f) for f in self.findings if f.light is not Light.GREEN))
 
     def modes_table(self) -> Table:
         """Table of the modes that answer to each other."""
