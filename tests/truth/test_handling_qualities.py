@@ -114,6 +114,8 @@ def test_refusals() -> None:
         attitude_bandwidth(model(0.1, 0.3), "phi", "lat", band_rad_s=(0.1, 3.0))
     with pytest.raises(DataError, match="has no bandwidth in the band"):
         attitude_bandwidth(model(0.1, 0.3, gain=-2.0), "phi", "lat", band_rad_s=(0.1, 3.0))
+    with pytest.raises(DataError, match="begin the band lower"):
+        attitude_bandwidth(model(0.1, 0.3), "phi", "lat", band_rad_s=(3.0, 30.0))
     with pytest.raises(DataError, match="no points in the band"):
         attitude_bandwidth(measured(0.1, 0.3, 50), "phi", "lat", band_rad_s=(80.0, 90.0))
     with pytest.raises(OptionError, match="band_rad_s has no meaning"):
@@ -144,6 +146,15 @@ def test_a_rate_is_integrated_and_a_sign_turned() -> None:
     )
     as_angle = attitude_bandwidth(attitude, "phi", "tau_phi")
     assert_close(as_rate.spread.values, as_angle.spread.values, rtol=1e-9, why="p = s phi")
+
+
+def test_a_control_of_the_other_sign_is_told() -> None:
+    turned = model(0.1, 0.3, gain=-2.0)
+    wrong = attitude_bandwidth(turned, "phi", "lat")
+    assert "sign-doubtful" in [finding.code for finding in wrong.findings]
+    right = attitude_bandwidth(turned, "phi", "lat", sign=-1)
+    assert right.findings == ()
+    assert_close(right.phase_bandwidth_rad_s, 2.14214, atol=1e-5, why="printed digits")
 
 
 def test_what_counts_depends_on_the_response_type() -> None:

@@ -24,8 +24,10 @@ NONLINEAR = 0.1
 """Difference of both phase delays, over the larger, beyond which the phase is no line."""
 SMALLEST_DELAY_S = 0.002
 COHERENT = 0.6
-LEADING_DEG = 45.0
+LEADING_DEG = 10.0
 """Phase at the beginning of the band above which a control may have the other sign."""
+LATE = "begin the band lower: the phase has passed −135° where it begins; or sign=-1"
+NO_FALL = "widen the band; take the attitude, or output_is='rate', with its sign"
 MOST_POINTS = 160
 """Measured points that carry errors: more say the same again."""
 Array = NDArray[np.float64]
@@ -118,7 +120,7 @@ def attitude_bandwidth(
             f"{output}/{input} has no bandwidth in the band",
             found=f"phase from {curve.degrees[0]:.0f}° to {curve.degrees[-1]:.0f}°",
             needed="a phase that passes −135° and −180°",
-            action="widen the band; take the attitude, or output_is='rate', with its sign",
+            action=LATE if curve.degrees[0] <= PHASE_MARGIN_DEG - 180.0 else NO_FALL,
         )
     errors = _spread(data, pair, values)
     nonlinear = _is_nonlinear(values)

@@ -122,8 +122,10 @@ class HandlingQualities:
         return self.summary()._repr_html_()
 
 
-FOR_PILOTS = "Levels were drawn up for piloted vehicles of full size: of a small one they say how \
-a pilot would find it, scaled or not."
+FOR_PILOTS = (
+    "Levels were drawn up for piloted vehicles of full size; for a small one they describe, and "
+    "require nothing."
+)
 
 
 def _row(what: str, quantity: Quantity, rating: Rating | None) -> tuple[Cell, ...]:
