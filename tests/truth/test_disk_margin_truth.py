@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,8 +12,11 @@ from scipy.optimize import minimize_scalar
 
 import flightid as fid
 from flightid.control.disk_geometry import gain_limits, phase_limit_deg
+from flightid.control.disk_margin import alphas_of
+from flightid.control.matrix_loop import read_loops, spread_at
 from flightid.control.structured_gain import structured_gain
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
+from flightid.responses.uncertainty import Known
 from tests.closeness import assert_close
 
 
@@ -215,6 +220,79 @@ def test_measured_disk_has_intervals():
     assert found.alpha.interval95[0] < exact.alpha.value < found.alpha.interval95[1]
     assert found.summary().rows[0][0] == "disk margin"
     assert found.to_dict()["schema"] == "flightid.disk_margin/1"
+
+
+def test_two_measured_loops_have_intervals_that_draws_confirm():
+    plant = fid.LinearSystem(
+        [[-1.0, 0.3], [0.0, -2.0]],
+        [[3.0, 0.5], [0.2, 4.0]],
+        np.eye(2),
+        np.zeros((2, 2)),
+        ("u1", "u2"),
+        ("y1", "y2"),
+        [0.05, 0.05],
+    )
+    law = static([[2.0, 0.3], [-0.4, 1.5]])
+    omega = np.geomspace(1.0, 60.0, 25)
+    exact, error = plant.frequency_response(omega), 0.03
+    rng = np.random.default_rng(4)
+
+    def seen(values):
+        return fid.FrequencyResponse.from_values(
+            omega,
+            values,
+            inputs=plant.inputs,
+            outputs=plant.outputs,
+            random_error=np.full((2, 2, 25), error),
+        )
+
+    found = fid.disk_margin(seen(exact), controller=law)
+    noise = rng.standard_normal((2, 150, 2, 2, 25))
+    drawn = exact * (1 + error * (noise[0] + 1j * noise[1]))
+    gains = np.asarray(law.d)
+    alphas = [np.min(alphas_of(each @ gains, 0.0)) for each in np.moveaxis(drawn, -1, 1)]
+    half = np.ptp(found.alpha.interval95) / 2
+    assert_close(1.96 * np.std(alphas), half, rtol=0.35, why="150 draws, least of many points")
+    # The same errors, told as a covariance that knows one output at a time.
+    spread = np.abs(exact).reshape(2, -1) * error
+    matrix = np.array([np.diag(np.tile(each, 2) ** 2) for each in spread])
+    told = replace(seen(exact), errors=Known(matrix, 25))
+    other = fid.disk_margin(told, controller=law)
+    assert_close(np.ptp(other.alpha.interval95) / 2, half, rtol=1e-6, why="one covariance")
+    nothing = fid.FrequencyResponse.from_values(
+        omega, exact, inputs=plant.inputs, outputs=plant.outputs
+    )
+    silent = fid.disk_margin(nothing, controller=law)
+    assert silent.alpha.interval95 is None
+    assert "no-intervals" in [each.code for each in silent.findings]
+
+
+def test_what_outputs_share_in_their_errors_is_carried():
+    rng = np.random.default_rng(7)
+    n = 3000
+    inputs = rng.standard_normal((2, n))
+    gust = 0.5 * rng.standard_normal(n)
+    outputs = [0.8 * inputs[0] + gust, 0.6 * inputs[1] + 0.9 * gust]
+    record = fid.Record.from_arrays(
+        np.arange(n) * 0.02,
+        inputs=dict(zip(("u1", "u2"), inputs, strict=True)),
+        outputs=dict(zip(("y1", "y2"), outputs, strict=True)),
+    )
+    response = fid.estimate_response(record, omega_rad_s=(5.0, 60.0, 8), window_s=4.0)
+    loops = read_loops(
+        response, None, None, controller=None, at="outputs", band_rad_s=None, unstable_poles=None
+    )
+    omega = response.omega_rad_s[2:6]
+    covariance = spread_at(loops, omega).covariance
+    own = response.covariance_at(omega)
+    half = len(covariance) // 2
+    for k in range(2):
+        block = covariance[k * half : (k + 1) * half, k * half : (k + 1) * half]
+        assert_close(block, own[k], atol=1e-9 * np.abs(own).max(), why="each output's own")
+    cross = np.abs(np.diagonal(covariance[:half, half:]))
+    scale = np.sqrt(np.diagonal(own[0]) * np.diagonal(own[1]))
+    assert np.median(cross / scale) > 0.8
+    assert fid.disk_margin(response).alpha.interval95 is not None
 
 
 def test_what_makes_no_disk_is_refused():

@@ -15,7 +15,7 @@ from flightid.control.loop_metrics import loop_metrics
 from flightid.control.loop_source import Controller
 from flightid.control.margin_findings import guide_finding
 from flightid.control.margins import GAIN_GUIDE_DB, PHASE_GUIDE_DEG
-from flightid.control.matrix_loop import At, MatrixLoop, equivalent_loop, read_loops
+from flightid.control.matrix_loop import At, MatrixLoop, equivalent_loop, read_loops, spread_at
 from flightid.control.structured_gain import structured_gain
 from flightid.conventions import Light
 from flightid.dynamics.quantity import Quantity, quantity_table
@@ -185,7 +185,7 @@ def disk_margin(
     -------
     Linear loops. With more than three loops the margin is a lower bound (an upper bound of the
     structured singular value), within about 0.1 % of the best that scalings give. Intervals are
-    carried by first order; the measurement of several outputs at once has none.
+    carried by first order.
 
     Reference
     ---------
@@ -211,7 +211,7 @@ def disk_margin(
         unstable_poles=unstable_poles,
     )
     omega, alphas, count = _over_frequency(loops, skew)
-    findings = list(_findings(loops, count))
+    findings = _stability(count)
     if count > 0:
         none = {key: Quantity(name, None, unit, None, UNSTABLE) for key, name, unit in QUANTITIES}
         return DiskMargin(
@@ -223,8 +223,8 @@ def disk_margin(
             response=None,
             findings=tuple(findings),
         )
-    made = _carried(loops, omega, alphas, skew)
-    findings += _guides(made)
+    made, unknown = _carried(loops, omega, alphas, skew)
+    findings += _guides(made) + unknown
     single = len(loops.channels) == 1
     response = loops.of(loops.spread.estimate, omega)[:, 0, 0] if single else None
     return DiskMargin(
@@ -268,7 +268,9 @@ def _over_frequency(loops: MatrixLoop, skew: float) -> tuple[Array, Array, int]:
     return omega, alphas, count
 
 
-def _carried(loops: MatrixLoop, omega: Array, alphas: Array, skew: float) -> dict[str, Quantity]:
+def _carried(
+    loops: MatrixLoop, omega: Array, alphas: Array, skew: float
+) -> tuple[dict[str, Quantity], list[Finding]]:
     """Numbers with their intervals, from the frequencies where the disk is small."""
     low = alphas <= NEAR * np.min(alphas)
     near = low | np.append(low[1:], False) | np.append(False, low[:-1])
@@ -277,18 +279,21 @@ def _carried(loops: MatrixLoop, omega: Array, alphas: Array, skew: float) -> dic
     at = omega[near]
 
     def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever the spread is of
-        values = loops.of(thing, omega)[near] if loops.measured else loops.of(thing, at)
-        alpha, place = _least(at, alphas_of(values, skew))
+        alpha, place = _least(at, alphas_of(loops.of(thing, at), skew))
         fall, rise = gain_limits(alpha, skew)
         decibels = [np.nan if g in (0.0, np.inf) else 20.0 * np.log10(g) for g in (rise, fall)]
         phase = phase_limit_deg(alpha, skew)
         return np.array([alpha, decibels[0], -decibels[1], phase, place])
 
-    carried = loops.spread.propagate(all_of)
-    return {
+    spread = spread_at(loops, at)
+    carried = spread.propagate(all_of)
+    made = {
         key: carried.quantity(place, name, unit, "the disk sets no limit")
         for place, (key, name, unit) in enumerate(QUANTITIES)
     }
+    if spread.known:
+        return made, []
+    return made, [Finding("no-intervals", Light.UNKNOWN, f"no intervals: {spread.reason}")]
 
 
 def _least(omega: Array, alphas: Array) -> tuple[float, float]:
@@ -321,17 +326,14 @@ def _guides(made: dict[str, Quantity]) -> list[Finding]:
     ]
 
 
-def _findings(loops: MatrixLoop, count: int) -> list[Finding]:
-    found = []
-    if count > 0:
-        found.append(
-            Finding(
-                "closed-loop-unstable",
-                Light.RED,
-                f"the closed loop is unstable: {count} unstable poles by the Nyquist criterion",
-                "change the gains, or give unstable_poles",
-            )
+def _stability(count: int) -> list[Finding]:
+    if count <= 0:
+        return []
+    return [
+        Finding(
+            "closed-loop-unstable",
+            Light.RED,
+            f"the closed loop is unstable: {count} unstable poles by the Nyquist criterion",
+            "change the gains, or give unstable_poles",
         )
-    if not loops.spread.known:
-        found.append(Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loops.spread.reason}"))
-    return found
+    ]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
 
 from flightid.control.loop_grid import Roots, loop_grid, roots_of
 from flightid.control.loop_source import Controller, Responding, known_values
@@ -16,6 +17,7 @@ from flightid.dynamics.spread_of import spread_of
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
 from flightid.responses import FrequencyResponse
 from flightid.responses.arithmetic import Known
+from flightid.responses.uncertainty import Points, combined
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -97,7 +99,7 @@ def read_loops(
     if band_rad_s is not None and not 0.0 < band_rad_s[0] < band_rad_s[1] < np.inf:
         raise OptionError("band_rad_s has no meaning", found=band_rad_s, needed="0 < low < high")
     measured = isinstance(source, FrequencyResponse)
-    spread = _spread(source)
+    spread = _unweighed(source) if measured else spread_of(source)
     thing = spread.estimate
     if not measured and not isinstance(thing, Responding):
         raise ModelError(
@@ -140,11 +142,48 @@ def equivalent_loop(loops: Complex) -> Complex:
     return np.asarray(np.where(found == 0.0, 1e-300, found))
 
 
-def _spread(source: object) -> Spread[Any]:
-    if isinstance(source, FrequencyResponse) and len(source.outputs) > 1:
-        reason = "errors that outputs of a measurement share are not carried"
-        return Spread(np.zeros(0), None, lambda _: source, None, reason)
-    return spread_of(source)
+def _unweighed(response: object) -> Spread[Any]:
+    """A measurement whose covariance is worked out where it is needed, by `spread_at`."""
+    return Spread(np.zeros(0), None, lambda _: response)
+
+
+def spread_at(loops: MatrixLoop, omega: Array) -> Spread[Any]:
+    """The spread of what the loops are computed from; of a measurement at some frequencies alone.
+
+    Parameters
+    ----------
+    loops : MatrixLoop
+    omega : ndarray, shape (n,)
+        Frequencies of the measurement, rad/s.
+
+    Returns
+    -------
+    Spread
+    """
+    if not loops.measured:
+        return loops.spread
+    chosen: FrequencyResponse = loops.spread.estimate.select(omega=omega)
+    parts = [spread_of(chosen, output=name) for name in chosen.outputs]
+    if len(parts) == 1:
+        return parts[0]
+    shape = chosen.response.shape
+
+    def make(numbers: Array) -> FrequencyResponse:
+        real, imaginary = np.moveaxis(numbers.reshape(shape[0], 2, *shape[1:]), 1, 0)
+        return replace(chosen, response=real + 1j * imaginary)
+
+    centre = np.concatenate([part.centre for part in parts])
+    unknown = next((part.reason for part in parts if not part.known), None)
+    if unknown is not None:
+        return Spread(centre, None, make, None, unknown)
+    if chosen.errors is None:
+        blocks = [np.asarray(part.covariance) for part in parts]
+        return Spread(centre, block_diag(*blocks), make, None, parts[0].reason)
+    rows = np.split(np.eye(len(centre)), len(parts), axis=1)
+    points = [
+        Points(k, np.arange(shape[1]), np.arange(shape[2])) for k in range(len(chosen.outputs))
+    ]
+    return Spread(centre, combined(chosen.errors, points, rows), make)
 
 
 def _chosen(
