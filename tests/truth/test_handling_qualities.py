@@ -233,6 +233,16 @@ def test_low_coherence_and_several_crossings_are_said() -> None:
     )
     codes = [finding.code for finding in attitude_bandwidth(noisy, "phi", "lat").findings]
     assert {"low-coherence", "several-crossings"} <= set(codes)
+    assert "noisy-crossing" not in codes
+    uncertain = fid.FrequencyResponse.from_values(
+        omega,
+        response.response,
+        inputs=["lat"],
+        outputs=["phi"],
+        random_error=np.full((1, 1, len(omega)), 0.05),
+    )
+    told = attitude_bandwidth(uncertain, "phi", "lat").findings
+    assert [finding.code for finding in told] == ["noisy-crossing"]
 
 
 def test_black_box_models_and_systems_are_read_to_nyquist() -> None:

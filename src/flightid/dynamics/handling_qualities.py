@@ -12,7 +12,7 @@ from flightid.dynamics.spread import Propagated
 from flightid.dynamics.spread_of import spread_of
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
-from flightid.responses import FrequencyResponse
+from flightid.responses import FrequencyResponse, PairResponse
 
 PHASE_MARGIN_DEG = 45.0
 GAIN_MARGIN_DB = 6.0
@@ -24,6 +24,8 @@ NONLINEAR = 0.1
 """Difference of both phase delays, over the larger, beyond which the phase is no line."""
 SMALLEST_DELAY_S = 0.002
 COHERENT = 0.6
+NOISY = 0.03
+"""Random error at a crossing beyond which intervals of a reading cover less than they say."""
 LEADING_DEG = 10.0
 """Phase at the beginning of the band above which a control may have the other sign."""
 LATE = "begin the band lower: the phase has passed −135° where it begins; or sign=-1"
@@ -237,7 +239,7 @@ def _coherence(data: object, pair: Pair, values: Array) -> tuple[Finding, ...]:
     if not isinstance(data, FrequencyResponse):
         return ()
     measured = data.pair(pair.output, pair.input)
-    found = _windows(data)
+    found = (*_windows(data), *_noise(measured, values))
     low, high = 0.95 * float(np.nanmin(values[:3])), 2.0 * float(values[0])
     inside = (measured.omega_rad_s >= low) & (measured.omega_rad_s <= high)
     if not np.any(inside) or np.min(measured.coherence[inside]) >= COHERENT:
@@ -249,6 +251,20 @@ def _coherence(data: object, pair: Pair, values: Array) -> tuple[Finding, ...]:
     )
     action = f"excite these frequencies more; below {COHERENT:g} the phase is a guess"
     return (*found, Finding("low-coherence", Light.AMBER, text, action))
+
+
+def _noise(measured: PairResponse, values: Array) -> tuple[Finding, ...]:
+    """Warning where intervals are too narrow, since the first of several crossings is read."""
+    places = np.clip(
+        np.searchsorted(measured.omega_rad_s, values[:2]), 0, len(measured.response) - 1
+    )
+    largest = float(np.max(measured.random_error[places]))
+    if largest <= NOISY:
+        return ()
+    text = f"random error {100.0 * largest:.0f} % where the phase is read: intervals are too narrow"
+    return (
+        Finding("noisy-crossing", Light.AMBER, text, "average more, or fit a model and read that"),
+    )
 
 
 def _windows(data: FrequencyResponse) -> tuple[Finding, ...]:
