@@ -209,7 +209,7 @@ def _beside(
 
 def _margins(closed: fid.ClosedLoop) -> fid.Table:
     rows = []
-    for stick, found in closed.margins(band_rad_s=(0.2, 40.0)).items():
+    for stick, found in closed.margins(band_rad_s=(0.02, 100.0)).items():
         wanted = (found.crossover, found.phase_margin, found.gain_margin, found.delay_margin)
         rows.append((f"at {stick}", *(each.text for each in wanted)))
     columns = tuple(

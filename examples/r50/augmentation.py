@@ -54,9 +54,9 @@ def main(form: str = "short", seed: str = "0") -> None:
 
 
 def margins(closed: fid.ClosedLoop) -> fid.Table:
-    """Of the loops broken at the actuators, the other closed; slower crossings are the speeds'."""
+    """Of the loops broken at the actuators, the other closed."""
     rows = []
-    for stick, found in closed.margins(band_rad_s=(0.8, 100.0)).items():
+    for stick, found in closed.margins(band_rad_s=(0.02, 100.0)).items():
         numbers = (found.crossover, found.phase_margin, found.gain_margin, found.delay_margin)
         rows.append((f"at {stick}", *(each.text for each in numbers)))
     names = ("loop broken", "crossover", "phase margin", "gain margin", "delay margin")

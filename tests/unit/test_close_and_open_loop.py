@@ -208,3 +208,26 @@ def test_words_of_a_closed_loop() -> None:
     assert "No intervals" in str(closed.summary())
     assert closed.to_dict()["schema"] == "flightid.closed_loop/1"
     assert "<table>" in closed._repr_html_()
+
+
+def test_a_digital_loop_may_leave_a_delayed_input_alone() -> None:
+    # The other input's delay acts on what rests while the loop is broken.
+    digital = [
+        L.gain(("p", "phi"), "law", [[-0.4, -0.3]]),
+        L.sample_and_hold("law", "lat", 0.02, 0.01),
+    ]
+    closed = fid.close_loop(vehicle(), digital)
+    assert closed.is_stable
+    # The loop that its gain would first make unstable is the static one.
+    still = closed.broken_at("lat").frequency_response([1e-9])[0, 0, 0].real
+    found = closed.margins()["lat"].gain_margin.value
+    assert_close(found, -20.0 * np.log10(-still), atol=0.05, why="the lowest frequency is not zero")
+    assert all(pole.real.value is not None for pole in closed.poles)
+
+
+def test_a_connection_is_a_linear_system_to_whoever_asks() -> None:
+    closed = fid.close_loop(vehicle(), controller(), draws=0)
+    system = fid.LinearSystem.of(closed.loops)
+    slow = np.array([0.3, 2.0])
+    assert_close(system.frequency_response(slow), closed.loops.frequency_response(slow), rtol=1e-5,
+                 why="delays of order three at 0.2 rad")  # fmt: skip
