@@ -9,6 +9,7 @@ import pytest
 
 import flightid as fid
 from flightid.control.autopilots import axis_loop
+from flightid.control.loop_problem import highest_crossover
 from flightid.control.tuning_requirements import TuningRequirements
 from flightid.control.worst_case import content_of_worst, least_share
 from flightid.conventions import Light
@@ -202,6 +203,16 @@ def test_noise_bounds_the_gains(fit: fid.Fit) -> None:
 def test_requirements_without_meaning_are_refused(changes: dict, said: str) -> None:
     with pytest.raises(OptionError, match=said):
         TuningRequirements(**changes)
+
+
+def test_the_highest_crossing_counts_for_the_band() -> None:
+    omega = np.geomspace(0.1, 100.0, 2000)
+    s = 1j * omega
+    twice = 5.0 / s + 3.0 * s / (s**2 + s + 400.0) * 10.0  # falls through one, and again at 20…40
+    found = highest_crossover(omega, np.array([twice, 2.0 / s, 0.01 / s]))
+    assert found[0] > 30.0
+    assert_close(found[1], 2.0, rtol=1e-9, why="an integrator, straight in its logarithm")
+    assert np.isnan(found[2])
 
 
 def test_statements_about_content() -> None:

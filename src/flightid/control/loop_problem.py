@@ -222,7 +222,7 @@ class LoopProblem:
             for name, loop in loops.named()
         }
         noise = self._noise(omega, np.abs(loops.control)[:, None] / np.abs(1.0 + loops.whole))
-        parts = self._slack(metrics, stable, noise)
+        parts = self._slack(metrics, stable, noise, highest_crossover(omega, loops.rate))
         return Judged(
             tuple(parts),
             np.array([*parts.values()]),
@@ -248,7 +248,11 @@ class LoopProblem:
         return np.asarray(np.sqrt(power * share))
 
     def _slack(
-        self, metrics: dict[str, LoopMetrics], stable: NDArray[np.bool_], noise: Array
+        self,
+        metrics: dict[str, LoopMetrics],
+        stable: NDArray[np.bool_],
+        noise: Array,
+        highest: Array,
     ) -> dict[str, Array]:
         """Slack by requirement, bounded so that one plant cannot hide the others."""
         need, parts = self.requirements, {}
@@ -263,9 +267,8 @@ class LoopProblem:
             parts[f"{name}: sensitivity peak"] = np.log(need.peak / peak) / np.log(need.peak)
             if need.delay_margin_s is not None and name != ANGLE:
                 parts[f"{name}: delay margin"] = found.delay_margin_s / need.delay_margin_s - 1.0
-        rate = metrics[RATE]
         if self.crossover_limit_rad_s is not None:
-            parts["identified band"] = np.log(self.crossover_limit_rad_s / rate.crossover_rad_s)
+            parts["identified band"] = np.log(self.crossover_limit_rad_s / highest)
         if self.noise_limit is not None:
             parts["output noise"] = np.log(self.noise_limit / np.maximum(noise, TINY))
         bounded = {
@@ -310,6 +313,21 @@ class LoopProblem:
             else rate.disturbance_bandwidth_rad_s
         )
         return np.asarray(np.log(present(bandwidth)) + DISTURBANCE_WEIGHT * rejection)
+
+
+def highest_crossover(omega_rad_s: Array, loop: Complex) -> Array:
+    """Highest frequency at which each loop's gain falls through one, rad/s; NaN without.
+
+    A derivative can hold the gain about one far beyond the crossover with the least phase.
+    """
+    logs, gain = np.log(omega_rad_s), np.log(np.abs(loop))
+    above = gain[..., :-1] >= 0.0
+    last = above.shape[-1] - 1 - np.argmax(above[..., ::-1], axis=-1)
+    one = np.take_along_axis(gain, last[..., None], -1)[..., 0]
+    two = np.take_along_axis(gain, last[..., None] + 1, -1)[..., 0]
+    share = np.clip(one / np.where(one > two, one - two, 1.0), 0.0, 1.0)
+    found = np.exp(logs[last] + share * (logs[last + 1] - logs[last]))
+    return np.asarray(np.where(above.any(axis=-1), found, np.nan))
 
 
 def present(values: Array) -> Array:
