@@ -143,6 +143,10 @@ def test_the_count_is_that_of_the_exact_poles(
         if np.min(np.abs(sizes - 1.0)) < 2e-5:
             continue  # on the circle within rounding: either answer is right
         counted = int(unstable_poles(omega, 1.0 + loops, plants.unstable[0]))
+        if counted == -1:
+            # Too coarse to tell is never taken for stable, and said of poles at the circle alone.
+            assert np.min(np.abs(sizes - 1.0)) < 1e-3
+            continue
         assert counted == np.count_nonzero(sizes > 1.0)
 
 
