@@ -250,7 +250,12 @@ def _over_frequency(loops: MatrixLoop, skew: float) -> tuple[Array, Array, int]:
     """Frequencies, α at each, and unstable poles of the closed loop."""
     omega, thing = loops.omega_rad_s, loops.spread.estimate
     turning = equivalent_loop(loops.of(thing, omega))
-    found = loop_metrics(omega, turning, unstable_poles=loops.unstable_poles)
+    found = loop_metrics(
+        omega,
+        turning,
+        unstable_poles=loops.unstable_poles,
+        closed_unstable_poles=loops.closed_unstable_poles,
+    )
     count = round(float(found.unstable_poles))
     if loops.measured:
         return omega, alphas_of(loops.of(thing, omega), skew), count

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.crossings import level_crossings
-from flightid.control.loop_metrics import DISTURBANCE_LEVEL_DB, loop_metrics
+from flightid.control.loop_metrics import DISTURBANCE_LEVEL_DB
 from flightid.control.loop_source import Controller, Given, read_loop
 from flightid.control.margin_findings import guide_finding, stability_findings
 from flightid.control.margins import LoopCurve, drawn_points, measured_up
@@ -190,7 +190,7 @@ def disturbance_rejection(
     sensitivity = 1.0 / (1.0 + loop.of(loop.spread.estimate, drawn))
 
     def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever the spread is of
-        found = loop_metrics(omega, loop.of(thing, omega), unstable_poles=loop.unstable_poles)
+        found = loop.metrics(omega, loop.of(thing, omega))
         ratio = 1.0 / ((1.0 + loop.of(thing, drawn)) * sensitivity)
         numbers = [float(getattr(found, name)) for _, _, name, _ in QUANTITIES]
         return np.concatenate([numbers, 20 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))])

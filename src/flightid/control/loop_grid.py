@@ -139,6 +139,14 @@ def loop_grid(
     return omega
 
 
+def whole_grid(
+    of: Callable[[Array], Complex], roots: Roots, band_rad_s: tuple[float, float]
+) -> Array:
+    """Frequencies below, in and above a band, for a count that must not miss any turn."""
+    low, high = _band(of, roots)
+    return loop_grid(of, roots, (min(low, band_rad_s[0]), max(high, band_rad_s[1])))
+
+
 def zoomed(omega: Array, centres: Array, ratio: float) -> Array:
     """The grid with pairs of points close around some frequencies."""
     wanted = centres[np.isfinite(centres) & (centres > omega[0]) & (centres < omega[-1])]

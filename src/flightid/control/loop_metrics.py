@@ -62,8 +62,8 @@ class LoopMetrics:
     disturbance_peak_db : ndarray
         Greatest ``|1/(1+L)|``, dB.
     unstable_poles : ndarray of float
-        Unstable poles of the closed loop by the Nyquist criterion in the band; below zero where
-        the open loop must have more than were given.
+        Unstable poles of the closed loop, as given or by the Nyquist criterion in the band; below
+        zero where the open loop must have more than were given.
 
     Example
     -------
@@ -106,7 +106,11 @@ class LoopMetrics:
 
 
 def loop_metrics(
-    omega_rad_s: ArrayLike, loop: ArrayLike, *, unstable_poles: ArrayLike = 0
+    omega_rad_s: ArrayLike,
+    loop: ArrayLike,
+    *,
+    unstable_poles: ArrayLike = 0,
+    closed_unstable_poles: ArrayLike | None = None,
 ) -> LoopMetrics:
     """Crossover, margins, sensitivity peaks and disturbance rejection of many loops.
 
@@ -121,6 +125,9 @@ def loop_metrics(
         Broken-loop responses L for negative feedback: ``1 + L = 0`` is critical.
     unstable_poles : array_like of int
         Unstable poles of the open loops, one number or one for each.
+    closed_unstable_poles : array_like of int, optional
+        Unstable poles of the closed loops where they are known. The grid need then not begin below
+        every crossing, and nothing below it is taken from its beginning.
 
     Returns
     -------
@@ -162,7 +169,11 @@ def loop_metrics(
     logs = np.log(omega)
     rows, ends = _ending(omega, rows)
     passes, starts = phase_crossings(logs, rows), _beginning(omega, rows)
-    unstable = begun + _encirclements(passes, starts.joined(ends), len(rows))
+    if closed_unstable_poles is None:
+        unstable = begun + _encirclements(passes, starts.joined(ends), len(rows))
+    else:
+        unstable = _unstable(closed_unstable_poles, lead)
+        starts = starts.kept(np.zeros(len(rows), dtype=np.bool_))
     sign = np.where(unstable > 0.0, -1.0, 1.0)
     found: dict[str, Array] = _phase_margins(gain_crossings(logs, rows), sign)
     found |= _gain_margins(passes.joined(starts.kept(starts.weight != 0.0)).joined(ends), sign)

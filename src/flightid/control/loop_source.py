@@ -9,7 +9,8 @@ from typing import Any, Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flightid.control.loop_grid import loop_grid, roots_of
+from flightid.control.loop_grid import Roots, loop_grid, roots_of, whole_grid
+from flightid.control.loop_metrics import LoopMetrics, loop_metrics
 from flightid.dynamics.spread import Spread
 from flightid.dynamics.spread_of import spread_of
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
@@ -55,6 +56,8 @@ class Loop:
         Of a measured response.
     end_rad_s : float
         Highest frequency that has a meaning, rad/s: π/T of a sampled loop.
+    closed_unstable_poles : int or None
+        Of the closed loop, counted over all frequencies where the band holds only some of them.
     """
 
     name: str
@@ -64,11 +67,21 @@ class Loop:
     unstable_poles: int
     coherence: Array | None = None
     end_rad_s: float = np.inf
+    closed_unstable_poles: int | None = None
 
     @property
     def measured(self) -> bool:
         """Whether the response is known at its own frequencies alone."""
         return self.coherence is not None
+
+    def metrics(self, omega: Array, values: Complex) -> LoopMetrics:
+        """Margins of the loop's response at some frequencies."""
+        return loop_metrics(
+            omega,
+            values,
+            unstable_poles=self.unstable_poles,
+            closed_unstable_poles=self.closed_unstable_poles,
+        )
 
 
 def read_loop(
@@ -184,7 +197,38 @@ def _modelled(
     omega = loop_grid(lambda at: of(model, at), roots, band_rad_s)
     count = roots.n_unstable if unstable_poles is None else unstable_poles
     name = f"{outputs[row]} / {inputs[column]}"
-    return Loop(name, spread, omega, of, count, None, roots.end_rad_s)
+    closed = closed_count(lambda at: of(model, at), roots, band_rad_s, count)
+    return Loop(name, spread, omega, of, count, None, roots.end_rad_s, closed)
+
+
+def closed_count(
+    of: Callable[[Array], Complex],
+    roots: Roots,
+    band_rad_s: tuple[float, float] | None,
+    unstable_poles: int,
+) -> int | None:
+    """Unstable poles of a closed loop, counted below, in and above a band.
+
+    Parameters
+    ----------
+    of : callable
+        The loop's response, shape (n_f,).
+    roots : Roots
+    band_rad_s : tuple of float or None
+    unstable_poles : int
+        Of the open loop.
+
+    Returns
+    -------
+    int or None
+        None without a band: what is looked at is then all there is. Below zero where the open loop
+        must have more unstable poles.
+    """
+    if band_rad_s is None:
+        return None
+    whole = whole_grid(of, roots, band_rad_s)
+    found = loop_metrics(whole, of(whole), unstable_poles=unstable_poles)
+    return round(float(found.unstable_poles))
 
 
 def known_values(controller: Controller, omega: Array) -> Complex:

@@ -116,7 +116,20 @@ def margin_findings(
             )
     if not loop.spread.known:
         found.append(Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loop.spread.reason}"))
+    if loop.measured:
+        found.append(_verdict_of_band(loop))
     return tuple(found)
+
+
+def _verdict_of_band(loop: Loop) -> Finding:
+    low, high = loop.omega_rad_s[[0, -1]]
+    return Finding(
+        "stability-of-the-band",
+        Light.UNKNOWN,
+        f"whether the closed loop is stable is judged from {low:.3g} to {high:.3g} rad/s and "
+        f"{loop.unstable_poles} unstable poles of the open loop: other turns about −1 are not seen",
+        "measure from below the lowest crossing, or fit a model",
+    )
 
 
 def stability_findings(loop: Loop, metrics: LoopMetrics) -> list[Finding]:

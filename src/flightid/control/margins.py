@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.control.crossings import gain_crossings, phase_crossings
 from flightid.control.loop_grid import zoomed
-from flightid.control.loop_metrics import LoopMetrics, loop_metrics
+from flightid.control.loop_metrics import LoopMetrics
 from flightid.control.loop_source import Controller, Given, Loop, read_loop
 from flightid.control.margin_findings import margin_findings
 from flightid.dynamics.quantity import Quantity, quantity_table
@@ -231,8 +231,9 @@ def margins(
         What a measured response is: the broken loop L, feedback over reference L/(1 + L), or error
         over reference (fed-back signal over a disturbance added to it) 1/(1 + L).
     band_rad_s : tuple of float, optional
-        Frequencies to look at, rad/s; left out: all of a measurement, and for a model what its
-        roots and delays call for.
+        Frequencies at which margins are looked for, rad/s; left out: all of a measurement, and for
+        a model what its roots and delays call for. Whether a model's loop is stable is counted over
+        all frequencies; of a measurement the band is all there is.
     unstable_poles : int, optional
         Unstable poles of the open loop. Left out: counted in a model; none in a measurement.
     phase_guide_deg, gain_guide_db : float
@@ -327,13 +328,12 @@ def measured_up(loop: Loop) -> tuple[Array, LoopMetrics]:
     omega, thing = loop.omega_rad_s, loop.spread.estimate
     for ratio in () if loop.measured else ZOOMS:
         values = loop.of(thing, omega)
-        found = loop_metrics(omega, values, unstable_poles=loop.unstable_poles)
+        found = loop.metrics(omega, values)
         centres = [getattr(found, name) for name in vars(found) if name.endswith("rad_s")]
         logs, rows = np.log(omega), values[None, :]
         passed = [gain_crossings(logs, rows).omega, phase_crossings(logs, rows).omega]
         omega = zoomed(omega, np.concatenate([np.ravel(each) for each in centres] + passed), ratio)
-    values = loop.of(thing, omega)
-    return omega, loop_metrics(omega, values, unstable_poles=loop.unstable_poles)
+    return omega, loop.metrics(omega, loop.of(thing, omega))
 
 
 def drawn_points(loop: Loop, omega: Array) -> Array:
@@ -351,7 +351,7 @@ def _carried(loop: Loop, omega: Array) -> tuple[list[tuple[Any, Quantity]], Loop
 
     def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever the spread is of
         values = loop.of(thing, omega)
-        found = loop_metrics(omega, values, unstable_poles=loop.unstable_poles)
+        found = loop.metrics(omega, values)
         ratio = (values if drawn is omega else loop.of(thing, drawn)) / centre
         curve = [20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))]
         return np.concatenate([[float(getattr(found, name)) for name in names], *curve])

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from flightid.control.loop_grid import Roots, loop_grid, roots_of
-from flightid.control.loop_source import Controller, Responding, known_values
+from flightid.control.loop_source import Controller, Responding, closed_count, known_values
 from flightid.dynamics.spread import Spread
 from flightid.dynamics.spread_of import spread_of
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
@@ -42,6 +42,8 @@ class MatrixLoop:
     unstable_poles : int
         Of the open loops.
     measured : bool
+    closed_unstable_poles : int or None
+        Of the closed loops, counted over all frequencies where a band holds only some of them.
     """
 
     channels: tuple[str, ...]
@@ -50,6 +52,7 @@ class MatrixLoop:
     of: Callable[[Any, Array], Complex]
     unstable_poles: int
     measured: bool
+    closed_unstable_poles: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +131,12 @@ def read_loops(
             omega = np.concatenate([omega[0] * STEADY, omega])
     names = {"outputs": rows, "inputs": columns, "both": rows + columns}[at]
     count = roots.n_unstable if unstable_poles is None else unstable_poles
-    return MatrixLoop(names, spread, omega, of, count, measured)
+    closed = (
+        None
+        if measured
+        else closed_count(lambda at_: equivalent_loop(of(thing, at_)), roots, band_rad_s, count)
+    )
+    return MatrixLoop(names, spread, omega, of, count, measured, closed)
 
 
 def _determinant(loops: Complex) -> Complex:
