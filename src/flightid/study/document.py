@@ -12,6 +12,7 @@ from flightid.plot.fit import Estimate, parameter_intervals
 from flightid.report.blocks import provenance
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
+from flightid.report.handling_qualities import handling_qualities_blocks
 from flightid.report.tuning import tuning_section
 from flightid.study.black_box_section import (
     black_box_in_short,
@@ -51,6 +52,7 @@ def study_document(study: Study) -> Document:
         (
             Section("Result", tuple(_result(study))),
             *models,
+            *_qualities(study),
             *gains,
             Section(
                 "The records" if study.inspection is None else "The log",
@@ -60,6 +62,15 @@ def study_document(study: Study) -> Document:
         ),
         f"Made by flightid {VERSION} from {', '.join(study.files)}.",
     )
+
+
+def _qualities(study: Study) -> Iterator[Section]:
+    if study.qualities:
+        parts = (
+            Section(f"Handling qualities of “{name}”", handling_qualities_blocks(found))
+            for name, found in study.qualities.items()
+        )
+        yield Section("Handling qualities", (), tuple(parts))
 
 
 def parameter_table(study: Study) -> Table:

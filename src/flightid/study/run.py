@@ -18,6 +18,7 @@ from flightid.report.text import to_text
 from flightid.simulation import write_ardupilot_log
 from flightid.study.black_box import identify_black_box
 from flightid.study.output import RESULTS, require_replaceable, whole_folder
+from flightid.study.qualities import rate_models, require_pairs
 from flightid.study.settings import Settings, read_settings
 from flightid.study.stages import (
     Identified,
@@ -83,6 +84,9 @@ def run_study(
     final = Path(output) if output is not None else source.with_name(f"{source.stem}-output")
     require_replaceable(final)
     tasks = [load_task(model, on_records=settings.on_records) for model in settings.models]
+    rated = settings.qualities
+    if rated is not None:
+        require_pairs(tasks, rated)
     # Reading and cutting, three steps for each model, writing; a flight before all of it.
     steps = 3 + 3 * (len(tasks) + len(settings.black_boxes))
     with whole_folder(final) as folder, progress(steps, source.stem) as advance:
@@ -106,6 +110,7 @@ def run_study(
             taken.truth,
             files,
             tuning,
+            {} if rated is None else rate_models(identified, rated),
         )
         _write(study, folder)
         advance()

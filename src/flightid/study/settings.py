@@ -15,6 +15,7 @@ from typing import Any, Literal, cast
 from flightid.errors import StudyError
 from flightid.study.black_box_settings import BlackBoxSettings, read_black_box
 from flightid.study.flight import FlightPlan, read_flight
+from flightid.study.qualities import QualitiesSettings, read_qualities
 from flightid.study.reading import TOP, TableReader
 from flightid.study.record_files import RecordFile, read_record_file
 from flightid.study.reducing import ReduceSettings, read_reduce
@@ -160,6 +161,8 @@ class Settings:
         How structures are reduced after their fit; None: not at all.
     tune : TuneSettings or None
         How the autopilot's gains are tuned; None: not at all.
+    qualities : QualitiesSettings or None
+        How handling qualities are read off the fits; None: not at all.
     """
 
     title: str
@@ -182,6 +185,7 @@ class Settings:
     initial: Literal["trim", "fit"]
     reduce: ReduceSettings | None = None
     tune: TuneSettings | None = None
+    qualities: QualitiesSettings | None = None
 
     @property
     def on_records(self) -> bool:
@@ -239,6 +243,9 @@ def read_settings(path: Path) -> Settings:
     on_records = method != FITS[0]
     reducing = root.maybe(lambda key: read_reduce(root.table(key)), "reduce")
     tuning = root.maybe(lambda key: read_tune(root.table(key)), "tune")
+    qualities = root.maybe(
+        lambda key: read_qualities(root.table(key), path.parent), "handling_qualities"
+    )
     readers = root.tables("model")
     models = tuple(
         _model(reader, path.parent, on_records=on_records, reduced=reducing is not None)
@@ -273,6 +280,7 @@ def read_settings(path: Path) -> Settings:
         initial,
         reducing,
         tuning,
+        qualities,
     )
 
 

@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from flightid.control.tuning import Tuning
+from flightid.dynamics.handling_qualities_table import HandlingQualities
 from flightid.findings import Finding
 from flightid.inspection import Inspection
 from flightid.record import Record
@@ -47,6 +48,8 @@ class Study:
         SHA-256 of what was read, by file name.
     tuning : Tuning or None
         Gains, where the study asks for them.
+    qualities : mapping of str to HandlingQualities
+        By model, where the study asks for them.
 
     Example
     -------
@@ -64,6 +67,7 @@ class Study:
     truth: Truth | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     tuning: Tuning | None = None
+    qualities: Mapping[str, HandlingQualities] = field(default_factory=dict)
 
     @cached_property
     def document(self) -> Document:
@@ -86,7 +90,8 @@ class Study:
         -------
         dict
             Keys ``schema``, ``title``, ``files``, ``inspection``, ``models``,
-            ``black_boxes``, ``tuning``, ``truth``, ``findings``, ``report``.
+            ``black_boxes``, ``tuning``, ``handling_qualities``, ``truth``, ``findings``,
+            ``report``.
         """
         return {
             "schema": SCHEMA,
@@ -96,6 +101,7 @@ class Study:
             "models": [item.to_dict() for item in self.identified],
             "black_boxes": [item.to_dict() for item in self.black_boxes],
             "tuning": None if self.tuning is None else self.tuning.to_dict(),
+            "handling_qualities": {name: each.to_dict() for name, each in self.qualities.items()},
             "truth": None if self.truth is None else self.truth.to_dict(),
             "findings": [finding.to_dict() for finding in self.findings],
             "report": to_dict(self.document),
