@@ -91,6 +91,23 @@ def study(seed: int, *, short: bool = False) -> Results:
     -------
     Results
     """
+    response, coherent, heave, reduction, fit = identified(seed, short=short)
+    assert isinstance(fit.model, fid.StateSpaceModel)
+    comparison = fid.verify(
+        [fit, linearised_full_envelope().with_responses(*coherent.names)],
+        fly_manoeuvres(seed),
+        names=["identified", "full-envelope"],
+        initial="fit",
+        outputs=OUTPUTS,
+        response=response,
+    )
+    return Results(response, coherent, heave, reduction, fit, comparison, augment(fit))
+
+
+def identified(
+    seed: int, *, short: bool = False
+) -> tuple[fid.FrequencyResponse, CoherentPairs, dict[str, fid.Fit], fid.Reduction, fid.Fit]:
+    """Fly, estimate, fit and reduce: what comes before any use of the model."""
     flown = fly_sweeps(seed, repeats=1, duration_s=120.0) if short else fly_sweeps(seed)
     response = _estimate(flown, 24 if short else 40)
     coherent = fid.coherent_pairs(response.select(outputs=OUTPUTS))
@@ -111,16 +128,7 @@ def study(seed: int, *, short: bool = False) -> Results:
         rough, plain, keep=HEAVE_KEPT, maximum_cost_rise_percent=5.0, after_rise="next"
     )
     fit = fid.identify(reduction.fit.model, response, omega_rad_s=coherent.bands)
-    assert isinstance(fit.model, fid.StateSpaceModel)
-    comparison = fid.verify(
-        [fit, linearised_full_envelope().with_responses(*coherent.names)],
-        fly_manoeuvres(seed),
-        names=["identified", "full-envelope"],
-        initial="fit",
-        outputs=OUTPUTS,
-        response=response,
-    )
-    return Results(response, coherent, heave, reduction, fit, comparison, augment(fit))
+    return response, coherent, heave, reduction, fit
 
 
 def _heave() -> fid.StateSpaceModel:

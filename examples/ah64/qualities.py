@@ -12,7 +12,7 @@ aircraft.
 import sys
 
 from flights import truth
-from identify import study
+from identify import identified
 
 import flightid as fid
 
@@ -22,7 +22,7 @@ BAND_RAD_S = (0.8, 25.0)
 
 def main(seed: str = "1") -> None:
     """Both models, then the equivalent roll mode."""
-    fit = study(int(seed), short=True).fit
+    *_, fit = identified(int(seed), short=True)
     for name, source in {"flown": truth(), "identified": fit}.items():
         found = fid.handling_qualities(source, axes=AXES, band_rad_s=BAND_RAD_S)
         print(f"{name}: {found!r}")

@@ -120,6 +120,62 @@ def test_the_r50_is_found_from_its_flights(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
 
 
+def test_tuned_gains_fly_with_the_margins_that_were_promised(tmp_path: Path) -> None:
+    script = EXAMPLES / "quadrotor_tuning" / "chain.py"
+    run = _script(script, "short", "4", "out", folder=tmp_path)
+    assert run.returncode == 0, run.stderr[-3000:]
+    met = re.search(r"(\d+) of (\d+) pairs of 95 % intervals meet", run.stdout)
+    assert met is not None
+    assert int(met[2]) == 10
+    assert int(met[1]) >= 9
+    assert (tmp_path / "out" / "gains-1.param").is_file()
+    assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
+
+
+def test_the_r50_is_augmented_with_margins(tmp_path: Path) -> None:
+    run = _script(EXAMPLES / "r50" / "augmentation.py", folder=tmp_path)
+    assert run.returncode == 0, run.stderr[-3000:]
+    said = run.stdout
+    assert "0 of 20 drawn vehicles are unstable" in said
+    phases = re.findall(r"^at (?:lat|lon) .*?([0-9.]+) \([^)]*\) deg", said, re.MULTILINE)
+    assert len(phases) == 2
+    assert min(map(float, phases)) > 45.0
+    # The augmentation pays for its states: attitude follows the stick several times faster.
+    for response in ("phi/lat", "theta/lon"):
+        off, on = (
+            float(value)
+            for value in re.findall(rf"^{response} +(?:off|on) +([0-9.]+) ", said, re.MULTILINE)
+        )
+        assert on > 4.0 * off, response
+
+
+def test_qualities_of_the_r50_are_read_alike_from_model_and_measurement(tmp_path: Path) -> None:
+    run = _script(EXAMPLES / "r50" / "qualities.py", "hover", "0", "out", folder=tmp_path)
+    # A red level is a verdict on the vehicle, no failure.
+    assert run.returncode == 0, run.stderr[-3000:]
+    read = {
+        tuple(row[:2]): float(row[2])
+        for row in map(str.split, run.stdout.splitlines())
+        if len(row) > 2 and row[0] in ("roll", "pitch") and row[1] in ("published", "identified")
+    }
+    assert len(read) == 4
+    for axis in ("roll", "pitch"):
+        assert abs(read[axis, "identified"] / read[axis, "published"] - 1.0) < 0.1, axis
+    assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
+
+
+def test_qualities_of_the_unstable_helicopter_are_those_of_the_flown_one(tmp_path: Path) -> None:
+    run = _script(EXAMPLES / "ah64" / "qualities.py", folder=tmp_path)
+    assert run.returncode == 0, run.stderr[-3000:]
+    true, _ = re.findall(r"^roll +bandwidth +([0-9.]+)", run.stdout, re.MULTILINE)
+    row = re.search(
+        r"^roll +bandwidth +[0-9.]+ +([0-9.]+) +([0-9.]+)  rad", run.stdout, re.MULTILINE
+    )
+    assert row is not None
+    assert float(row[1]) < float(true) < float(row[2])
+    assert run.stdout.count("longitudinal phugoid-like: worse than level 1") == 2
+
+
 def test_the_rig_grey_boxes_are_found_with_what_the_study_left_out(tmp_path: Path) -> None:
     study = EXAMPLES / "quadrotor_grey_box" / "study.py"
     run = _script(study, "short", "0", "out", folder=tmp_path)

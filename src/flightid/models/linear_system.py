@@ -18,6 +18,8 @@ from flightid.models.rational import Rational
 from flightid.models.realisation import Matrices
 
 Array = NDArray[np.float64]
+BLOCK = 1 << 17
+"""Elements of the matrices that are solved at a time."""
 DEFAULT_PADE_ORDER = 3
 
 
@@ -247,11 +249,14 @@ class LinearSystem(Rational):
         points = (
             1j * omega if self.sample_time_s is None else np.exp(1j * omega * self.sample_time_s)
         )
-        pencil = points[:, None, None] * np.eye(self.order) - a
+        states = np.empty((len(omega), *b.shape), dtype=np.complex128)
+        # As many frequencies at a time as stay in the cache.
+        size = max(BLOCK // max(a.size, 1), 1)
         try:
-            states = np.linalg.solve(
-                pencil, np.broadcast_to(b, (len(omega), *b.shape)).astype(complex)
-            )
+            for start in range(0, len(omega), size):
+                some = slice(start, start + size)
+                pencil = points[some, None, None] * np.eye(self.order) - a
+                states[some] = np.linalg.solve(pencil, np.broadcast_to(b, states[some].shape))
         except np.linalg.LinAlgError as error:
             raise DataError(
                 "the system has no finite response at these frequencies",
