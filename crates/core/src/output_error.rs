@@ -146,7 +146,9 @@ impl<'a, T: Trajectories> OutputError<'a, T> {
         let theta = Vec::new();
         let is_free = data.iter().all(|each| each.limits.is_empty());
         let settles = trajectories.is_affine() && is_free;
-        let gathers = settles && !noise.full && noise.limit.is_infinite();
+        // Residuals at numbers of a record that are not at their best yet would count as noise.
+        let alone = data.iter().all(|each| each.n_free() == 0);
+        let gathers = settles && alone && !noise.full && noise.limit.is_infinite();
         let (tried, moments) = (0, None);
         Ok(Self { trajectories, data, weights, passes, settles, gathers, theta, tried, moments })
     }
@@ -210,23 +212,6 @@ impl<'a, T: Trajectories> OutputError<'a, T> {
         })
     }
 
-    /// As `begin`, in passes that serve the first linearisation too.
-    fn begin_gathering(&mut self, x: &[f64]) -> Result<(), CoreError> {
-        let mut moments = self.gather(x)?;
-        if self.data.iter().any(|each| each.n_free() > 0) && moments.is_finite() {
-            self.weights.update(&moments)?;
-            let found = self.weigh();
-            for (pass, found) in self.passes.iter_mut().zip(found) {
-                pass.elimination = found;
-            }
-            self.follow(&vec![0.0; x.len()], 1.0);
-            moments = self.gather(x)?;
-        }
-        require_finite(&moments)?;
-        self.moments = Some(moments);
-        Ok(())
-    }
-
     /// Free numbers of the records, before the elimination of the last linearisation.
     pub fn own(&self) -> Vec<Vec<f64>> {
         self.passes.iter().map(|pass| pass.own.clone()).collect()
@@ -265,7 +250,10 @@ impl<T: Trajectories> Objective for OutputError<'_, T> {
 
     fn begin(&mut self, x: &[f64]) -> Result<(), CoreError> {
         if self.gathers {
-            return self.begin_gathering(x);
+            let moments = self.gather(x)?;
+            require_finite(&moments)?;
+            self.moments = Some(moments);
+            return Ok(());
         }
         for _ in 0..2 {
             // From the start values of the records' own numbers to their best at this θ.
@@ -294,8 +282,7 @@ impl<T: Trajectories> Objective for OutputError<'_, T> {
         self.follow(&change, share);
         if self.gathers {
             let moments = self.gather(x)?;
-            let beside: f64 = self.weigh().iter().map(|each| each.beside).sum();
-            let cost = moments.cost - beside;
+            let cost = moments.cost;
             self.moments = Some(moments);
             return Ok(cost);
         }

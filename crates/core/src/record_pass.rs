@@ -37,6 +37,16 @@ pub struct RecordPass {
     sums: OutputSums,
 }
 
+/// Share of a cost that has to be left after what the records' own numbers take, for the difference
+/// to have digits: beside outputs of an unstable trial point, which grow out of all bounds, it is
+/// rounding and may even be zero.
+const LEFT: f64 = 1e-6;
+
+/// Whether a cost and what is taken from it are too close for their difference to mean anything.
+fn cancels(cost: f64, taken: f64) -> bool {
+    taken > 0.0 && cost - taken < LEFT * cost
+}
+
 /// What one record adds to the normal equations.
 #[derive(Debug, Clone)]
 pub struct Part {
@@ -156,6 +166,9 @@ impl RecordPass {
         let (found, cost) = self.normal_equations(task, &values, false)?;
         let step = found.step(&[], 1.0);
         self.trial.iter_mut().zip(step).for_each(|(value, each)| *value += each);
+        if cancels(cost, found.beside) {
+            return self.trial_moments(task).map(|moments| moments.cost);
+        }
         Ok(cost - found.beside)
     }
 
@@ -199,7 +212,7 @@ impl RecordPass {
         Ok(self.sums.moments(task.weights))
     }
 
-    /// Normal equations from what `gather` kept, the record's own numbers eliminated.
+    /// Normal equations from what `gather` kept, of a record without numbers of its own.
     pub fn weigh(&self, data: &RecordData, weights: &Weights, n_theta: usize) -> Elimination {
         let (gram, sums) = self.sums.weighed(weights);
         let stride = gram.len().isqrt();
@@ -207,10 +220,9 @@ impl RecordPass {
         eliminate(&mut ordered, data.n_free(), data.n_free() + n_theta + 1)
     }
 
-    /// Keep an elimination from `weigh`. The cost is that with the own numbers at their best, where
-    /// `follow` takes them.
+    /// Keep what `weigh` found.
     pub fn keep_gathered(&mut self, found: Elimination, weights: &Weights) -> Part {
-        let cost = self.sums.moments(weights).cost - found.beside;
+        let cost = self.sums.moments(weights).cost;
         let part = Part { rest: found.rest.clone(), beside: 0.0, cost };
         self.elimination = found;
         part

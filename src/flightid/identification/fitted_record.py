@@ -41,8 +41,9 @@ class FittedRecord:
     >>> record = fid.Record.from_arrays(time_s, inputs={"tau_phi": np.sign(np.sin(3 * time_s))})
     >>> model = fid.load_model("rate_first_order")
     >>> flown = fid.simulate(model, record, units={"p": "rad/s"})
+    >>> flown = flown.replace({"p": flown["p"] + 0.1 * (-1.0) ** np.arange(300)})
     >>> fid.identify(model, flown).records[0]
-    FittedRecord('record', 300 samples, outputs [p], rms of residuals p 0)
+    FittedRecord('record', 300 samples, outputs [p], rms of residuals p 0.1)
     """
 
     measured: Record
