@@ -111,7 +111,7 @@ def chain(axes: tuple[str, ...], seed: int, folder: Path) -> Chain:
     flight = fly(runs=runs, autopilot=autopilot, seed=seed, log_every=4)
     log = fid.read_log(write_ardupilot_log(flight, folder / "before.BIN"))
     fits = {axis: identify(log, axis) for axis in axes}
-    tuning = fid.tune(fits, gains=log.parameters, requirements=REQUIREMENTS, seed=seed)
+    tuning = fid.tune(fits, gains=log, requirements=REQUIREMENTS, seed=seed)
     tuning.write(folder / "gains.param", overwrite=True)
     loops = {
         axis: measured.loops(retuned(autopilot, tuning.gains), axis, seed + 100) for axis in axes

@@ -34,6 +34,9 @@ def _coupled(strength: float) -> fid.LinearSystem:
     )
 
 
+_FIXED = _coupled(0.4)
+
+
 def _loops(*axes: str) -> dict[str, AxisLoop]:
     return {
         axis: axis_loop("arducopter", axis, loop_rate_hz=400.0).with_gains(
@@ -82,9 +85,8 @@ def _largest_pole(plants: SampledPlants, loops: list[AxisLoop]) -> float:
 
 @pytest.fixture(scope="module")
 def tuning() -> fid.Tuning:
-    plant = _coupled(0.4)
     return fid.tune(
-        {"roll": plant, "pitch": plant},
+        {"roll": _FIXED, "pitch": _FIXED},
         gains=_loops("roll", "pitch"),
         requirements=NEED,
         rate="raw",
@@ -105,6 +107,7 @@ def test_coupled_axes_are_stable_together_by_their_poles(tuning: fid.Tuning) -> 
     assert together.coupling is not None
     assert together.coupling > 0.2
     assert (together.worst_disk_margin or 0.0) > 0.3
+    assert together.flown_stable_plants == together.n_plants == 1
     assert any(f.code == "together" and f.light is Light.GREEN for f in tuning.findings)
 
 
@@ -120,6 +123,26 @@ def test_coupling_costs_what_designing_alone_does_not_see(tuning: fid.Tuning) ->
     )  # fmt: skip
     ratio = tuning.gains["ATC_RAT_RLL_P"] / free.gains["ATC_RAT_RLL_P"]
     assert abs(ratio - 1.0) > 0.02
+
+
+def test_flown_gains_are_judged_with_the_other_axes_flown_gains(tuning: fid.Tuning) -> None:
+    first, again = (
+        {f"{each.loop}: {each.name}": each for each in made["roll"].promises}
+        for made in (
+            tuning,
+            fid.tune(
+                dict.fromkeys(("roll", "pitch"), _FIXED),
+                gains={axis: tuning[axis].loop for axis in ("roll", "pitch")},
+                requirements=NEED, rate="raw", band_rad_s=(0.5, 100.0), nominal=True,
+            ),
+        )
+    )  # fmt: skip
+    for name, promise in first.items():
+        if promise.nominal is not None and "reduction" not in name:
+            assert_close(
+                again[name].flown or 0.0, promise.nominal, rtol=0.02,
+                why="the gains found are flown: pitch moved by at most 2 % in the last round",
+            )  # fmt: skip
 
 
 def test_steps_of_all_axes_are_written_together(tuning: fid.Tuning, tmp_path: Path) -> None:

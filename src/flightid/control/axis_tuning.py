@@ -82,6 +82,11 @@ class Setting:
     requirements: TuningRequirements
     noise: tuple[Array, Array] | None = None
 
+    def coherence_of(self, place: int) -> tuple[Array, Array] | None:
+        """Frequencies and coherence of an axis' measured response, where the fit rests on one."""
+        system = self.searched.sampled.systems[0]
+        return self.evidence.coherences.get(f"{system.outputs[place]}/{system.inputs[place]}")
+
 
 @dataclass(frozen=True, eq=False)
 class AxisResult:
@@ -146,7 +151,7 @@ def noise_limit(setting: Setting, problem: LoopProblem, flown: Array) -> float |
 def tune_axis(
     setting: Setting,
     loops: list[AxisLoop],
-    flown: AxisLoop,
+    flown: list[AxisLoop],
     place: int,
     advance: Callable[[int], None],
 ) -> AxisResult:
@@ -157,8 +162,8 @@ def tune_axis(
     setting : Setting
     loops : list of AxisLoop
         All axes as they stand; that of this axis gives filters and start.
-    flown : AxisLoop
-        This axis as flown.
+    flown : list of AxisLoop
+        All axes as flown.
     place : int
         Which axis.
     advance : callable
@@ -168,18 +173,20 @@ def tune_axis(
     -------
     AxisResult
     """
-    paths = ControllerPaths(loops[place], setting.gyro, setting.with_angle)
-    plants = setting.searched.axis(place, loops, setting.gyro)
-    open_problem = problem_of(setting, plants, paths, None)
-    before = paths.gains_of(flown)
-    limit = noise_limit(setting, open_problem, before)
-    problem = replace(open_problem, noise_limit=limit)
+    gyro, paths = setting.gyro, ControllerPaths(loops[place], setting.gyro, setting.with_angle)
+    before = paths.gains_of(flown[place])
+    as_flown = problem_of(setting, setting.searched.axis(place, flown, gyro), paths, None)
+    limit = noise_limit(setting, as_flown, before)
+    problem = problem_of(setting, setting.searched.axis(place, loops, gyro), paths, limit)
     first = list(range(1 + len(setting.evidence.corners)))
     found = search(problem, first, advance)
     loop = paths.with_parameters(paths.parameters(found.gains))
-    fresh = problem_of(setting, setting.judged.axis(place, loops, setting.gyro), paths, limit)
-    made, met = promises(fresh, paths.gains_of(loop), before)
-    return AxisResult(found, loop, made, met, fresh.judge(before[None]).stable[0], fresh)
+    fresh = problem_of(setting, setting.judged.axis(place, loops, gyro), paths, limit)
+    # What flew had the other axes' flown gains around it, not those that they are given here.
+    fresh_flown = replace(fresh, plants=setting.judged.axis(place, flown, gyro))
+    old = fresh_flown.judge(before[None])
+    made, met = promises(fresh, paths.gains_of(loop), old)
+    return AxisResult(found, loop, made, met, old.stable[0], fresh)
 
 
 def axis_steps(setting: Setting, loop: AxisLoop) -> int:

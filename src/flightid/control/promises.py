@@ -102,7 +102,7 @@ KINDS = (
 
 
 def promises(
-    problem: LoopProblem, gains: Array, flown: Array | None
+    problem: LoopProblem, gains: Array, old: Judged | None
 ) -> tuple[tuple[Promise, ...], NDArray[np.bool_]]:
     """Numbers of all loops, and which plants meet every requirement.
 
@@ -110,15 +110,16 @@ def promises(
     ----------
     problem : LoopProblem
         Its plants are those to promise for, the estimate first.
-    gains, flown : ndarray, shape (n_gains,)
-        New and flown gains; `flown` is None where nothing was flown.
+    gains : ndarray, shape (n_gains,)
+        New gains.
+    old : Judged or None
+        The flown gains on the same plants; None where nothing was flown.
 
     Returns
     -------
     tuple of tuple of Promise and ndarray of bool, shape (n_plants,)
     """
     new = problem.judge(gains[None])
-    old = None if flown is None else problem.judge(flown[None])
     made = []
     for loop, kind in _wanted(new):
         values = np.asarray(getattr(new.metrics[loop], kind.field))[0]

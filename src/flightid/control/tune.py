@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flightid.control.autopilots import AxisLoop, axis_loop
+from flightid.control.autopilots import AxisLoop
 from flightid.control.autopilots.axis_loop import Gyro
 from flightid.control.axis_tuning import (
     JUDGED_POINTS,
@@ -22,10 +22,11 @@ from flightid.control.axis_tuning import (
     tune_axis,
 )
 from flightid.control.controller_paths import ControllerPaths, has_angle_loop
+from flightid.control.flown_gains import Gains, flown_loop
 from flightid.control.pid_design import PidDesign
 from flightid.control.sampled_plants import SampledPlants, sample_plants
 from flightid.control.tuning_evidence import Band, Evidence, Verdicts, gather
-from flightid.control.tuning_findings import remarks, verdict
+from flightid.control.tuning_findings import low_coherence, remarks, verdict
 from flightid.control.tuning_requirements import TuningRequirements
 from flightid.control.tuning_responses import response_bands
 from flightid.control.worst_case import content_of_worst, least_share
@@ -39,7 +40,6 @@ CHANNELS = {"roll": ("tau_phi", "p"), "pitch": ("tau_theta", "q"), "yaw": ("tau_
 DRAWS, SHOWN = 300, 60
 ANSWER_S = 0.15
 """Time from a step of output in which a vehicle has turned the right way."""
-Gains = AxisLoop | Mapping[str, float]
 
 
 def tune_pid(
@@ -73,10 +73,11 @@ def tune_pid(
     ----------
     fit : Fit, PolynomialFit, InnovationsFit, or with `nominal` a model
         From the autopilot's output (mixer command, torque set-point) to the rate.
-    gains : AxisLoop or mapping of str to float
-        As flown: the axis of `flightid.control.autopilots`, or parameters by name.
+    gains : AxisLoop, Log or mapping of str to float
+        As flown: the axis of `flightid.control.autopilots`, the log of the flight, or parameters
+        by name.
     autopilot, axis : str
-        Of parameters given by name.
+        Of parameters given by name; a log tells its autopilot.
     input, output : str, optional
         Channels of the model; by default those of the axis.
     requirements : TuningRequirements, optional
@@ -139,7 +140,7 @@ def tune_pid(
     >>> design.promise("rate loop", "phase margin").nominal > 45.0
     True
     """
-    flown = gains if isinstance(gains, AxisLoop) else axis_loop(autopilot, axis, gains)
+    flown = flown_loop(gains, autopilot, axis)
     usual = CHANNELS[flown.axis]
     channels = ([output or usual[1]], [input or usual[0]])
     need = requirements or TuningRequirements()
@@ -165,9 +166,9 @@ def tune_pid(
         _noise(gyro_noise, step),
     )
     with progress(axis_steps(setting, flown), f"tuning {flown.axis}") as advance:
-        result = tune_axis(setting, [flown], flown, 0, advance)
+        result = tune_axis(setting, [flown], [flown], 0, advance)
     couplings = _couplings(evidence.estimate, channels[0][0])
-    return design_of(setting, result, [flown], 0, flown, couplings, seed)
+    return design_of(setting, result, [flown], 0, [flown], couplings, seed)
 
 
 def make_setting(
@@ -217,11 +218,12 @@ def design_of(
     result: AxisResult,
     loops: list[AxisLoop],
     place: int,
-    flown: AxisLoop,
+    all_flown: list[AxisLoop],
     couplings: list[str],
     seed: int,
 ) -> PidDesign:
-    """Put the result of one axis together; `loops` are all axes as flown."""
+    """Put the result of one axis together; `loops` are all axes as they stand."""
+    flown = all_flown[place]
     paths = ControllerPaths(flown, setting.gyro, setting.with_angle)
     exists, known = result.found.exists, bool(setting.evidence.draws)
     changes = changes_of(paths, result.loop)
@@ -230,7 +232,7 @@ def design_of(
     )
     new = [result.loop if k == place else loop for k, loop in enumerate(loops)]
     shown = setting.judged.sampled.take(list(range(min(SHOWN, len(setting.judged.sampled)))))
-    steady = list(loops) if bool(result.flown_stable[0]) else None
+    steady = all_flown if bool(result.flown_stable[0]) else None
     bands = response_bands(shown, new, steady, place, setting.gyro) if exists else ()
     count = len(result.met)
     return PidDesign(
@@ -250,6 +252,7 @@ def design_of(
         (
             verdict(result, known),
             *remarks(result, flown, changes, stages, couplings),
+            *low_coherence(result, setting.coherence_of(place)),
             *setting.evidence.findings,
         ),
         {

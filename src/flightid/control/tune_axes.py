@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.autopilots import AxisLoop, axis_loop
+from flightid.control.autopilots import AxisLoop
 from flightid.control.autopilots.axis_loop import Gyro
 from flightid.control.axis_tuning import AxisResult, PlantSet, Setting, axis_steps, tune_axis
 from flightid.control.controller_paths import ControllerPaths, has_angle_loop, standing
 from flightid.control.disk_geometry import gain_limits, phase_limit_deg
 from flightid.control.disk_margin import alphas_of
+from flightid.control.flown_gains import GainsOfAxes, flown_loop
 from flightid.control.pid_design import PidDesign
 from flightid.control.sampled_plants import AxisLoops, whole_loop
 from flightid.control.stability_count import unstable_poles
@@ -39,7 +40,7 @@ LOWEST_RAD_S = 0.1
 def tune(
     fits: Mapping[str, object],
     *,
-    gains: Mapping[str, AxisLoop] | Mapping[str, float],
+    gains: GainsOfAxes,
     autopilot: str = "arducopter",
     requirements: TuningRequirements | Mapping[str, TuningRequirements] | None = None,
     rate: Gyro = "filtered",
@@ -62,10 +63,10 @@ def tune(
     fits : mapping of str to fit
         By axis: ``{"roll": fit, "pitch": fit, "yaw": other}``. One fit for two axes holds both
         commands and both rates.
-    gains : mapping of str to AxisLoop, or of str to float
-        As flown: by axis, or all parameters by the autopilot's names.
+    gains : mapping of str to AxisLoop, Log, or mapping of str to float
+        As flown: by axis, the log of the flight, or all parameters by the autopilot's names.
     autopilot : str
-        Of parameters given by name.
+        Of parameters given by name; a log tells its autopilot.
     requirements : TuningRequirements, or a mapping of them by axis, optional
     rate, angle_loop, band_rad_s, draws, seed, nominal : optional
         As for `flightid.tune_pid`.
@@ -109,7 +110,7 @@ def tune(
         raise OptionError(
             "axes to tune", found=", ".join(unknown) or "none", needed=", ".join(CHANNELS)
         )
-    loops = {axis: _loop(gains, autopilot, axis) for axis in fits}
+    loops = {axis: flown_loop(gains, autopilot, axis) for axis in fits}
     shared = {"rate": rate, "band_rad_s": band_rad_s, "draws": draws, "seed": seed}
     designs: dict[str, PidDesign] = {}
     together: list[Together] = []
@@ -144,16 +145,6 @@ def tune(
         designs |= dict(zip(axes, made, strict=True))
         together.append(whole)
     return Tuning(tuple(designs[axis] for axis in fits), tuple(together))
-
-
-def _loop(
-    gains: Mapping[str, AxisLoop] | Mapping[str, float], autopilot: str, axis: str
-) -> AxisLoop:
-    given = gains.get(axis)
-    if isinstance(given, AxisLoop):
-        return given
-    named = {name: value for name, value in gains.items() if not isinstance(value, AxisLoop)}
-    return axis_loop(autopilot, axis, named)
 
 
 def _requirements(
@@ -199,9 +190,9 @@ def _coupled(
         for _ in range(ROUNDS):
             before = list(loops)
             results = []
-            for place, loop in enumerate(flown):
+            for place in range(len(flown)):
                 asked = replace(setting, requirements=needs[place])
-                result = tune_axis(asked, loops, loop, place, advance)
+                result = tune_axis(asked, loops, flown, place, advance)
                 results.append(result)
                 if result.found.exists:
                     loops[place] = result.loop
@@ -213,7 +204,7 @@ def _coupled(
             result,
             loops,
             place,
-            flown[place],
+            flown,
             [],
             seed,
         )
@@ -239,18 +230,10 @@ def _together(
     setting: Setting, loops: list[AxisLoop], flown: list[AxisLoop], axes: list[str]
 ) -> Together:
     plants = setting.judged
-    matrix = _matrix(plants, loops, setting.gyro)
-    eye = np.eye(len(loops))
-    stable = (
-        unstable_poles(plants.omega_rad_s, np.linalg.det(eye + matrix), plants.sampled.unstable)
-        == 0
-    )
+    matrix, before = (_matrix(plants, each, setting.gyro) for each in (loops, flown))
+    stable, steady = (_held(plants, each) for each in (matrix, before))
     kept = plants.omega_rad_s > LOWEST_RAD_S
     alphas = _least_alphas(matrix[:, kept])
-    before = _matrix(plants, flown, setting.gyro)[0]
-    steady = unstable_poles(
-        plants.omega_rad_s, np.linalg.det(eye + before), plants.sampled.unstable[0]
-    )
     worst = min(alphas) if bool(stable.all()) else None
     return Together(
         tuple(axes),
@@ -260,9 +243,17 @@ def _together(
         worst,
         None if worst is None else float(20.0 * np.log10(gain_limits(worst)[1])),
         None if worst is None else float(phase_limit_deg(worst)),
-        _least_alphas(before[None, kept])[0] if int(steady) == 0 else None,
+        _least_alphas(before[:1, kept])[0] if bool(steady[0]) else None,
         _coupling(plants, loops, setting.gyro),
+        int(steady.sum()),
     )
+
+
+def _held(plants: PlantSet, matrices: Complex) -> NDArray[np.bool_]:
+    """Which plants are stable with all loops closed."""
+    determinants = np.linalg.det(np.eye(matrices.shape[-1]) + matrices)
+    counted = unstable_poles(plants.omega_rad_s, determinants, plants.sampled.unstable)
+    return np.asarray(counted == 0)
 
 
 def _least_alphas(matrices: Complex) -> list[float]:

@@ -33,10 +33,12 @@ class Together:
         With the flown gains, at the estimate.
     coupling : float or None
         Largest closed-loop gain from one axis' rate set-point to another axis' rate.
+    flown_stable_plants : int
+        Of the same plants, how many the flown gains hold stable.
 
     Example
     -------
-    >>> Together(("roll", "pitch"), 300, 300, 0.9, 0.8, 7.4, 43.6, 1.1, 0.2).all_stable
+    >>> Together(("roll", "pitch"), 300, 300, 0.9, 0.8, 7.4, 43.6, 1.1, 0.2, 300).all_stable
     True
     """
 
@@ -49,6 +51,7 @@ class Together:
     phase_deg: float | None
     flown_disk_margin: float | None
     coupling: float | None
+    flown_stable_plants: int
 
     @property
     def all_stable(self) -> bool:
@@ -157,6 +160,7 @@ class Tuning:
             Column("worst", digits=3),
             Column("all gains", "± dB", 3),
             Column("all phases", "± deg", 3),
+            Column("stable as flown"),
             Column("flown disk margin", digits=3),
             Column("gain to the other axis", digits=2),
         )
@@ -165,6 +169,7 @@ class Tuning:
                 " and ".join(each.axes),
                 f"{each.stable_plants} of {each.n_plants}",
                 *(each.disk_margin, each.worst_disk_margin, each.gain_db, each.phase_deg),
+                f"{each.flown_stable_plants} of {each.n_plants}",
                 *(each.flown_disk_margin, each.coupling),
             )
             for each in self.together

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.dynamics.continuous import to_continuous
@@ -18,6 +21,7 @@ from flightid.models.linear_system import LinearSystem
 CORNER = 2.0
 """Standard deviations from the estimate to the corners that a search begins with."""
 Band = tuple[float, float]
+Array = NDArray[np.float64]
 
 
 class Verdicts(Protocol):
@@ -45,6 +49,8 @@ class Evidence:
     hold_in_model : bool
         Whether the model's delay holds the output hold's half sample.
     findings : tuple of Finding
+    coherences : mapping of str to tuple of ndarray
+        By ``"output/input"`` of the fitted responses: frequencies (rad/s) and coherence.
     """
 
     estimate: LinearSystem
@@ -54,6 +60,7 @@ class Evidence:
     band_rad_s: Band | None
     hold_in_model: bool
     findings: tuple[Finding, ...]
+    coherences: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
 
     @property
     def sources(self) -> tuple[LinearSystem, ...]:
@@ -138,6 +145,11 @@ def gather(
         band,
         _hold_in_model(source),
         tuple(findings),
+        {
+            each.name: (each.measured.omega_rad_s, each.measured.coherence)
+            for each in getattr(source, "responses", ())
+            if hasattr(each, "measured")
+        },
     )
 
 

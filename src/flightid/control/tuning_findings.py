@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
 from flightid.control.axis_tuning import AxisResult
+from flightid.control.margin_findings import COHERENCE
 from flightid.control.pid_design import Stage, TunedGain
 from flightid.control.worst_case import least_share
 from flightid.conventions import Light
 from flightid.findings import Finding
 
+Array = NDArray[np.float64]
 ENOUGH = 0.95
-COHERENT = 0.6
+NEAR = 2.0**0.5
+"""Half an octave to either side."""
 ADVICE = {
     "stability": "no gains in the ranges hold every plant: identify better, or widen the ranges",
     "identified band": "sweep to higher frequencies, or lower band_factor knowingly",
@@ -127,3 +131,31 @@ def remarks(
         )
     for text in flown.unmodelled:
         yield Finding("unmodelled", Light.AMBER, text)
+
+
+def low_coherence(result: AxisResult, measured: tuple[Array, Array] | None) -> Iterator[Finding]:
+    """Say where a loop would cross over at frequencies that the flight hardly excited.
+
+    Parameters
+    ----------
+    result : AxisResult
+    measured : tuple of ndarray or None
+        Frequencies (rad/s) and coherence of the response that was fitted.
+    """
+    if measured is None or not result.found.exists:
+        return
+    omega, coherence = measured
+    for promise in result.promises:
+        if promise.name != "crossover" or promise.nominal is None:
+            continue
+        near = np.geomspace(promise.nominal / NEAR, promise.nominal * NEAR, 21)
+        known = float(np.mean(np.interp(near, omega, coherence)))
+        if known < COHERENCE:
+            yield Finding(
+                "coherence-at-crossover",
+                Light.RED,
+                f"{promise.loop}: coherence is {known:.2f} about the new crossover "
+                f"of {promise.nominal:.3g} rad/s",
+                "sweep that band with more amplitude, or ask for a crossover where the response "
+                "was measured",
+            )
