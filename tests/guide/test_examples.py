@@ -195,6 +195,44 @@ def test_the_rig_grey_boxes_are_found_with_what_the_study_left_out(tmp_path: Pat
     assert (tmp_path / "out" / "rig.BIN").read_bytes()[:2] == b"\xa3\x95"
 
 
+def test_gains_of_the_rig_are_held_with_all_loops_closed(tmp_path: Path) -> None:
+    script = EXAMPLES / "quadrotor_grey_box" / "gains.py"
+    run = _script(script, "short", "0", "out", folder=tmp_path)
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    said = run.stdout
+    for axis in ("roll", "pitch"):
+        # Couplings carry the crossover past the third of the identified band that it was held in.
+        row = re.search(rf"^{axis} +rate loop +crossover +rad/s(.*)$", said, re.MULTILINE)
+        assert row is not None
+        alone, really, closed, worst = map(float, row.group(1).split())
+        assert alone <= 10.5 < 11.0 < really
+        assert max(closed, worst) <= 10.5
+        phase = re.search(rf"^{axis} +whole loop +phase margin +deg(.*)$", said, re.MULTILINE)
+        assert phase is not None
+        assert float(phase.group(1).split()[-1]) > 45.0
+    assert re.search(r"^roll and pitch +21 of 21 ", said, re.MULTILINE)
+    assert "[green] roll and pitch closed together" in said
+    assert len(re.findall(r"21 of 21 fresh plants meet every requirement", said)) == 3
+
+
+def test_tuned_gains_fly_as_promised(tmp_path: Path) -> None:
+    script = EXAMPLES / "quadrotor_tuning" / "chain.py"
+    run = _script(script, "short", "7", "out", folder=tmp_path)
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    met = re.search(r"(\d+) of 10 pairs of 95 % intervals meet", run.stdout)
+    assert met is not None
+    assert int(met.group(1)) >= 8, run.stdout
+    rows = re.findall(r"^roll +(?:whole|angle) loop .* (?:yes|no)$", run.stdout, re.MULTILINE)
+    flown = [[float(cell) for cell in row.split()[-10:-2]] for row in rows if "phase" in row]
+    assert len(flown) == 2
+    for _, promised, _, _, _, measured, *_ in flown:
+        assert abs(measured - promised) < 1.5, "degrees"
+    assert (tmp_path / "out" / "report.html").stat().st_size > 50_000
+    files = {path.name for path in (tmp_path / "out").glob("gains*")}
+    assert any("rollback" in name for name in files)
+    assert len(files) >= 2
+
+
 def test_the_linear_twin_rotor_study_finds_the_published_modes(tmp_path: Path) -> None:
     script = EXAMPLES / "twin_rotor_linear" / "analyse.py"
     run = _script(script, "rig", "--seed", "1", folder=tmp_path)
