@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -126,23 +127,20 @@ def test_coupling_costs_what_designing_alone_does_not_see(tuning: fid.Tuning) ->
 
 
 def test_flown_gains_are_judged_with_the_other_axes_flown_gains(tuning: fid.Tuning) -> None:
-    first, again = (
-        {f"{each.loop}: {each.name}": each for each in made["roll"].promises}
-        for made in (
-            tuning,
-            fid.tune(
-                dict.fromkeys(("roll", "pitch"), _FIXED),
-                gains={axis: tuning[axis].loop for axis in ("roll", "pitch")},
-                requirements=NEED, rate="raw", band_rad_s=(0.5, 100.0), nominal=True,
-            ),
-        )
+    slow = fid.tune(
+        {"roll": _FIXED, "pitch": _FIXED},
+        gains=_loops("roll", "pitch"),
+        requirements={"roll": NEED, "pitch": dataclasses.replace(NEED, crossover_rad_s=6.0)},
+        rate="raw", band_rad_s=(0.5, 100.0), nominal=True,
     )  # fmt: skip
-    for name, promise in first.items():
-        if promise.nominal is not None and "reduction" not in name:
-            assert_close(
-                again[name].flown or 0.0, promise.nominal, rtol=0.02,
-                why="the gains found are flown: pitch moved by at most 2 % in the last round",
-            )  # fmt: skip
+    assert slow["pitch"].gains["ATC_RAT_PIT_P"] < 0.7 * tuning["pitch"].gains["ATC_RAT_PIT_P"]
+    moved = False
+    for before, after in zip(tuning["roll"].promises, slow["roll"].promises, strict=True):
+        # What flew does not depend on what pitch is given now.
+        assert (before.flown is None) == (after.flown is None)
+        assert before.flown is None or before.flown == pytest.approx(after.flown, rel=1e-9)
+        moved |= before.nominal != after.nominal
+    assert moved
 
 
 def test_steps_of_all_axes_are_written_together(tuning: fid.Tuning, tmp_path: Path) -> None:
