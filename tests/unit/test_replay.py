@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from pathlib import Path
 
@@ -32,8 +31,6 @@ RUN = SidRun(
     axis=10, start_s=2.0, magnitude=0.1, start_hz=0.8, stop_hz=10.0, fade_in_s=1.0,
     record_s=8.0, fade_out_s=0.5, leave_after_s=10.0,
 )  # fmt: skip
-LOGS = Path(os.environ.get("FLIGHTID_DATA", "")) / "logs"
-needs_logs = pytest.mark.skipif(not LOGS.is_dir(), reason="FLIGHTID_DATA holds no real logs")
 
 
 @pytest.fixture(scope="module")
@@ -192,20 +189,20 @@ def test_px4_torque_is_reproduced_from_its_topics(tmp_path: Path, saturated: boo
     assert_close(found.logged["output"], output[: found.time_s.size], atol=1e-6, why="as logged")
 
 
-@needs_logs
 @pytest.mark.parametrize("axis", ["roll", "pitch", "yaw"])
-def test_real_copter_rows_confirm_the_gain_and_say_why_the_rest_is_open(axis: str) -> None:
-    found = replay(fid.read_log(LOGS / "arducopter_457.BIN"), axis)
+def test_real_copter_rows_confirm_the_gain_and_say_why_the_rest_is_open(
+    shared_data: Path, axis: str
+) -> None:
+    found = replay(fid.read_log(shared_data / "logs" / "arducopter_457.BIN"), axis)
     codes = [finding.code for finding in found.findings]
     assert {"gains-confirmed", "log-rate", "limit-flag", "integrator-set"} <= set(codes)
     assert not found.exact
     assert any("INS_HNTCH" in text for text in found.loop.unmodelled)
 
 
-@needs_logs
 @pytest.mark.parametrize(("axis", "least"), [("roll", 92), ("pitch", 82), ("yaw", 98)])
-def test_real_px4_log_holds_the_old_controller(axis: str, least: float) -> None:
-    log = fid.read_log(LOGS / "px4_quad_2016.ulg")
+def test_real_px4_log_holds_the_old_controller(shared_data: Path, axis: str, least: float) -> None:
+    log = fid.read_log(shared_data / "logs" / "px4_quad_2016.ulg")
     found = replay(log, axis)
     assert found.loop.to_dict()["autopilot"] == "px4_multicopter"
     assert (found["output"].fit_percent or 0) > least
