@@ -6,8 +6,6 @@ import inspect
 import re
 import types
 
-import pytest
-
 import flightid
 
 PUBLIC = [name for name in flightid.__all__ if not name.startswith("__")]
@@ -27,36 +25,95 @@ def _members() -> list[tuple[str, object]]:
     return found
 
 
-MEMBERS = _members()
-FUNCTIONS = [(name, item) for name, item in MEMBERS if inspect.isfunction(item)]
-CLASSES = [(name, item) for name, item in MEMBERS if inspect.isclass(item)]
-
-
-@pytest.mark.parametrize(("name", "item"), MEMBERS, ids=[name for name, _ in MEMBERS])
-def test_has_an_example_that_runs(name: str, item: object) -> None:
+def _without_example(name: str, item: object) -> list[str]:
     # The examples themselves run as doctests of the suite.
-    assert ">>> " in (inspect.getdoc(item) or "") or isinstance(item, str), f"{name}: no example"
+    if ">>> " in (inspect.getdoc(item) or "") or isinstance(item, str):
+        return []
+    return [f"{name}: no example"]
 
 
-@pytest.mark.parametrize(("name", "item"), FUNCTIONS, ids=[name for name, _ in FUNCTIONS])
-def test_function_documents_parameters_results_errors_and_source(name: str, item: object) -> None:
+def _has_section(document: str, title: str) -> bool:
+    return re.search(rf"^{title}\n-+$", document, re.MULTILINE) is not None
+
+
+def _missing_of_function(name: str, item: types.FunctionType) -> list[str]:
     document = inspect.getdoc(item) or ""
-    parameters = [p for p in inspect.signature(item).parameters if p not in ("self", "cls")]  # type: ignore[arg-type]
-    for section in ["Returns", "Raises", *(["Parameters"] if parameters else [])]:
-        assert re.search(rf"^{section}\n-+$", document, re.MULTILINE), (
-            f"{name}: no section {section}"
-        )
-    for parameter in parameters:
-        assert re.search(rf"\b{parameter}\b", document), f"{name}: {parameter} is not documented"
+    parameters = [key for key in inspect.signature(item).parameters if key not in ("self", "cls")]
+    sections = ["Returns", "Raises", *(["Parameters"] if parameters else [])]
     if name.rsplit(".", maxsplit=1)[-1] not in NO_FORMULA:
-        assert re.search(r"^References?\n-+$", document, re.MULTILINE), (
-            f"{name}: no section Reference"
-        )
+        sections.append("References?")
+    missing = [
+        f"{name}: no section {title}" for title in sections if not _has_section(document, title)
+    ]
+    return missing + [
+        f"{name}: {key} is not documented"
+        for key in parameters
+        if not re.search(rf"\b{key}\b", document)
+    ]
 
 
-@pytest.mark.parametrize(("name", "item"), CLASSES, ids=[name for name, _ in CLASSES])
-def test_class_documents_its_public_methods(name: str, item: type) -> None:
-    for key, member in vars(item).items():
-        if key.startswith("_") or not (inspect.isfunction(member) or isinstance(member, property)):
-            continue
-        assert inspect.getdoc(member), f"{name}.{key} is not documented"
+def _missing_of_class(name: str, item: type) -> list[str]:
+    return [
+        f"{name}.{key} is not documented"
+        for key, member in vars(item).items()
+        if not key.startswith("_")
+        and (inspect.isfunction(member) or isinstance(member, property))
+        and not inspect.getdoc(member)
+    ]
+
+
+def test_every_name_has_an_example_that_runs() -> None:
+    offenders = [line for name, item in _members() for line in _without_example(name, item)]
+    assert not offenders, "\n".join(offenders)
+
+
+def test_functions_document_parameters_results_errors_and_source() -> None:
+    functions = [(name, item) for name, item in _members() if inspect.isfunction(item)]
+    assert len(functions) > 20
+    offenders = [line for name, item in functions for line in _missing_of_function(name, item)]
+    assert not offenders, "\n".join(offenders)
+
+
+def test_classes_document_their_public_methods() -> None:
+    classes = [(name, item) for name, item in _members() if inspect.isclass(item)]
+    assert len(classes) > 20
+    offenders = [line for name, item in classes for line in _missing_of_class(name, item)]
+    assert not offenders, "\n".join(offenders)
+
+
+def _documented_in_part(gain: float) -> float:
+    """Double a gain.
+
+    Returns
+    -------
+    The double.
+    """
+    return 2.0 * gain
+
+
+class _DocumentedInPart:
+    def told(self) -> None:
+        """Say something."""
+
+    def untold(self) -> None: ...
+
+    @property
+    def unnamed(self) -> int:
+        return 1
+
+
+def test_the_rules_can_fail() -> None:
+    assert _without_example("f", _documented_in_part) == ["f: no example"]
+    assert _missing_of_function("f", _documented_in_part) == [
+        "f: no section Raises",
+        "f: no section Parameters",
+        "f: no section References?",
+    ]
+    assert _missing_of_function("f", _undocumented)[-1] == "f: gain is not documented"
+    assert _missing_of_class("C", _DocumentedInPart) == [
+        "C.untold is not documented",
+        "C.unnamed is not documented",
+    ]
+
+
+def _undocumented(gain: float) -> None: ...

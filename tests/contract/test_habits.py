@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import re
-from pathlib import Path
 
 import pytest
 
@@ -12,26 +11,85 @@ from tests.contract.source import PACKAGE, ROOT, python_files, rust_files, stage
 
 FORBIDDEN_STEMS = {"utils", "util", "helpers", "common", "misc", "base", "core"}
 OPEN_ENDS = re.compile(r"\b(TODO|FIXME|XXX|HACK)\b|todo!\(|unimplemented!\(|NotImplementedError")
+PANICS = re.compile(r"\.unwrap\(\)|\.expect\(|panic!\(|unreachable!\(")
 
 
-@pytest.mark.parametrize("path", python_files(), ids=lambda p: str(p.relative_to(PACKAGE)))
-def test_python_source(path: Path) -> None:
-    assert path.stem not in FORBIDDEN_STEMS
-    assert not OPEN_ENDS.search(path.read_text(encoding="utf-8"))
-    for node in ast.walk(tree(path)):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-            assert node.func.id not in {"eval", "exec"}, f"line {node.lineno}"
-            assert node.func.id != "print" or stage(path) == "cli", f"line {node.lineno}"
-        if isinstance(node, ast.ExceptHandler):
-            assert node.type is not None, f"line {node.lineno}: bare except"
+def _open_ends(text: str) -> list[str]:
+    return [
+        f"{number}: open end {match[0]!r}"
+        for number, line in enumerate(text.split("\n"), 1)
+        for match in OPEN_ENDS.finditer(line)
+    ]
 
 
-@pytest.mark.parametrize("path", rust_files(), ids=lambda p: str(p.relative_to(ROOT)))
-def test_rust_source_neither_panics_nor_leaves_ends_open(path: Path) -> None:
-    if "tests" in path.parts or "benches" in path.parts:
-        return
-    text = path.read_text(encoding="utf-8").split("#[cfg(test)]")[0]
-    assert not OPEN_ENDS.search(text)
-    code = "\n".join(line for line in text.split("\n") if not line.strip().startswith("//"))
-    found = re.findall(r"\.unwrap\(\)|\.expect\(|panic!\(|unreachable!\(", code)
-    assert not found, f"{len(found)} places can panic: {sorted(set(found))}"
+def _python_habits(module: ast.Module, *, may_print: bool) -> list[str]:
+    forbidden = {"eval", "exec"} if may_print else {"eval", "exec", "print"}
+    found = []
+    for node in ast.walk(module):
+        called = node.func if isinstance(node, ast.Call) else None
+        if isinstance(called, ast.Name) and called.id in forbidden:
+            found.append(f"{called.lineno}: calls {called.id}")
+        if isinstance(node, ast.ExceptHandler) and node.type is None:
+            found.append(f"{node.lineno}: bare except")
+    return found
+
+
+def _panics(text: str) -> list[str]:
+    return [
+        f"{number}: {match[0]} can panic"
+        for number, line in enumerate(text.split("\n"), 1)
+        if not line.strip().startswith("//")
+        for match in PANICS.finditer(line)
+    ]
+
+
+def test_python_sources() -> None:
+    offenders = []
+    for path in python_files():
+        found = _open_ends(path.read_text("utf-8"))
+        found += _python_habits(tree(path), may_print=stage(path) == "cli")
+        if path.stem in FORBIDDEN_STEMS:
+            found.append("a name that says nothing")
+        offenders += [f"{path.relative_to(PACKAGE)}:{line}" for line in found]
+    assert not offenders, "\n".join(offenders)
+
+
+def test_rust_sources_neither_panic_nor_leave_ends_open() -> None:
+    offenders = []
+    for path in rust_files():
+        if "tests" in path.parts or "benches" in path.parts:
+            continue
+        text = path.read_text("utf-8").split("#[cfg(test)]")[0]
+        found = [*_open_ends(text), *_panics(text)]
+        offenders += [f"{path.relative_to(ROOT)}:{line}" for line in found]
+    assert not offenders, "\n".join(offenders)
+
+
+@pytest.mark.parametrize(
+    ("planted", "said"),
+    [
+        ("print('x')", ["1: calls print"]),
+        ("eval('x')", ["1: calls eval"]),
+        ("exec('x')", ["1: calls exec"]),
+        ("try:\n    x\nexcept:\n    pass", ["3: bare except"]),
+        ("try:\n    x\nexcept KeyError:\n    pass", []),
+    ],
+)
+def test_python_habits_can_fail(planted: str, said: list[str]) -> None:
+    assert _python_habits(ast.parse(planted), may_print=False) == said
+
+
+def test_a_command_may_print() -> None:
+    assert not _python_habits(ast.parse("print('x')"), may_print=True)
+
+
+@pytest.mark.parametrize(
+    "planted", ["# TODO: later", "// FIXME", "todo!()", "unimplemented!()", "NotImplementedError"]
+)
+def test_open_ends_can_fail(planted: str) -> None:
+    assert len(_open_ends(f"fine\n{planted}")) == 1
+
+
+@pytest.mark.parametrize("planted", [".unwrap()", '.expect("x")', 'panic!("x")', "unreachable!()"])
+def test_panics_can_fail(planted: str) -> None:
+    assert len(_panics(f"let x = y{planted};\n// {planted}")) == 1
