@@ -37,7 +37,7 @@ ORDER = [
 ]
 # Result types only, and nobody but the chain's ends imports them.
 SHOW = {"plot", "report"}
-ENDS = {"study", "cli", "app", "__init__"}
+ENDS = {"study", "cli", "app", "__init__", "__main__"}
 # Inference serves fits with statistics, and simulation serves verification and loops: both are
 # stages that name a later one's verbs nowhere, so these arrows keep the graph without circles.
 ALLOWED = {

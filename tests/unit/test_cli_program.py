@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from io import StringIO
 
 import click
@@ -41,6 +43,18 @@ def _install(monkeypatch: pytest.MonkeyPatch, function) -> None:
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
     assert program.run(["--version"]) == 0
     assert VERSION in capsys.readouterr().out
+
+
+def test_the_package_runs_as_a_module() -> None:
+    command = [sys.executable, "-m", "flightid", "--version"]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert run.stdout == f"flightid, version {VERSION}\n", run.stderr
+    unknown = subprocess.run(
+        [*command[:3], "indentify"], capture_output=True, text=True, check=False
+    )
+    assert unknown.returncode == 2
+    assert "flightid" in unknown.stderr
+    assert "Did you mean 'identify'?" in unknown.stderr
 
 
 def test_help_lists_every_verb_with_one_line(capsys: pytest.CaptureFixture[str]) -> None:

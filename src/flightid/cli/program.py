@@ -6,13 +6,13 @@ import pkgutil
 import traceback
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.metadata import version
 
 import click
 
 import flightid.cli
 from flightid.cli.output import Exit, note
 from flightid.errors import FlightidError
+from flightid.version import VERSION
 
 ORDER = ("inspect", "design", "response", "identify", "verify", "tune", "simulate", "report", "run")
 """Verbs in the order of the work, as help lists them; others follow in alphabetical order."""
@@ -57,7 +57,7 @@ class Verbs(click.Group):
     epilog="Exit codes: 0 done; 1 done, and a verdict is red; 2 input cannot be used; "
     "70 a fault in flightid; 130 interrupted.",
 )
-@click.version_option(version("flightid"), prog_name="flightid")
+@click.version_option(VERSION, prog_name="flightid")
 @click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 @click.pass_context
