@@ -8,7 +8,7 @@ STAMP  := $(VENV)/.installed
 JOBS   ?= auto
 FUZZ_RUNS ?= 1000000
 
-.PHONY: demo test test-slow fuzz bench lint format stubs develop wheel constraints clean help
+.PHONY: demo test test-slow fuzz bench lint hooks format stubs develop wheel constraints clean help
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/ —/'
@@ -39,7 +39,10 @@ lint: $(STAMP)  ## formatting, lints and types of both halves
 	cargo fmt --all --check
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 
-format: $(STAMP)
+hooks: $(STAMP)  ## check every commit of this clone before it is made
+	$(BIN)/pre-commit install
+
+format: $(STAMP)  ## lay out the code and mend what can be mended
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 	cargo fmt --all
