@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import flightid as fid
-from flightid.simulation.export.c_compiler import c_compiler, compile_library, library_suffix
+from flightid.export.c_compiler import c_compiler, compile_library, library_suffix
 from flightid.table import Cell, Column, Table
 
 try:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid import Table
-from flightid.control.loop_metrics import loop_metrics
+from flightid.control.margins.loop_metrics import loop_metrics
 from flightid.table import Column
 
 Array = NDArray[np.float64]

@@ -185,9 +185,9 @@ def _best(call: Callable[[], Array], repeats: int) -> tuple[float, Array]:
 
 def _native(record: fid.Record, starts: int) -> Callable[[], Array]:
     """The search alone, as the peers have it: without statistics, findings and provenance."""
-    from flightid.identification.output_error import search_records  # noqa: PLC0415
-    from flightid.identification.record_options import RecordOptions  # noqa: PLC0415
-    from flightid.identification.record_setup import prepare_records  # noqa: PLC0415
+    from flightid.identification.output_error.fit import search_records  # noqa: PLC0415
+    from flightid.identification.records.options import RecordOptions  # noqa: PLC0415
+    from flightid.identification.records.setup import prepare_records  # noqa: PLC0415
 
     options = RecordOptions(starts=starts, initial_state="trim", free_bias=False)
     prepared = prepare_records(two_rates(), record, options)

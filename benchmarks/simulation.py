@@ -9,9 +9,10 @@ import numpy as np
 import scipy.signal
 
 from flightid import Record, Table
-from flightid.models.linear_system import LinearSystem
-from flightid.simulation import fly, simulate
+from flightid.models.linear.linear_system import LinearSystem
+from flightid.simulation import simulate
 from flightid.table import Column
+from flightid.vehicles import fly
 
 N_SAMPLES = 40_000
 

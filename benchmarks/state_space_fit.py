@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 import flightid as fid
-from flightid.identification.selection import coherence_weight
+from flightid.identification.frequency_domain.selection import coherence_weight
 from flightid.table import Column, Table
 
 OMEGA = np.geomspace(0.3, 40.0, 60)

@@ -13,8 +13,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 import flightid as fid
+from flightid.identification.frequency_domain.selection import coherence_weight
 from flightid.identification.multistart import draw_starts
-from flightid.identification.selection import coherence_weight
 from flightid.table import Column, Table
 
 OMEGA = np.geomspace(0.5, 60.0, 20)

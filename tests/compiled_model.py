@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flightid.simulation.export.c_compiler import c_compiler
+from flightid.export.c_compiler import c_compiler
 
 WARNINGS = ["-std=c99", "-pedantic", "-Wall", "-Wextra", "-Wconversion", "-Werror"]
 needs_compiler = pytest.mark.skipif(c_compiler() is None, reason="no C compiler on this machine")

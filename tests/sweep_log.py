@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import chirp, lfilter
 
-from flightid.logs.dataflash_writer import DataflashWriter
+from flightid.logs.dataflash.writer import DataflashWriter
 
 LETTERS = "RPY"
 GYROS = ("GyrX", "GyrY", "GyrZ")

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
-from flightid.control.loop_problem import LoopProblem, Plants
-from flightid.control.sampled_plants import SampledPlants, loop_grid
-from flightid.control.tuning_requirements import TuningRequirements
+from flightid.control.tuning.loop_problem import LoopProblem, Plants
+from flightid.control.tuning.requirements import TuningRequirements
+from flightid.control.tuning.sampled_plants import SampledPlants, loop_grid
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import flightid as fid
 from flightid.excitation import Excitation, doublet, modified_3211, sweep
-from flightid.simulation import CrudePilot, Disturbance, FlightConditions, fly_closed_loop
+from flightid.vehicles import CrudePilot, Disturbance, FlightConditions, fly_closed_loop
 
 SAMPLE_RATE_HZ = 50.0
 INPUTS = ("lon", "lat", "ped", "col")

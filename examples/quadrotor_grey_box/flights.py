@@ -15,7 +15,7 @@ import flightid as fid
 from flightid.conventions import Role
 from flightid.excitation import Excitation
 from flightid.record import Channel, Step
-from flightid.simulation import (
+from flightid.vehicles import (
     Autopilot,
     CrudePilot,
     Flight,
@@ -27,7 +27,7 @@ from flightid.simulation import (
     fly_closed_loop,
     write_ardupilot_log,
 )
-from flightid.simulation.scenario import published_runs
+from flightid.vehicles.scenario import published_runs
 
 POWER_UP_S = 10.0
 """The autopilot's clock is ahead of the flight's by this."""

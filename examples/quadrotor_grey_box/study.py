@@ -22,7 +22,7 @@ import flightid as fid
 from flightid.files import write_atomically
 from flightid.report.content import TableBlock
 from flightid.report.html import to_html
-from flightid.simulation import rate_truth
+from flightid.vehicles import rate_truth
 
 PUBLISHED_NOISE = {
     rate: float(tables.PUBLISHED["mse"][rate]["training"]) ** 0.5 for rate in RATES[:2]

@@ -6,7 +6,7 @@ Run: python examples/quadrotor_rig/fly.py flight.BIN [advised|published] [seed]
 import sys
 from pathlib import Path
 
-from flightid.simulation import fly_scenario, write_ardupilot_log
+from flightid.vehicles import fly_scenario, write_ardupilot_log
 
 
 def main(path: Path, scenario: str = "advised", seed: str = "0") -> None:

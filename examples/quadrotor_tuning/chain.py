@@ -21,13 +21,7 @@ from flightid.files import write_atomically
 from flightid.report.content import Document, Paragraph, Section, TableBlock
 from flightid.report.html import to_html
 from flightid.report.tuning import tuning_section
-from flightid.simulation import (
-    Autopilot,
-    RateGains,
-    SidRun,
-    fly,
-    write_ardupilot_log,
-)
+from flightid.vehicles import Autopilot, RateGains, SidRun, fly, write_ardupilot_log
 
 AXES = ("roll", "pitch", "yaw")
 CHANNELS = {"roll": ("tau_phi", "p"), "pitch": ("tau_theta", "q"), "yaw": ("tau_psi", "r")}

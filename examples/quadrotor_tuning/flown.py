@@ -8,7 +8,7 @@ import numpy as np
 
 import flightid as fid
 from flightid.record import Record
-from flightid.simulation import Autopilot, Flight, SidRun, fly
+from flightid.vehicles import Autopilot, Flight, SidRun, fly
 
 AXES = ("roll", "pitch", "yaw")
 COMMANDS = {"roll": "tau_phi", "pitch": "tau_theta", "yaw": "tau_psi"}

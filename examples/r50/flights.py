@@ -10,13 +10,8 @@ from dataclasses import dataclass
 
 import flightid as fid
 from flightid.excitation import Excitation, doublet, sweep
-from flightid.simulation import (
-    CrudePilot,
-    Disturbance,
-    FlightConditions,
-    actuator_positions,
-    fly_closed_loop,
-)
+from flightid.simulation import actuator_positions
+from flightid.vehicles import CrudePilot, Disturbance, FlightConditions, fly_closed_loop
 
 SAMPLE_RATE_HZ = 50.0
 INPUTS = ("lat", "lon", "ped", "col")

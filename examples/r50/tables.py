@@ -11,8 +11,8 @@ from flights import LIBRARY
 from identification import Identified
 
 import flightid as fid
-from flightid.dynamics import Quantity
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty import Quantity
 
 PUBLISHED = tomllib.loads(Path(__file__).with_name("published.toml").read_text(encoding="utf-8"))
 

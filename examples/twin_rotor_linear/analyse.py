@@ -22,10 +22,10 @@ from fly import fly, write_csv
 from numpy.typing import ArrayLike
 
 import flightid as fid
-from flightid.models.discrete_modes import discrete_modes
-from flightid.simulation import TwinRotor
+from flightid.models.linear.discrete_modes import discrete_modes
 from flightid.study import run_study
 from flightid.table import Cell, Column, Table
+from flightid.vehicles import TwinRotor
 
 HERE = Path(__file__).parent
 SAMPLE_TIME_S = 0.1

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from flightid.excitation import doublet, multistep, prbs
 from flightid.files import write_atomically
 from flightid.record import Record
-from flightid.simulation import TwinRotor
+from flightid.vehicles import TwinRotor
 
 RATE_HZ = 10.0
 AMPLITUDE_V = 0.1

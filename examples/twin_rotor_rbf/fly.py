@@ -18,7 +18,7 @@ from scipy.io import savemat
 
 from flightid.excitation import doublet, multistep, prbs, uniform_noise
 from flightid.record import Record
-from flightid.simulation import TwinRotor
+from flightid.vehicles import TwinRotor
 
 RATE_HZ = 5.0
 AMPLITUDE_V = 1.0

@@ -25,37 +25,39 @@ if TYPE_CHECKING:
     from flightid.control.autopilots.px4_autotune import px4_autotune_gains
     from flightid.control.autopilots.replay import replay
     from flightid.control.autopilots.replay_result import Replay
-    from flightid.control.closed_loop import close_loop
-    from flightid.control.closed_loop_result import ClosedLoop
-    from flightid.control.disk_margin import DiskMargin, disk_margin
-    from flightid.control.disturbance_rejection import (
+    from flightid.control.closed_loop.close_loop import close_loop
+    from flightid.control.closed_loop.open_loop import open_loop
+    from flightid.control.closed_loop.result import ClosedLoop
+    from flightid.control.loops.connect import connect
+    from flightid.control.loops.interconnection import Interconnection
+    from flightid.control.margins.disk_margin import DiskMargin, disk_margin
+    from flightid.control.margins.disturbance_rejection import (
         DisturbanceRejection,
         disturbance_rejection,
     )
-    from flightid.control.loops.connect import connect
-    from flightid.control.loops.interconnection import Interconnection
-    from flightid.control.margins import Margins, margins
-    from flightid.control.open_loop import open_loop
-    from flightid.control.pid_design import PidDesign
-    from flightid.control.tune import tune_pid
-    from flightid.control.tune_axes import tune
-    from flightid.control.tuning import Tuning
-    from flightid.control.tuning_requirements import TuningRequirements
-    from flightid.dynamics.approximate_modes import approximate_modes
-    from flightid.dynamics.conditions import compare_conditions
-    from flightid.dynamics.conditions_result import ConditionComparison
+    from flightid.control.margins.margins import Margins, margins
+    from flightid.control.tuning.pid_design import PidDesign
+    from flightid.control.tuning.requirements import TuningRequirements
+    from flightid.control.tuning.result import Tuning
+    from flightid.control.tuning.tune import tune
+    from flightid.control.tuning.tune_pid import tune_pid
+    from flightid.dynamics.conditions.compare_conditions import compare_conditions
+    from flightid.dynamics.conditions.result import ConditionComparison
     from flightid.dynamics.continuous import to_continuous, to_discrete
-    from flightid.dynamics.derivatives import DerivativeTable, derivatives
-    from flightid.dynamics.handling_qualities import attitude_bandwidth
-    from flightid.dynamics.handling_qualities_table import handling_qualities
+    from flightid.dynamics.derivatives.derivatives import DerivativeTable, derivatives
+    from flightid.dynamics.handling_qualities.attitude_bandwidth import attitude_bandwidth
+    from flightid.dynamics.handling_qualities.handling_qualities import handling_qualities
+    from flightid.dynamics.handling_qualities.pilot_cutoff import pilot_cutoff
     from flightid.dynamics.interpretation import Interpretation, interpret
-    from flightid.dynamics.lower_order import lower_order
-    from flightid.dynamics.mode_result import Modes
-    from flightid.dynamics.modes import modes
-    from flightid.dynamics.pilot_cutoff import pilot_cutoff
-    from flightid.dynamics.rotor import rotor_physics
-    from flightid.dynamics.rotor_result import RotorPhysics
+    from flightid.dynamics.lower_order.lower_order import lower_order
+    from flightid.dynamics.modes.approximate_modes import approximate_modes
+    from flightid.dynamics.modes.modes import modes
+    from flightid.dynamics.modes.result import Modes
+    from flightid.dynamics.rotor.result import RotorPhysics
+    from flightid.dynamics.rotor.rotor_physics import rotor_physics
     from flightid.errors import FlightidError
+    from flightid.export import Exported
+    from flightid.export.to_file import export
     from flightid.findings import Finding
     from flightid.identification import (
         Advice,
@@ -71,11 +73,11 @@ if TYPE_CHECKING:
         Reduction,
         StructureComparison,
     )
-    from flightid.identification.advice import advise
+    from flightid.identification.advice.advice import advise
+    from flightid.identification.advice.impulse_response import impulse_response
     from flightid.identification.identify import identify
-    from flightid.identification.impulse_response import impulse_response
-    from flightid.identification.reduce import reduce
-    from flightid.identification.structures import compare_structures
+    from flightid.identification.reduction.reduce import reduce
+    from flightid.identification.reduction.structures import compare_structures
     from flightid.inspection import Inspection, inspect_log
     from flightid.logs import Log, LogTable, read_log
     from flightid.models import (
@@ -108,16 +110,14 @@ if TYPE_CHECKING:
         coherent_pairs,
         estimate_response,
     )
-    from flightid.simulation.export import Exported
-    from flightid.simulation.export.to_file import export
     from flightid.simulation.noise import Noise
     from flightid.simulation.simulate import simulate
     from flightid.study import Study, run_study
     from flightid.table import Table
     from flightid.validation import Comparison, OrderScan, ResidualTests, Verification
-    from flightid.validation.order_scan import scan_orders
-    from flightid.validation.residuals import residual_tests
-    from flightid.validation.verify import verify
+    from flightid.validation.order_scan.scan_orders import scan_orders
+    from flightid.validation.residuals.residual_tests import residual_tests
+    from flightid.validation.verification.verify import verify
 
 # Name -> the module that holds it (a public module is its own home).
 _HOMES = {
@@ -133,12 +133,12 @@ _HOMES = {
     "Advice": "flightid.identification",
     "ImpulseResponse": "flightid.identification",
     "OrderScan": "flightid.validation",
-    "advise": "flightid.identification.advice",
-    "approximate_modes": "flightid.dynamics.approximate_modes",
-    "DerivativeTable": "flightid.dynamics.derivatives",
-    "derivatives": "flightid.dynamics.derivatives",
-    "impulse_response": "flightid.identification.impulse_response",
-    "scan_orders": "flightid.validation.order_scan",
+    "advise": "flightid.identification.advice.advice",
+    "approximate_modes": "flightid.dynamics.modes.approximate_modes",
+    "DerivativeTable": "flightid.dynamics.derivatives.derivatives",
+    "derivatives": "flightid.dynamics.derivatives.derivatives",
+    "impulse_response": "flightid.identification.advice.impulse_response",
+    "scan_orders": "flightid.validation.order_scan.scan_orders",
     "Channel": "flightid.record",
     "CoherentPairs": "flightid.responses",
     "Comparison": "flightid.validation",
@@ -153,40 +153,40 @@ _HOMES = {
     "InnovationsModel": "flightid.models",
     "Inspection": "flightid.inspection",
     "Interpretation": "flightid.dynamics.interpretation",
-    "attitude_bandwidth": "flightid.dynamics.handling_qualities",
-    "handling_qualities": "flightid.dynamics.handling_qualities_table",
-    "lower_order": "flightid.dynamics.lower_order",
-    "pilot_cutoff": "flightid.dynamics.pilot_cutoff",
+    "attitude_bandwidth": "flightid.dynamics.handling_qualities.attitude_bandwidth",
+    "handling_qualities": "flightid.dynamics.handling_qualities.handling_qualities",
+    "lower_order": "flightid.dynamics.lower_order.lower_order",
+    "pilot_cutoff": "flightid.dynamics.handling_qualities.pilot_cutoff",
     "interpret": "flightid.dynamics.interpretation",
     "to_continuous": "flightid.dynamics.continuous",
     "to_discrete": "flightid.dynamics.continuous",
     "LinearSystem": "flightid.models",
     "LocalMinimum": "flightid.identification",
-    "DiskMargin": "flightid.control.disk_margin",
-    "disk_margin": "flightid.control.disk_margin",
-    "DisturbanceRejection": "flightid.control.disturbance_rejection",
-    "disturbance_rejection": "flightid.control.disturbance_rejection",
-    "Margins": "flightid.control.margins",
-    "margins": "flightid.control.margins",
+    "DiskMargin": "flightid.control.margins.disk_margin",
+    "disk_margin": "flightid.control.margins.disk_margin",
+    "DisturbanceRejection": "flightid.control.margins.disturbance_rejection",
+    "disturbance_rejection": "flightid.control.margins.disturbance_rejection",
+    "Margins": "flightid.control.margins.margins",
+    "margins": "flightid.control.margins.margins",
     "Log": "flightid.logs",
     "LogTable": "flightid.logs",
     "Output": "flightid.models",
     "ModelBuilder": "flightid.models",
-    "Modes": "flightid.dynamics.mode_result",
-    "modes": "flightid.dynamics.modes",
-    "ConditionComparison": "flightid.dynamics.conditions_result",
-    "compare_conditions": "flightid.dynamics.conditions",
-    "RotorPhysics": "flightid.dynamics.rotor_result",
-    "rotor_physics": "flightid.dynamics.rotor",
+    "Modes": "flightid.dynamics.modes.result",
+    "modes": "flightid.dynamics.modes.modes",
+    "ConditionComparison": "flightid.dynamics.conditions.result",
+    "compare_conditions": "flightid.dynamics.conditions.compare_conditions",
+    "RotorPhysics": "flightid.dynamics.rotor.result",
+    "rotor_physics": "flightid.dynamics.rotor.rotor_physics",
     "NarxFit": "flightid.identification",
     "NarxModel": "flightid.models",
     "PairResponse": "flightid.responses",
     "Parameter": "flightid.models",
-    "PidDesign": "flightid.control.pid_design",
-    "TuningRequirements": "flightid.control.tuning_requirements",
-    "Tuning": "flightid.control.tuning",
-    "tune": "flightid.control.tune_axes",
-    "tune_pid": "flightid.control.tune",
+    "PidDesign": "flightid.control.tuning.pid_design",
+    "TuningRequirements": "flightid.control.tuning.requirements",
+    "Tuning": "flightid.control.tuning.result",
+    "tune": "flightid.control.tuning.tune",
+    "tune_pid": "flightid.control.tuning.tune_pid",
     "Parameters": "flightid.models",
     "PolynomialFit": "flightid.identification",
     "PolynomialModel": "flightid.models",
@@ -199,13 +199,13 @@ _HOMES = {
     "Table": "flightid.table",
     "TransferFunction": "flightid.models",
     "TransferFunctionModel": "flightid.models",
-    "compare_structures": "flightid.identification.structures",
+    "compare_structures": "flightid.identification.reduction.structures",
     "coherent_pairs": "flightid.responses",
     "conditioning": "flightid.conditioning",
     "Interconnection": "flightid.control.loops.interconnection",
-    "ClosedLoop": "flightid.control.closed_loop_result",
-    "close_loop": "flightid.control.closed_loop",
-    "open_loop": "flightid.control.open_loop",
+    "ClosedLoop": "flightid.control.closed_loop.result",
+    "close_loop": "flightid.control.closed_loop.close_loop",
+    "open_loop": "flightid.control.closed_loop.open_loop",
     "connect": "flightid.control.loops.connect",
     "loops": "flightid.control",
     "Verification": "flightid.validation",
@@ -219,19 +219,19 @@ _HOMES = {
     "to_scipy": "flightid.models",
     "read_system": "flightid.models",
     "write_system": "flightid.models",
-    "Exported": "flightid.simulation.export",
+    "Exported": "flightid.export",
     "Noise": "flightid.simulation.noise",
-    "export": "flightid.simulation.export.to_file",
+    "export": "flightid.export.to_file",
     "library_names": "flightid.models",
     "load_model": "flightid.models",
     "read_log": "flightid.logs",
     "read_records": "flightid.record",
-    "reduce": "flightid.identification.reduce",
-    "residual_tests": "flightid.validation.residuals",
+    "reduce": "flightid.identification.reduction.reduce",
+    "residual_tests": "flightid.validation.residuals.residual_tests",
     "run_study": "flightid.study",
     "simulate": "flightid.simulation.simulate",
     "validation": "flightid.validation",
-    "verify": "flightid.validation.verify",
+    "verify": "flightid.validation.verification.verify",
     "write_model": "flightid.models",
     "write_records": "flightid.record",
 }

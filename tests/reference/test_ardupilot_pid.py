@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightid import _native
-from flightid.simulation import RateGains
-from flightid.simulation.flight import fly
+from flightid.vehicles import RateGains
+from flightid.vehicles.flight import fly
 from tests.closeness import assert_close
 
 F = np.float32

@@ -12,7 +12,7 @@ from flightid.control.autopilots.filters import (
     one_pole_response,
     sections_response,
 )
-from flightid.simulation import RateGains
+from flightid.vehicles import RateGains
 from tests.closeness import assert_close
 
 RATE_HZ = 1000.0

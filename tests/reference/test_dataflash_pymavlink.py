@@ -10,7 +10,7 @@ import pytest
 
 import flightid as fid
 from flightid.logs import DataflashWriter
-from flightid.logs.dataflash_layout import standard_tables
+from flightid.logs.dataflash.layout import standard_tables
 from tests.closeness import assert_close
 
 LOGS = ("arducopter_457.BIN", "arducopter_470dev_ground.BIN")

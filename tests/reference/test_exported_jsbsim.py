@@ -10,7 +10,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import ExportError, OptionError
-from flightid.simulation.export.jsbsim import FT_M, LBF_N
+from flightid.export.jsbsim import FT_M, LBF_N
 from tests.closeness import assert_close
 
 INERTIA = {"ixx": 1421.0, "iyy": 4067.0, "izz": 4786.0, "ixz": 150.0}

@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 
 import flightid as fid
 from flightid.errors import ExportError, OptionError
-from flightid.simulation.export import fmu as fmu_module
-from flightid.simulation.export.fmu_description import base_unit
+from flightid.export import fmu as fmu_module
+from flightid.export.fmu_description import base_unit
 from tests.closeness import assert_close
 from tests.compiled_model import needs_compiler
 from tests.unit.test_export import EVIL

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flightid import Record, _native
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.simulation import simulate
 from tests.closeness import assert_close
 

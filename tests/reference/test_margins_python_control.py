@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import flightid as fid
-from flightid.control.crossings import gain_crossings, phase_crossings
-from flightid.control.disk_geometry import gain_limits, phase_limit_deg
-from flightid.control.disk_margin import alphas_of
-from flightid.control.loop_metrics import loop_metrics
+from flightid.control.margins.crossings import gain_crossings, phase_crossings
+from flightid.control.margins.disk_geometry import gain_limits, phase_limit_deg
+from flightid.control.margins.disk_margin import alphas_of
+from flightid.control.margins.loop_metrics import loop_metrics
 from tests.closeness import assert_close
 
 OMEGA = np.geomspace(1e-3, 1e4, 15000)

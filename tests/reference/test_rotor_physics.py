@@ -11,7 +11,7 @@ import pytest
 import flightid as fid
 from flightid import errors
 from flightid.dynamics import Blade, effective_lock_number
-from flightid.dynamics.rotor_blades import flapping_time_constant
+from flightid.dynamics.rotor.blades import flapping_time_constant
 from tests.closeness import assert_close
 
 SPEED = 850.0 * 2.0 * math.pi / 60.0

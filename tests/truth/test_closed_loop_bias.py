@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 import flightid as fid
-from flightid.simulation import Autopilot, RateGains, SidRun, Turbulence, fly
+from flightid.vehicles import Autopilot, RateGains, SidRun, Turbulence, fly
 
 OMEGA = np.geomspace(1.5, 12.0, 8)
 RUN = SidRun(10, 3.0, 0.06, 0.2, 6.0, 2.0, 60.0, 1.0, leave_after_s=70.0)

@@ -9,9 +9,9 @@ import pytest
 
 import flightid as fid
 from flightid.excitation import sweep
+from flightid.responses.errors.random_error import Points, combined, covariances
 from flightid.responses.store import read_response, write_response
-from flightid.responses.uncertainty import Points, combined, covariances
-from flightid.simulation import CrudePilot, Disturbance, FlightConditions, fly_closed_loop
+from flightid.vehicles import CrudePilot, Disturbance, FlightConditions, fly_closed_loop
 from tests.closeness import assert_close
 
 RATE_HZ = 25.0

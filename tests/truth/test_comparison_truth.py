@@ -10,8 +10,8 @@ from scipy.linalg import expm
 
 import flightid as fid
 from flightid.conventions import Light
-from flightid.models.linear_system import LinearSystem
-from flightid.validation.comparison import N_STRETCHES, swap_p_value
+from flightid.models.linear.linear_system import LinearSystem
+from flightid.validation.verification.comparison import N_STRETCHES, swap_p_value
 from tests.closeness import assert_close
 
 A = np.array([[0.5, 1.0, 0.0], [-1.0, 0.5, 0.0], [0.3, 0.0, -2.0]])

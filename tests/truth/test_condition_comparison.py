@@ -9,8 +9,8 @@ import pytest
 
 import flightid as fid
 from flightid import errors
-from flightid.dynamics import Quantity
-from flightid.dynamics.ratios import chance_of, holm, ratio_of
+from flightid.dynamics.conditions.ratios import chance_of, holm, ratio_of
+from flightid.uncertainty import Quantity
 from tests.closeness import assert_close
 
 

@@ -9,11 +9,11 @@ import pytest
 from scipy.signal import lfilter
 
 from flightid.conditioning import check_consistency
-from flightid.conditioning.coloured_residuals import autoregression, periodogram
 from flightid.conditioning.kinematics import OUTPUTS, UNITS, KinematicModel, rotation_rows
 from flightid.conventions import STANDARD_GRAVITY_M_S2
 from flightid.errors import DataError, OptionError, SingularError, UnitError, UnknownNameError
 from flightid.record import Record
+from flightid.uncertainty.coloured_residuals import autoregression, periodogram
 from tests.closeness import assert_close
 
 TRUTH = {

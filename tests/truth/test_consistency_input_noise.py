@@ -9,9 +9,9 @@ import pytest
 from scipy.signal import lfilter
 
 from flightid.conditioning import check_consistency
-from flightid.conditioning.coloured_residuals import autoregression, periodogram
-from flightid.conditioning.input_noise import white_deviation
 from flightid.conditioning.kinematics import INPUTS, KinematicModel
+from flightid.uncertainty.coloured_residuals import autoregression, periodogram
+from flightid.uncertainty.input_noise import white_deviation
 from tests.closeness import assert_close
 from tests.truth.test_consistency import FORCES, TRUTH, flight
 

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
 import flightid as fid
-from flightid.control.disk_geometry import gain_limits, phase_limit_deg
-from flightid.control.disk_margin import alphas_of
-from flightid.control.matrix_loop import read_loops, spread_at
-from flightid.control.structured_gain import structured_gain
+from flightid.control.margins.disk_geometry import gain_limits, phase_limit_deg
+from flightid.control.margins.disk_margin import alphas_of
+from flightid.control.margins.matrix_loop import read_loops, spread_at
+from flightid.control.margins.structured_gain import structured_gain
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
-from flightid.responses.uncertainty import Known
+from flightid.responses.errors.random_error import Known
 from tests.closeness import assert_close
 
 

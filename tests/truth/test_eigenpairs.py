@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightid.dynamics.participation import Eigenpair, eigenpairs
+from flightid.dynamics.modes.participation import Eigenpair, eigenpairs
 from tests.closeness import assert_close
 
 

@@ -15,10 +15,10 @@ import flightid as fid
 from flightid import excitation as ex
 from flightid.errors import DataError, ModelError, OptionError, ShapeError
 from flightid.identification import bias_rounds
-from flightid.identification.estimator_bias import Correction
-from flightid.identification.model_outputs import systems_of
+from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.responses.arithmetic import add_delay
 from flightid.responses.store import read_response, write_response
+from flightid.simulation.model_outputs import systems_of
 from tests.closeness import assert_close
 
 RATE_HZ = 200.0

@@ -10,9 +10,9 @@ from scipy.optimize import brentq
 
 import flightid as fid
 from flightid.dynamics import attitude_bandwidth
-from flightid.dynamics.handling_qualities import bandwidth_numbers
-from flightid.dynamics.handling_qualities_curve import Curve, Pair, smoother_of
-from flightid.dynamics.rating_charts_reading import rating_chart
+from flightid.dynamics.handling_qualities.attitude_bandwidth import bandwidth_numbers
+from flightid.dynamics.handling_qualities.curve import Curve, Pair, smoother_of
+from flightid.dynamics.handling_qualities.rating_charts_reading import rating_chart
 from flightid.errors import DataError, OptionError, UnknownNameError
 from tests.closeness import assert_close
 

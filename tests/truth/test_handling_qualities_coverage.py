@@ -15,8 +15,8 @@ from scipy.signal import lfilter
 from scipy.stats import binom
 
 import flightid as fid
-from flightid.dynamics.handling_qualities import bandwidth_numbers
-from flightid.dynamics.handling_qualities_curve import Curve, Pair, smoother_of
+from flightid.dynamics.handling_qualities.attitude_bandwidth import bandwidth_numbers
+from flightid.dynamics.handling_qualities.curve import Curve, Pair, smoother_of
 from tests.closeness import assert_close
 
 STEP_S = 0.02

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.identification.selection import coherence_weight
-from flightid.inference import (
+from flightid.identification.frequency_domain.selection import coherence_weight
+from flightid.responses.errors.random_error import Known
+from flightid.uncertainty import (
     correlation,
     cramer_rao,
     gauss_newton_hessian,
     insensitivity,
     propagate,
 )
-from flightid.responses.uncertainty import Known
 from tests.closeness import assert_close
 
 TRUTH = {

@@ -17,11 +17,11 @@ import pytest
 from scipy.stats import binom
 
 import flightid as fid
-from flightid.simulation import rate_truth
 from flightid.study import stages
 from flightid.study.settings import Settings, read_settings
 from flightid.study.stages import Task
 from flightid.study.truth import Truth
+from flightid.vehicles import rate_truth
 from tests.closeness import assert_close
 
 STUDY = Path(__file__).parent.parent.parent / "examples" / "quadrotor_rig" / "study.toml"

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flightid.control.loop_metrics import loop_metrics
+from flightid.control.margins.loop_metrics import loop_metrics
 from flightid.errors import DataError, ShapeError
 from tests.closeness import assert_close
 

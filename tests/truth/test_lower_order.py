@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.dynamics.lower_order_structures import STRUCTURES, equivalent_model
+from flightid.dynamics.lower_order.structures import STRUCTURES, equivalent_model
 from flightid.errors import DataError, OptionError, UnknownNameError
 from tests.closeness import assert_close
 

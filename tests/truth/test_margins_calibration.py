@@ -9,8 +9,8 @@ import pytest
 from scipy import signal
 
 import flightid as fid
-from flightid.dynamics.spread_of import spread_of
-from flightid.responses.uncertainty import Known
+from flightid.identification.spread_of import spread_of
+from flightid.responses.errors.random_error import Known
 from tests.closeness import assert_close
 
 STEP_S = 0.02

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import flightid as fid
-from flightid.control.loop_metrics import loop_metrics
-from flightid.dynamics.spread_of import spread_of
+from flightid.control.margins.loop_metrics import loop_metrics
+from flightid.identification.spread_of import spread_of
 from tests.closeness import assert_close
 
 LAW = 0.15

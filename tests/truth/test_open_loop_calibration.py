@@ -8,7 +8,7 @@ import pytest
 import flightid as fid
 from flightid.excitation import sweep
 from flightid.models import Output, Parameter, Parameters
-from flightid.simulation import Disturbance, FlightConditions, fly_closed_loop
+from flightid.vehicles import Disturbance, FlightConditions, fly_closed_loop
 from tests.closeness import assert_close
 
 L = fid.loops

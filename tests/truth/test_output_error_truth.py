@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 import flightid as fid
-from flightid.identification.record_options import RecordOptions
-from flightid.identification.record_setup import prepare_records
+from flightid.identification.records.options import RecordOptions
+from flightid.identification.records.setup import prepare_records
 from tests.closeness import assert_close
 
 Array = NDArray[np.float64]

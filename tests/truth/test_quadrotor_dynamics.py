@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from flightid import _native
-from flightid.simulation import (
+from flightid.simulation import simulate
+from flightid.vehicles import (
     Autopilot,
     Flight,
     QuadrotorParameters,
@@ -17,7 +18,6 @@ from flightid.simulation import (
     Turbulence,
     fly,
     rate_truth,
-    simulate,
 )
 from tests.closeness import assert_close
 

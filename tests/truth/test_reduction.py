@@ -10,7 +10,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, FitError, ModelError, OptionError, UnknownNameError
-from flightid.identification.reduction_rules import ReductionLimits, choose
+from flightid.identification.reduction.rules import ReductionLimits, choose
 from flightid.plot.reduction import reduction_path
 from tests.closeness import assert_close
 from tests.roll_and_yaw import ABSENT, REAL, lateral, measured

@@ -10,7 +10,7 @@ import pytest
 from scipy import signal
 
 import flightid as fid
-from flightid.validation.residual_result import ResidualTests
+from flightid.validation.residuals.result import ResidualTests
 
 KINDS = ("εε", "uε", "u²ε", "u²ε²", "ε(εu)")
 STEP, FREE = "one step ahead", "free run"

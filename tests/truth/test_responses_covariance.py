@@ -11,10 +11,10 @@ from scipy import linalg, signal
 
 from flightid import FrequencyResponse, Record, estimate_response
 from flightid.errors import DataError
-from flightid.responses.covariance import basis_transform
-from flightid.responses.local_polynomial import LocalErrors
-from flightid.responses.noise import NoiseSpectrum
-from flightid.responses.transform import WindowPlan, frames
+from flightid.responses.errors.covariance import basis_transform
+from flightid.responses.errors.noise import NoiseSpectrum
+from flightid.responses.estimators.local_polynomial import LocalErrors
+from flightid.responses.estimators.transform import WindowPlan, frames
 from tests.closeness import assert_close
 
 DT = 0.02

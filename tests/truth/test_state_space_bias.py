@@ -10,7 +10,7 @@ from scipy.signal import cont2discrete
 from scipy.stats import binom
 
 import flightid as fid
-from flightid.identification.model_outputs import (
+from flightid.simulation.model_outputs import (
     between_samples,
     driven_outputs,
     free_outputs,

@@ -9,8 +9,8 @@ import pytest
 
 import flightid as fid
 from flightid.control.autopilots import axis_loop
-from flightid.control.loop_metrics import loop_metrics
-from flightid.control.sampled_plants import loop_grid, sample_plants
+from flightid.control.margins.loop_metrics import loop_metrics
+from flightid.control.tuning.sampled_plants import loop_grid, sample_plants
 
 N_FLIGHTS = 120
 STEP_S = 1 / 400

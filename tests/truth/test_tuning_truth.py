@@ -10,14 +10,14 @@ from scipy.optimize import brentq, differential_evolution
 
 import flightid as fid
 from flightid.control.autopilots import axis_loop
-from flightid.control.controller_paths import ControllerPaths
-from flightid.control.gain_search import HEADROOM, Found, search
-from flightid.control.loop_problem import LoopProblem
-from flightid.control.sampled_plants import loop_grid, sample_plants
-from flightid.control.stability_count import unstable_poles
-from flightid.control.tuning_responses import responses
-from flightid.dynamics.spread_of import spread_of
-from flightid.simulation import rate_truth
+from flightid.control.margins.stability_count import unstable_poles
+from flightid.control.tuning.controller_paths import ControllerPaths
+from flightid.control.tuning.gain_search import HEADROOM, Found, search
+from flightid.control.tuning.loop_problem import LoopProblem
+from flightid.control.tuning.responses import responses
+from flightid.control.tuning.sampled_plants import loop_grid, sample_plants
+from flightid.identification.spread_of import spread_of
+from flightid.vehicles import rate_truth
 from tests.closeness import assert_close
 from tests.tuning_loops import closed_loop_poles, integrators_with_delay, largest_pole
 

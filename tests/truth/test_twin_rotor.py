@@ -11,7 +11,8 @@ from scipy.integrate import solve_ivp
 
 from flightid import _native
 from flightid.errors import DataError, OptionError, ShapeError
-from flightid.simulation import Draught, Encoders, TwinRotor, TwinRotorParameters, simulate
+from flightid.simulation import simulate
+from flightid.vehicles import Draught, Encoders, TwinRotor, TwinRotorParameters
 from tests.closeness import assert_close
 
 CALM = Draught(moment_n_m=(0.0, 0.0))

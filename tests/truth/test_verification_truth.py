@@ -7,7 +7,7 @@ import pytest
 
 import flightid as fid
 from flightid import validation
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 from tests.closeness import assert_close
 
 TIME_S = np.arange(600) * 0.02

@@ -11,8 +11,8 @@ from pymavlink import mavutil
 import flightid as fid
 from flightid import _native, errors
 from flightid.logs.log import Log
-from flightid.simulation import Flight, SidRun, fly, write_ardupilot_log
-from flightid.simulation.ardupilot_log import POWER_UP_US
+from flightid.vehicles import Flight, SidRun, fly, write_ardupilot_log
+from flightid.vehicles.ardupilot_log import POWER_UP_US
 from tests.closeness import assert_close
 
 FLOAT32 = "the log keeps single precision"

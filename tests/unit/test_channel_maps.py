@@ -17,8 +17,8 @@ from flightid.errors import (
     UnknownNameError,
 )
 from flightid.logs import DataflashWriter, channel_map
-from flightid.logs.channel_map import DEFAULTS, default_map
-from flightid.logs.dataflash import UNITS
+from flightid.logs.channels.channel_map import DEFAULTS, default_map
+from flightid.logs.dataflash.reader import UNITS
 from flightid.units import canonical, same_dimension
 from tests.closeness import assert_close
 

@@ -12,7 +12,7 @@ import flightid as fid
 from flightid.cli.program import run
 from flightid.errors import OptionError, UnknownNameError
 from flightid.plot.simulation import simulated_history
-from flightid.simulation.stick import stick_record
+from flightid.vehicles.pilot_inputs import stick_record
 from tests.closeness import assert_close
 
 

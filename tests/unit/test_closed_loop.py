@@ -9,15 +9,9 @@ from scipy.integrate import solve_ivp
 import flightid as fid
 from flightid import errors
 from flightid.excitation import Excitation, sweep
-from flightid.models.linear_system import LinearSystem
-from flightid.simulation import (
-    CrudePilot,
-    Disturbance,
-    FlightConditions,
-    actuator_positions,
-    fly_closed_loop,
-    simulate,
-)
+from flightid.models.linear.linear_system import LinearSystem
+from flightid.simulation import actuator_positions, simulate
+from flightid.vehicles import CrudePilot, Disturbance, FlightConditions, fly_closed_loop
 from tests.closeness import assert_close
 
 SPIRAL = LinearSystem([[0.3]], [[6.0]], [[1.0]], [[0.0]], ("lat",), ("p",), [0.03])

@@ -12,7 +12,7 @@ import flightid as fid
 from flightid.cli.program import run
 from flightid.conventions import Light
 from flightid.errors import OptionError, UnknownNameError
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.plot import verification as pictures
 from flightid.report.verification import verification_blocks, verification_sections
 from tests.closeness import assert_close

@@ -8,9 +8,9 @@ import pytest
 import flightid as fid
 from flightid.conditioning.smoothing import local_derivative, local_mean
 from flightid.errors import DataError, FitError, ModelError, OptionError, UnknownNameError
-from flightid.identification.fourier_integral import Harmonics
-from flightid.identification.nuisance import Nuisance
-from flightid.inference.spectral import spectral_covariance
+from flightid.identification.records.nuisance import Nuisance
+from flightid.identification.regression.fourier_integral import Harmonics
+from flightid.uncertainty.spectral import spectral_covariance
 from tests.closeness import assert_close
 from tests.regression_flights import fly, noisy, short_period, values
 

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 import flightid as fid
 from flightid.conventions import Light
 from flightid.errors import ExportError, ModelError, OptionError
-from flightid.simulation.export import c_compiler
-from flightid.simulation.export.names import comment, identifier, identifiers, text_literal
+from flightid.export import c_compiler
+from flightid.export.names import comment, identifier, identifiers, text_literal
 from tests.compiled_model import CompiledModel, needs_compiler
 from tests.unit.test_saved_models import ARMAX, NARX
 

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from flightid import _native
 from flightid.errors import ModelError
-from flightid.models.dimensions import require_unit
-from flightid.models.formula import formula_names
+from flightid.models.language.dimensions import require_unit
+from flightid.models.language.formula import formula_names
 from tests.closeness import assert_close
 
 

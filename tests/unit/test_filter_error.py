@@ -9,8 +9,8 @@ from scipy.linalg import solve_discrete_are
 import flightid as fid
 from flightid import _native
 from flightid.errors import FitError
-from flightid.identification.innovations import FilteredData, InnovationsProblem
-from flightid.identification.steady_filter import ContinuousPoint, steady_filter
+from flightid.identification.filter_error.innovations import FilteredData, InnovationsProblem
+from flightid.identification.filter_error.steady_filter import ContinuousPoint, steady_filter
 from tests.closeness import assert_close
 from tests.regression_flights import fly, noisy, short_period, values
 

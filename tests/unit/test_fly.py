@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from flightid import errors
 from flightid.cli.program import program
 from flightid.conventions import Role
-from flightid.simulation import (
+from flightid.vehicles import (
     Autopilot,
     PilotDoublet,
     QuadrotorParameters,
@@ -24,7 +24,7 @@ from flightid.simulation import (
     fly_scenario,
     rate_truth,
 )
-from flightid.simulation.scenario import advised_runs, published_runs
+from flightid.vehicles.scenario import advised_runs, published_runs
 from tests.closeness import assert_close
 
 TURN = [PilotDoublet("roll", 0.1, 3.0)]

@@ -10,9 +10,9 @@ import pytest
 
 import flightid as fid
 from flightid.dynamics import rate, rating_chart
-from flightid.dynamics.handling_qualities_modes import mode_ratings
-from flightid.dynamics.mode_names import NamedMode
-from flightid.dynamics.rating import normal_draws
+from flightid.dynamics.handling_qualities.mode_ratings import mode_ratings
+from flightid.dynamics.handling_qualities.rating import normal_draws
+from flightid.dynamics.modes.names import NamedMode
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.plot.handling_qualities import (
     bandwidth_curves,

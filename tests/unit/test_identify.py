@@ -10,9 +10,9 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, FitError, OptionError, UnitError, UnknownNameError
-from flightid.inference import interval95, null_combination, propagate
-from flightid.inference.cramer_rao import cramer_rao
-from flightid.inference.insensitivity import insensitivity
+from flightid.uncertainty import interval95, null_combination, propagate
+from flightid.uncertainty.cramer_rao import cramer_rao
+from flightid.uncertainty.insensitivity import insensitivity
 from tests.closeness import assert_close
 
 OMEGA = np.geomspace(0.5, 60.0, 120)

@@ -9,7 +9,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, ModelError, OptionError
-from flightid.models.linear_recursion import run_recursion
+from flightid.models.linear.recursion import run_recursion
 from flightid.plot.subspace import singular_values
 from tests.closeness import assert_close
 from tests.innovations_records import PAIR, SINGLE, flown

@@ -15,7 +15,7 @@ from flightid.conventions import Light
 from flightid.inspection import advice
 from flightid.inspection.inspection import Inspection
 from flightid.logs import Log
-from flightid.logs.ulog import UlogSource
+from flightid.logs.ulog.reader import UlogSource
 from tests.sweep_log import SweepFlight
 from tests.ulog_builder import UlogBuilder
 

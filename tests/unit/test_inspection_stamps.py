@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import flightid as fid
 from flightid.inspection.stamps import believable
 from flightid.logs import Log
-from flightid.logs.ulog import UlogSource
+from flightid.logs.ulog.reader import UlogSource
 from tests.sweep_log import SweepFlight
 from tests.ulog_builder import UlogBuilder
 

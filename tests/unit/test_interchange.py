@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 import flightid as fid
 from flightid.errors import ExportError, FileFormatError, ModelError
 from flightid.models.description import model_from_description
-from flightid.models.linear_description import system_to_table
+from flightid.models.linear.description import system_to_table
+from flightid.models.linear.system_files import MAXIMUM_BYTES
 from flightid.models.save import model_as_toml
-from flightid.models.system_files import MAXIMUM_BYTES
 from tests.closeness import assert_close
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import flightid as fid
 from flightid import errors
-from flightid.models.delay_states import pade_delay
+from flightid.models.linear.delay_states import pade_delay
 from tests.closeness import assert_close
 
 

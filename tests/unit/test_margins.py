@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.control.margin_findings import guide_finding
-from flightid.dynamics.quantity import Quantity
+from flightid.control.margins.findings import guide_finding
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
+from flightid.uncertainty.quantity import Quantity
 
 
 def loop(gain=4.0, delay=0.1):

@@ -9,7 +9,7 @@ from scipy import signal
 import flightid as fid
 from flightid.errors import ModelError
 from flightid.models import Block, StateSpaceModel
-from flightid.models.blocks import KINDS
+from flightid.models.language.blocks import KINDS
 from tests.closeness import assert_close
 
 OMEGA = np.geomspace(0.3, 300.0, 40)

@@ -12,8 +12,8 @@ import flightid as fid
 from flightid import _native
 from flightid.errors import FitError, ModelError, UnknownNameError
 from flightid.models import StateSpaceModel
+from flightid.models.language.sympy_input import sympy_formula, sympy_sides
 from flightid.models.save import model_as_toml
-from flightid.models.sympy_input import sympy_formula, sympy_sides
 from tests.closeness import assert_close
 
 T = sympy.Symbol("t")

@@ -13,7 +13,7 @@ from scipy import integrate, interpolate
 import flightid as fid
 from flightid.errors import DataError, ModelError
 from flightid.models import Axis, RecordValue, StateSpaceModel, TableFunction
-from flightid.models.symbolic import Printer
+from flightid.models.language.symbolic import Printer
 from tests.closeness import assert_close
 
 X = (-0.4, -0.1, 0.0, 0.3, 0.5, 0.9)

@@ -10,9 +10,9 @@ import pytest
 
 import flightid as fid
 from flightid import errors
-from flightid.dynamics.modes import UNFITTED, UNSIGNED
-from flightid.dynamics.participation import eigenpairs
-from flightid.models.discrete_modes import NO_COUNTERPART
+from flightid.dynamics.modes.modes import UNFITTED, UNSIGNED
+from flightid.dynamics.modes.participation import eigenpairs
+from flightid.models.linear.discrete_modes import NO_COUNTERPART
 from tests.closeness import assert_close
 
 

@@ -20,7 +20,7 @@ from flightid.errors import (
     UnknownNameError,
 )
 from flightid.models import Lag, NarxEquation, Term
-from flightid.models.narx_terms import product_term
+from flightid.models.narx.terms import product_term
 from tests.closeness import assert_close
 from tests.narx_records import quadratic
 
@@ -115,7 +115,7 @@ def test_radial_models_beat_the_linear_one(kernel: str, candidates: str) -> None
 def test_centres_computed_on_the_fly_give_the_same_model(monkeypatch: pytest.MonkeyPatch) -> None:
     model = fid.NarxModel("y", ("u",), 1, 2, width=3.0, maximum_terms=10)
     kept = fid.identify(model, quadratic(150, noise=0.01))
-    monkeypatch.setattr("flightid.identification.orthogonal_least_squares.MAXIMUM_BYTES", 0)
+    monkeypatch.setattr("flightid.identification.narx.fit.MAXIMUM_BYTES", 0)
     lazy = fid.identify(model, quadratic(150, noise=0.01))
     assert lazy.equation.weights == kept.equation.weights
     assert lazy.equation.terms == kept.equation.terms

@@ -9,9 +9,9 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, OptionError
-from flightid.identification.narx_candidates import candidate_terms, product_columns
-from flightid.identification.narx_regressors import regressors_of
-from flightid.identification.orthogonal_least_squares import _select
+from flightid.identification.narx.candidates import candidate_terms, product_columns
+from flightid.identification.narx.fit import _select
+from flightid.identification.narx.regressors import regressors_of
 from tests.closeness import assert_close
 from tests.narx_records import quadratic
 

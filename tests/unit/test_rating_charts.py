@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flightid.dynamics import RatingChart, rate, rating_chart, rating_charts
-from flightid.dynamics.rating import normal_draws
+from flightid.dynamics.handling_qualities.rating import normal_draws
 from flightid.errors import DataError, FileFormatError, OptionError, UnknownNameError
 from tests.closeness import assert_close
 

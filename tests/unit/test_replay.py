@@ -15,7 +15,7 @@ from flightid.control.autopilots.axis_loop import LoopFlags
 from flightid.logs import DataflashWriter
 from flightid.logs.log import Log
 from flightid.plot import autopilots as plots
-from flightid.simulation import (
+from flightid.vehicles import (
     Autopilot,
     Flight,
     PilotDoublet,

@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 import flightid as fid
 from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
 from flightid.plot.residuals import correlations
-from flightid.validation.correlation import (
+from flightid.validation.residuals.correlation import (
     cross_correlation,
     independence_portmanteau,
     lag_covariance,
     white_portmanteau,
 )
-from flightid.validation.residuals import is_two_level
+from flightid.validation.residuals.residual_tests import is_two_level
 from tests.closeness import assert_close
 
 STEP = "one step ahead"

@@ -13,9 +13,9 @@ from scipy import signal
 from flightid import FrequencyResponse, Record, estimate_response
 from flightid.errors import DataError, FileFormatError, ShapeError
 from flightid.responses import arithmetic
+from flightid.responses.errors.random_error import Known
 from flightid.responses.spectrum_measures import band_rms, cutoff_frequency
 from flightid.responses.store import from_xarray, read_response, to_xarray, write_response
-from flightid.responses.uncertainty import Known
 from tests.closeness import assert_close
 
 OMEGA = np.array([1.0, 3.0, 9.0])

@@ -10,8 +10,13 @@ from scipy import signal
 
 from flightid import FrequencyResponse, Record, estimate_response
 from flightid.errors import DataError, OptionError, ShapeError, UnitError, UnknownNameError
-from flightid.responses.conditioned import random_error
-from flightid.responses.windows import automatic_windows, overlap_factor, plan_of, shifts_of
+from flightid.responses.estimators.conditioned import random_error
+from flightid.responses.estimators.windows import (
+    automatic_windows,
+    overlap_factor,
+    plan_of,
+    shifts_of,
+)
 from tests.closeness import assert_close
 
 DT = 0.02

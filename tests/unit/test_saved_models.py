@@ -12,7 +12,7 @@ import flightid as fid
 from flightid.errors import FlightidError, ModelError
 from flightid.models import Lag, NarxEquation, Term, load_structure
 from flightid.models.description import model_from_description, model_to_description
-from flightid.models.narx import Scaling
+from flightid.models.narx.model import Scaling
 
 ARMAX = fid.PolynomialModel(
     "theta", ("v", "w"), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5], [0.3]], c=[1, 0.2], nk=(2, 1),

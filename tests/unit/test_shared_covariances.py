@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.responses.uncertainty import Points, covariances
+from flightid.responses.errors.random_error import Points, covariances
 from tests.closeness import assert_close
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flightid import Record, errors
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.simulation import simulate
 from tests.closeness import assert_close
 

@@ -14,7 +14,7 @@ from flightid.errors import (
     UnknownNameError,
 )
 from flightid.models import Output, Parameter, Parameters, StateSpaceModel
-from flightid.models.integration_steps import steps_per_sample
+from flightid.models.state_space.integration_steps import steps_per_sample
 from tests.closeness import assert_close
 
 HOVER_N = 1.25 * 9.80665

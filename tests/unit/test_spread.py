@@ -7,7 +7,8 @@ import pytest
 
 import flightid as fid
 from flightid import errors
-from flightid.dynamics import Quantity, Spread, quantity_table, spread_of
+from flightid.identification import spread_of
+from flightid.uncertainty import Quantity, Spread, quantity_table
 from tests.closeness import assert_close
 
 COVARIANCE = np.array([[0.04, 0.01], [0.01, 0.09]])

@@ -11,10 +11,10 @@ import pytest
 from flightid.conventions import Light
 from flightid.errors import OptionError, StudyError
 from flightid.models import load_model
-from flightid.simulation import Autopilot, QuadrotorParameters, fly
 from flightid.study.flight import FlightPlan, read_flight
 from flightid.study.reading import TableReader
 from flightid.study.truth import Truth, recovered
+from flightid.vehicles import Autopilot, QuadrotorParameters, fly
 
 
 def _plan(text: str) -> FlightPlan:

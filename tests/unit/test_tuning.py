@@ -10,13 +10,13 @@ import pytest
 
 import flightid as fid
 from flightid.control.autopilots import axis_loop, axis_loop_of
-from flightid.control.loop_problem import highest_crossover
-from flightid.control.tuning_requirements import TuningRequirements
-from flightid.control.worst_case import content_of_worst, least_share
+from flightid.control.tuning.loop_problem import highest_crossover
+from flightid.control.tuning.requirements import TuningRequirements
+from flightid.control.tuning.worst_case import content_of_worst, least_share
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
 from flightid.findings import Finding
-from flightid.simulation import fly, write_ardupilot_log
+from flightid.vehicles import fly, write_ardupilot_log
 from tests.closeness import assert_close
 
 FLOWN = axis_loop("arducopter", "roll", loop_rate_hz=400.0).with_gains(

@@ -10,7 +10,7 @@ import pytest
 
 import flightid as fid
 from flightid.control.autopilots import AxisLoop, axis_loop, read_parameters
-from flightid.control.sampled_plants import SampledPlants, sample_plants
+from flightid.control.tuning.sampled_plants import SampledPlants, sample_plants
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.plot.tuning import gain_map, nichols, time_responses

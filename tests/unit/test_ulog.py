@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from flightid import _native
 from flightid.errors import LogFormatError, MissingColumnError
 from flightid.logs import Log, read_log
-from flightid.logs.ulog import UlogSource
+from flightid.logs.ulog.reader import UlogSource
 from tests.ulog_builder import UlogBuilder, flight
 
 

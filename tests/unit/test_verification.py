@@ -21,7 +21,7 @@ from flightid.errors import (
     UnitError,
     UnknownNameError,
 )
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.plot import verification as pictures
 from tests.closeness import assert_close
 

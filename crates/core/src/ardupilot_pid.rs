@@ -1,4 +1,4 @@
-//! ArduPilot's rate PID (Python side: `control/autopilots/arducopter.py`, `simulation/autopilot.py`),
+//! ArduPilot's rate PID (Python side: `control/autopilots/arducopter.py`, `vehicles/autopilot.py`),
 //! in the autopilot's own single precision or in double for its linear view.
 //!
 //! Structure of AC_PID: notch and low-pass on target (NTF, FLTT), notch and low-pass on error (NEF,

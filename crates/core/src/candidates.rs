@@ -1,5 +1,5 @@
 //! Candidate terms of a regression: given columns, and radial functions that are kept or computed
-//! when they are read. (Python side: identification/narx_candidates.py)
+//! when they are read. (Python side: identification/narx/candidates.py)
 
 use rayon::prelude::*;
 

@@ -1,5 +1,5 @@
 //! Polynomials in the delay operator q⁻¹ applied to signals, from rest. (Python side:
-//! models/polynomial.py)
+//! models/polynomial/model.py)
 
 /// p(q) x delayed by `delay` samples, added to `out` with a factor.
 pub fn add_product(factor: f64, polynomial: &[f64], delay: usize, x: &[f64], out: &mut [f64]) {

@@ -1,5 +1,5 @@
 //! Residuals of a model against frequency responses, for the Levenberg–Marquardt. (Python side:
-//! identification/frequency_domain.py)
+//! identification/frequency_domain/fit.py)
 //!
 //! Two costs: the coherence-weighted sum of squared decibels and degrees (Tischler & Remple, eq.
 //! 11.4 and 12.24), with weights that the caller prepares; and the whitened complex error

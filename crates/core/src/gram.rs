@@ -1,6 +1,6 @@
 //! Normal equations of many rows in few columns: gathered in tiles that stay in registers, one
 //! record's own columns eliminated, and the triangle of what is left.
-//! (Python side: identification/output_error.py)
+//! (Python side: identification/output_error/fit.py)
 //!
 //! Reference: Golub & Van Loan, *Matrix Computations*, 4th ed., §4.2.9 and §5.3.
 

@@ -1,5 +1,5 @@
 //! Inner products and orthogonalisation of long vectors.
-//! (Python side: identification/orthogonal_least_squares.py)
+//! (Python side: identification/narx/fit.py)
 
 /// Columns that one reading of the candidates is multiplied by: with four, reading from memory and
 /// multiplying take about equally long.

@@ -1,5 +1,5 @@
 //! Two sums of squares of the same variables as one, so that a fit may weigh different kinds of data
-//! by their likelihoods. (Python side: identification/joint.py)
+//! by their likelihoods. (Python side: identification/joint/fit.py)
 
 use crate::error::CoreError;
 use crate::householder::triangularise;

@@ -1,5 +1,5 @@
 //! State-space models and transfer functions as linear systems with derivatives by their parameters.
-//! (Python side: identification/output_error.py)
+//! (Python side: identification/output_error/fit.py)
 
 use crate::error::CoreError;
 use crate::linear_output_error::{LinearFamily, LinearPoint};

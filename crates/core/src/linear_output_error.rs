@@ -1,5 +1,5 @@
 //! Linear models on records: exact hold discretisation, sensitivities by one recursion in blocks.
-//! (Python side: identification/output_error.py)
+//! (Python side: identification/output_error/fit.py)
 
 use crate::block_recursion::BLOCK;
 use crate::discretisation::{Hold, Sampled, StateSpace, discretise};

@@ -1,5 +1,5 @@
 //! Many runs of one linear recursion x(k+1) = A x(k) + f(k): the state predictor and its
-//! sensitivities share their transition matrix. (Python side: identification/filter_error.py)
+//! sensitivities share their transition matrix. (Python side: identification/filter_error/fit.py)
 
 use crate::error::CoreError;
 

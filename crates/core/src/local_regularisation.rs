@@ -1,5 +1,5 @@
 //! Penalties of the chosen terms from the evidence for them, and the choice made again with those.
-//! (Python side: identification/orthogonal_least_squares.py)
+//! (Python side: identification/narx/fit.py)
 //!
 //! Chen's update λ_i ← γ_i/(n − Σγ) · SSE/g_i², with γ_i = a_i/(a_i + λ_i) and g_i = b_i/(a_i + λ_i), has
 //! one fixed point for given terms in a given order. With u_i = b_i²/a_i and the residual variance of

@@ -1,5 +1,5 @@
 //! Products of directions with all candidates, found for several terms at one reading.
-//! (Python side: identification/orthogonal_least_squares.py)
+//! (Python side: identification/narx/fit.py)
 //!
 //! Reading the candidates from memory costs as much as multiplying them by several vectors. So at each
 //! reading the terms that will probably follow are guessed, by greedy selection among the best few, and

@@ -1,5 +1,5 @@
 //! Tables of one or two axes as functions: linear, or cubic with given kind of slopes. (Python side:
-//! models/tables.py)
+//! models/language/tables.py)
 //!
 //! Every kind is a sum of node values and node slopes times basis functions of the place in a cell, so
 //! that dual numbers give the derivatives of all orders. Monotone slopes: Fritsch and Butland, A method

@@ -1,5 +1,5 @@
 //! Second derivatives, by parameters, of the matrices and delays of a model: third derivatives of its
-//! tape, from dual numbers of dual numbers of dual numbers. (Python side: models/statespace.py)
+//! tape, from dual numbers of dual numbers of dual numbers. (Python side: models/state_space/model.py)
 
 use crate::dual::{Dual, Scalar};
 use crate::error::CoreError;

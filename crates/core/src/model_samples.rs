@@ -1,5 +1,5 @@
 //! Equations and outputs of a model at every sample of a record, with derivatives along chosen
-//! directions. (Python side: identification/sampled_equations.py)
+//! directions. (Python side: identification/regression/sampled_equations.py)
 
 use crate::error::CoreError;
 use crate::model_tape::ModelTape;

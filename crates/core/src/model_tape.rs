@@ -1,5 +1,5 @@
 //! A state-space model as text, compiled: residuals left − right of its equations, outputs and
-//! delays, linearised at a point with exact derivatives. (Python side: models/statespace.py)
+//! delays, linearised at a point with exact derivatives. (Python side: models/state_space/model.py)
 //!
 //! With z = [ẋ, x, u] the linear model is M ẋ = F x + G u, y = H₁ ẋ + H₀ x + D u, where
 //! [M, −F, −G] = ∂r/∂z and [H₁, H₀, D] = ∂y/∂z.

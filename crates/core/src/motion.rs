@@ -1,5 +1,5 @@
 //! The equations of a model made ready for integration in time: M(x, θ) ẋ = f(x, u, θ), y(ẋ, x, u, θ),
-//! with formulas of all derivatives that are not always zero. (Python side: models/statespace.py)
+//! with formulas of all derivatives that are not always zero. (Python side: models/state_space/model.py)
 //!
 //! What depends on parameters alone is computed once for a trajectory (`leaves`). The state derivatives
 //! must enter linearly: then residuals at ẋ = 0 and M give them exactly.

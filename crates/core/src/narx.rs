@@ -1,5 +1,5 @@
 //! Prediction of a NARX model: a sum of products of lags and of radial functions of all lags, run one
-//! step, k steps or freely. (Python side: models/narx.py)
+//! step, k steps or freely. (Python side: models/narx/model.py)
 //!
 //! Reference: Billings, *Nonlinear System Identification*, Wiley 2013, sections 2.2 and 12.4.
 

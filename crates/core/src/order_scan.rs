@@ -1,5 +1,5 @@
 //! Many ARX or ARMAX orders on the same records: one triangle of the largest regressor matrix, the
-//! others by taking its columns; ARMAX refined from there. (Python side: validation/order_scan.py)
+//! others by taking its columns; ARMAX refined from there. (Python side: validation/order_scan/scan_orders.py)
 //!
 //! Reference: Ljung, *System Identification*, 2nd ed., sections 10.1 and 16.4; Hannan & Rissanen
 //! (1982), Biometrika 69.

@@ -1,5 +1,5 @@
 //! Forward selection of regression terms by error-reduction ratio.
-//! (Python side: identification/orthogonal_least_squares.py)
+//! (Python side: identification/narx/fit.py)
 //!
 //! For every candidate p_j the squared length a_j and the product b_j = w_jᵀy of its part w_j that is
 //! orthogonal to the chosen terms are kept; a new direction q changes them by r_j = qᵀp_j alone, so

@@ -1,4 +1,4 @@
-//! Maximum-likelihood output error over many records. (Python side: identification/output_error.py)
+//! Maximum-likelihood output error over many records. (Python side: identification/output_error/fit.py)
 //!
 //! Minimises ½ Σ vᵀR⁻¹v + (N/2) ln det R over parameters θ that all records share and, for each
 //! record, initial states, input shifts and output biases. Each record's own numbers are eliminated

@@ -1,5 +1,5 @@
 //! How output error weighs residuals: the noise covariance and robust weights.
-//! (Python side: identification/output_error.py)
+//! (Python side: identification/output_error/fit.py)
 
 use crate::error::CoreError;
 use crate::record_data::RecordData;

@@ -1,6 +1,6 @@
 //! What one record's rows sum up to, output by output, so that weights can be given afterwards: one
 //! pass serves the cost of a trial point, its noise covariance and its linearisation.
-//! (Python side: identification/output_error.py)
+//! (Python side: identification/output_error/fit.py)
 
 use crate::gram::add_rows;
 use crate::output_error::LANES;

@@ -1,5 +1,5 @@
 //! Prediction-error fits of linear polynomial models. (Python side:
-//! identification/prediction_error.py)
+//! identification/prediction_error/fit.py)
 //!
 //! Derivatives are shifts of a few filtered signals; the Jacobian is triangularised block by block
 //! and never kept. The unknown past of each record is linear in the errors and eliminated.

@@ -1,5 +1,5 @@
 //! Normal equations of shifted signals: sums of one shift follow from those of the shift before, so
-//! few of them run over the record. (Python side: validation/order_scan.py)
+//! few of them run over the record. (Python side: validation/order_scan/scan_orders.py)
 //!
 //! Half the digits of an orthogonal triangle: for ranking many structures, not for reporting one.
 //!

@@ -1,5 +1,5 @@
 //! The one-step predictor of A y = Σ (Bᵢ/Fᵢ) uᵢ + (C/D) e: its errors, their derivatives as shifts of
-//! a few filtered signals, and what the unknown past adds. (Python side: models/polynomial.py)
+//! a few filtered signals, and what the unknown past adds. (Python side: models/polynomial/model.py)
 //!
 //! With wᵢ = (Bᵢ/Fᵢ) uᵢ and s = A y − Σ wᵢ the prediction error is e = (D/C) s.
 //!

@@ -1,5 +1,5 @@
 //! Roots of real polynomials, and polynomials moved into the unit circle. (Python side:
-//! identification/prediction_error.py)
+//! identification/prediction_error/fit.py)
 
 use num_complex::Complex64;
 

@@ -1,4 +1,4 @@
-//! Rigid-body quadrotor with four lagging rotors (Python side: `simulation/quadrotor.py`).
+//! Rigid-body quadrotor with four lagging rotors (Python side: `vehicles/quadrotor.py`).
 //!
 //! Newton–Euler equations in body axes (x forward, y right, z down) with quaternion attitude:
 //! v̇ = −ω × v + Rᵀg + F/m and I ω̇ = −ω × (I ω + h) − ḣ + M, where h is the rotors' momentum. Rotor

@@ -1,5 +1,5 @@
 //! A simulated flight: quadrotor, sensors, gusts and autopilot in one loop (Python side:
-//! `simulation/flight.py`).
+//! `vehicles/flight.py`).
 //!
 //! Order within loop k, as in ArduCopter's fast loop: gyro sample and filter, rate controllers (with
 //! the targets and injections that loop k − 1 left behind), mixer and motors, then attitude loop and

@@ -1,4 +1,4 @@
-//! Radial basis functions of the distance to a centre. (Python side: models/narx.py)
+//! Radial basis functions of the distance to a centre. (Python side: models/narx/model.py)
 //!
 //! Reference: Chen, Cowan & Grant, "Orthogonal least squares learning algorithm for radial basis
 //! function networks", IEEE Trans. Neural Networks 2 (1991), section II.

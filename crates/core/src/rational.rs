@@ -1,5 +1,5 @@
 //! Transfer functions multiplied out, for their realisation. (Python side:
-//! identification/output_error.py)
+//! identification/output_error/fit.py)
 
 use std::ops::Range;
 

@@ -1,5 +1,5 @@
 //! One record's measurements and what of its own numbers is free. (Python side:
-//! identification/record_setup.py)
+//! identification/records/setup.py)
 
 use crate::error::CoreError;
 

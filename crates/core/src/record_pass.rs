@@ -1,5 +1,5 @@
 //! One record's part of an output-error fit: its own numbers, and passes over its samples.
-//! (Python side: identification/output_error.py)
+//! (Python side: identification/output_error/fit.py)
 
 use crate::error::CoreError;
 use crate::gram::{Elimination, add_rows, eliminate};

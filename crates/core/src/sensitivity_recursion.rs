@@ -1,5 +1,5 @@
 //! Sensitivities of a linear model by one recursion, a block of samples at a time.
-//! (Python side: identification/output_error.py)
+//! (Python side: identification/output_error/fit.py)
 //!
 //! The state and its derivatives by θ, initial state and input shifts are columns of one matrix S:
 //! S⁺ = Φ S + Σ_q K_q · source_q, where the sources are the states themselves (for ∂Φ/∂θ x) and the

@@ -1,5 +1,5 @@
 //! Frequency responses of a state-space model with exact derivatives of log H, for the fit.
-//! (Python side: models/statespace.py)
+//! (Python side: models/state_space/model.py)
 //!
 //! H(jω) = {[H₀ + jω H₁] [jωM − F]⁻¹ G + D} e^{−jωτ}. With X = [jωM − F]⁻¹ G and the adjoint
 //! Λ = [jωM − F]⁻ᵀ [H₀ + jω H₁]ᵀ the derivative of each pair is a sum over those few entries of the

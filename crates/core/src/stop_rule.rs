@@ -1,4 +1,4 @@
-//! What ends a forward selection. (Python side: models/narx.py)
+//! What ends a forward selection. (Python side: models/narx/model.py)
 
 /// What ends the selection. The last four run to the most terms and keep the smallest value, where k
 /// is the effective number of parameters: with penalties less than the number of terms.

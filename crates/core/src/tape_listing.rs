@@ -1,5 +1,5 @@
 //! A model's equations as a plain list of operations, for whatever writes them in another language.
-//! (Python side: simulation/export/equation_code.py)
+//! (Python side: export/equation_code.py)
 
 use crate::error::CoreError;
 use crate::model_tape::ModelTape;

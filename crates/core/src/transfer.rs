@@ -1,5 +1,5 @@
 //! Transfer functions gain · Π numerator factors / Π denominator factors · e^{−τ s} with exact
-//! derivatives of log H with respect to the parameters. (Python side: models/transfer.py)
+//! derivatives of log H with respect to the parameters. (Python side: models/transfer/model.py)
 //!
 //! Several responses share one set of parameters. Factors are polynomials in `s` whose coefficients
 //! are expressions; tied parameters are definitions in terms of the others.

@@ -1,5 +1,5 @@
 //! Twin-rotor rig: a beam on a pivot with a main and a tail rotor (Python side:
-//! `simulation/twin_rotor.py`).
+//! `vehicles/twin_rotor.py`).
 //!
 //! With pitch ψ from the horizontal, yaw φ, motor momenta-like states τ₁, τ₂ and the thrust moments
 //! Mᵢ = aᵢ τᵢ|τᵢ| + bᵢ τᵢ:

@@ -1,4 +1,4 @@
-//! ArduPilot DataFlash logs (Python side: `logs/dataflash.py`).
+//! ArduPilot DataFlash logs (Python side: `logs/dataflash/reader.py`).
 //!
 //! A log is a row of messages: `A3 95 type payload`, where the payload's layout by type is itself
 //! logged in `FMT` messages. There is no checksum and no length in the header, so a message is

@@ -1,4 +1,4 @@
-//! PX4 ULog: bytes to an index of what the log holds (Python side: `logs/ulog.py`).
+//! PX4 ULog: bytes to an index of what the log holds (Python side: `logs/ulog/reader.py`).
 //!
 //! The record walk is our own. The crate `px4-ulog` 0.6.1, which the tests use as a cross-check, stops
 //! for good at the first record that it cannot read, keeps no place to resume from, and panics on a

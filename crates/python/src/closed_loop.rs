@@ -1,4 +1,4 @@
-//! Binding of closed-loop simulation (Python side: `simulation/closed_loop.py`).
+//! Binding of closed-loop simulation (Python side: `vehicles/quadrotor_loop.py`).
 
 use crate::error::from_core;
 use crate::linear_simulation::{States, matrix};

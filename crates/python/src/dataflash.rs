@@ -1,4 +1,4 @@
-//! Binding of `flightid_logs::dataflash` (used by `logs/dataflash.py`).
+//! Binding of `flightid_logs::dataflash` (used by `logs/dataflash/reader.py`).
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! Face of `flightid_core::nonlinear_output_error`. (Python side: identification/equation_records.py)
+//! Face of `flightid_core::nonlinear_output_error`. (Python side: identification/output_error/equation_records.py)
 
 use flightid_core::linear_output_error::Driven;
 use flightid_core::motion::Motion;

@@ -1,5 +1,5 @@
 //! Face of `flightid_core::frequency_fit` for every kind of model. (Python side:
-//! identification/frequency_domain.py)
+//! identification/frequency_domain/fit.py)
 
 use flightid_core::CoreError;
 use flightid_core::frequency_fit::{

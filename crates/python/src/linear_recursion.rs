@@ -1,4 +1,4 @@
-//! Face of `flightid_core::linear_recursion`. (Python side: identification/filter_error.py)
+//! Face of `flightid_core::linear_recursion`. (Python side: identification/filter_error/fit.py)
 
 use flightid_core::linear_recursion::recurse;
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};

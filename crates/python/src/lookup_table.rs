@@ -1,4 +1,4 @@
-//! Face of `flightid_core::lookup_table`. (Python side: models/tables.py)
+//! Face of `flightid_core::lookup_table`. (Python side: models/language/tables.py)
 
 use std::collections::BTreeMap;
 

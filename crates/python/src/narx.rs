@@ -1,5 +1,5 @@
 //! Binding of term selection and NARX runs.
-//! (Python side: models/narx.py, identification/orthogonal_least_squares.py)
+//! (Python side: models/narx/model.py, identification/narx/fit.py)
 
 use crate::error::from_core;
 use flightid_core::CoreError;

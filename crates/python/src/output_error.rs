@@ -1,5 +1,5 @@
 //! Face of `flightid_core::output_error` for every kind of model. (Python side:
-//! identification/output_error.py)
+//! identification/output_error/fit.py)
 
 use flightid_core::CoreError;
 use flightid_core::least_squares::{Options, Problem};

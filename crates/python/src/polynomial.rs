@@ -1,5 +1,5 @@
 //! Binding of the polynomial predictor and its fits.
-//! (Python side: models/polynomial.py, identification/prediction_error.py)
+//! (Python side: models/polynomial/model.py, identification/prediction_error/fit.py)
 
 use crate::error::from_core;
 use crate::interrupt;

@@ -1,4 +1,4 @@
-//! Binding of the simulated quadrotor (Python side: `simulation/flight.py`). Parameter groups come as
+//! Binding of the simulated quadrotor (Python side: `vehicles/flight.py`). Parameter groups come as
 //! mappings from field name to value.
 
 use crate::autopilots::pid_gains;

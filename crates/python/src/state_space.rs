@@ -1,4 +1,4 @@
-//! Face of `flightid_core::model_tape` and `state_space_fit`. (Python side: models/statespace.py)
+//! Face of `flightid_core::model_tape` and `state_space_fit`. (Python side: models/state_space/model.py)
 
 use std::collections::BTreeMap;
 

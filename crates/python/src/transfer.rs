@@ -1,4 +1,4 @@
-//! Face of `flightid_core::transfer` and `frequency_fit`. (Python side: models/transfer.py)
+//! Face of `flightid_core::transfer` and `frequency_fit`. (Python side: models/transfer/model.py)
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Binding of the simulated twin-rotor rig (Python side: `simulation/twin_rotor.py`). Parameter groups
+//! Binding of the simulated twin-rotor rig (Python side: `vehicles/twin_rotor.py`). Parameter groups
 //! come as mappings from field name to value.
 
 use crate::error::from_core;

@@ -1,4 +1,4 @@
-//! Binding of `flightid_logs::ulog` (used by `logs/ulog.py`).
+//! Binding of `flightid_logs::ulog` (used by `logs/ulog/reader.py`).
 
 use flightid_logs::LogError;
 use flightid_logs::ulog::Ulog;

@@ -12,7 +12,7 @@ from flightid.cli.pairs import numbers, pairs
 
 if TYPE_CHECKING:
     from flightid.models import LinearSystem, StateSpaceModel, TransferFunctionModel
-    from flightid.models.hold_equivalent import Hold
+    from flightid.models.linear.hold_equivalent import Hold
     from flightid.record import Record
 
     Flown = LinearSystem | StateSpaceModel | TransferFunctionModel
@@ -47,8 +47,8 @@ def quadrotor(output: Path, scenario: str, seed: int, as_json: bool) -> None:
     The log is ArduCopter's: mixer sweeps of roll, pitch and yaw, then doublets for verification.
     """
     from flightid.progress import progress
-    from flightid.simulation.ardupilot_log import write_ardupilot_log
-    from flightid.simulation.scenario import fly_scenario
+    from flightid.vehicles.ardupilot_log import write_ardupilot_log
+    from flightid.vehicles.scenario import fly_scenario
 
     with progress(2, "Flying") as advance:
         flight = fly_scenario(scenario, seed=seed)
@@ -158,7 +158,7 @@ def _driving(
     """Records of the files, or one of shapes."""
     from flightid import read_log, read_records
     from flightid.cli.identify import LOGS
-    from flightid.simulation.stick import stick_record
+    from flightid.vehicles.pilot_inputs import stick_record
 
     inputs = tuple(model.inputs)
     if not files:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conditioning.align import align
-from flightid.conditioning.coloured_residuals import corrected_covariance
 from flightid.conditioning.consistency_findings import (
     drift_findings,
     findings_of,
@@ -29,6 +28,7 @@ from flightid.conditioning.output_error import OutputError, too_steep
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.record import Record, Step
 from flightid.table import Cell
+from flightid.uncertainty.coloured_residuals import corrected_covariance
 from flightid.units import require_match
 
 Array = NDArray[np.float64]

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from flightid._native import reconstruct_kinematics
-from flightid.conditioning.input_noise import InputNoise, white_deviation
 from flightid.conventions import STANDARD_GRAVITY_M_S2
+from flightid.uncertainty.input_noise import InputNoise, white_deviation
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from scipy.linalg import expm, logm, schur, solve_sylvester
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.identification import InnovationsFit, PolynomialFit
 from flightid.models import InnovationsModel, PolynomialModel
-from flightid.models.linear_system import LinearModel, LinearSystem
+from flightid.models.linear.linear_system import LinearModel, LinearSystem
 
 Array = NDArray[np.float64]
 Four = tuple[Array, Array, Array, Array]

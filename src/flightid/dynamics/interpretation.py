@@ -13,10 +13,16 @@ from flightid.conventions import Light
 from flightid.errors import ModelError
 from flightid.findings import Finding
 from flightid.identification import FittedParameter, InnovationsFit, PolynomialFit
-from flightid.identification.innovations_roots import ALL, innovations_roots
-from flightid.identification.polynomial_roots import POLE, ZERO, Errors, FittedRoot, fitted_roots
+from flightid.identification.prediction_error.roots import (
+    POLE,
+    ZERO,
+    Errors,
+    FittedRoot,
+    fitted_roots,
+)
+from flightid.identification.subspace.roots import ALL, innovations_roots
 from flightid.models import InnovationsModel, PolynomialModel
-from flightid.models.discrete_modes import AT_ORIGIN, NO_COUNTERPART
+from flightid.models.linear.discrete_modes import AT_ORIGIN, NO_COUNTERPART
 from flightid.table import Cell, Column, Table
 
 SCHEMA = "flightid.interpretation/1"

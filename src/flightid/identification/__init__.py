@@ -1,21 +1,22 @@
 """Identification: a model and data to a fit (native side: `frequency_fit.rs`)."""
 
-from flightid.identification.advice import Advice, advise
+from flightid.identification.advice.advice import Advice, advise
+from flightid.identification.advice.impulse_response import ImpulseResponse, impulse_response
 from flightid.identification.fit import Fit, FittedParameter, FittedResponse, LocalMinimum
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.identify import identify
-from flightid.identification.impulse_response import ImpulseResponse, impulse_response
-from flightid.identification.innovations_fit import InnovationsFit
-from flightid.identification.narx_fit import ChosenTerm, NarxFit
-from flightid.identification.polynomial_fit import PolynomialFit
-from flightid.identification.reduce import reduce
-from flightid.identification.reduction import Reduction, ReductionStep
-from flightid.identification.structures import (
+from flightid.identification.narx.result import ChosenTerm, NarxFit
+from flightid.identification.prediction_error.result import PolynomialFit
+from flightid.identification.reduction.reduce import reduce
+from flightid.identification.reduction.result import Reduction, ReductionStep
+from flightid.identification.reduction.structures import (
     StructureComparison,
     StructureRow,
     compare_structures,
 )
-from flightid.identification.subspace_order import OrderChoice
+from flightid.identification.spread_of import spread_of
+from flightid.identification.subspace.order import OrderChoice
+from flightid.identification.subspace.result import InnovationsFit
 
 __all__ = [
     "Advice",
@@ -39,4 +40,5 @@ __all__ = [
     "identify",
     "impulse_response",
     "reduce",
+    "spread_of",
 ]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.identification.error_model import APPROXIMATE, UNKNOWN
 from flightid.identification.fit import FittedParameter
+from flightid.identification.frequency_domain.error_model import APPROXIMATE, UNKNOWN
 from flightid.identification.multistart import CONVERGED, End
 
 CRAMER_RAO_GUIDE_PERCENT = 20.0

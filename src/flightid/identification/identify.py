@@ -7,31 +7,34 @@ from dataclasses import dataclass, fields
 from typing import Any, overload
 
 from flightid.errors import FitError, OptionError
-from flightid.identification.equation_error import fit_equation_error, fit_fourier_regression
-from flightid.identification.filter_error import fit_filter_error
+from flightid.identification.filter_error.fit import fit_filter_error
 from flightid.identification.fit import Fit
-from flightid.identification.fourier_output_error_fit import fit_fourier_output_error
-from flightid.identification.frequency_domain import Options, fit_responses
-from flightid.identification.innovations_fit import InnovationsFit
-from flightid.identification.joint import JointOptions, fit_jointly
-from flightid.identification.narx_fit import NarxFit
-from flightid.identification.orthogonal_least_squares import fit_narx
-from flightid.identification.output_error import fit_output_error
-from flightid.identification.polynomial_fit import PolynomialFit
-from flightid.identification.prediction_error import fit_polynomial
-from flightid.identification.record_options import Freedom, InitialState, RecordOptions
-from flightid.identification.regression_options import (
+from flightid.identification.frequency_domain.fit import Options, fit_responses
+from flightid.identification.frequency_domain.selection import Bands
+from flightid.identification.joint.fit import JointOptions, fit_jointly
+from flightid.identification.narx.fit import fit_narx
+from flightid.identification.narx.result import NarxFit
+from flightid.identification.output_error.fit import fit_output_error
+from flightid.identification.prediction_error.fit import fit_polynomial
+from flightid.identification.prediction_error.result import PolynomialFit
+from flightid.identification.records.options import Freedom, InitialState, RecordOptions
+from flightid.identification.regression.equation_error import (
+    fit_equation_error,
+    fit_fourier_regression,
+)
+from flightid.identification.regression.fourier_output_error_fit import fit_fourier_output_error
+from flightid.identification.regression.options import (
     EquationErrorOptions,
     FilterErrorOptions,
     FourierOptions,
     FourierOutputErrorOptions,
 )
-from flightid.identification.selection import Bands
-from flightid.identification.subspace_fit import fit_subspace
+from flightid.identification.subspace.fit import fit_subspace
+from flightid.identification.subspace.result import InnovationsFit
 from flightid.models import Model, StateSpaceModel, TransferFunctionModel
-from flightid.models.narx import NarxModel
-from flightid.models.polynomial_structure import PolynomialStructure
-from flightid.models.subspace_structure import SubspaceStructure
+from flightid.models.innovations.structure import SubspaceStructure
+from flightid.models.narx.model import NarxModel
+from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError, MissingColumnError, UnitError, UnknownNameError
 from flightid.inspection.stamps import believable
 from flightid.logs import Log
-from flightid.logs.channel_map import ChannelMap, channel_map, default_map
+from flightid.logs.channels.channel_map import ChannelMap, channel_map, default_map
 from flightid.logs.extraction import extract
 from flightid.record import Record
 from flightid.record.timebase import to_uniform

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import MissingColumnError, UnitError
-from flightid.logs.channel_map import ChannelSource, MappedChannel
+from flightid.logs.channels.channel_map import ChannelSource, MappedChannel
 from flightid.units import DIMENSIONLESS, convert, same_dimension
 
 if TYPE_CHECKING:

@@ -9,10 +9,10 @@ from pathlib import Path
 from flightid.conventions import Role
 from flightid.errors import MissingColumnError
 from flightid.findings import Finding
-from flightid.logs.channel_map import ChannelMap
+from flightid.logs.channels.channel_map import ChannelMap
+from flightid.logs.dataflash.sid_runs import SidRun, locate
 from flightid.logs.log_table import LogTable
 from flightid.logs.self_check import InjectionCheck, check_injection
-from flightid.logs.sid_runs import SidRun, locate
 from flightid.logs.source import ByteRange, Event, Gap, LogSource, MessageInfo, ParameterChange
 from flightid.logs.to_record import make_record
 from flightid.record import Record

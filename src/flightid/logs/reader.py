@@ -6,10 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from flightid.errors import LogFormatError
-from flightid.logs.dataflash import open_dataflash
+from flightid.logs.dataflash.reader import open_dataflash
 from flightid.logs.log import Log
 from flightid.logs.source import LogSource
-from flightid.logs.ulog import UlogSource
+from flightid.logs.ulog.reader import UlogSource
 
 ULOG_MAGIC = b"ULog\x01\x12\x35"
 DATAFLASH_HEADER = b"\xa3\x95"

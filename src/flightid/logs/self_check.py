@@ -19,7 +19,7 @@ from scipy.optimize import minimize_scalar
 
 from flightid.conventions import Axis, Light
 from flightid.findings import Finding
-from flightid.logs.sid_runs import SidRun
+from flightid.logs.dataflash.sid_runs import SidRun
 
 if TYPE_CHECKING:
     from flightid.logs.log import Log

@@ -12,16 +12,16 @@ from scipy.interpolate import CubicSpline
 
 from flightid.conventions import Role
 from flightid.errors import DataError, MissingColumnError, OptionError
-from flightid.logs.channel_map import (
+from flightid.logs.channels.channel_map import (
     ChannelMap,
     ChannelSource,
     MappedChannel,
     channel_map,
     default_map,
 )
+from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.logs.extraction import Extracted, extract, find
 from flightid.logs.self_check import InjectionCheck, check_injection, chirp_clock, paired_rows
-from flightid.logs.sid_runs import SidRun
 from flightid.record import Channel, Record, Step
 from flightid.record.timebase import GapPolicy, to_uniform
 from flightid.table import Cell

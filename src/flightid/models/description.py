@@ -5,27 +5,27 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from flightid.errors import ModelError
-from flightid.models.innovations import InnovationsModel
-from flightid.models.linear_description import (
-    innovations_from_table,
-    innovations_to_table,
-    system_from_table,
-    system_to_table,
-)
-from flightid.models.linear_system import LinearSystem
-from flightid.models.narx import NarxEquation
-from flightid.models.narx_description import narx_from_table, narx_to_table
-from flightid.models.parameters import Parameters
-from flightid.models.polynomial import PolynomialModel
-from flightid.models.reading import (
+from flightid.models.innovations.model import InnovationsModel
+from flightid.models.language.reading import (
     read_parameter,
     read_table,
     read_text,
     read_texts,
     require_keys,
 )
-from flightid.models.statespace import StateSpaceModel
-from flightid.models.transfer import TransferFunction, TransferFunctionModel
+from flightid.models.linear.description import (
+    innovations_from_table,
+    innovations_to_table,
+    system_from_table,
+    system_to_table,
+)
+from flightid.models.linear.linear_system import LinearSystem
+from flightid.models.narx.description import narx_from_table, narx_to_table
+from flightid.models.narx.model import NarxEquation
+from flightid.models.parameters import Parameters
+from flightid.models.polynomial.model import PolynomialModel
+from flightid.models.state_space.model import StateSpaceModel
+from flightid.models.transfer.model import TransferFunction, TransferFunctionModel
 
 Model = TransferFunctionModel | StateSpaceModel
 """Models with named parameters."""

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from flightid.errors import FileFormatError, ModelError, OptionError, UnknownNameError
 from flightid.models.description import Model, SavedModel, model_from_description
-from flightid.models.statespace import StateSpaceModel
-from flightid.models.transfer import TransferFunctionModel
+from flightid.models.state_space.model import StateSpaceModel
+from flightid.models.transfer.model import TransferFunctionModel
 
 MAXIMUM_BYTES = 1 << 20
 _LIBRARY_NAME = re.compile(r"[a-z0-9_]+")

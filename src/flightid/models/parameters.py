@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import ModelError, UnknownNameError
-from flightid.models.dimensions import require_unit
-from flightid.models.formula import RESERVED, formula_names
+from flightid.models.language.dimensions import require_unit
+from flightid.models.language.formula import RESERVED, formula_names
 from flightid.table import Column, Table
 from flightid.units import canonical
 

@@ -8,11 +8,11 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from flightid.dynamics.handling_qualities_result import AttitudeBandwidth
-from flightid.dynamics.lower_order_result import LowerOrder
-from flightid.dynamics.pilot_cutoff import PilotCutoff
-from flightid.dynamics.rating import Rating
-from flightid.dynamics.rating_charts import RatingChart
+from flightid.dynamics.handling_qualities.pilot_cutoff import PilotCutoff
+from flightid.dynamics.handling_qualities.rating import Rating
+from flightid.dynamics.handling_qualities.rating_charts import RatingChart
+from flightid.dynamics.handling_qualities.result import AttitudeBandwidth
+from flightid.dynamics.lower_order.result import LowerOrder
 from flightid.errors import DataError
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode

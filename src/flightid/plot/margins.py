@@ -6,13 +6,13 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from flightid.control.disk_geometry import gain_limits
-from flightid.control.disk_margin import DiskMargin
-from flightid.control.disturbance_rejection import DisturbanceRejection
-from flightid.control.loop_metrics import DISTURBANCE_LEVEL_DB
-from flightid.control.margins import GAIN_GUIDE_DB, PHASE_GUIDE_DEG, LoopCurve, Margins
-from flightid.dynamics.quantity import Quantity
+from flightid.control.margins.disk_geometry import gain_limits
+from flightid.control.margins.disk_margin import DiskMargin
+from flightid.control.margins.disturbance_rejection import DisturbanceRejection
+from flightid.control.margins.loop_metrics import DISTURBANCE_LEVEL_DB
+from flightid.control.margins.margins import GAIN_GUIDE_DB, PHASE_GUIDE_DEG, LoopCurve, Margins
 from flightid.plot import look
+from flightid.uncertainty.quantity import Quantity
 
 Array = NDArray[np.float64]
 DEVIATIONS_95 = 1.959964

@@ -9,7 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from flightid.dynamics.mode_result import Mode, Modes
+from flightid.dynamics.modes.result import Mode, Modes
 from flightid.plot import look
 
 HEIGHT_PX = 440

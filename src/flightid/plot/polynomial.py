@@ -7,8 +7,8 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from flightid.identification import ImpulseResponse, InnovationsFit, PolynomialFit
-from flightid.identification.innovations_roots import ALL
-from flightid.models.polynomial_structure import PolynomialStructure
+from flightid.identification.subspace.roots import ALL
+from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.plot import look
 from flightid.validation import OrderScan
 

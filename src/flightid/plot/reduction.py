@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from flightid.identification.reduction import Reduction, worst_percents
+from flightid.identification.reduction.result import Reduction, worst_percents
 from flightid.plot import look
 
 HEIGHT_PX = 520

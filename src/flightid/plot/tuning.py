@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from flightid.control.pid_design import PidDesign
+from flightid.control.tuning.pid_design import PidDesign
 from flightid.errors import UnknownNameError
 from flightid.plot import look
 

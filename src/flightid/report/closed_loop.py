@@ -11,7 +11,7 @@ from flightid.report.figures import figure_block
 from flightid.report.margins import margin_blocks
 
 if TYPE_CHECKING:
-    from flightid.control.closed_loop_result import ClosedLoop
+    from flightid.control.closed_loop.result import ClosedLoop
 
 
 def closed_loop_section(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from flightid.dynamics.handling_qualities_table import HandlingQualities
-from flightid.dynamics.lower_order_result import LowerOrder
-from flightid.dynamics.pilot_cutoff import PilotCutoff
-from flightid.dynamics.rating import Rating
+from flightid.dynamics.handling_qualities.handling_qualities import HandlingQualities
+from flightid.dynamics.handling_qualities.pilot_cutoff import PilotCutoff
+from flightid.dynamics.handling_qualities.rating import Rating
+from flightid.dynamics.lower_order.result import LowerOrder
 from flightid.plot.handling_qualities import (
     bandwidth_curves,
     cutoff_spectrum,

@@ -16,9 +16,9 @@ from flightid.report.content import Block, TableBlock
 from flightid.report.figures import figure_block
 
 if TYPE_CHECKING:
-    from flightid.control.disk_margin import DiskMargin
-    from flightid.control.disturbance_rejection import DisturbanceRejection
-    from flightid.control.margins import Margins
+    from flightid.control.margins.disk_margin import DiskMargin
+    from flightid.control.margins.disturbance_rejection import DisturbanceRejection
+    from flightid.control.margins.margins import Margins
 
 
 def margin_blocks(margins: Margins, disk: DiskMargin | None = None) -> tuple[Block, ...]:

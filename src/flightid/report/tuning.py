@@ -11,8 +11,8 @@ from flightid.report.content import Block, Lights, Section, TableBlock
 from flightid.report.figures import figure_block
 
 if TYPE_CHECKING:
-    from flightid.control.pid_design import PidDesign
-    from flightid.control.tuning import Tuning
+    from flightid.control.tuning.pid_design import PidDesign
+    from flightid.control.tuning.result import Tuning
 
 
 def design_blocks(design: PidDesign) -> tuple[Block, ...]:

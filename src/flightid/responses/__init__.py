@@ -1,6 +1,6 @@
 """Frequency responses of records: spectra, conditioning, composite windows, coherence and error."""
 
-from flightid.responses.coherence_test import CoherentPairs, coherent_pairs
+from flightid.responses.coherent_pairs import CoherentPairs, coherent_pairs
 from flightid.responses.estimate import estimate_response
 from flightid.responses.pair import PairResponse
 from flightid.responses.response import FrequencyResponse

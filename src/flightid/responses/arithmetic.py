@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.conventions import Light
 from flightid.errors import DataError, ShapeError
 from flightid.findings import Finding
+from flightid.responses.errors.random_error import CovarianceSource
 from flightid.responses.response import FrequencyResponse
-from flightid.responses.uncertainty import CovarianceSource
 from flightid.units import canonical
 
 Known = Callable[[NDArray[np.complex128]], ArrayLike] | ArrayLike

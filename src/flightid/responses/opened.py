@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import ShapeError, SingularError
+from flightid.responses.errors.random_error import CovarianceSource, Points, combined
 from flightid.responses.response import FrequencyResponse
-from flightid.responses.uncertainty import CovarianceSource, Points, combined
 
 Complex = NDArray[np.complex128]
 SINGULAR = 1e-9

@@ -20,8 +20,8 @@ from flightid.errors import FileFormatError
 from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.record.history import Step
+from flightid.responses.errors.random_error import Known
 from flightid.responses.response import AXES, FrequencyResponse
-from flightid.responses.uncertainty import Known
 
 SCHEMA = "flightid.frequency_response/1"
 DIMENSIONS = {"o": "output", "i": "input", "f": "omega_rad_s"}

@@ -8,7 +8,7 @@ import numpy as np
 
 from flightid import _native
 from flightid.errors import OptionError, UnknownNameError
-from flightid.models.realisation import Matrices
+from flightid.models.linear.realisation import Matrices
 from flightid.record import Record, Step
 
 

@@ -13,8 +13,8 @@ from scipy.linalg import expm
 
 from flightid.errors import ModelError, OptionError, UnknownNameError
 from flightid.models import LinearModel, LinearSystem, StateSpaceModel
-from flightid.models.linear_recursion import run_recursion
-from flightid.models.statespace_checks import derivative
+from flightid.models.linear.recursion import run_recursion
+from flightid.models.state_space.checks import derivative
 
 Array = NDArray[np.float64]
 NOISE_PARTS = 8

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid import _native
 from flightid.errors import DataError, ShapeError, UnknownNameError
 from flightid.models import StateSpaceModel
-from flightid.models.integration_steps import steps_per_sample
+from flightid.models.state_space.integration_steps import steps_per_sample
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from flightid import _native
 from flightid.conventions import Role
 from flightid.errors import DataError, ModelError, OptionError, ShapeError
 from flightid.models import LinearModel, LinearSystem, StateSpaceModel
-from flightid.models.hold_equivalent import Hold
-from flightid.models.linear_recursion import run_recursion
+from flightid.models.linear.hold_equivalent import Hold
+from flightid.models.linear.recursion import run_recursion
 from flightid.record import Channel, Record, Step
 from flightid.simulation.noise import (
     NOISE_PARTS,

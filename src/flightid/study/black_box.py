@@ -10,7 +10,7 @@ from flightid.conventions import Light, Role
 from flightid.findings import Finding
 from flightid.identification import NarxFit, PolynomialFit, identify
 from flightid.models import NarxModel, PolynomialModel
-from flightid.models.polynomial_structure import PolynomialStructure
+from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.responses import CoherentPairs, FrequencyResponse, coherent_pairs, estimate_response
 from flightid.study.black_box_settings import NARX, BlackBoxSettings

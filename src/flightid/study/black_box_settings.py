@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flightid.models import NarxModel
-from flightid.models.narx import CANDIDATES, STOPS
-from flightid.models.narx_terms import KERNELS, WIDTH_FACTORS
-from flightid.models.polynomial_structure import INITIAL, OFFSETS
+from flightid.models.narx.model import CANDIDATES, STOPS
+from flightid.models.narx.terms import KERNELS, WIDTH_FACTORS
+from flightid.models.polynomial.structure import INITIAL, OFFSETS
 from flightid.study.reading import TableReader
 
 ORDERS = {

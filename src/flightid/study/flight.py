@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields
 from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
-from flightid.simulation import (
+from flightid.study.reading import TableReader
+from flightid.vehicles import (
     Autopilot,
     Flight,
     PilotDoublet,
@@ -16,7 +17,6 @@ from flightid.simulation import (
     Turbulence,
     fly,
 )
-from flightid.study.reading import TableReader
 
 SIMULATORS = ("quadrotor",)
 Part = TypeVar("Part")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from flightid.dynamics.approximate_modes import approximate_modes
-from flightid.dynamics.derivatives import derivatives
-from flightid.dynamics.modes import modes
+from flightid.dynamics.derivatives.derivatives import derivatives
+from flightid.dynamics.modes.approximate_modes import approximate_modes
+from flightid.dynamics.modes.modes import modes
 from flightid.errors import ModelError
 from flightid.models import StateSpaceModel
 from flightid.plot import look

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flightid.dynamics.handling_qualities_table import (
+from flightid.dynamics.handling_qualities.handling_qualities import (
     ATTITUDES,
     VEHICLES,
     HandlingQualities,

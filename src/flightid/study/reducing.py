@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from flightid.identification.reduce import AFTER_RISE
-from flightid.identification.reduction_rules import ReductionLimits
+from flightid.identification.reduction.reduce import AFTER_RISE
+from flightid.identification.reduction.rules import ReductionLimits
 from flightid.study.reading import TableReader
 
 

@@ -15,7 +15,6 @@ from flightid.progress import progress
 from flightid.record import Record
 from flightid.report.html import to_html
 from flightid.report.text import to_text
-from flightid.simulation import write_ardupilot_log
 from flightid.study.black_box import identify_black_box
 from flightid.study.output import RESULTS, require_replaceable, whole_folder
 from flightid.study.qualities import rate_models, require_pairs
@@ -34,6 +33,7 @@ from flightid.study.stages import (
 from flightid.study.study import Study
 from flightid.study.truth import Truth
 from flightid.study.tuning import TuneSettings, tune_models
+from flightid.vehicles import write_ardupilot_log
 
 FLIGHT_LOG = "flight.bin"
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from flightid.control.tuning import Tuning
-from flightid.dynamics.handling_qualities_table import HandlingQualities
+from flightid.control.tuning.result import Tuning
+from flightid.dynamics.handling_qualities.handling_qualities import HandlingQualities
 from flightid.findings import Finding
 from flightid.inspection import Inspection
 from flightid.record import Record

@@ -12,8 +12,8 @@ from scipy.stats import binom
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.simulation import Flight, RateTruth
-from flightid.simulation.truth import AXES, RATES
+from flightid.vehicles import Flight, RateTruth
+from flightid.vehicles.truth import AXES, RATES
 
 if TYPE_CHECKING:
     from flightid.models import Model

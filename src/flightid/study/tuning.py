@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from flightid.control.autopilots import axis_loop_of
 from flightid.control.autopilots.axis_loop import Gyro
-from flightid.control.tune import CHANNELS, DRAWS
-from flightid.control.tune_axes import tune
-from flightid.control.tuning import Tuning
-from flightid.control.tuning_requirements import OBJECTIVES, TuningRequirements
+from flightid.control.tuning.requirements import OBJECTIVES, TuningRequirements
+from flightid.control.tuning.result import Tuning
+from flightid.control.tuning.tune import tune
+from flightid.control.tuning.tune_pid import CHANNELS, DRAWS
 from flightid.errors import StudyError
 from flightid.study.reading import TableReader
 

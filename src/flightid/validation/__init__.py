@@ -5,10 +5,6 @@
 0.0
 """
 
-from flightid.validation.comparison import Comparison, Contrast
-from flightid.validation.correlation_test import CorrelationTest, Horizon, Kind, Loop, Verdict
-from flightid.validation.cross_validation import cross_validate
-from flightid.validation.cross_validation_result import CrossRun, CrossValidation
 from flightid.validation.metrics import (
     fit_percent,
     mse,
@@ -18,17 +14,27 @@ from flightid.validation.metrics import (
     vaf_percent,
     weighted_rms,
 )
-from flightid.validation.muad import Envelopes, Mismatch, mismatch, muad_envelopes
-from flightid.validation.narx_search import NarxSearch, search_narx
-from flightid.validation.order_scan import scan_orders
-from flightid.validation.order_scan_result import OrderScan, OrderTrial
-from flightid.validation.residual_result import ResidualTests
-from flightid.validation.residuals import residual_tests
-from flightid.validation.shifts import Shifts
-from flightid.validation.spectra import compare_spectra, residual_spectra
-from flightid.validation.spectra_result import Peak, ResidualSpectra, SpectrumComparison
-from flightid.validation.verification import Prediction, Verification
-from flightid.validation.verify import verify
+from flightid.validation.order_scan.narx_search import NarxSearch, search_narx
+from flightid.validation.order_scan.result import OrderScan, OrderTrial
+from flightid.validation.order_scan.scan_orders import scan_orders
+from flightid.validation.residuals.correlation_result import (
+    CorrelationTest,
+    Horizon,
+    Kind,
+    Loop,
+    Verdict,
+)
+from flightid.validation.residuals.residual_tests import residual_tests
+from flightid.validation.residuals.result import ResidualTests
+from flightid.validation.spectra.result import Peak, ResidualSpectra, SpectrumComparison
+from flightid.validation.spectra.spectra import compare_spectra, residual_spectra
+from flightid.validation.verification.comparison import Comparison, Contrast
+from flightid.validation.verification.cross_validation import cross_validate
+from flightid.validation.verification.cross_validation_result import CrossRun, CrossValidation
+from flightid.validation.verification.muad import Envelopes, Mismatch, mismatch, muad_envelopes
+from flightid.validation.verification.result import Prediction, Verification
+from flightid.validation.verification.shifts import Shifts
+from flightid.validation.verification.verify import verify
 
 __all__ = [
     "Comparison",

@@ -95,7 +95,7 @@ def axis_loop_of(
     -------
     >>> import tempfile
     >>> import flightid as fid
-    >>> from flightid.simulation import fly, write_ardupilot_log
+    >>> from flightid.vehicles import fly, write_ardupilot_log
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     log = fid.read_log(write_ardupilot_log(fly(duration_s=2.0), f"{folder}/sim.BIN"))
     ...     axis_loop_of(log, "roll")

@@ -101,7 +101,7 @@ def replay(
     -------
     >>> import tempfile
     >>> import flightid as fid
-    >>> from flightid.simulation import PilotDoublet, fly, write_ardupilot_log
+    >>> from flightid.vehicles import PilotDoublet, fly, write_ardupilot_log
     >>> flight = fly(doublets=[PilotDoublet("roll", start_s=1.0, amplitude=0.2)], duration_s=4.0)
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     log = fid.read_log(write_ardupilot_log(flight, f"{folder}/sim.BIN"))

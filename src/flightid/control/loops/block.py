@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from flightid.errors import ModelError, OptionError
 from flightid.models import StateSpaceModel
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.units import canonical
 
 

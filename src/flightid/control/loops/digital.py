@@ -9,7 +9,7 @@ import numpy as np
 
 from flightid.control.loops.block import Block
 from flightid.errors import ModelError, OptionError
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 
 
 def sampled(

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from flightid.control.loops.block import Block, Equations, Hold, Limits, RateLimit
 from flightid.errors import ModelError, OptionError
 from flightid.models import StateSpaceModel
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 
 
 def gain(

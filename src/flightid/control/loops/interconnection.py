@@ -26,8 +26,8 @@ from flightid.control.loops.wiring import Wiring
 from flightid.conventions import Light
 from flightid.errors import OptionError, UnknownNameError
 from flightid.findings import Finding
-from flightid.models.hold_equivalent import Hold as InputHold
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.hold_equivalent import Hold as InputHold
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.record import Record
 from flightid.table import Column, Table
 

@@ -15,7 +15,7 @@ from scipy.linalg import block_diag
 
 from flightid.control.loops.block import Block
 from flightid.errors import ModelError
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 
 Array = NDArray[np.float64]
 SINGULAR = 1e-12

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.control.loops.block import Block
 from flightid.errors import ModelError
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 
 Array = NDArray[np.float64]
 Units = Mapping[str, str] | None

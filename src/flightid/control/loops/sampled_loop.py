@@ -12,7 +12,7 @@ from flightid.control.loops.linear_core import Core, assemble
 from flightid.control.loops.views import linear_view
 from flightid.control.loops.wiring import Wiring
 from flightid.errors import ModelError, OptionError
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 
 SAME = 1e-9
 

@@ -21,8 +21,8 @@ from flightid.control.loops.linear_core import Core, assemble
 from flightid.control.loops.wiring import Wiring
 from flightid.conventions import Role
 from flightid.errors import OptionError, ShapeError, UnitError
-from flightid.models.integration_steps import steps_per_sample
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
+from flightid.models.state_space.integration_steps import steps_per_sample
 from flightid.record import Channel, Record, Step
 from flightid.simulation.nonlinear import run_equations
 from flightid.units import canonical

@@ -11,7 +11,7 @@ from flightid.control.loops.elements import static
 from flightid.control.loops.linear_core import Core, Row, assemble
 from flightid.control.loops.wiring import Wiring
 from flightid.errors import ModelError, OptionError
-from flightid.models.linear_system import LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 
 
 def linear_view(block: Block) -> Block:

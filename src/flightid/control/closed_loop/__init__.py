@@ -1,0 +1,1 @@
+"""Controllers closed around models and opened again."""

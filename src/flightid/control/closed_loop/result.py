@@ -1,0 +1,188 @@
+"""What closing a loop gives: poles with intervals, broken loops, and a verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from operator import methodcaller
+
+from flightid.control.loops.interconnection import Interconnection
+from flightid.control.margins.margins import Margins, margins
+from flightid.errors import UnknownNameError
+from flightid.findings import Finding
+from flightid.table import Column, Table
+from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.spread import Spread
+
+SCHEMA = "flightid.closed_loop/1"
+
+
+@dataclass(frozen=True)
+class ClosedPole:
+    """One pole of a closed loop, or a pair.
+
+    Attributes
+    ----------
+    real, imaginary, frequency : Quantity
+        rad/s; of a sampled loop, of ln z/T.
+    damping : Quantity
+    """
+
+    real: Quantity
+    imaginary: Quantity
+    frequency: Quantity
+    damping: Quantity
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ClosedLoop:
+    """A controller closed around a model.
+
+    Made by `flightid.close_loop`.
+
+    Attributes
+    ----------
+    name : str
+    loops : Interconnection
+        All signals at the estimate: outputs of the model and ``"<input>_total"``.
+    actuators : tuple of str
+        Inputs of the model that the controller moves.
+    spread : Spread of Interconnection
+        The loops over the uncertainty of the model.
+    poles : tuple of ClosedPole
+        The slowest, as many as there are states.
+    draws, unstable_draws : int
+        Vehicles that were drawn from the uncertainty, and those that are unstable.
+    findings : tuple of Finding
+    reason : str
+        Why there are no intervals.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> yaw = fid.LinearSystem([[-0.4]], [[2.0]], [[1.0]], [[0.0]], ("ped",), ("r",))
+    >>> closed = fid.close_loop(yaw, {"ped": {"r": 1.0}})
+    >>> closed.poles[0].real
+    Quantity(real part = -2.4 rad/s)
+    >>> closed.broken_at("ped").frequency_response([0.0]).real.item()
+    5.0
+    """
+
+    name: str
+    loops: Interconnection
+    actuators: tuple[str, ...]
+    spread: Spread[Interconnection]
+    poles: tuple[ClosedPole, ...]
+    draws: int
+    unstable_draws: int
+    findings: tuple[Finding, ...]
+    reason: str = ""
+
+    @property
+    def is_stable(self) -> bool:
+        """Stability at the estimate."""
+        return self.loops.is_stable
+
+    def broken_at(self, actuator: str) -> Interconnection:
+        """The loop broken at an actuator, the others closed; negative feedback.
+
+        Parameters
+        ----------
+        actuator : str
+            One of `actuators`.
+
+        Returns
+        -------
+        Interconnection
+
+        Raises
+        ------
+        UnknownNameError
+            The controller does not move it.
+        """
+        return self.loops.broken_at(self._total(actuator))
+
+    def margins(self, *, band_rad_s: tuple[float, float] | None = None) -> dict[str, Margins]:
+        """Margins of the loop broken at each actuator, with 95 % intervals, the others closed.
+
+        Parameters
+        ----------
+        band_rad_s : tuple of float, optional
+            As for `flightid.margins`.
+
+        Returns
+        -------
+        dict of str to Margins
+        """
+        found = {}
+        for name in self.actuators:
+            broken = self.spread.then(methodcaller("broken_at", self._total(name)))
+            found[name] = margins(broken, band_rad_s=band_rad_s)
+        return found
+
+    def _total(self, actuator: str) -> str:
+        if actuator not in self.actuators:
+            raise UnknownNameError(
+                "the controller does not move this input", found=repr(actuator),
+                needed=f"one of {', '.join(self.actuators)}",
+            )  # fmt: skip
+        return f"{actuator}_total"
+
+    def __repr__(self) -> str:
+        """Actuators, verdict and slowest pole on one line."""
+        n = len(self.actuators)
+        verdict = "stable" if self.is_stable else "not stable"
+        slowest = max((p.real.value for p in self.poles if p.real.value is not None), default=None)
+        pole = "" if slowest is None else f", slowest pole {slowest:.4g} rad/s"
+        names = ", ".join(self.actuators)
+        return f"ClosedLoop({n} actuator{'' if n == 1 else 's'} [{names}], {verdict}{pole})"
+
+    def summary(self) -> Table:
+        """Table of the poles with 95 % intervals.
+
+        Returns
+        -------
+        Table
+        """
+        columns = (
+            Column("real", "rad/s"), Column("real, 95 %"), Column("imaginary", "rad/s"),
+            Column("frequency", "rad/s"), Column("frequency, 95 %"), Column("damping", digits=3),
+            Column("damping, 95 %"),
+        )  # fmt: skip
+        rows = tuple(
+            (
+                each.real.value, _interval(each.real), each.imaginary.value, each.frequency.value,
+                _interval(each.frequency), each.damping.value, _interval(each.damping),
+            )
+            for each in self.poles
+        )  # fmt: skip
+        notes = [str(finding) for finding in self.findings]
+        if self.draws:
+            notes.append(f"{self.unstable_draws} of {self.draws} drawn vehicles are unstable.")
+        if self.reason:
+            notes.append(f"No intervals: {self.reason}.")
+        return Table(f"Poles of {self.name}", columns, rows, tuple(notes)).without_empty_columns()
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key."""
+        return {
+            "schema": SCHEMA,
+            "name": self.name,
+            "actuators": list(self.actuators),
+            "stable": self.is_stable,
+            "poles": [
+                {key: getattr(each, key).to_dict() for key in vars(each)} for each in self.poles
+            ],
+            "draws": self.draws,
+            "unstable_draws": self.unstable_draws,
+            "loops": self.loops.to_dict(),
+            "findings": [each.to_dict() for each in self.findings],
+        }
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()
+
+
+def _interval(quantity: Quantity) -> str:
+    if quantity.interval95 is None:
+        return ""
+    return f"{quantity.interval95[0]:.4g} to {quantity.interval95[1]:.4g}"

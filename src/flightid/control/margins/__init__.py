@@ -1,0 +1,1 @@
+"""Stability margins and disturbance rejection of loops."""

@@ -1,0 +1,159 @@
+"""What margins say of a loop, judged at the worse end of their intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from flightid.control.margins.loop_metrics import LoopMetrics
+from flightid.control.margins.loop_source import Loop
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.uncertainty.quantity import Quantity
+
+COHERENCE = 0.6
+"""Below this a measured response near crossover says little."""
+
+
+def guide_finding(
+    quantity: Quantity, guide: float, code: str, action: str, *, at_least: bool = True
+) -> Finding:
+    """Whether a number keeps a guide, at the worse end of its interval.
+
+    Parameters
+    ----------
+    quantity : Quantity
+        With a value.
+    guide : float
+        In its unit.
+    code, action : str
+    at_least : bool
+        Whether the guide is a least or a greatest value.
+
+    Returns
+    -------
+    Finding
+        Red: the estimate misses the guide; amber: its interval reaches over it.
+
+    Example
+    -------
+    >>> pm = Quantity("phase margin", 50.0, "deg", (43.0, 57.0))
+    >>> guide_finding(pm, 45.0, "phase-margin", "add lead").light.value
+    'amber'
+    """
+    assert quantity.value is not None
+    sign = 1.0 if at_least else -1.0
+    text = f"{quantity.name} {quantity.text}, guide {'at least' if at_least else 'at most'} "
+    text += f"{guide:g} {quantity.unit}"
+    if sign * (quantity.value - guide) < 0.0:
+        return Finding(code, Light.RED, f"{text}: missed", action)
+    if quantity.interval95 is None:
+        return Finding(code, Light.GREEN, f"{text}: kept by the estimate, without interval")
+    end = quantity.interval95[0 if at_least else 1]
+    if sign * (end - guide) < 0.0:
+        reach = f"{text}: the interval reaches beyond it, to {end:.3g}"
+        return Finding(code, Light.AMBER, reach, f"{action}, or measure it better")
+    return Finding(code, Light.GREEN, f"{text}: kept in the whole interval")
+
+
+def margin_findings(
+    loop: Loop,
+    metrics: LoopMetrics,
+    made: Mapping[str, Quantity],
+    *,
+    phase_guide_deg: float,
+    gain_guide_db: float,
+) -> tuple[Finding, ...]:
+    """Findings of `margins`.
+
+    Parameters
+    ----------
+    loop : Loop
+    metrics : LoopMetrics
+        Of the estimate.
+    made : mapping of str to Quantity
+    phase_guide_deg, gain_guide_db : float
+
+    Returns
+    -------
+    tuple of Finding
+    """
+    found = [*stability_findings(loop, metrics)]
+    # What an unstable loop has to give back is no margin that a guide could judge.
+    guides = (
+        ()
+        if metrics.unstable_poles > 0.0
+        else (
+            ("phase_margin", phase_guide_deg, "take gain or lag out of the loop"),
+            ("gain_margin", gain_guide_db, "lower the gain"),
+            ("gain_reduction_margin", gain_guide_db, "raise the gain"),
+        )
+    )
+    for key, guide, action in guides:
+        quantity = made[key]
+        if quantity.value is not None:
+            found.append(guide_finding(quantity, guide, key.replace("_", "-"), action))
+    if made["crossover"].value is None:
+        found.append(
+            Finding(
+                "no-crossover",
+                Light.UNKNOWN,
+                "the gain does not pass one in the band: there is no phase margin to speak of",
+                "widen the band, if the loop is meant to act there",
+            )
+        )
+    elif loop.coherence is not None:
+        at = np.interp(made["crossover"].value, loop.omega_rad_s, loop.coherence)
+        if at < COHERENCE:
+            found.append(
+                Finding(
+                    "coherence-at-crossover",
+                    Light.AMBER,
+                    f"coherence at the crossover is {at:.2f}",
+                    "excite that band better, or fit a model",
+                )
+            )
+    if not loop.spread.known:
+        found.append(Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loop.spread.reason}"))
+    if loop.measured:
+        found.append(_verdict_of_band(loop))
+    return tuple(found)
+
+
+def _verdict_of_band(loop: Loop) -> Finding:
+    low, high = loop.omega_rad_s[[0, -1]]
+    return Finding(
+        "stability-of-the-band",
+        Light.UNKNOWN,
+        f"whether the closed loop is stable is judged from {low:.3g} to {high:.3g} rad/s and "
+        f"{loop.unstable_poles} unstable poles of the open loop: other turns about −1 are not seen",
+        "measure from below the lowest crossing, or fit a model",
+    )
+
+
+def stability_findings(loop: Loop, metrics: LoopMetrics) -> list[Finding]:
+    """What the Nyquist criterion says, where it does not say that all is well."""
+    count = round(float(metrics.unstable_poles))
+    open_poles = f"{loop.unstable_poles} unstable poles of the open"
+    if count > 0:
+        return [
+            Finding(
+                "closed-loop-unstable",
+                Light.RED,
+                f"the closed loop is unstable: {count} unstable poles by the Nyquist criterion, "
+                f"from {open_poles} loop; its margins are what must be taken back, and negative",
+                "change the gains; for a measurement that began too high, or an unstable vehicle, "
+                "give unstable_poles",
+            )
+        ]
+    if count < 0:
+        return [
+            Finding(
+                "nyquist-criterion-contradicted",
+                Light.AMBER,
+                f"the response turns about −1 as if it had more than {open_poles} loop",
+                "give unstable_poles, or begin the band lower",
+            )
+        ]
+    return []

@@ -1,0 +1,368 @@
+"""Margins of one loop with their intervals: crossover, phase, gain, delay, distance from −1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.control.margins.crossings import gain_crossings, phase_crossings
+from flightid.control.margins.findings import margin_findings
+from flightid.control.margins.loop_grid import zoomed
+from flightid.control.margins.loop_metrics import LoopMetrics
+from flightid.control.margins.loop_source import Controller, Given, Loop, read_loop
+from flightid.findings import Finding
+from flightid.table import Column, Table
+from flightid.uncertainty.quantity import Quantity, quantity_table
+
+SCHEMA = "flightid.margins/1"
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+PHASE_GUIDE_DEG = 45.0
+GAIN_GUIDE_DB = 6.0
+"""MIL-F-9490D table III and its successors, for modes between 0.06 Hz and the first elastic one."""
+ZOOMS = (1e-3, 1e-5)
+"""Ratios at which points are put beside what was found, round by round."""
+DRAWN_POINTS = 400
+FAR_DB = 40.0
+"""Beyond which a passage of the negative axis is not listed."""
+QUANTITIES = (
+    ("crossover", "crossover_rad_s", "rad/s"),
+    ("phase margin", "phase_margin_deg", "deg"),
+    ("delay margin", "delay_margin_s", "s"),
+    ("gain margin", "gain_margin_db", "dB"),
+    ("phase crossover", "phase_crossover_rad_s", "rad/s"),
+    ("gain-reduction margin", "gain_reduction_margin_db", "dB"),
+    ("gain-reduction crossing", "gain_reduction_rad_s", "rad/s"),
+    ("modulus margin", "modulus_margin", "1"),
+    ("sensitivity peak", "sensitivity_peak", "1"),
+)
+NO_CROSSOVER = "the gain does not pass one in the band"
+MISSING = {
+    "crossover_rad_s": NO_CROSSOVER,
+    "phase_margin_deg": NO_CROSSOVER,
+    "delay_margin_s": NO_CROSSOVER,
+    "gain_margin_db": "no rise of the gain makes the loop unstable at a frequency in the band",
+    "phase_crossover_rad_s": "no gain margin in the band",
+    "gain_reduction_margin_db": "no fall of the gain makes the loop unstable in the band",
+    "gain_reduction_rad_s": "no gain-reduction margin in the band",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class LoopCurve:
+    """A loop's response for pictures, with standard errors.
+
+    Attributes
+    ----------
+    omega_rad_s : ndarray, shape (n_f,)
+    response : ndarray of complex, shape (n_f,)
+        L, negative feedback.
+    stderr_db, stderr_deg : ndarray, shape (n_f,), or None
+        Of gain and phase; None without covariance.
+    """
+
+    omega_rad_s: Array
+    response: Complex
+    stderr_db: Array | None = None
+    stderr_deg: Array | None = None
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """One passage of the unit circle or of the negative real axis.
+
+    Attributes
+    ----------
+    omega_rad_s : float
+    margin : float
+        Degrees from −180° at the unit circle, positive: lag to spare; dB below one at the axis.
+
+    Example
+    -------
+    >>> Crossing(4.0, 67.1).margin
+    67.1
+    """
+
+    omega_rad_s: float
+    margin: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Margins:
+    """Result of `margins`.
+
+    Attributes
+    ----------
+    name : str
+        The loop: output and input.
+    crossover, phase_margin, delay_margin : Quantity
+        At the crossover with the least phase to spare: rad/s, degrees, s. Margins of an unstable
+        loop are negative.
+    gain_margin, phase_crossover : Quantity
+        How much the gain may rise, dB, and where, rad/s.
+    gain_reduction_margin, gain_reduction_crossing : Quantity
+        How much it may fall, dB, and where, rad/s.
+    modulus_margin, sensitivity_peak : Quantity
+        Least distance of L from −1, and its inverse.
+    crossovers : tuple of Crossing
+        All passages of the unit circle.
+    phase_crossovers : tuple of Crossing
+        All passages of the negative real axis within 40 dB of −1.
+    unstable_poles : int
+        Of the closed loop, by the Nyquist criterion.
+    curve : LoopCurve
+    findings : tuple of Finding
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> loop = fid.LinearSystem([[0.0]], [[4.0]], [[1.0]], [[0.0]], ("e",), ("y",), [0.1])
+    >>> fid.margins(loop)
+    Margins(y / e: phase 67.08 deg, gain 11.88 dB)
+    """
+
+    name: str
+    crossover: Quantity
+    phase_margin: Quantity
+    delay_margin: Quantity
+    gain_margin: Quantity
+    phase_crossover: Quantity
+    gain_reduction_margin: Quantity
+    gain_reduction_crossing: Quantity
+    modulus_margin: Quantity
+    sensitivity_peak: Quantity
+    crossovers: tuple[Crossing, ...]
+    phase_crossovers: tuple[Crossing, ...]
+    unstable_poles: int
+    curve: LoopCurve = field(repr=False)
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether the closed loop has no unstable pole, by the Nyquist criterion."""
+        return self.unstable_poles == 0
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """All numbers with their intervals."""
+        return tuple(
+            getattr(self, name.replace("-", "_").replace(" ", "_")) for name, *_ in QUANTITIES
+        )
+
+    def __repr__(self) -> str:
+        """Verdict, phase and gain margin on one line."""
+        verdict = "" if self.is_stable else f"unstable with {self.unstable_poles} poles, "
+        return (
+            f"Margins({self.name}: {verdict}phase {self.phase_margin.text}, "
+            f"gain {self.gain_margin.text})"
+        )
+
+    def summary(self) -> Table:
+        """Table of all numbers with their intervals.
+
+        Returns
+        -------
+        Table
+        """
+        notes = tuple(map(str, self.findings))
+        return quantity_table(f"Margins of {self.name}", self.quantities, notes)
+
+    def crossing_table(self) -> Table:
+        """Table of every crossing, by frequency.
+
+        Returns
+        -------
+        Table
+        """
+        columns = (Column("frequency", "rad/s"), Column("what"), Column("margin"), Column("unit"))
+        rows = [(c.omega_rad_s, "gain passes one", c.margin, "deg") for c in self.crossovers]
+        rows += [
+            (c.omega_rad_s, "phase passes −180°", c.margin, "dB") for c in self.phase_crossovers
+        ]
+        return Table(f"Crossings of {self.name}", columns, tuple(sorted(rows)))
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key."""
+        return {
+            "schema": SCHEMA,
+            "loop": self.name,
+            "stable": self.is_stable,
+            "unstable_poles": self.unstable_poles,
+            "quantities": {each.name: each.to_dict() for each in self.quantities},
+            "crossovers": [[c.omega_rad_s, c.margin] for c in self.crossovers],
+            "phase_crossovers": [[c.omega_rad_s, c.margin] for c in self.phase_crossovers],
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()
+
+
+def margins(
+    loop: object,
+    output: str | None = None,
+    input: str | None = None,
+    *,
+    controller: Controller | None = None,
+    given: Given = "broken",
+    band_rad_s: tuple[float, float] | None = None,
+    unstable_poles: int | None = None,
+    phase_guide_deg: float = PHASE_GUIDE_DEG,
+    gain_guide_db: float = GAIN_GUIDE_DB,
+) -> Margins:
+    """Margins of a loop, broken at one point, with 95 % intervals.
+
+    The loop is the response from what enters the break to what comes back, for negative feedback:
+    ``1 + L = 0`` is critical. A summing junction that adds needs ``controller=-1``.
+
+    Parameters
+    ----------
+    loop : Fit, model, LinearSystem, connection broken at a signal, or FrequencyResponse
+        The broken loop itself, or the plant where `controller` is given.
+    output, input : str, optional
+        Which pair; may be left out where there is one only.
+    controller : model, callable of s = jω, array_like, shape (n_f,), or number, optional
+        Known part by which the response is multiplied. A model's unstable poles are counted; a
+        function or numbers are taken as stable.
+    given : {"broken", "closed", "sensitivity"}
+        What a measured response is: the broken loop L, feedback over reference L/(1 + L), or error
+        over reference (fed-back signal over a disturbance added to it) 1/(1 + L).
+    band_rad_s : tuple of float, optional
+        Frequencies at which margins are looked for, rad/s; left out: all of a measurement, and for
+        a model what its roots and delays call for. Whether a model's loop is stable is counted over
+        all frequencies; of a measurement the band is all there is.
+    unstable_poles : int, optional
+        Unstable poles of the open loop. Left out: counted in a model; none in a measurement.
+    phase_guide_deg, gain_guide_db : float
+        What the findings ask for, at the worse end of the interval.
+
+    Returns
+    -------
+    Margins
+
+    Raises
+    ------
+    OptionError
+        An option without meaning, or several channels without a choice.
+    UnknownNameError
+        There is no such channel.
+    ModelError
+        The loop has no frequency response.
+    DataError
+        A measurement with fewer than three frequencies, or a loop that is zero or not finite.
+    ShapeError
+        A controller that does not fit.
+
+    Assumes
+    -------
+    A linear loop. Intervals are those of the estimate's covariance carried by first order, so they
+    are biased where a margin hangs on two crossings that change places, and leave out what a model
+    lacks. The sensitivity peak of a noisy measurement is biased upwards: it is the highest of many
+    points. A measurement should begin below and end above the crossings; joint input and output
+    with a known excitation (``estimate_response(method="instrument")`` from error to feedback)
+    gives L of a flown loop without the bias of a direct estimate.
+
+    Reference
+    ---------
+    Franklin, Powell & Emami-Naeini, *Feedback Control of Dynamic Systems*, 7th ed., sections 6.3
+    and 6.4; guides: MIL-F-9490D (1975) §3.1.3.6.1, kept by SAE AS94900.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> loop = fid.LinearSystem([[0.0]], [[4.0]], [[1.0]], [[0.0]], ("e",), ("y",), [0.1])
+    >>> found = margins(loop)
+    >>> round(found.phase_margin.value, 2), round(found.gain_margin.value, 2)
+    (67.08, 11.88)
+    """
+    source = read_loop(
+        loop,
+        output,
+        input,
+        controller=controller,
+        given=given,
+        band_rad_s=band_rad_s,
+        unstable_poles=unstable_poles,
+    )
+    omega, metrics = measured_up(source)
+    estimate = source.of(source.spread.estimate, omega)
+    quantities, curve = _carried(source, omega)
+    rows, logs = estimate[None, :], np.log(omega)
+    gains, phases = gain_crossings(logs, rows), phase_crossings(logs, rows)
+    phases = phases.kept(np.abs(phases.value) < np.log(10.0) / 20.0 * FAR_DB)
+    made = {name.replace("-", "_").replace(" ", "_"): each for (name, *_), each in quantities}
+    findings = margin_findings(
+        source,
+        metrics,
+        made,
+        phase_guide_deg=phase_guide_deg,
+        gain_guide_db=gain_guide_db,
+    )
+    return Margins(
+        source.name,
+        **made,
+        crossovers=tuple(map(Crossing, gains.omega.tolist(), np.degrees(gains.value).tolist())),
+        phase_crossovers=tuple(
+            map(Crossing, phases.omega.tolist(), (-20 / np.log(10) * phases.value).tolist())
+        ),
+        unstable_poles=max(round(float(metrics.unstable_poles)), 0),
+        curve=curve,
+        findings=findings,
+    )
+
+
+def measured_up(loop: Loop) -> tuple[Array, LoopMetrics]:
+    """Frequencies, drawn close around what counts where the loop is a model, and the metrics.
+
+    Parameters
+    ----------
+    loop : Loop
+
+    Returns
+    -------
+    tuple of ndarray, shape (n_f,), and LoopMetrics
+    """
+    omega, thing = loop.omega_rad_s, loop.spread.estimate
+    for ratio in () if loop.measured else ZOOMS:
+        values = loop.of(thing, omega)
+        found = loop.metrics(omega, values)
+        centres = [getattr(found, name) for name in vars(found) if name.endswith("rad_s")]
+        logs, rows = np.log(omega), values[None, :]
+        passed = [gain_crossings(logs, rows).omega, phase_crossings(logs, rows).omega]
+        omega = zoomed(omega, np.concatenate([np.ravel(each) for each in centres] + passed), ratio)
+    return omega, loop.metrics(omega, loop.of(thing, omega))
+
+
+def drawn_points(loop: Loop, omega: Array) -> Array:
+    """Frequencies for a picture: of a model some, of a measurement all."""
+    if loop.measured or len(omega) <= DRAWN_POINTS:
+        return omega
+    return np.asarray(omega[np.linspace(0, len(omega) - 1, DRAWN_POINTS).astype(int)])
+
+
+def _carried(loop: Loop, omega: Array) -> tuple[list[tuple[Any, Quantity]], LoopCurve]:
+    """Every number with its interval, and the curve with its standard errors."""
+    names = [name for _, name, _ in QUANTITIES]
+    drawn = drawn_points(loop, omega)
+    centre = loop.of(loop.spread.estimate, drawn)
+
+    def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever the spread is of
+        values = loop.of(thing, omega)
+        found = loop.metrics(omega, values)
+        ratio = (values if drawn is omega else loop.of(thing, drawn)) / centre
+        curve = [20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))]
+        return np.concatenate([[float(getattr(found, name)) for name in names], *curve])
+
+    carried = loop.spread.propagate(all_of)
+    quantities = [
+        (each, carried.quantity(place, each[0], each[2], MISSING.get(each[1], "")))
+        for place, each in enumerate(QUANTITIES)
+    ]
+    stderr, count = carried.stderr, len(names)
+    if stderr is None:
+        return quantities, LoopCurve(drawn, centre)
+    parts = stderr[count : count + len(drawn)], stderr[count + len(drawn) :]
+    return quantities, LoopCurve(drawn, centre, *parts)

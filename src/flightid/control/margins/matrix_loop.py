@@ -1,0 +1,254 @@
+"""Several loops broken at once: the matrix of a plant and its controller at inputs or outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import block_diag
+
+from flightid.control.margins.loop_grid import Roots, loop_grid, roots_of
+from flightid.control.margins.loop_source import Controller, Responding, closed_count, known_values
+from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
+from flightid.identification.spread_of import spread_of
+from flightid.responses import FrequencyResponse
+from flightid.responses.arithmetic import Known
+from flightid.responses.errors.random_error import Points, combined
+from flightid.uncertainty.spread import Spread
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+At = Literal["outputs", "inputs", "both"]
+PLACES = ("outputs", "inputs", "both")
+STEADY = np.array([1e-3, 1e-2, 1e-1])
+"""Added below the lowest frequency, as shares of it."""
+
+
+@dataclass(frozen=True, eq=False)
+class MatrixLoop:
+    """Loops broken together, negative feedback, with their uncertainty.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Where they are broken, n of them.
+    spread : Spread
+    omega_rad_s : ndarray, shape (n_f,)
+    of : callable
+        From the thing and frequencies to L, shape (n_f, n, n).
+    unstable_poles : int
+        Of the open loops.
+    measured : bool
+    closed_unstable_poles : int or None
+        Of the closed loops, counted over all frequencies where a band holds only some of them.
+    """
+
+    channels: tuple[str, ...]
+    spread: Spread[Any]
+    omega_rad_s: Array
+    of: Callable[[Any, Array], Complex]
+    unstable_poles: int
+    measured: bool
+    closed_unstable_poles: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class KnownLaw:
+    """A controller of one loop given as function of s, values or a number."""
+
+    law: Known
+    outputs: tuple[str, ...] = ("law",)
+    inputs: tuple[str, ...] = ("law",)
+
+    def frequency_response(self, omega_rad_s: ArrayLike) -> Complex:
+        """Response, shape (1, 1, n_f)."""
+        return known_values(self.law, np.asarray(omega_rad_s, dtype=np.float64))[None, None]
+
+
+def read_loops(
+    source: object,
+    outputs: Sequence[str] | None,
+    inputs: Sequence[str] | None,
+    *,
+    controller: Controller | None,
+    at: At,
+    band_rad_s: tuple[float, float] | None,
+    unstable_poles: int | None,
+) -> MatrixLoop:
+    """Read a plant and its controller, or loops that are broken already.
+
+    Raises
+    ------
+    OptionError
+        An unknown place to break the loops, or a place without a controller.
+    ModelError
+        The source has no frequency response.
+    UnknownNameError
+        There is no such channel.
+    ShapeError
+        Numbers of channels that do not fit.
+    """
+    if at not in PLACES:
+        raise OptionError("at is not known", found=repr(at), needed="one of " + ", ".join(PLACES))
+    if controller is None and at != "outputs":
+        raise OptionError(
+            "loops without a controller are broken where they are", found=at, needed="controller=…"
+        )
+    if controller is not None and not isinstance(controller, Responding):
+        controller = KnownLaw(controller)
+    if band_rad_s is not None and not 0.0 < band_rad_s[0] < band_rad_s[1] < np.inf:
+        raise OptionError("band_rad_s has no meaning", found=band_rad_s, needed="0 < low < high")
+    measured = isinstance(source, FrequencyResponse)
+    spread = _unweighed(source) if measured else spread_of(source)
+    thing = spread.estimate
+    if not measured and not isinstance(thing, Responding):
+        raise ModelError(
+            "the loop has no frequency response",
+            found=type(source).__name__,
+            needed="a model, a fit, a system, or a measurement",
+        )
+    rows, columns = _chosen(thing, outputs, inputs, controller)
+    known = tuple(thing.outputs), tuple(thing.inputs)
+    places = np.ix_([known[0].index(n) for n in rows], [known[1].index(n) for n in columns])
+
+    def of(model: Any, omega: Array) -> Complex:  # noqa: ANN401 — whatever the spread is of
+        values = model.response if measured else model.frequency_response(omega)
+        plant = np.moveaxis(np.asarray(values, dtype=np.complex128)[places], -1, 0)
+        return plant if controller is None else _joined(plant, controller, omega, rows, columns, at)
+
+    roots = (Roots() if measured else roots_of(thing)).joined(roots_of(controller))
+    if measured:
+        omega = thing.omega_rad_s
+        if band_rad_s is not None:
+            raise OptionError("a measurement has its own band", needed="response.select(omega=…)")
+    else:
+        omega = loop_grid(lambda at_: _determinant(of(thing, at_)), roots, band_rad_s)
+        if band_rad_s is None:
+            # Coupled loops may be weakest where nothing moves any more.
+            omega = np.concatenate([omega[0] * STEADY, omega])
+    names = {"outputs": rows, "inputs": columns, "both": rows + columns}[at]
+    count = roots.n_unstable if unstable_poles is None else unstable_poles
+    closed = (
+        None
+        if measured
+        else closed_count(lambda at_: equivalent_loop(of(thing, at_)), roots, band_rad_s, count)
+    )
+    return MatrixLoop(names, spread, omega, of, count, measured, closed)
+
+
+def _determinant(loops: Complex) -> Complex:
+    """det(I + L) − 1: one loop that turns about −1 as all of them do together."""
+    return np.asarray(np.linalg.det(np.eye(loops.shape[1]) + loops) - 1.0)
+
+
+def equivalent_loop(loops: Complex) -> Complex:
+    """The single loop with the same closed-loop poles, shape (n_f,), never quite zero."""
+    found = _determinant(loops)
+    return np.asarray(np.where(found == 0.0, 1e-300, found))
+
+
+def _unweighed(response: object) -> Spread[Any]:
+    """A measurement whose covariance is worked out where it is needed, by `spread_at`."""
+    return Spread(np.zeros(0), None, lambda _: response)
+
+
+def spread_at(loops: MatrixLoop, omega: Array) -> Spread[Any]:
+    """The spread of what the loops are computed from; of a measurement at some frequencies alone.
+
+    Parameters
+    ----------
+    loops : MatrixLoop
+    omega : ndarray, shape (n,)
+        Frequencies of the measurement, rad/s.
+
+    Returns
+    -------
+    Spread
+    """
+    if not loops.measured:
+        return loops.spread
+    chosen: FrequencyResponse = loops.spread.estimate.select(omega=omega)
+    parts = [spread_of(chosen, output=name) for name in chosen.outputs]
+    if len(parts) == 1:
+        return parts[0]
+    shape = chosen.response.shape
+
+    def make(numbers: Array) -> FrequencyResponse:
+        real, imaginary = np.moveaxis(numbers.reshape(shape[0], 2, *shape[1:]), 1, 0)
+        return replace(chosen, response=real + 1j * imaginary)
+
+    centre = np.concatenate([part.centre for part in parts])
+    unknown = next((part.reason for part in parts if not part.known), None)
+    if unknown is not None:
+        return Spread(centre, None, make, None, unknown)
+    if chosen.errors is None:
+        blocks = [np.asarray(part.covariance) for part in parts]
+        return Spread(centre, block_diag(*blocks), make, None, parts[0].reason)
+    rows = np.split(np.eye(len(centre)), len(parts), axis=1)
+    points = [
+        Points(k, np.arange(shape[1]), np.arange(shape[2])) for k in range(len(chosen.outputs))
+    ]
+    return Spread(centre, combined(chosen.errors, points, rows), make)
+
+
+def _chosen(
+    thing: Any,  # noqa: ANN401 — a model or a measurement
+    outputs: Sequence[str] | None,
+    inputs: Sequence[str] | None,
+    controller: Any,  # noqa: ANN401
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Plant outputs and inputs: as given, else by the controller's names, else all."""
+    found = []
+    for kind, wanted, fed in (("outputs", outputs, "inputs"), ("inputs", inputs, "outputs")):
+        known = tuple(getattr(thing, kind))
+        names = tuple(wanted) if wanted is not None else tuple(getattr(controller, fed, known))
+        if wanted is None and not set(names) <= set(known):
+            names = known
+        for name in names:
+            if name not in known:
+                raise UnknownNameError(
+                    f"there is no such {kind[:-1]}", found=name, needed=", ".join(known)
+                )
+        found.append(names)
+    rows, columns = found
+    sizes = (len(columns), len(rows))
+    if controller is None and sizes[0] != sizes[1]:
+        raise ShapeError("loops are not square", found=sizes[::-1], needed="as many back as out")
+    shape = len(getattr(controller, "outputs", columns)), len(getattr(controller, "inputs", rows))
+    if controller is not None and shape != sizes:
+        raise ShapeError(
+            "the controller does not fit the plant",
+            found=f"{shape[0]} outputs, {shape[1]} inputs",
+            needed=f"{sizes[0]} outputs, {sizes[1]} inputs",
+        )
+    return rows, columns
+
+
+def _joined(
+    plant: Complex,
+    controller: Responding,
+    omega: Array,
+    rows: tuple[str, ...],
+    columns: tuple[str, ...],
+    at: At,
+) -> Complex:
+    law = np.asarray(controller.frequency_response(omega), dtype=np.complex128)
+    known = tuple(getattr(controller, "outputs", ())), tuple(getattr(controller, "inputs", ()))
+    if set(known[0]) == set(columns) and set(known[1]) == set(rows):
+        law = law[np.ix_([known[0].index(n) for n in columns], [known[1].index(n) for n in rows])]
+    law = np.moveaxis(law, -1, 0)
+    if not np.all(np.isfinite(law)):
+        raise DataError("the controller is not finite at a frequency", needed="finite values")
+    if at == "outputs":
+        return np.asarray(plant @ law)
+    if at == "inputs":
+        return np.asarray(law @ plant)
+    # Outputs y and inputs u broken together: y = P u, u = −K y.
+    n_y, n_u = len(rows), len(columns)
+    both = np.zeros((len(omega), n_y + n_u, n_y + n_u), dtype=np.complex128)
+    both[:, :n_y, n_y:] = -plant
+    both[:, n_y:, :n_y] = law
+    return both

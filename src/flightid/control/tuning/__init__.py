@@ -1,0 +1,1 @@
+"""Gains that hold for every vehicle the data allow."""

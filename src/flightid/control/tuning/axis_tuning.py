@@ -1,0 +1,258 @@
+"""One axis tuned with the others as they stand: search, fresh plants to judge by, safe steps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.control.autopilots import AxisLoop
+from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.tuning.controller_paths import ControllerPaths, loop_responses, standing
+from flightid.control.tuning.evidence import Evidence
+from flightid.control.tuning.gain_search import Found, search
+from flightid.control.tuning.gain_search import steps as search_steps
+from flightid.control.tuning.loop_problem import ANGLE, LoopProblem, Plants
+from flightid.control.tuning.pid_design import Stage, TunedGain
+from flightid.control.tuning.promises import Promise, promises
+from flightid.control.tuning.requirements import TuningRequirements
+from flightid.control.tuning.sampled_plants import (
+    AxisLoops,
+    SampledPlants,
+    loop_grid,
+    plants_of_axis,
+)
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+SEARCH_POINTS, JUDGED_POINTS = 200, 700
+
+
+@dataclass(frozen=True, eq=False)
+class PlantSet:
+    """Plants with their responses on one grid.
+
+    Attributes
+    ----------
+    sampled : SampledPlants
+    omega_rad_s : ndarray, shape (n_f,)
+    rate, angle : ndarray of complex, shape (n, n_axes, n_axes, n_f)
+    """
+
+    sampled: SampledPlants
+    omega_rad_s: Array
+    rate: Complex
+    angle: Complex
+
+    @classmethod
+    def of(
+        cls, sampled: SampledPlants, points: int, loops: Sequence[AxisLoop], gyro: Gyro
+    ) -> PlantSet:
+        """Evaluate plants on a grid of the loop."""
+        omega = loop_grid(sampled.sample_time_s, points)
+        return cls(sampled, omega, *loop_responses(sampled, omega, loops, gyro))
+
+    def axis(self, place: int, loops: list[AxisLoop], gyro: Gyro) -> Plants:
+        """Plants of one axis with the other loops closed."""
+        pairs = [standing(loop, self.omega_rad_s, gyro) for loop in loops]
+        closed = AxisLoops(*(np.array(each) for each in zip(*pairs, strict=True)))
+        return plants_of_axis(
+            self.rate, self.angle, self.omega_rad_s, self.sampled.unstable, place, closed
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """All that is the same for every axis and round.
+
+    Attributes
+    ----------
+    evidence : Evidence
+    searched, judged : PlantSet
+        Plants of the search, and fresh ones on a finer grid; the estimate first in both.
+    gyro : {"raw", "filtered"}
+    with_angle : bool
+    requirements : TuningRequirements
+    noise : tuple of ndarray or None
+        Frequencies (rad/s) and spectral density ((rad/s)²/Hz) of the rate's noise.
+    """
+
+    evidence: Evidence
+    searched: PlantSet
+    judged: PlantSet
+    gyro: Gyro
+    with_angle: bool
+    requirements: TuningRequirements
+    noise: tuple[Array, Array] | None = None
+
+    def coherence_of(self, place: int) -> tuple[Array, Array] | None:
+        """Frequencies and coherence of an axis' measured response, where the fit rests on one."""
+        system = self.searched.sampled.systems[0]
+        return self.evidence.coherences.get(f"{system.outputs[place]}/{system.inputs[place]}")
+
+
+@dataclass(frozen=True, eq=False)
+class AxisResult:
+    """What was found for one axis.
+
+    Attributes
+    ----------
+    found : Found
+    loop : AxisLoop
+        With the gains found, rounded.
+    promises : tuple of Promise
+    met : ndarray of bool, shape (n_fresh,)
+        Which fresh plants meet every requirement.
+    flown_stable : ndarray of bool or None
+        Which of them the flown gains hold stable, the estimate first.
+    problem : LoopProblem
+        With the fresh plants.
+    """
+
+    found: Found
+    loop: AxisLoop
+    promises: tuple[Promise, ...]
+    met: NDArray[np.bool_]
+    flown_stable: NDArray[np.bool_]
+    problem: LoopProblem
+
+
+def problem_of(
+    setting: Setting, plants: Plants, paths: ControllerPaths, noise_limit: float | None
+) -> LoopProblem:
+    """The axis as a problem on some plants."""
+    need, band = setting.requirements, setting.evidence.band_rad_s
+    low, high = paths.ranges()
+    limit = None
+    if band is not None and need.band_factor is not None:
+        limit = band[1] / need.band_factor
+    return LoopProblem(
+        plants,
+        paths,
+        paths.kinds,
+        low,
+        high,
+        need,
+        limit,
+        None if setting.noise is None else np.interp(plants.omega_rad_s, *setting.noise),
+        noise_limit,
+    )
+
+
+def noise_limit(setting: Setting, problem: LoopProblem, flown: Array) -> float | None:
+    """Largest output noise: what was asked for, and the growth over the flown gains."""
+    need, limits = setting.requirements, []
+    if need.output_noise_rms is not None and setting.noise is not None:
+        limits.append(need.output_noise_rms)
+    if need.noise_growth is not None:
+        judged = problem.judge(flown[None], [0])
+        if bool(judged.stable[0, 0]):
+            limits.append(need.noise_growth * float(judged.noise[0, 0]))
+    return min(limits, default=None)
+
+
+def tune_axis(
+    setting: Setting,
+    loops: list[AxisLoop],
+    flown: list[AxisLoop],
+    place: int,
+    advance: Callable[[int], None],
+) -> AxisResult:
+    """Tune one axis with the loops of the others closed as they stand.
+
+    Parameters
+    ----------
+    setting : Setting
+    loops : list of AxisLoop
+        All axes as they stand; that of this axis gives filters and start.
+    flown : list of AxisLoop
+        All axes as flown.
+    place : int
+        Which axis.
+    advance : callable
+        Told of steps done.
+
+    Returns
+    -------
+    AxisResult
+    """
+    gyro, paths = setting.gyro, ControllerPaths(loops[place], setting.gyro, setting.with_angle)
+    before = paths.gains_of(flown[place])
+    as_flown = problem_of(setting, setting.searched.axis(place, flown, gyro), paths, None)
+    limit = noise_limit(setting, as_flown, before)
+    problem = problem_of(setting, setting.searched.axis(place, loops, gyro), paths, limit)
+    first = list(range(1 + len(setting.evidence.corners)))
+    found = search(problem, first, advance)
+    loop = paths.with_parameters(paths.parameters(found.gains))
+    fresh = problem_of(setting, setting.judged.axis(place, loops, gyro), paths, limit)
+    # What flew had the other axes' flown gains around it, not those that they are given here.
+    fresh_flown = replace(fresh, plants=setting.judged.axis(place, flown, gyro))
+    old = fresh_flown.judge(before[None])
+    made, met = promises(fresh, paths.gains_of(loop), old)
+    return AxisResult(found, loop, made, met, old.stable[0], fresh)
+
+
+def axis_steps(setting: Setting, loop: AxisLoop) -> int:
+    """Steps that `tune_axis` announces."""
+    paths = ControllerPaths(loop, setting.gyro, setting.with_angle)
+    low, high = paths.ranges()
+    plants = setting.searched.axis(0, [loop] * setting.searched.sampled.n_axes, setting.gyro)
+    return search_steps(LoopProblem(plants, paths, paths.kinds, low, high, setting.requirements))
+
+
+def changes_of(paths: ControllerPaths, new: AxisLoop) -> tuple[TunedGain, ...]:
+    """Each parameter before and after."""
+    ranges, before, after = paths.loop.ranges, paths.loop.gains, new.gains
+    return tuple(
+        TunedGain(
+            name, ranges[name].unit, before[name], after[name], ranges[name].low, ranges[name].high
+        )
+        for name in paths.names
+    )
+
+
+def stages_of(
+    setting: Setting,
+    loops: list[AxisLoop],
+    place: int,
+    changes: tuple[TunedGain, ...],
+    limit: float,
+) -> tuple[Stage, ...]:
+    """Steps from the flown gains to the new ones, no ratio above the limit, each judged."""
+    ratios = [abs(np.log(c.new / c.flown)) for c in changes if c.flown > 0.0 and c.new > 0.0]
+    count = max(1, int(np.ceil(max(ratios, default=0.0) / np.log(limit) - 1e-9)))
+    paths = ControllerPaths(loops[place], setting.gyro, setting.with_angle)
+    plants = setting.searched.axis(place, loops, setting.gyro)
+    problem = problem_of(setting, plants, paths, None)
+    stages = []
+    for k in range(1, count + 1):
+        gains = {c.name: _between(c, k / count) for c in changes}
+        judged = problem.judge(paths.gains_of(paths.with_parameters(gains))[None])
+        inner = [each for name, each in judged.metrics.items() if name != ANGLE]
+        stages.append(
+            Stage(
+                gains,
+                bool(judged.stable.all()),
+                _least([each.phase_margin_deg for each in inner]),
+                _least([each.gain_margin_db for each in inner]),
+            )
+        )
+    return tuple(stages)
+
+
+def _between(change: TunedGain, share: float) -> float:
+    """On the way from flown to new: by ratio, and by difference where one is zero."""
+    if share >= 1.0:
+        return change.new
+    if change.flown > 0.0 and change.new > 0.0:
+        value = change.flown * (change.new / change.flown) ** share
+    else:
+        value = change.flown + share * (change.new - change.flown)
+    return float(f"{value:.4g}")
+
+
+def _least(values: list[Array]) -> float | None:
+    finite = [float(v) for each in values for v in each.ravel() if np.isfinite(v)]
+    return min(finite, default=None)

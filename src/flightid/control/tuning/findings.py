@@ -1,0 +1,161 @@
+"""Verdicts on tuned gains, with what to do about each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.control.autopilots import AxisLoop
+from flightid.control.margins.findings import COHERENCE
+from flightid.control.tuning.axis_tuning import AxisResult
+from flightid.control.tuning.pid_design import Stage, TunedGain
+from flightid.control.tuning.worst_case import least_share
+from flightid.conventions import Light
+from flightid.findings import Finding
+
+Array = NDArray[np.float64]
+ENOUGH = 0.95
+NEAR = 2.0**0.5
+"""Half an octave to either side."""
+ADVICE = {
+    "stability": "no gains in the ranges hold every plant: identify better, or widen the ranges",
+    "identified band": "sweep to higher frequencies, or lower band_factor knowingly",
+    "output noise": "lower the derivative filter, find the vibration, or allow more noise",
+    "target": "lower the target, or make actuators and filters faster",
+    "margin": "identify the delay better or make it shorter (filters, loop rate, motors)",
+}
+
+
+def verdict(result: AxisResult, known: bool) -> Finding:
+    """Whether gains were found, and for how many of the plants."""
+    names = ", ".join(result.found.binding)
+    if not result.found.exists:
+        short = [
+            f"{name} {slack:+.0%}" for name, slack in result.found.slack.items() if slack < 0.0
+        ]
+        return Finding(
+            "no-gains",
+            Light.RED,
+            f"no gains meet all requirements for every plant; nearest: {', '.join(short)}",
+            advice(result.found.binding),
+        )
+    if not known:
+        return Finding("gains", Light.AMBER, f"gains found for the model alone; binding: {names}")
+    good, count = int(result.met.sum()), len(result.met)
+    share = least_share(good, count)
+    return Finding(
+        "gains",
+        Light.GREEN if share >= ENOUGH else Light.AMBER,
+        f"{good} of {count} fresh plants meet every requirement: at least {share:.1%} of those "
+        f"that the data allow (95 % confidence); binding: {names or 'nothing'}",
+        "" if share >= ENOUGH else "draw more plants for the search",
+    )
+
+
+def advice(binding: Sequence[str]) -> str:
+    """What to do about what binds."""
+    for name in binding:
+        for key, text in ADVICE.items():
+            if key in name:
+                return text
+    return ADVICE["margin"]
+
+
+def remarks(
+    result: AxisResult,
+    flown: AxisLoop,
+    changes: Sequence[TunedGain],
+    stages: Sequence[Stage],
+    couplings: Sequence[str],
+) -> Iterator[Finding]:
+    """What else is to be known.
+
+    Parameters
+    ----------
+    result : AxisResult
+    flown : AxisLoop
+        The axis as flown.
+    changes, stages : sequence of TunedGain and of Stage
+    couplings : sequence of str
+        Other rates of the model that no loop of the design closes.
+    """
+    held = result.flown_stable
+    if not bool(held[0]):
+        yield Finding(
+            "flown-unstable",
+            Light.RED,
+            "the model is unstable with the gains that flew",
+            "the model, its sign, its delay or the gains are not those of the flight: check each",
+        )
+    elif not bool(held.all()):
+        yield Finding(
+            "flown-unstable",
+            Light.AMBER,
+            f"{np.count_nonzero(~held)} of {len(held)} plants are unstable with the flown gains",
+            "the spread is wider than what flew: identify better",
+        )
+    if couplings:
+        yield Finding(
+            "couplings",
+            Light.AMBER,
+            f"the model couples this axis with {', '.join(couplings)}, whose loops are left open",
+            "tune the axes together with flightid.tune",
+        )
+    outside = [c.name for c in changes if not c.low <= c.flown <= c.high]
+    if outside:
+        yield Finding(
+            "outside-range", Light.AMBER, f"flown outside its range: {', '.join(outside)}"
+        )
+    shaky = [k for k, stage in enumerate(stages, 1) if not stage.stable]
+    if shaky:
+        yield Finding(
+            "unstable-step",
+            Light.RED,
+            f"step {shaky[0]} on the way is not stable for every plant",
+            "do not fly it: change the gains one after the other by hand",
+        )
+    elif len(stages) > 1:
+        yield Finding(
+            "steps",
+            Light.AMBER,
+            f"the new gains are further than one safe step: {len(stages)} steps",
+            "fly each before the next, and identify again on the way",
+        )
+    if any(flown.values.get(role, 0.0) for role in ("ff", "d_ff")):
+        yield Finding(
+            "feed-forward",
+            Light.AMBER,
+            "feed-forward is kept as flown: it moves no margin, but it does move the step",
+        )
+    for text in flown.unmodelled:
+        yield Finding("unmodelled", Light.AMBER, text)
+
+
+def low_coherence(result: AxisResult, measured: tuple[Array, Array] | None) -> Iterator[Finding]:
+    """Say where a loop would cross over at frequencies that the flight hardly excited.
+
+    Parameters
+    ----------
+    result : AxisResult
+    measured : tuple of ndarray or None
+        Frequencies (rad/s) and coherence of the response that was fitted.
+    """
+    if measured is None or not result.found.exists:
+        return
+    omega, coherence = measured
+    for promise in result.promises:
+        if promise.name != "crossover" or promise.nominal is None:
+            continue
+        near = np.geomspace(promise.nominal / NEAR, promise.nominal * NEAR, 21)
+        known = float(np.mean(np.interp(near, omega, coherence)))
+        if known < COHERENCE:
+            yield Finding(
+                "coherence-at-crossover",
+                Light.RED,
+                f"{promise.loop}: coherence is {known:.2f} about the new crossover "
+                f"of {promise.nominal:.3g} rad/s",
+                "sweep that band with more amplitude, or ask for a crossover where the response "
+                "was measured",
+            )

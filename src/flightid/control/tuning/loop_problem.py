@@ -1,0 +1,335 @@
+"""The loops of an axis as a problem: gains in, slack of every requirement for every plant out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
+from flightid.control.margins.stability_count import unstable_poles
+from flightid.control.tuning.requirements import TuningRequirements
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+TINY = 1e-12
+DISTURBANCE_WEIGHT = 0.2
+LOWEST_PEAK_RAD_S, PEAK_BANDS = 0.5, 20
+FULL, NONE = 1.0, -20.0
+"""Slack of a requirement that sets no limit, for lack of a crossing; and the least that counts."""
+RATE, WHOLE, ANGLE = "rate loop", "whole loop", "angle loop"
+TARGET = "target"
+
+
+@dataclass(frozen=True, eq=False)
+class Plants:
+    """Plants that one axis may have, with all other loops closed.
+
+    Attributes
+    ----------
+    omega_rad_s : ndarray, shape (n_f,)
+        From far below all dynamics to half the sample rate, rad/s.
+    rate, angle : ndarray of complex, shape (n, n_f)
+        Output to the rate that the controller is given, and to the angle; the estimate first.
+    rest : ndarray of complex, shape (n, n_f)
+        det(I + L) of the other loops alone; one where there are none.
+    unstable : ndarray of int, shape (n,)
+        Poles of the open plants outside the unit circle.
+    """
+
+    omega_rad_s: Array
+    rate: Complex
+    angle: Complex
+    rest: Complex
+    unstable: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        """Number of plants."""
+        return len(self.rate)
+
+    def take(self, rows: list[int]) -> Plants:
+        """Some of the plants."""
+        return replace(
+            self,
+            rate=self.rate[rows],
+            angle=self.angle[rows],
+            rest=self.rest[rows],
+            unstable=self.unstable[rows],
+        )
+
+    def thinned(self, stride: int) -> Plants:
+        """The plants at every so many frequencies, the highest among them."""
+        kept = np.arange(len(self.omega_rad_s) - 1, -1, -stride)[::-1]
+        return replace(
+            self,
+            omega_rad_s=self.omega_rad_s[kept],
+            rate=self.rate[:, kept],
+            angle=self.angle[:, kept],
+            rest=self.rest[:, kept],
+        )
+
+
+class Paths(Protocol):
+    """The controller's paths at given frequencies, linear in its gains but for the last."""
+
+    def feedback(self, omega_rad_s: Array) -> Complex:
+        """Rate to output with the opposite sign, for each gain alone: (n_gains, n_f)."""
+        ...
+
+    def forward(self, omega_rad_s: Array) -> Complex:
+        """Rate set-point to output: for each gain alone, then what no gain changes."""
+        ...
+
+    def angle(self, omega_rad_s: Array) -> Complex | None:
+        """Angle with the opposite sign to rate set-point for a gain of one; None without."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Loops:
+    """Loop transfers of candidates with plants, each (n_candidates, n_plants, n_f).
+
+    Attributes
+    ----------
+    control : ndarray of complex, shape (n_candidates, n_f)
+        Rate to output, with the opposite sign.
+    rate, whole, angle : ndarray of complex
+        Broken at the output with the angle loop open, with it closed, and at the angle.
+    """
+
+    control: Complex
+    rate: Complex
+    whole: Complex
+    angle: Complex | None
+
+    def named(self) -> Iterator[tuple[str, Complex]]:
+        """Each loop that there is."""
+        yield RATE, self.rate
+        if self.angle is not None:
+            yield WHOLE, self.whole
+            yield ANGLE, self.angle
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """Candidates judged by each plant.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Requirements.
+    slack : ndarray, shape (n_requirements, n_candidates, n_plants)
+        At least 0 where the requirement is met, 1 where it sets no limit.
+    objective : ndarray, shape (n_candidates, n_plants)
+        Natural logarithm of what is to be high.
+    metrics : dict of str to LoopMetrics
+        By loop, arrays (n_candidates, n_plants).
+    stable : ndarray of bool, shape (n_candidates, n_plants)
+    noise : ndarray, shape (n_candidates, n_plants)
+        Output over gyro noise, rms; rms output where the noise is known.
+    peaks : ndarray, shape (n_loops, n_candidates, n_plants, n_bands)
+        Slack of the sensitivity peak by bands of frequency: where two peaks are equally high, the
+        highest alone has an edge that a search would stick to.
+    """
+
+    names: tuple[str, ...]
+    slack: Array
+    objective: Array
+    metrics: dict[str, LoopMetrics]
+    stable: NDArray[np.bool_]
+    noise: Array
+    peaks: Array
+
+
+@dataclass(frozen=True, eq=False)
+class LoopProblem:
+    """What the loops of an axis must do, and what they may be made of.
+
+    Attributes
+    ----------
+    plants : Plants
+    paths : Paths
+    kinds : tuple of str
+        ``"P"``, ``"I"`` or ``"D"`` of each gain of the rate loop; last ``"A"`` where there is
+        an angle loop.
+    low, high : ndarray, shape (n_gains,)
+        Ranges of the gains.
+    requirements : TuningRequirements
+    crossover_limit_rad_s : float or None
+        The band's upper edge over the factor, rad/s.
+    noise_psd : ndarray, shape (n_f,), or None
+        Of the rate that the controller is given, (rad/s)²/Hz; None: white, of unknown size.
+    noise_limit : float or None
+        Largest output noise over gyro noise (or rms output where the noise is known).
+    """
+
+    plants: Plants
+    paths: Paths
+    kinds: tuple[str, ...]
+    low: Array
+    high: Array
+    requirements: TuningRequirements
+    crossover_limit_rad_s: float | None = None
+    noise_psd: Array | None = None
+    noise_limit: float | None = None
+
+    def with_plants(self, plants: Plants) -> LoopProblem:
+        """The same requirements on other plants, at their frequencies."""
+        known = self.plants.omega_rad_s
+        psd = self.noise_psd
+        moved = None if psd is None else np.interp(plants.omega_rad_s, known, psd)
+        return replace(self, plants=plants, noise_psd=moved)
+
+    @property
+    def has_angle(self) -> bool:
+        """Whether an angle loop is designed too."""
+        return "A" in self.kinds
+
+    def loops(self, gains: Array, plants: Plants) -> Loops:
+        """Loop transfers of candidates (n_candidates, n_gains)."""
+        omega = plants.omega_rad_s
+        inner = gains[:, :-1] if self.has_angle else gains
+        control = inner @ self.paths.feedback(omega)
+        rate = control[:, None] * plants.rate
+        unit = self.paths.angle(omega)
+        if not self.has_angle or unit is None:
+            return Loops(control, rate, rate, None)
+        terms = self.paths.forward(omega)
+        forward = inner @ terms[:-1] + terms[-1]
+        outer = (gains[:, -1:] * forward * unit)[:, None] * plants.angle
+        return Loops(control, rate, rate + outer, outer / (1.0 + rate))
+
+    def judge(self, gains: Array, rows: list[int] | None = None) -> Judged:
+        """Judge candidates.
+
+        Parameters
+        ----------
+        gains : ndarray, shape (n_candidates, n_gains)
+        rows : list of int, optional
+            Plants to judge by; all when left out.
+        """
+        plants = self.plants if rows is None else self.plants.take(rows)
+        omega, loops = plants.omega_rad_s, self.loops(gains, plants)
+        stable = np.ones(loops.rate.shape[:2], dtype=bool)
+        for broken in dict.fromkeys((RATE, WHOLE)):
+            difference = 1.0 + (loops.rate if broken == RATE else loops.whole)
+            stable &= unstable_poles(omega, difference * plants.rest, plants.unstable) == 0
+        metrics = {
+            name: loop_metrics(omega, loop, unstable_poles=plants.unstable)
+            for name, loop in loops.named()
+        }
+        noise = self._noise(omega, np.abs(loops.control)[:, None] / np.abs(1.0 + loops.whole))
+        parts = self._slack(metrics, stable, noise, highest_crossover(omega, loops.rate))
+        return Judged(
+            tuple(parts),
+            np.array([*parts.values()]),
+            self._objective(plants, metrics[RATE], 1.0 + loops.whole),
+            metrics,
+            stable,
+            noise,
+            np.array([self._peaks(omega, loop) for _, loop in loops.named()]),
+        )
+
+    def _peaks(self, omega: Array, loop: Complex) -> Array:
+        start = int(np.searchsorted(omega, LOWEST_PEAK_RAD_S))
+        edges = np.unique(np.linspace(start, len(omega), PEAK_BANDS, endpoint=False).astype(int))
+        least = np.minimum.reduceat(np.abs(1.0 + loop), edges, axis=-1)
+        peak = self.requirements.peak
+        return np.asarray(np.clip(1.0 + np.log(least) / np.log(peak), NONE, FULL))
+
+    def _noise(self, omega: Array, gain: Array) -> Array:
+        """Rms of the output for the noise of the gyro, over the band of the sampled loop."""
+        weight = np.ones_like(omega) if self.noise_psd is None else self.noise_psd
+        power = np.trapezoid(gain**2 * weight, omega, axis=-1)
+        share = 1.0 / omega[-1] if self.noise_psd is None else 1.0 / (2.0 * np.pi)
+        return np.asarray(np.sqrt(power * share))
+
+    def _slack(
+        self,
+        metrics: dict[str, LoopMetrics],
+        stable: NDArray[np.bool_],
+        noise: Array,
+        highest: Array,
+    ) -> dict[str, Array]:
+        """Slack by requirement, bounded so that one plant cannot hide the others."""
+        need, parts = self.requirements, {}
+        for name, found in metrics.items():
+            least = need.angle_phase_margin_deg if name == ANGLE else need.phase_margin_deg
+            peak = found.sensitivity_peak
+            parts[f"{name}: phase margin"] = found.phase_margin_deg / least - 1.0
+            parts[f"{name}: gain margin"] = found.gain_margin_db / need.gain_margin_db - 1.0
+            parts[f"{name}: gain reduction margin"] = (
+                found.gain_reduction_margin_db / need.gain_margin_db - 1.0
+            )
+            parts[f"{name}: sensitivity peak"] = np.log(need.peak / peak) / np.log(need.peak)
+            if need.delay_margin_s is not None and name != ANGLE:
+                parts[f"{name}: delay margin"] = found.delay_margin_s / need.delay_margin_s - 1.0
+        if self.crossover_limit_rad_s is not None:
+            parts["identified band"] = np.log(self.crossover_limit_rad_s / highest)
+        if self.noise_limit is not None:
+            parts["output noise"] = np.log(self.noise_limit / np.maximum(noise, TINY))
+        bounded = {
+            name: np.clip(np.where(np.isnan(each), FULL, each), NONE, FULL)
+            for name, each in (parts | self._targets(metrics)).items()
+        }
+        return {"stability": np.where(stable, FULL, -1.0), **bounded}
+
+    def _targets(self, metrics: dict[str, LoopMetrics]) -> dict[str, Array]:
+        need, rate = self.requirements, metrics[RATE]
+        asked = [
+            ("crossover", rate.crossover_rad_s, need.crossover_rad_s),
+            (
+                "disturbance bandwidth",
+                rate.disturbance_bandwidth_rad_s,
+                need.disturbance_bandwidth_rad_s,
+            ),
+        ]
+        if ANGLE in metrics:
+            reached = metrics[ANGLE].crossover_rad_s
+            asked.append(("angle crossover", reached, need.angle_crossover_rad_s))
+        return {
+            f"{TARGET} {name}": np.log(present(reached) / target)
+            for name, reached, target in asked
+            if target is not None
+        }
+
+    def _objective(self, plants: Plants, rate: LoopMetrics, difference: Complex) -> Array:
+        """Logarithm of what is raised: how little a step of disturbance leaves, or a bandwidth.
+
+        A bandwidth alone would leave the integral open, so disturbances keep a small weight.
+        """
+        omega = plants.omega_rad_s
+        felt = plants.angle if self.has_angle else plants.rate
+        left = np.abs(felt / difference) / omega
+        rejection = -0.5 * np.log(np.trapezoid(left**2, omega, axis=-1) / np.pi)
+        if self.requirements.objective == "disturbance":
+            return np.asarray(rejection)
+        bandwidth = (
+            rate.crossover_rad_s
+            if self.requirements.objective == "crossover"
+            else rate.disturbance_bandwidth_rad_s
+        )
+        return np.asarray(np.log(present(bandwidth)) + DISTURBANCE_WEIGHT * rejection)
+
+
+def highest_crossover(omega_rad_s: Array, loop: Complex) -> Array:
+    """Highest frequency at which each loop's gain falls through one, rad/s; NaN without.
+
+    A derivative can hold the gain about one far beyond the crossover with the least phase.
+    """
+    logs, gain = np.log(omega_rad_s), np.log(np.abs(loop))
+    above = gain[..., :-1] >= 0.0
+    last = above.shape[-1] - 1 - np.argmax(above[..., ::-1], axis=-1)
+    one = np.take_along_axis(gain, last[..., None], -1)[..., 0]
+    two = np.take_along_axis(gain, last[..., None] + 1, -1)[..., 0]
+    share = np.clip(one / np.where(one > two, one - two, 1.0), 0.0, 1.0)
+    found = np.exp(logs[last] + share * (logs[last + 1] - logs[last]))
+    return np.asarray(np.where(above.any(axis=-1), found, np.nan))
+
+
+def present(values: Array) -> Array:
+    """Zero in place of a frequency that is not there."""
+    return np.where(np.isnan(values), TINY, values)

@@ -1,0 +1,359 @@
+"""The noun: gains of one axis, what they promise, and how to get there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from pathlib import Path
+
+from flightid.control.autopilots import AxisLoop, GainChange, write_param, write_params
+from flightid.control.tuning.loop_problem import LoopProblem
+from flightid.control.tuning.promises import Promise
+from flightid.control.tuning.requirements import TuningRequirements
+from flightid.control.tuning.responses import ResponseBand
+from flightid.errors import DataError, UnknownNameError
+from flightid.findings import Finding
+from flightid.table import Cell, Column, Table
+
+SCHEMA = "flightid.pid_design/1"
+
+
+@dataclass(frozen=True)
+class TunedGain:
+    """One parameter before and after.
+
+    Attributes
+    ----------
+    name, unit : str
+        The autopilot's name.
+    flown, new : float
+    low, high : float
+        Range of the autopilot's documentation.
+
+    Example
+    -------
+    >>> TunedGain("ATC_RAT_RLL_P", "1/(rad/s)", 0.1, 0.15, 0.01, 0.5).ratio
+    1.4999999999999998
+    """
+
+    name: str
+    unit: str
+    flown: float
+    new: float
+    low: float
+    high: float
+
+    @property
+    def ratio(self) -> float | None:
+        """New over flown; None where nothing was flown."""
+        return self.new / self.flown if self.flown > 0.0 else None
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One step of gains on the way.
+
+    Attributes
+    ----------
+    gains : mapping of str to float
+        By the autopilot's names.
+    stable : bool
+        For every plant that the data allow.
+    phase_margin_deg, gain_margin_db : float or None
+        Least ones of all loops and plants, at the output.
+    """
+
+    gains: Mapping[str, float]
+    stable: bool
+    phase_margin_deg: float | None
+    gain_margin_db: float | None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PidDesign:
+    """Result of `flightid.tune_pid`.
+
+    Attributes
+    ----------
+    flown, loop : AxisLoop
+        The axis as flown, and with the new gains (as flown where there are none).
+    exists : bool
+        Whether gains meet the requirements for the plants that the data allow.
+    changes : tuple of TunedGain
+    requirements : TuningRequirements
+    promises : tuple of Promise
+        Margins and bandwidths with their spread, beside those of the flown gains; of the nearest
+        gains where none meet the requirements.
+    binding : tuple of str
+        What keeps the gains from going further; where there are none, what cannot be met.
+    responses : tuple of ResponseBand
+        Steps and disturbances.
+    stages : tuple of Stage
+        Steps from the flown gains to the new ones, none larger than the limit.
+    content : float
+        Share of the plants that do at least as well as the worst promised, at 95 % confidence; 0
+        where the uncertainty is not known.
+    share_met : float
+        Lower 95 % bound of the share of plants that meet every requirement.
+    problem : LoopProblem
+        The axis with the plants that the promises are for: what pictures are drawn from.
+    n_plants : int
+        Plants that the promises rest on, the search having seen none of them.
+    findings : tuple of Finding
+    provenance : mapping
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> from flightid.control.autopilots import axis_loop
+    >>> plant = fid.load_model("rate_integrator", axis="roll").with_values(
+    ...     {"Ltphi": 140.0, "tau": 0.03})
+    >>> design = fid.tune_pid(plant, gains=axis_loop("arducopter", "roll", loop_rate_hz=400.0),
+    ...     band_rad_s=(1.0, 100.0), nominal=True)
+    >>> design.exists
+    True
+    """
+
+    flown: AxisLoop
+    loop: AxisLoop
+    exists: bool
+    changes: tuple[TunedGain, ...]
+    requirements: TuningRequirements
+    promises: tuple[Promise, ...]
+    binding: tuple[str, ...]
+    responses: tuple[ResponseBand, ...]
+    stages: tuple[Stage, ...]
+    content: float
+    share_met: float
+    n_plants: int
+    problem: LoopProblem
+    findings: tuple[Finding, ...] = ()
+    provenance: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def axis(self) -> str:
+        """Axis."""
+        return self.flown.axis
+
+    @property
+    def gains(self) -> dict[str, float]:
+        """New gains by the autopilot's names."""
+        return {change.name: change.new for change in self.changes}
+
+    def promise(self, loop: str, name: str) -> Promise:
+        """One number, for example ``promise("rate loop", "phase margin")``.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such number.
+        """
+        for each in self.promises:
+            if (each.loop, each.name) == (loop, name):
+                return each
+        known = ", ".join(f"{each.loop}: {each.name}" for each in self.promises)
+        raise UnknownNameError("there is no such promise", found=f"{loop}: {name}", needed=known)
+
+    def response(self, name: str) -> ResponseBand:
+        """One time response, for example ``response("rate step")``.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such response.
+        """
+        for each in self.responses:
+            if each.name == name:
+                return each
+        known = ", ".join(each.name for each in self.responses)
+        raise UnknownNameError("there is no such response", found=name, needed=known)
+
+    def __repr__(self) -> str:
+        """Axis, gains and the worst phase margin on one line."""
+        if not self.exists:
+            return f"PidDesign({self.axis}: no gains; {', '.join(self.binding)})"
+        margins = [
+            each.worst
+            for each in self.promises
+            if each.name == "phase margin" and each.worst is not None
+        ]
+        gains = ", ".join(f"{name} {value:.4g}" for name, value in self.gains.items())
+        return f"PidDesign({self.axis}: {gains}; worst phase margin {min(margins):.3g} deg)"
+
+    def gain_table(self) -> Table:
+        """Gains before and after."""
+        columns = (
+            Column("parameter"),
+            Column("flown"),
+            Column("new"),
+            Column("ratio", digits=3),
+            Column("low"),
+            Column("high"),
+            Column("unit"),
+        )
+        rows: list[tuple[Cell, ...]] = [
+            (
+                *(c.name, c.flown),
+                *((c.new, c.ratio) if self.exists else (None, None)),
+                *(c.low, c.high, c.unit),
+            )
+            for c in self.changes
+        ]
+        return Table(f"Gains of {self.axis}", columns, tuple(rows), self._words())
+
+    def promise_table(self) -> Table:
+        """Margins and bandwidths beside those of the flown gains."""
+        columns = (
+            Column("loop"),
+            Column("quantity"),
+            Column("required"),
+            Column("nominal", digits=3),
+            Column("95 % low", digits=3),
+            Column("95 % high", digits=3),
+            Column("worst", digits=3),
+            Column("unit"),
+            Column("flown", digits=3),
+            Column("flown, worst", digits=3),
+        )
+        rows: list[tuple[Cell, ...]] = []
+        for each in self.promises:
+            low, high = each.interval95 or (None, None)
+            rows.append(
+                (
+                    *(each.loop, each.name, each.required, each.nominal, low, high, each.worst),
+                    *(each.unit, each.flown, each.flown_worst),
+                )
+            )
+        note = (
+            f"Worst: of {self.n_plants} plants drawn from what the data allow; "
+            f"{self.content:.1%} of such plants do at least as well (95 % confidence)."
+            if self.content
+            else "Of the model alone: its errors are not known."
+        )
+        title = f"What the {'new' if self.exists else 'nearest'} gains of {self.axis} promise"
+        return Table(title, columns, tuple(rows), (note,)).without_empty_columns()
+
+    def stage_table(self) -> Table:
+        """Steps on the way to the new gains."""
+        names = [change.name for change in self.changes]
+        columns = (
+            Column("step"),
+            *(Column(name) for name in names),
+            Column("least phase margin", "deg", 3),
+            Column("least gain margin", "dB", 3),
+            Column("stable"),
+        )
+        rows = tuple(
+            (
+                *(k, *(stage.gains[name] for name in names)),
+                *(stage.phase_margin_deg, stage.gain_margin_db, stage.stable),
+            )
+            for k, stage in enumerate(self.stages, 1)
+        )
+        return Table(f"Steps for {self.axis}", columns, rows)
+
+    def _words(self) -> tuple[str, ...]:
+        binds = ", ".join(self.binding) or "nothing"
+        bound = f"Binding: {binds}." if self.exists else f"Cannot be met together: {binds}."
+        return (bound, *map(str, self.findings))
+
+    def summary(self) -> Table:
+        """Gains, with the verdicts below; `promise_table` has the margins."""
+        return self.gain_table()
+
+    def write(self, path: str | Path, *, overwrite: bool = False) -> tuple[Path, ...]:
+        """Write the gains as the autopilot's parameter files, and the flown ones to go back to.
+
+        One file for each step (``name-1.param``, … where there are several), each with a file
+        ``….rollback.param`` of the flown values; QGroundControl's layout for PX4.
+
+        Parameters
+        ----------
+        path : str or Path
+            Name of the file, usually ``*.param`` or, for PX4, ``*.params``.
+        overwrite : bool
+            Whether files that exist may be replaced.
+
+        Returns
+        -------
+        tuple of Path
+            What was written, step by step.
+
+        Raises
+        ------
+        DataError
+            There are no gains that meet the requirements.
+        OptionError
+            A file is already there.
+        OSError
+            A file cannot be written.
+        """
+        return write_steps(path, [self], overwrite=overwrite)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key."""
+        return {
+            "schema": SCHEMA,
+            "autopilot": self.flown.autopilot,
+            "axis": self.axis,
+            "exists": self.exists,
+            "gains": {
+                c.name: {"flown": c.flown, "new": c.new if self.exists else None, "unit": c.unit}
+                for c in self.changes
+            },
+            "requirements": self.requirements.to_dict(),
+            "promises": [each.to_dict() for each in self.promises],
+            "binding": list(self.binding),
+            "stages": [
+                {"gains": dict(s.gains), "stable": s.stable, "phase_margin_deg": s.phase_margin_deg}
+                for s in self.stages
+            ],
+            "content": self.content,
+            "share_met": self.share_met,
+            "n_plants": self.n_plants,
+            "findings": [finding.to_dict() for finding in self.findings],
+            "provenance": dict(self.provenance),
+        }
+
+    def _repr_html_(self) -> str:
+        return self.gain_table()._repr_html_() + self.promise_table()._repr_html_()
+
+
+def write_steps(
+    path: str | Path, designs: Sequence[PidDesign], *, overwrite: bool = False
+) -> tuple[Path, ...]:
+    """Write the steps of several axes together; an axis that arrives earlier stays there.
+
+    Raises
+    ------
+    DataError
+        An axis has no gains.
+    """
+    for design in designs:
+        if not design.exists:
+            raise DataError(
+                f"no gains of {design.axis} meet the requirements, so none are written",
+                found=", ".join(design.binding),
+                action="relax a requirement that cannot be met, or identify better",
+            )
+    final, count = Path(path), max(len(design.stages) for design in designs)
+    write = write_params if designs[0].flown.autopilot.startswith("px4") else write_param
+    written = []
+    for k in range(count):
+        changes = chain.from_iterable(
+            _step_changes(each, min(k, len(each.stages) - 1)) for each in designs
+        )
+        name = final if count == 1 else final.with_name(f"{final.stem}-{k + 1}{final.suffix}")
+        notes = [f"flightid: step {k + 1} of {count}; fly each before the next"]
+        made = write(name, changes, notes=notes, overwrite=overwrite)
+        written += [each for each in (made.path, made.rollback) if each is not None]
+    return tuple(written)
+
+
+def _step_changes(design: PidDesign, step: int) -> list[GainChange]:
+    flown = design.flown.gains
+    return [
+        GainChange(name, value, flown[name], f"{design.axis}")
+        for name, value in design.stages[step].gains.items()
+    ]

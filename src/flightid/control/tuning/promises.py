@@ -1,0 +1,220 @@
+"""What gains promise: each margin and bandwidth at the estimate, over its spread, at its worst."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.control.tuning.loop_problem import ANGLE, TARGET, Judged, LoopProblem
+from flightid.uncertainty.quantity import Quantity
+
+Array = NDArray[np.float64]
+EDGES_95 = (2.5, 97.5)
+
+
+@dataclass(frozen=True, repr=False)
+class Promise:
+    """One number of one loop.
+
+    Attributes
+    ----------
+    loop, name, unit : str
+    nominal : float or None
+        At the estimate; None where there is no such crossing.
+    interval95 : tuple of float or None
+        Of the middle 95 % of the plants; None where there is one plant, or a crossing is missing.
+    worst : float or None
+        Of all plants.
+    flown, flown_worst : float or None
+        The same with the gains of the log; None where they are not stable either.
+    required : str
+        What was asked for; empty where nothing was.
+    met : bool
+        Whether every plant meets it.
+
+    Example
+    -------
+    >>> Promise("rate loop", "phase margin", "deg", 52.0, (48.0, 56.0), 47.1, 60.0, 55.0, "≥ 45")
+    Promise(rate loop: phase margin 52 deg, worst 47.1)
+    """
+
+    loop: str
+    name: str
+    unit: str
+    nominal: float | None
+    interval95: tuple[float, float] | None
+    worst: float | None
+    flown: float | None
+    flown_worst: float | None
+    required: str = ""
+    met: bool = True
+
+    def __repr__(self) -> str:
+        """Loop, name and numbers on one line."""
+        values = ["none" if each is None else f"{each:.4g}" for each in (self.nominal, self.worst)]
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"Promise({self.loop}: {self.name} {values[0]}{unit}, worst {values[1]})"
+
+    @property
+    def quantity(self) -> Quantity:
+        """Nominal value with its interval."""
+        reason = "" if self.nominal is not None else "no crossing in the band of the loop"
+        return Quantity(
+            f"{self.loop}: {self.name}", self.nominal, self.unit, self.interval95, reason
+        )
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return self.quantity.to_dict() | {
+            "name": f"{self.loop}: {self.name}",
+            "worst": self.worst,
+            "flown": self.flown,
+            "flown_worst": self.flown_worst,
+            "required": self.required,
+            "met": self.met,
+        }
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """A number of `LoopMetrics`: where it is, its name, unit, and whether more is better."""
+
+    field: str
+    name: str
+    unit: str
+    more: bool
+    requirement: str = ""
+
+
+KINDS = (
+    _Kind("crossover_rad_s", "crossover", "rad/s", True),
+    _Kind("phase_margin_deg", "phase margin", "deg", True, "phase margin"),
+    _Kind("gain_margin_db", "gain margin", "dB", True, "gain margin"),
+    _Kind("gain_reduction_margin_db", "gain reduction margin", "dB", True, "gain reduction margin"),
+    _Kind("delay_margin_s", "delay margin", "s", True, "delay margin"),
+    _Kind("sensitivity_peak", "sensitivity peak", "1", False, "sensitivity peak"),
+    _Kind("disturbance_bandwidth_rad_s", "disturbance bandwidth", "rad/s", True),
+    _Kind("disturbance_peak_db", "disturbance peak", "dB", False),
+)
+
+
+def promises(
+    problem: LoopProblem, gains: Array, old: Judged | None
+) -> tuple[tuple[Promise, ...], NDArray[np.bool_]]:
+    """Numbers of all loops, and which plants meet every requirement.
+
+    Parameters
+    ----------
+    problem : LoopProblem
+        Its plants are those to promise for, the estimate first.
+    gains : ndarray, shape (n_gains,)
+        New gains.
+    old : Judged or None
+        The flown gains on the same plants; None where nothing was flown.
+
+    Returns
+    -------
+    tuple of tuple of Promise and ndarray of bool, shape (n_plants,)
+    """
+    new = problem.judge(gains[None])
+    made = []
+    for loop, kind in _wanted(new):
+        values = np.asarray(getattr(new.metrics[loop], kind.field))[0]
+        before = None if old is None else np.asarray(getattr(old.metrics[loop], kind.field))[0]
+        steady = old is not None and bool(old.stable[0, 0])
+        made.append(
+            Promise(
+                loop,
+                kind.name,
+                kind.unit,
+                _number(values[0]),
+                _interval(values),
+                _worst(values, kind.more),
+                _number(before[0]) if steady and before is not None else None,
+                _worst(before, kind.more)
+                if before is not None and old is not None and bool(old.stable.all())
+                else None,
+                *_requirement(problem, new, loop, kind),
+            )
+        )
+    made.append(_noise(problem, new, old))
+    return tuple(made), np.asarray(new.slack[:, 0].min(axis=0) >= 0.0)
+
+
+def _wanted(judged: Judged) -> Iterator[tuple[str, _Kind]]:
+    for loop in judged.metrics:
+        for kind in KINDS:
+            if loop != ANGLE or not kind.field.startswith("disturbance"):
+                yield loop, kind
+
+
+def _requirement(problem: LoopProblem, judged: Judged, loop: str, kind: _Kind) -> tuple[str, bool]:
+    """What was asked of a number, in words, and whether all plants meet it."""
+    need, texts, names = problem.requirements, [], []
+    if kind.requirement:
+        names.append(f"{loop}: {kind.requirement}")
+    least_phase = need.angle_phase_margin_deg if loop == ANGLE else need.phase_margin_deg
+    fixed = {
+        "phase margin": f"≥ {least_phase:g}",
+        "gain margin": f"≥ {need.gain_margin_db:g}",
+        "gain reduction margin": f"≥ {need.gain_margin_db:g}",
+        "sensitivity peak": f"≤ {need.peak:.4g}",
+        "delay margin": "" if need.delay_margin_s is None else f"≥ {need.delay_margin_s:g}",
+    }
+    if kind.requirement and names[0] in judged.names:
+        texts.append(fixed[kind.requirement])
+    if kind.name == "crossover" and loop != "whole loop":
+        target = need.angle_crossover_rad_s if loop == ANGLE else need.crossover_rad_s
+        if target is not None:
+            texts.append(f"≥ {target:g}")
+            names.append(f"{TARGET} {'angle ' if loop == ANGLE else ''}crossover")
+        if loop != ANGLE and problem.crossover_limit_rad_s is not None:
+            texts.append(f"≤ {problem.crossover_limit_rad_s:.4g}")
+            names.append("identified band")
+    target = need.disturbance_bandwidth_rad_s
+    if kind.name == "disturbance bandwidth" and loop == "rate loop" and target is not None:
+        texts.append(f"≥ {target:g}")
+        names.append(f"{TARGET} disturbance bandwidth")
+    rows = [judged.slack[judged.names.index(name), 0] for name in names if name in judged.names]
+    return " and ".join(texts), all(bool((row >= 0.0).all()) for row in rows)
+
+
+def _noise(problem: LoopProblem, new: Judged, old: Judged | None) -> Promise:
+    known = problem.noise_psd is not None
+    values = new.noise[0]
+    limit = problem.noise_limit
+    before = None if old is None or not old.stable[0, 0] else old.noise[0]
+    return Promise(
+        "output",
+        "noise, rms" if known else "noise over gyro noise",
+        "1" if known else "1/(rad/s)",
+        _number(values[0]),
+        _interval(values),
+        _worst(values, False),
+        None if before is None else _number(before[0]),
+        None if before is None or old is None or not old.stable.all() else _worst(before, False),
+        "" if limit is None else f"≤ {limit:.4g}",
+        limit is None or bool((values <= limit).all()),
+    )
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _interval(values: Array) -> tuple[float, float] | None:
+    if len(values) < 3 or not np.all(np.isfinite(values)):
+        return None
+    low, high = np.percentile(values, EDGES_95)
+    return float(low), float(high)
+
+
+def _worst(values: Array, more: bool) -> float | None:
+    """A missing crossing sets no limit, so the others decide."""
+    present = values[np.isfinite(values)]
+    if not present.size:
+        return None
+    return float(present.min() if more else present.max())

@@ -1,0 +1,189 @@
+"""Step and disturbance responses of the sampled loops, exact at the samples, for many plants."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.control.autopilots import AxisLoop
+from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.tuning.controller_paths import (
+    ControllerPaths,
+    has_angle_loop,
+    loop_responses,
+    standing,
+)
+from flightid.control.tuning.sampled_plants import (
+    BELOW_NYQUIST,
+    AxisLoops,
+    SampledPlants,
+    plants_of_axis,
+)
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+SHOWN_S = {
+    "rate step": 1.0,
+    "angle step": 2.0,
+    "disturbance to rate": 2.0,
+    "disturbance to angle": 4.0,
+}
+UNITS = {
+    "rate step": "rad/s",
+    "angle step": "rad",
+    "disturbance to rate": "rad/s",
+    "disturbance to angle": "rad",
+}
+SETTLED_SHARE = 1e-3
+FIRST_S, LONGEST = 8.0, 1 << 16
+LIKE_ZERO = 1e-4
+"""Share of the lowest frequency at which the limit towards zero is taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseBand:
+    """A time response of all plants.
+
+    Attributes
+    ----------
+    name, unit : str
+        What it is; a disturbance is one unit of output.
+    time_s : ndarray, shape (n_t,)
+    estimate, low, high : ndarray, shape (n_t,)
+        Of the estimate, and the pointwise extremes of all plants.
+    flown : ndarray, shape (n_t,), or None
+        Of the estimate with the flown gains; None where they are unstable.
+    """
+
+    name: str
+    unit: str
+    time_s: Array
+    estimate: Array
+    low: Array
+    high: Array
+    flown: Array | None
+
+    @property
+    def overshoot(self) -> float:
+        """Of a step of the estimate, share of the step."""
+        return float(self.estimate.max() - 1.0)
+
+
+def responses(
+    plants: SampledPlants,
+    loops: list[AxisLoop],
+    place: int,
+    gyro: Gyro,
+    *,
+    shown_s: float | None = None,
+) -> dict[str, tuple[Array, Array]]:
+    """Responses of one axis to steps, for each plant, with all loops closed.
+
+    The closed loop's pulse response is the inverse discrete Fourier transform of its exact
+    response at e^(jωT), over a span in which it dies away; steps are its sums.
+
+    Parameters
+    ----------
+    plants : SampledPlants
+    loops : list of AxisLoop
+        Controllers of all axes.
+    place : int
+        Which axis.
+    gyro : {"raw", "filtered"}
+        Which rate the plants end at.
+    shown_s : float, optional
+        Length, s; by default each response's own.
+
+    Returns
+    -------
+    dict of str to tuple of ndarray
+        Times (n_t,), s, and values (n_plants, n_t).
+
+    Reference
+    ---------
+    Oppenheim & Schafer, *Discrete-Time Signal Processing*, 3rd ed., section 8.4 (sampling of the
+    transform is aliasing in time, which vanishes where the response has died away).
+    """
+    step = plants.sample_time_s
+    count = 1 << int(np.ceil(np.log2(FIRST_S / step)))
+    while True:
+        pulses = _pulses(plants, loops, place, gyro, count)
+        tails = [
+            np.abs(each[:, -count // 16 :]).max() / np.abs(each).max() for each in pulses.values()
+        ]
+        if max(tails) < SETTLED_SHARE / count or count >= LONGEST:
+            break
+        count *= 4
+    found = {}
+    for name, pulse in pulses.items():
+        n = min(count, 1 + round((shown_s or SHOWN_S[name]) / step))
+        found[name] = (np.arange(n, dtype=np.float64) * step, np.cumsum(pulse, axis=1)[:, :n])
+    return found
+
+
+def _pulses(
+    plants: SampledPlants, loops: list[AxisLoop], place: int, gyro: Gyro, count: int
+) -> dict[str, Array]:
+    """Pulse responses, each (n_plants, count)."""
+    omega = np.pi / plants.sample_time_s * np.arange(count // 2 + 1) / (count // 2)
+    omega[0], omega[-1] = LIKE_ZERO * omega[1], BELOW_NYQUIST * omega[-1]
+    pairs = [standing(loop, omega, gyro) for loop in loops]
+    closed = AxisLoops(*(np.array(each) for each in zip(*pairs, strict=True)))
+    seen = loop_responses(plants, omega, loops, gyro)
+    axis = plants_of_axis(*seen, omega, plants.unstable, place, closed)
+    rate = closed.feedback[place] * axis.rate
+    whole = rate + closed.outer[place] * axis.angle
+    paths = ControllerPaths(loops[place], gyro, has_angle_loop(loops[place]))
+    terms = paths.forward(omega)
+    gains = paths.gains_of(loops[place])
+    forward = (gains[:-1] if paths.with_angle else gains) @ terms[:-1] + terms[-1]
+    made = {
+        "rate step": forward * axis.rate / (1.0 + rate),
+        "disturbance to rate": axis.rate / (1.0 + whole),
+    }
+    if paths.with_angle:
+        made["angle step"] = closed.outer[place] * axis.angle / (1.0 + whole)
+        made["disturbance to angle"] = axis.angle / (1.0 + whole)
+    return {name: np.fft.irfft(value, count, axis=-1) for name, value in made.items()}
+
+
+def response_bands(
+    plants: SampledPlants,
+    new: list[AxisLoop],
+    flown: list[AxisLoop] | None,
+    place: int,
+    gyro: Gyro,
+) -> tuple[ResponseBand, ...]:
+    """Responses of all plants as bands, beside the flown gains.
+
+    Parameters
+    ----------
+    plants : SampledPlants
+        The estimate first.
+    new, flown : list of AxisLoop
+        Controllers of all axes; `flown` is None where they are not stable.
+    place : int
+        Which axis.
+    gyro : {"raw", "filtered"}
+
+    Returns
+    -------
+    tuple of ResponseBand
+    """
+    made = responses(plants, new, place, gyro)
+    first = plants.take([0])
+    before = {} if flown is None else responses(first, flown, place, gyro)
+    return tuple(
+        ResponseBand(
+            name,
+            UNITS[name],
+            time_s,
+            values[0],
+            values.min(axis=0),
+            values.max(axis=0),
+            before[name][1][0] if name in before else None,
+        )
+        for name, (time_s, values) in sorted(made.items(), reverse=True)
+    )

@@ -1,0 +1,1 @@
+"""One vehicle at several flight conditions."""

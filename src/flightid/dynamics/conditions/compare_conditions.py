@@ -1,0 +1,242 @@
+"""Flight conditions side by side: parameters and modes, their ratios, and what really changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from flightid.conventions import Light
+from flightid.dynamics.conditions.ratios import chance_of, holm, ratio_of
+from flightid.dynamics.conditions.result import (
+    ComparedMode,
+    ComparedNumber,
+    ConditionComparison,
+)
+from flightid.dynamics.modes.modes import modes
+from flightid.dynamics.modes.result import Mode, Modes
+from flightid.errors import ModelError, OptionError
+from flightid.findings import Finding
+from flightid.identification import Fit
+from flightid.models import StateSpaceModel, TransferFunctionModel
+from flightid.uncertainty.quantity import Quantity
+
+ALIKE = 0.3
+"""Least common participation of two modes that are taken for the same one."""
+FAR = 10.0
+"""Cost of a pair of modes that cannot be the same."""
+NUMBERS = ("natural frequency", "damping ratio", "real")
+
+
+@dataclass(frozen=True)
+class _Condition:
+    name: str
+    values: dict[str, Quantity]
+    modes: Modes
+
+
+def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
+    """Models of several flight conditions side by side.
+
+    Parameters
+    ----------
+    sources : mapping of str to Fit or model
+        Two or more by name of the condition, such as hover and cruise; the first is the base of all
+        ratios.
+
+    Returns
+    -------
+    ConditionComparison
+        Parameters that two or more share and modes that answer to each other, with the ratio to the
+        base and its interval, and findings on what changed.
+
+    Raises
+    ------
+    OptionError
+        Fewer than two conditions.
+    ModelError
+        A source without named parameters.
+
+    Assumes
+    -------
+    Conditions identified from different flights, so that their errors are independent. A change is
+    called significant by Holm's rule: one false verdict among all parameters, or among all modes,
+    in 5 % of comparisons.
+
+    Reference
+    ---------
+    Mettler, Tischler & Kanade, *J. American Helicopter Society* 47(1), 2002, tables 4 and 5 (last
+    column); Fieller, *J. Royal Statistical Society B* 16 (1954), for the interval of a ratio.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> found = compare_conditions({
+    ...     "hover": fid.load_model("r50_hover"), "cruise": fid.load_model("r50_cruise")})
+    >>> found
+    ConditionComparison(hover, cruise: 29 common parameters, 5 common modes, 0 significant changes)
+    >>> round(found["tau_s"].ratios["cruise"].value, 2)
+    0.76
+    """
+    if len(sources) < 2:
+        raise OptionError(
+            "a comparison needs two conditions", found=", ".join(sources) or "none", needed="2"
+        )
+    conditions = [_condition(name, source) for name, source in sources.items()]
+    numbers = tuple(_numbers(conditions))
+    matched, alone = _match(conditions)
+    alone_parameters = {
+        c.name: tuple(n for n in c.values if not any(n in o.values for o in conditions if o != c))
+        for c in conditions
+    }
+    significant = holm(
+        {
+            f"{number.name} {name}": chance
+            for number in numbers
+            for name, chance in number.chances.items()
+        }
+    )
+    significant_modes = holm(
+        {
+            f"{number.name} {name}": chance
+            for mode in matched
+            for number in mode.numbers
+            for name, chance in number.chances.items()
+        }
+    )
+    findings = [
+        *_changes(numbers, significant),
+        *_changes([n for mode in matched for n in mode.numbers], significant_modes),
+        *_turned(conditions, matched),
+    ]
+    return ConditionComparison(
+        tuple(sources), numbers, tuple(matched), alone_parameters, alone, tuple(findings)
+    )
+
+
+def _condition(name: str, source: object) -> _Condition:
+    model = source.model if isinstance(source, Fit) else source
+    if not isinstance(model, StateSpaceModel | TransferFunctionModel):
+        raise ModelError(
+            f"condition {name} has no named parameters",
+            found=type(model).__name__,
+            needed="a fit or model of transfer functions or equations",
+        )
+    if isinstance(source, Fit):
+        values = {
+            key: Quantity(
+                key, p.value, p.unit, p.interval95, "" if p.interval95 else p.reason or p.status
+            )
+            for key, p in source.parameters.items()
+        }
+    else:
+        values = {
+            key: Quantity(key, p.value, p.unit, None, "the model was not fitted")
+            for key, p in model.parameters.items()
+        }
+    return _Condition(name, values, modes(source))
+
+
+def _numbers(conditions: Sequence[_Condition]) -> Iterator[ComparedNumber]:
+    names = dict.fromkeys(name for condition in conditions for name in condition.values)
+    for name in names:
+        there = {c.name: c.values[name] for c in conditions if name in c.values}
+        if len(there) > 1:
+            yield _compared(name, there)
+
+
+def _compared(name: str, there: dict[str, Quantity]) -> ComparedNumber:
+    base, *others = there
+    ratios = {o: ratio_of(there[o], there[base], f"{name}, {o} over {base}") for o in others}
+    chances = {o: chance_of(there[o], there[base]) for o in others}
+    known = {key: value for key, value in chances.items() if value is not None}
+    return ComparedNumber(name, there, ratios, known)
+
+
+def _match(
+    conditions: Sequence[_Condition],
+) -> tuple[list[ComparedMode], dict[str, tuple[str, ...]]]:
+    """Modes of later conditions that answer to those of the first, and the rest."""
+    base, *others = conditions
+    answers: dict[int, dict[str, Mode]] = {k: {base.name: m} for k, m in enumerate(base.modes)}
+    alone: dict[str, tuple[str, ...]] = {}
+    for other in others:
+        cost = np.array([[_distance(a, b) for b in other.modes] for a in base.modes])
+        rows, columns = linear_sum_assignment(cost)
+        taken = set()
+        for row, column in zip(map(int, rows), map(int, columns), strict=True):
+            if cost[row, column] < FAR:
+                answers[row][other.name] = other.modes.modes[column]
+                taken.add(column)
+        alone[other.name] = tuple(m.name for k, m in enumerate(other.modes.modes) if k not in taken)
+    alone[base.name] = tuple(found[base.name].name for found in answers.values() if len(found) == 1)
+    matched = [_compared_mode(found, base.name) for found in answers.values() if len(found) > 1]
+    return matched, alone
+
+
+def _distance(first: Mode, second: Mode) -> float:
+    """From common participation and place; `FAR` for modes that cannot be the same."""
+    if first.is_pair != second.is_pair or not (first.root and second.root):
+        return FAR
+    if first.participations and second.participations:
+        states = {p.state for p in first.participations}
+        common = sum(min(first.share(state), second.share(state)) for state in states)
+        if common < ALIKE:
+            return FAR
+    else:
+        common = 1.0
+    apart = abs(first.root - second.root) / max(abs(first.root), abs(second.root))
+    return (1.0 - common) + apart
+
+
+def _compared_mode(found: dict[str, Mode], base: str) -> ComparedMode:
+    numbers = []
+    pair = found[base].is_pair
+    for name in NUMBERS:
+        if pair == (name == "real"):
+            continue
+        there = {}
+        for condition, mode in found.items():
+            number = {q.name: q for q in mode.quantities}[name]
+            there[condition] = number
+        numbers.append(_compared(f"{found[base].name}, {name}", there))
+    return ComparedMode(found[base].name, found, tuple(numbers))
+
+
+def _changes(numbers: Sequence[ComparedNumber], significant: set[str]) -> Iterator[Finding]:
+    for number in numbers:
+        base = next(iter(number.values))
+        for name, ratio in number.ratios.items():
+            if f"{number.name} {name}" not in significant:
+                continue
+            turned = ratio.value is not None and ratio.value < 0.0
+            size = f", ratio {ratio.text}" if ratio.value is not None else ""
+            yield Finding(
+                "sign-changed" if turned else "changed",
+                Light.AMBER if turned else Light.GREEN,
+                f"{number.name}: {number.values[base].text} in {base}, "
+                f"{number.values[name].text} in {name}{size}",
+                "schedule what rests on it" if turned else "",
+            )
+
+
+def _turned(conditions: Sequence[_Condition], matched: Sequence[ComparedMode]) -> Iterator[Finding]:
+    for mode in matched:
+        grows = {name: m.root.real > 0.0 for name, m in mode.modes.items()}
+        if len(set(grows.values())) > 1:
+            unstable = ", ".join(name for name, growing in grows.items() if growing)
+            yield Finding(
+                "stability-changed",
+                Light.AMBER,
+                f"{mode.name}: unstable in {unstable}, stable in the rest",
+                "check the loop in each condition",
+            )
+    stable = {c.name: c.modes.is_stable for c in conditions}
+    if len(set(stable.values())) > 1:
+        unstable = ", ".join(name for name, held in stable.items() if not held)
+        yield Finding(
+            "stability-changed", Light.AMBER, f"unstable in {unstable}, not in the rest",
+            "check the loop in each condition",
+        )  # fmt: skip

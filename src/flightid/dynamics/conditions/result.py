@@ -1,0 +1,214 @@
+"""A comparison of flight conditions as a result: numbers and modes side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from flightid.conventions import Light
+from flightid.dynamics.modes.result import Mode
+from flightid.errors import UnknownNameError
+from flightid.findings import Finding
+from flightid.table import Cell, Column, Table
+from flightid.uncertainty.quantity import Quantity
+
+SCHEMA = "flightid.condition_comparison/1"
+
+
+@dataclass(frozen=True)
+class ComparedNumber:
+    """One number in several conditions.
+
+    Attributes
+    ----------
+    name : str
+    values : mapping of str to Quantity
+        By condition, those that have it.
+    ratios : mapping of str to Quantity
+        To the first of them, by condition, with Fieller's interval.
+    chances : mapping of str to float
+        Probability of so large a difference between equal truths.
+
+    Example
+    -------
+    >>> one = Quantity("Zw", -0.6, "1/s")
+    >>> ComparedNumber("Zw", {"hover": one}, {}, {}).name
+    'Zw'
+    """
+
+    name: str
+    values: Mapping[str, Quantity]
+    ratios: Mapping[str, Quantity]
+    chances: Mapping[str, float]
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "values": {name: value.to_dict() for name, value in self.values.items()},
+            "ratios": {name: value.to_dict() for name, value in self.ratios.items()},
+            "chances": dict(self.chances),
+        }
+
+
+@dataclass(frozen=True)
+class ComparedMode:
+    """Modes of several conditions that answer to each other.
+
+    Attributes
+    ----------
+    name : str
+        In the first condition.
+    modes : mapping of str to Mode
+        By condition.
+    numbers : tuple of ComparedNumber
+        Natural frequency and damping ratio, or the real eigenvalue.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> both = {n: fid.load_model(f"r50_{n}") for n in ("hover", "cruise")}
+    >>> fid.compare_conditions(both).modes[0].name
+    'heave'
+    """
+
+    name: str
+    modes: Mapping[str, Mode]
+    numbers: tuple[ComparedNumber, ...]
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "modes": {name: mode.to_dict() for name, mode in self.modes.items()},
+            "numbers": {number.name: number.to_dict() for number in self.numbers},
+        }
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class ConditionComparison:
+    """Result of `flightid.compare_conditions`.
+
+    Attributes
+    ----------
+    conditions : tuple of str
+    parameters : tuple of ComparedNumber
+        Those that two or more conditions share.
+    modes : tuple of ComparedMode
+    only_parameters, only_modes : mapping of str to tuple of str
+        What one condition has alone.
+    findings : tuple of Finding
+        Significant changes, turned signs, stability.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> both = {n: fid.load_model(f"r50_{n}") for n in ("hover", "cruise")}
+    >>> fid.compare_conditions(both).only_parameters["cruise"]
+    ('Lw', 'Mw', 'Mcol', 'Yped', 'U0', 'V0')
+    """
+
+    conditions: tuple[str, ...]
+    parameters: tuple[ComparedNumber, ...]
+    modes: tuple[ComparedMode, ...]
+    only_parameters: Mapping[str, tuple[str, ...]]
+    only_modes: Mapping[str, tuple[str, ...]]
+    findings: tuple[Finding, ...]
+
+    def __getitem__(self, name: str) -> ComparedNumber:
+        for number in self.parameters:
+            if number.name == name:
+                return number
+        raise UnknownNameError(
+            "there is no such common parameter",
+            found=repr(name),
+            needed=", ".join(number.name for number in self.parameters),
+        )
+
+    def summary(self) -> Table:
+        """Table of the common parameters, ratios to the first condition and findings."""
+        notes = [
+            f"Only in {name}: {', '.join(alone)}."
+            for name, alone in self.only_parameters.items()
+            if alone
+        ]
+        title = "Parameters, " + " and ".join(self.conditions)
+        return self._table(title, self.parameters, (*notes, *self.verdicts))
+
+    @property
+    def verdicts(self) -> tuple[str, ...]:
+        """What changed beyond noise in one sentence, and each finding that asks for something."""
+        changed = [f.message.split(":")[0] for f in self.findings if f.code == "changed"]
+        said = [f"Changed beyond noise: {'; '.join(changed)}."] if changed else []
+        return (*said, *(str(f) for f in self.findings if f.light is not Light.GREEN))
+
+    def modes_table(self) -> Table:
+        """Table of the modes that answer to each other."""
+        numbers = [number for mode in self.modes for number in mode.numbers]
+        notes = tuple(
+            f"Only in {name}: {', '.join(alone)}."
+            for name, alone in self.only_modes.items()
+            if alone
+        )
+        return self._table("Modes, " + " and ".join(self.conditions), numbers, notes)
+
+    def _table(
+        self,
+        title: str,
+        numbers: tuple[ComparedNumber, ...] | list[ComparedNumber],
+        notes: tuple[str, ...],
+    ) -> Table:
+        columns = [Column("quantity"), Column("unit")]
+        for name in self.conditions:
+            columns += [Column(name), Column("±", digits=2)]
+        for name in self.conditions[1:]:
+            columns += [Column(f"{name} / {self.conditions[0]}", digits=3), Column("95 %")]
+            columns += [Column("chance", digits=2)]
+        rows: list[tuple[Cell, ...]] = []
+        for number in numbers:
+            unit = next(iter(number.values.values())).unit
+            cells: list[Cell] = [number.name, "" if unit == "1" else unit]
+            for name in self.conditions:
+                cells += _value(number.values.get(name))
+            for name in self.conditions[1:]:
+                cells += [*_ratio(number.ratios.get(name)), number.chances.get(name)]
+            rows.append(tuple(cells))
+        said: tuple[str, ...] = ("chance: of so large a difference between equal truths.",)
+        if not any(number.chances for number in numbers):
+            said = ()
+        return Table(title, tuple(columns), tuple(rows), (*said, *notes)).without_empty_columns()
+
+    def __repr__(self) -> str:
+        """Sizes and number of significant changes on one line."""
+        changed = sum(f.code in ("changed", "sign-changed") for f in self.findings)
+        return (
+            f"ConditionComparison({', '.join(self.conditions)}: {len(self.parameters)} common "
+            f"parameters, {len(self.modes)} common modes, {changed} significant changes)"
+        )
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key."""
+        return {
+            "schema": SCHEMA,
+            "conditions": list(self.conditions),
+            "parameters": {number.name: number.to_dict() for number in self.parameters},
+            "modes": [mode.to_dict() for mode in self.modes],
+            "only_parameters": {n: list(v) for n, v in self.only_parameters.items()},
+            "only_modes": {n: list(v) for n, v in self.only_modes.items()},
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_() + self.modes_table()._repr_html_()
+
+
+def _value(quantity: Quantity | None) -> list[Cell]:
+    if quantity is None:
+        return [None, None]
+    ends = quantity.interval95
+    return [quantity.value, None if ends is None else (ends[1] - ends[0]) / 2.0]
+
+
+def _ratio(ratio: Quantity | None) -> list[Cell]:
+    if ratio is None or ratio.value is None:
+        return [None, ""]
+    ends = ratio.interval95
+    return [ratio.value, "" if ends is None else f"{ends[0]:.3g} to {ends[1]:.3g}"]

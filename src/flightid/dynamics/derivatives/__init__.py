@@ -1,0 +1,1 @@
+"""Stability and control derivatives, with and without dimensions."""

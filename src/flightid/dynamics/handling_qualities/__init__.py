@@ -1,0 +1,1 @@
+"""Handling qualities: criteria, charts, ratings."""

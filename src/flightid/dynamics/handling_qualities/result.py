@@ -1,0 +1,194 @@
+"""What `attitude_bandwidth` found: five numbers with their covariance, and the curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.dynamics.handling_qualities.curve import Curve
+from flightid.dynamics.handling_qualities.rating import Rating, normal_draws, rate
+from flightid.dynamics.handling_qualities.rating_charts import RatingChart
+from flightid.findings import Finding
+from flightid.table import Table
+from flightid.uncertainty.quantity import Quantity, quantity_table
+from flightid.uncertainty.spread import Propagated
+
+SCHEMA = "flightid.attitude_bandwidth/2"
+PLACES = {"omega_180": 0, "phase": 1, "gain": 2, "delay": 3, "slope": 4}
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AttitudeBandwidth:
+    """Result of `attitude_bandwidth`.
+
+    Attributes
+    ----------
+    output, input : str
+        Attitude (or rate) and control.
+    response_type : str
+        ``"rate"``: the lesser of both bandwidths counts; ``"attitude"``: that of the phase.
+    spread : Propagated
+        ω_180, phase bandwidth, gain bandwidth (rad/s), phase delay by two points and by the slope
+        of the phase (s), with their covariance; NaN where a finding says why.
+    curve : Curve
+        The attitude response, for pictures.
+    nonlinear : bool
+        The phase beyond ω_180 is no line: the slope counts as phase delay, as the standard says.
+    findings : tuple of Finding
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> fid.attitude_bandwidth(fid.load_model("attitude_first_order"), "phi", "tau_phi")
+    AttitudeBandwidth(phi/tau_phi, 2.693 rad/s, phase delay 0.01492 s)
+    """
+
+    output: str
+    input: str
+    response_type: str
+    spread: Propagated
+    curve: Curve
+    nonlinear: bool = False
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """``"output/input"``."""
+        return f"{self.output}/{self.input}"
+
+    def _value(self, name: str) -> float | None:
+        value = float(self.spread.values[PLACES[name]])
+        return value if np.isfinite(value) else None
+
+    @property
+    def omega_180_rad_s(self) -> float:
+        """Where the phase passes −180°, rad/s."""
+        return float(self.spread.values[PLACES["omega_180"]])
+
+    @property
+    def phase_bandwidth_rad_s(self) -> float:
+        """Where the phase passes −135°, 45° before instability, rad/s."""
+        return float(self.spread.values[PLACES["phase"]])
+
+    @property
+    def gain_bandwidth_rad_s(self) -> float | None:
+        """Where the gain is 6 dB above that at ω_180, rad/s; None where a finding says why."""
+        return self._value("gain")
+
+    @property
+    def phase_delay_s(self) -> float | None:
+        """Fall of phase from ω_180 to its double, s; None where a finding says why."""
+        return self._value("delay")
+
+    @property
+    def phase_slope_delay_s(self) -> float | None:
+        """The same from the least-squares slope of the phase there, s."""
+        return self._value("slope")
+
+    @property
+    def gain_limited(self) -> bool:
+        """Whether the gain bandwidth is the lesser."""
+        gain = self.gain_bandwidth_rad_s
+        return gain is not None and gain < self.phase_bandwidth_rad_s
+
+    @property
+    def bandwidth_rad_s(self) -> float:
+        """Bandwidth that counts for the response type, rad/s."""
+        gain = self.gain_bandwidth_rad_s
+        if self.response_type == "attitude" or gain is None:
+            return self.phase_bandwidth_rad_s
+        return min(self.phase_bandwidth_rad_s, gain)
+
+    @property
+    def rated_delay_s(self) -> float | None:
+        """Phase delay that counts, s: by the slope where the phase is no line."""
+        return self.phase_slope_delay_s if self.nonlinear else self.phase_delay_s
+
+    def samples(self) -> dict[str, Array]:
+        """Draws of ``bandwidth`` (rad/s) and ``phase_delay`` (s); empty without a covariance."""
+        places = [PLACES["phase"]]
+        if self.response_type == "rate" and self.gain_bandwidth_rad_s is not None:
+            places.append(PLACES["gain"])
+        if self.rated_delay_s is not None:
+            places.append(PLACES["slope" if self.nonlinear else "delay"])
+        covariance = self.spread.covariance
+        drawn = normal_draws(
+            self.spread.values[places],
+            None if covariance is None else covariance[np.ix_(places, places)],
+        )
+        if drawn is None:
+            return {}
+        late = self.rated_delay_s is not None
+        found = {"bandwidth": np.min(drawn[: len(places) - late], axis=0)}
+        return {**found, "phase_delay": drawn[-1]} if late else found
+
+    @property
+    def bandwidth(self) -> Quantity:
+        """Bandwidth that counts, with the interval of the lesser of both."""
+        drawn = self.samples().get("bandwidth")
+        if drawn is None:
+            known = self.spread.covariance is not None
+            reason = "not determined within its uncertainty" if known else self.spread.reason
+            return Quantity("bandwidth", self.bandwidth_rad_s, "rad/s", None, reason)
+        low, high = np.quantile(drawn, [0.025, 0.975])
+        return Quantity("bandwidth", self.bandwidth_rad_s, "rad/s", (float(low), float(high)))
+
+    @property
+    def quantities(self) -> tuple[Quantity, ...]:
+        """All numbers with their intervals."""
+        missing = {finding.code: finding.message for finding in self.findings}
+        made = self.spread.quantity
+        return (
+            self.bandwidth,
+            made(0, "ω_180", "rad/s"),
+            made(1, "phase bandwidth", "rad/s"),
+            made(2, "gain bandwidth", "rad/s", missing.get("gain-bandwidth", "")),
+            made(3, "phase delay", "s", missing.get("phase-delay", "")),
+            made(4, "phase delay by slope", "s", missing.get("phase-slope", "")),
+        )
+
+    def rate(self, chart: RatingChart) -> Rating | None:
+        """Level on a chart of bandwidth and phase delay; None without a phase delay."""
+        delay = self.rated_delay_s
+        if delay is None:
+            return None
+        values = {"bandwidth": self.bandwidth_rad_s, "phase_delay": delay}
+        return rate(chart, values, self.samples(), subject=self.name)
+
+    def __repr__(self) -> str:
+        """Bandwidth and phase delay on one line."""
+        late = self.rated_delay_s
+        delay = "unknown" if late is None else f"{late:.4g} s"
+        return (
+            f"AttitudeBandwidth({self.name}, {self.bandwidth_rad_s:.4g} rad/s, phase delay {delay})"
+        )
+
+    def summary(self) -> Table:
+        """Table of all values with 95 % intervals."""
+        title = f"Attitude bandwidth of {self.name}, {self.response_type} command"
+        return quantity_table(title, self.quantities, tuple(map(str, self.findings)))
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key."""
+        return {
+            "schema": SCHEMA,
+            "output": self.output,
+            "input": self.input,
+            "response_type": self.response_type,
+            "omega_180_rad_s": self.omega_180_rad_s,
+            "phase_bandwidth_rad_s": self.phase_bandwidth_rad_s,
+            "gain_bandwidth_rad_s": self.gain_bandwidth_rad_s,
+            "bandwidth_rad_s": self.bandwidth_rad_s,
+            "phase_delay_s": self.phase_delay_s,
+            "phase_slope_delay_s": self.phase_slope_delay_s,
+            "gain_limited": self.gain_limited,
+            "nonlinear": self.nonlinear,
+            "quantities": {each.name: each.to_dict() for each in self.quantities},
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()

@@ -1,0 +1,1 @@
+"""Equivalent systems of low order."""

@@ -1,0 +1,1 @@
+"""Modes of motion: eigenvalues, participation, names, approximations."""

@@ -1,0 +1,293 @@
+"""Modes of any model: eigenvalues with what they mean, and 95 % intervals on all of it."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.conventions import Light
+from flightid.dynamics.modes.names import NamedMode, name_by_outputs, name_by_states
+from flightid.dynamics.modes.participation import UNINVOLVED, Eigenpair, eigenpairs
+from flightid.dynamics.modes.result import Mode, Modes, Participation
+from flightid.dynamics.modes.state_matrix import StateMatrix, read_states
+from flightid.findings import Finding
+from flightid.models.linear.discrete_modes import AT_ORIGIN, NO_COUNTERPART
+from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.spread import NORMAL_95
+
+Array = NDArray[np.float64]
+UNFITTED = "does not depend on what was fitted"
+UNSIGNED = "the interval of the real part holds zero: growth and decay are both possible"
+SEEN = 1e-6
+"""Size in an output, against the largest, below which the output does not show a mode."""
+
+
+def modes(source: object, *, states: Mapping[str, str] | None = None) -> Modes:
+    """Modes of a model with their meaning and their intervals.
+
+    Parameters
+    ----------
+    source : Fit, PolynomialFit, InnovationsFit, or a model or LinearSystem
+        A model alone has no intervals. Delays add no modes; noise models are left out.
+    states : mapping of str to str, optional
+        Conventional names (u, w, q, theta, …) of states that the model calls something else, for
+        the words.
+
+    Returns
+    -------
+    Modes
+        Eigenvalue, damping ratio, natural frequency, period, time constant, time to half or to
+        double, participation and description of each.
+
+    Raises
+    ------
+    ModelError
+        There is no linear system in the source.
+    UnknownNameError
+        There is no such state.
+
+    Assumes
+    -------
+    Errors of the parameters small enough for first order. Where an eigenvalue departs from
+    first order by more than half a standard error, as where two nearly meet, there is no interval
+    and `Mode.reason` says why. Times have the interval of the real part turned over.
+
+    Reference
+    ---------
+    Magnus, "On differentiating eigenvalues and eigenvectors", *Econometric Theory* 1 (1985): for a
+    simple eigenvalue dλ = wᴴ dA v / wᴴ v. Participation factors: Pérez-Arriaga, Verghese &
+    Schweppe, *IEEE Trans. Power Apparatus and Systems* 101 (1982), eq. 5.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> found = modes(fid.load_model("fixed_wing_longitudinal"))
+    >>> print(found.modes[0].description)
+    phugoid, lightly damped oscillation: pitch attitude 49 %, forward speed 48 %
+    >>> round(found.mode("short period").natural_frequency.value, 3)
+    3.609
+    """
+    read = read_states(source, states or {})
+    pairs = eigenpairs(np.asarray(read.system.a), read.directions)
+    made = sorted((_mode(read, pair) for pair in pairs), key=_order)
+    return Modes(
+        read.name,
+        tuple(made),
+        read.system.sample_time_s,
+        read.reason,
+        tuple(_judge(made)),
+    )
+
+
+def _order(mode: Mode) -> tuple[float, float, str]:
+    """Slowest first; equal to rounding by name, so that every machine lists them alike."""
+    value = mode.eigenvalue
+    if value is None:
+        return math.inf, 0.0, mode.name
+    return float(f"{abs(value):.9g}"), float(f"{value.real:.9g}"), mode.name
+
+
+def _mode(read: StateMatrix, pair: Eigenpair) -> Mode:
+    step = read.system.sample_time_s
+    value, rate, lacking = _continuous(pair.value, step)
+    moves = None if pair.value_moves is None or value is None else rate * pair.value_moves
+    reason = lacking or read.reason or pair.reason
+    if moves is not None and not np.any(np.abs(moves) > 0.0):
+        moves, reason = None, UNFITTED
+    numbers = _Numbers(value, moves, reason)
+    parts = tuple(_participations(read, pair)) if read.physical else ()
+    return Mode(
+        value,
+        pair.value,
+        _named(read, pair, value),
+        numbers.real(),
+        numbers.imaginary(),
+        numbers.natural_frequency(),
+        numbers.damping_ratio(),
+        numbers.period(),
+        numbers.time_constant(),
+        *numbers.halving(),
+        parts,
+        numbers.covariance(),
+        lacking or pair.reason,
+    )
+
+
+def _continuous(root: complex, step: float | None) -> tuple[complex | None, complex, str]:
+    """Eigenvalue in rad/s, its derivative by the root, and why there is none."""
+    if step is None:
+        return root, 1.0, ""
+    if root == 0.0:
+        return None, 0.0, AT_ORIGIN
+    if not root.imag and root.real < 0.0:
+        return None, 0.0, NO_COUNTERPART
+    return cmath.log(root) / step, 1.0 / (root * step), ""
+
+
+def _named(read: StateMatrix, pair: Eigenpair, value: complex | None) -> NamedMode:
+    if read.physical:
+        return name_by_states(value, pair, read.states, read.units)
+    shown = np.abs(np.asarray(read.system.c) @ pair.vector)
+    seen = [
+        name
+        for name, size in zip(read.system.outputs, shown, strict=True)
+        if size > SEEN * np.max(shown, initial=0.0)
+    ]
+    return name_by_outputs(value, seen)
+
+
+def _participations(read: StateMatrix, pair: Eigenpair) -> Iterator[Participation]:
+    if pair.factors is None:
+        return
+    shares, share_errors = pair.shares, pair.share_errors
+    lead = int(np.argmax(shares))
+    shape, shape_errors = pair.shape(lead), pair.shape_errors(lead)
+    reason = read.reason or pair.reason
+    for place in np.argsort(-shares, kind="stable"):
+        unit = read.system.units.get(read.system.states[place], "1")
+        involved = abs(pair.factors[place]) > UNINVOLVED
+        share = _plain("share", float(shares[place]), "1", share_errors, place, reason)
+        size = _plain("size", float(abs(shape[place])), unit, shape_errors, place, reason)
+        yield Participation(
+            read.system.states[place],
+            unit,
+            complex(pair.factors[place]),
+            share if involved else Quantity("share", share.value, "1", None, "takes no part"),
+            size if place != lead else Quantity("size", 1.0, unit, None, "one by definition"),
+            float(np.angle(shape[place])),
+        )
+
+
+def _plain(
+    name: str, value: float, unit: str, errors: Array | None, place: int, reason: str
+) -> Quantity:
+    if errors is None:
+        return Quantity(name, value, unit, None, reason)
+    half = NORMAL_95 * float(errors[place])
+    if half == 0.0:
+        return Quantity(name, value, unit, None, UNFITTED)
+    return Quantity(name, value, unit, (value - half, value + half))
+
+
+class _Numbers:
+    """Quantities of one eigenvalue from its moves along the directions of the spread."""
+
+    def __init__(
+        self, value: complex | None, moves: NDArray[np.complex128] | None, reason: str
+    ) -> None:
+        self.value, self.moves, self.reason = value, moves, reason
+
+    def _made(self, name: str, unit: str, value: float | None, moves: Array | None) -> Quantity:
+        if value is None or moves is None:
+            return Quantity(name, value, unit, None, self.reason)
+        half = NORMAL_95 * float(np.sqrt(np.sum(moves**2)))
+        return Quantity(name, value, unit, (value - half, value + half))
+
+    def covariance(self) -> Array | None:
+        if self.moves is None:
+            return None
+        rows = np.array([self.moves.real, self.moves.imag])
+        return np.asarray(rows @ rows.T)
+
+    def real(self) -> Quantity:
+        value = None if self.value is None else self.value.real
+        return self._made("real", "rad/s", value, None if self.moves is None else self.moves.real)
+
+    def imaginary(self) -> Quantity:
+        if self.value is None:
+            return Quantity("imaginary", None, "rad/s", None, self.reason)
+        if not self.value.imag:
+            return Quantity("imaginary", 0.0, "rad/s", None, "real eigenvalue")
+        moves = None if self.moves is None else self.moves.imag
+        return self._made("imaginary", "rad/s", self.value.imag, moves)
+
+    def natural_frequency(self) -> Quantity:
+        name, unit = "natural frequency", "rad/s"
+        if self.value is None:
+            return Quantity(name, None, unit, None, self.reason)
+        size = abs(self.value)
+        if self.moves is None or size == 0.0:
+            return Quantity(name, size, unit, None, self.reason or "an integrator")
+        moves = np.real(np.conj(self.value) * self.moves) / size
+        if not self.value.imag and NORMAL_95 * np.sqrt(np.sum(moves**2)) >= size:
+            return Quantity(name, size, unit, None, UNSIGNED)
+        return self._made(name, unit, size, moves)
+
+    def damping_ratio(self) -> Quantity:
+        name = "damping ratio"
+        if self.value is None or self.value == 0.0:
+            reason = "an integrator has no damping" if self.value == 0.0 else self.reason
+            return Quantity(name, None, "1", None, reason)
+        size = abs(self.value)
+        ratio = -self.value.real / size
+        if not self.value.imag:
+            return Quantity(name, ratio, "1", None, "real eigenvalue")
+        if self.moves is None:
+            return Quantity(name, ratio, "1", None, self.reason)
+        grown = np.real(np.conj(self.value) * self.moves) / size
+        return self._made(
+            name, "1", ratio, -self.moves.real / size + self.value.real * grown / size**2
+        )
+
+    def period(self) -> Quantity:
+        return _turned("period", self.imaginary(), 2.0 * math.pi, "no oscillation")
+
+    def time_constant(self) -> Quantity:
+        return _turned("time constant", self.real(), -1.0, "no decay")
+
+    def halving(self) -> tuple[Quantity, Quantity]:
+        """Time to half and to double."""
+        rate = self.real()
+        decays = rate.value is not None and rate.value < 0.0
+        grows = rate.value is not None and rate.value > 0.0
+        half = _turned("time to half", rate, -math.log(2.0), "no decay")
+        double = _turned("time to double", rate, math.log(2.0), "no growth")
+        return (
+            half if decays else Quantity(half.name, None, "s", None, self.reason or "no decay"),
+            double if grows else Quantity(double.name, None, "s", None, self.reason or "no growth"),
+        )
+
+
+def _turned(name: str, rate: Quantity, factor: float, without: str) -> Quantity:
+    """A time from a rate, and its interval from the rate's, turned over."""
+    if not rate.value:
+        return Quantity(name, None, "s", None, rate.reason if rate.value is None else without)
+    value = factor / rate.value
+    if rate.interval95 is None:
+        return Quantity(name, value, "s", None, rate.reason)
+    low, high = rate.interval95
+    if low <= 0.0 <= high:
+        return Quantity(name, value, "s", None, UNSIGNED)
+    ends = sorted((factor / low, factor / high))
+    return Quantity(name, value, "s", (ends[0], ends[1]))
+
+
+def _judge(found: list[Mode]) -> Iterator[Finding]:
+    for mode in found:
+        if mode.eigenvalue is None and mode.reason == NO_COUNTERPART:
+            yield Finding(
+                "no-continuous-counterpart",
+                Light.AMBER,
+                f"the pole z = {mode.root.real:.4g} is real and negative: {NO_COUNTERPART}",
+                "lower the order, or take the model as it is, sampled",
+            )
+            continue
+        growing = mode.time_to_double
+        if growing.value is not None:
+            yield Finding(
+                "unstable-mode",
+                Light.AMBER,
+                f"{mode.name}: unstable, doubles in {growing.text}",
+                "close a loop around it before anything else",
+            )
+        if mode.real.interval95 is not None and mode.time_constant.reason == UNSIGNED:
+            yield Finding(
+                "stability-not-determined",
+                Light.AMBER,
+                f"{mode.name}: {UNSIGNED} ({mode.real.text})",
+                "longer records at low frequencies",
+            )

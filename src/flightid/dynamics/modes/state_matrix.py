@@ -1,0 +1,141 @@
+"""The state matrix of any linear model with its spread, and what its states are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flightid.errors import UnknownNameError
+from flightid.identification import Fit
+from flightid.identification.spread_of import spread_of
+from flightid.models import LinearSystem, StateSpaceModel
+from flightid.uncertainty.spread import Propagated
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class StateMatrix:
+    """The linear system of a source, with the spread of its matrix A.
+
+    Attributes
+    ----------
+    name : str
+        The model's.
+    system : LinearSystem
+    directions : ndarray, shape (k, n, n), or None
+        Independent moves of A of one standard error each; None where `reason` says why.
+    reason : str
+    physical : bool
+        Whether the states mean something: not those of a black box.
+    states : tuple of str
+        Their names, conventional where the user said so.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> read_states(fid.load_model("short_period"), {}).states
+    ('alpha', 'q')
+    """
+
+    name: str
+    system: LinearSystem
+    directions: Array | None
+    reason: str
+    physical: bool
+    states: tuple[str, ...]
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of each state by the name in `states`."""
+        kept = self.system.units
+        pairs = zip(self.system.states, self.states, strict=True)
+        return {new: kept.get(old, "1") for old, new in pairs}
+
+    def propagate(self, function: Callable[[Array], ArrayLike]) -> Propagated:
+        """Values and covariance of what is computed from A; see `Spread.propagate`.
+
+        Parameters
+        ----------
+        function : callable
+            From A (n, n) to k numbers; NaN for one that is not determined.
+        """
+        a = np.asarray(self.system.a)
+        values = np.atleast_1d(np.asarray(function(a), dtype=np.float64))
+        if self.directions is None:
+            return Propagated(values, None, self.reason)
+        ends = [
+            np.atleast_1d(np.asarray(function(a + move), dtype=np.float64))
+            - np.atleast_1d(np.asarray(function(a - move), dtype=np.float64))
+            for move in self.directions
+        ]
+        slopes = np.array(ends).reshape(len(ends), len(values)) / 2.0
+        return Propagated(values, slopes.T @ slopes)
+
+
+def read_states(source: object, states: Mapping[str, str]) -> StateMatrix:
+    """Take the state matrix of a fit, a model or a system.
+
+    Parameters
+    ----------
+    source : Fit, PolynomialFit, InnovationsFit, model or LinearSystem
+    states : mapping of str to str
+        Conventional name by the model's own name of a state.
+
+    Returns
+    -------
+    StateMatrix
+
+    Raises
+    ------
+    ModelError
+        There is no linear system in the source.
+    UnknownNameError
+        There is no such state.
+    """
+    system = LinearSystem.of(source)
+    model = getattr(source, "model", source)
+    for name in states:
+        if name not in system.states:
+            raise UnknownNameError(
+                "there is no such state", found=repr(name), needed=", ".join(system.states)
+            )
+    made_up = tuple(f"x{k + 1}" for k in range(system.order))
+    physical = isinstance(model, StateSpaceModel) or (
+        isinstance(model, LinearSystem) and system.states != made_up
+    )
+    directions, reason = _directions(source)
+    return StateMatrix(
+        getattr(model, "name", "linear system"),
+        system,
+        directions,
+        reason,
+        physical or bool(states),
+        tuple(states.get(name, name) for name in system.states),
+    )
+
+
+def _directions(source: object) -> tuple[Array | None, str]:
+    """Moves of A along independent directions of one standard error each, or why there are none."""
+    spread = spread_of(source)
+    if spread.covariance is None:
+        return None, spread.reason
+    if isinstance(source, Fit) and isinstance(source.model, StateSpaceModel):
+        return _exact_directions(source, source.model), ""
+    order = LinearSystem.of(source).order
+    slopes = spread.slopes(lambda model: np.asarray(LinearSystem.of(model).a).ravel())
+    return slopes.reshape(-1, order, order), ""
+
+
+def _exact_directions(fit: Fit, model: StateSpaceModel) -> Array:
+    """From dA = M⁻¹(dF − dM A), without differences."""
+    a, m, by_name = model.state_space()[0], model.matrices().m, model.matrix_derivatives()
+    slopes = np.array(
+        [np.linalg.solve(m, by_name[name].f - by_name[name].m @ a) for name in fit.names]
+    ).reshape(len(fit.names), *a.shape)
+    sizes, turned = np.linalg.eigh(np.asarray(fit.covariance))
+    factor = turned * np.sqrt(np.maximum(sizes, 0.0))
+    return np.asarray(np.einsum("pk,pst->kst", factor, slopes))

@@ -1,0 +1,1 @@
+"""What identified numbers say of a rotor."""

@@ -1,0 +1,113 @@
+"""Export to C: two files, written together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flightid.errors import ExportError, OptionError
+from flightid.export.c_source import CSource, Hold, equation_source, linear_source
+from flightid.export.exported import Exported
+from flightid.export.names import identifier
+from flightid.files import write_atomically
+from flightid.models import LinearSystem, StateSpaceModel
+
+
+def model_source(
+    model: object,
+    name: str,
+    stem: str,
+    *,
+    sample_time_s: float | None,
+    hold: Hold = "zero",
+    substeps: int | None = None,
+    tunable: bool = False,
+) -> CSource:
+    """C text of a model: equations where it is nonlinear or to be tuned, else exact samples.
+
+    Parameters
+    ----------
+    model : StateSpaceModel, LinearSystem or what `LinearSystem.of` takes
+    name, stem : str
+        Of the model, and of the files.
+    sample_time_s : float or None
+        Time of one step, s.
+    hold : {"zero", "first"}
+        What the inputs do between samples.
+    substeps : int, optional
+        Runge-Kutta steps in a sample.
+    tunable : bool
+        Whether the parameters can be changed in C.
+
+    Returns
+    -------
+    CSource
+
+    Raises
+    ------
+    OptionError
+        An unknown hold; a sample time that is missing; substeps of an exact discretisation.
+    ExportError
+        A model without equations cannot be tuned.
+    """
+    if hold not in ("zero", "first"):
+        raise OptionError("hold is not known", found=hold, needed="'zero' or 'first'")
+    equations = isinstance(model, StateSpaceModel) and (tunable or not model.is_linear)
+    if isinstance(model, StateSpaceModel) and equations:
+        return equation_source(model, name, stem, sample_time_s, hold, substeps)
+    if tunable:
+        raise ExportError(
+            "a model without equations has no parameters that code could change",
+            found=type(model).__name__,
+            needed="a StateSpaceModel",
+        )
+    if substeps is not None:
+        raise OptionError(
+            "a linear model has no substeps: its discretisation is exact", found=substeps
+        )
+    return linear_source(LinearSystem.of(model), name, stem, sample_time_s, hold)
+
+
+def export_c(
+    model: object,
+    path: Path,
+    name: str,
+    *,
+    sample_time_s: float | None = None,
+    hold: Hold = "zero",
+    substeps: int | None = None,
+    tunable: bool = False,
+) -> Exported:
+    """Write header and source; `model_source` says the options.
+
+    Returns
+    -------
+    Exported
+    """
+    stem = identifier(path.stem)
+    made = model_source(
+        model,
+        name,
+        stem,
+        sample_time_s=sample_time_s,
+        hold=hold,
+        substeps=substeps,
+        tunable=tunable,
+    )
+    if path.stem != stem:
+        raise OptionError(
+            "a C file has a name that its header cannot carry",
+            found=path.name,
+            needed=f"letters, digits and underscores, such as {stem}.c",
+        )
+    # The source names the header: it comes first, so that no source is seen without its header.
+    header = write_atomically(path.with_suffix(".h"), made.header)
+    source = write_atomically(path.with_suffix(".c"), made.source)
+    facts = {
+        "prefix": made.prefix,
+        "step": f"{made.sample_time_s:g} s",
+        "method": made.method,
+        "size": f"{len(made.states)} states, {len(made.inputs)} inputs, "
+        f"{len(made.outputs)} outputs, {len(made.parameters)} parameters",
+        "build": f"cc -std=c99 -O2 -c {source.name}",
+    }
+    return Exported("c", (source, header), facts)

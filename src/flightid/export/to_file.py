@@ -1,0 +1,205 @@
+"""Models to files of other tools: one verb, the format by the file's suffix."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from flightid.conventions import Light
+from flightid.errors import ExportError, OptionError
+from flightid.export.c import export_c
+from flightid.export.exported import Exported
+from flightid.export.fmu import export_fmu
+from flightid.export.jsbsim import export_jsbsim
+from flightid.findings import Finding
+from flightid.identification import Fit, NarxFit
+from flightid.models import (
+    InnovationsModel,
+    LinearSystem,
+    NarxEquation,
+    PolynomialModel,
+    StateSpaceModel,
+    TransferFunctionModel,
+    write_model,
+    write_system,
+)
+from flightid.models.linear.system_files import MATLAB_RECIPE
+
+FORMATS = {
+    ".toml": "toml",
+    ".mat": "mat",
+    ".json": "json",
+    ".npz": "npz",
+    ".c": "c",
+    ".h": "c",
+    ".fmu": "fmu",
+    ".xml": "jsbsim",
+}
+
+_WRITERS: Mapping[str, Callable[..., Exported]] = {
+    "c": export_c,
+    "fmu": export_fmu,
+    "jsbsim": export_jsbsim,
+}
+
+
+def export(
+    source: object,
+    path: str | Path,
+    format: str | None = None,
+    *,
+    name: str | None = None,
+    **options: object,
+) -> Exported:
+    """Write a model to a file of another tool, whole or not at all.
+
+    Parameters
+    ----------
+    source : a fit, a model or a LinearSystem
+        A fit gives its model; what a format can hold of its uncertainty goes along.
+    path : str or Path
+        File to write; its folder must exist.
+    format : str, optional
+        ``"toml"`` (flightid's own), ``"mat"``, ``"json"``, ``"npz"`` (matrices), ``"c"``
+        (portable C99, two files), ``"fmu"`` (FMI 3.0) or ``"jsbsim"`` (aerodynamics in .xml).
+        Left out: by the suffix.
+    name : str, optional
+        Of the model in the file; left out: the file's name.
+    **options
+        Of the format. C: ``sample_time_s``, ``hold`` ("zero" or "first"), ``substeps``,
+        ``tunable`` (equations with parameters to change, instead of exact samples). FMU:
+        ``sample_time_s`` (the internal step), ``interfaces`` (of "model-exchange" and
+        "co-simulation"), ``pade_order`` (for delays in model exchange), ``substeps``,
+        ``compile`` (False: sources alone). JSBSim: ``mass_kg``, ``inertia_kg_m2``, ``trim``,
+        ``properties``.
+
+    Returns
+    -------
+    Exported
+        The files, how they are used, and what the format could not carry.
+
+    Raises
+    ------
+    OptionError
+        An unknown format or option.
+    ExportError
+        The model has no counterpart in the format.
+    ModelError
+        The source is no model, or contradicts the options.
+    OSError
+        The file cannot be written.
+
+    Reference
+    ---------
+    ISO/IEC 9899:1999 (C99); Modelica Association, *Functional Mock-up Interface Specification*,
+    version 3.0.2.
+
+    Example
+    -------
+    >>> import tempfile
+    >>> import flightid as fid
+    >>> roll = fid.load_model("rate_first_order").with_values({"Lp": -5.0, "Ltphi": 150.0})
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     export(roll, f"{folder}/roll.c", sample_time_s=1 / 400)
+    Exported(c: roll.c, roll.h)
+    """
+    place = Path(path)
+    chosen = format or FORMATS.get(place.suffix.lower(), "")
+    if chosen not in FORMATS.values():
+        known = ", ".join(f"{kind} ({suffix})" for suffix, kind in FORMATS.items())
+        raise OptionError("format of an export is not known", found=format or place.name,
+                          needed=f"one of {known}")  # fmt: skip
+    model = model_of(source)
+    if chosen in _WRITERS:
+        return _called(_WRITERS[chosen], model, place, name or place.stem, options=options)
+    if options:
+        raise OptionError(f"format {chosen} has no such options", found=", ".join(options))
+    return _toml(model, place) if chosen == "toml" else _matrices(source, model, place, chosen)
+
+
+def model_of(source: object) -> object:
+    """The model of a fit, or the source itself."""
+    if isinstance(source, NarxFit):
+        return source.equation
+    model = getattr(source, "model", None)
+    return source if model is None or isinstance(source, NarxEquation) else model
+
+
+def _called(
+    function: Callable[..., Exported], *arguments: object, options: Mapping[str, object]
+) -> Exported:
+    """The writer of a format with its options, which are checked by name."""
+    known = set(function.__kwdefaults__ or {})
+    unknown = set(options) - known
+    if unknown:
+        raise OptionError(
+            "the format has no such option",
+            found=", ".join(sorted(unknown)),
+            needed=", ".join(sorted(known)),
+        )
+    return function(*arguments, **options)
+
+
+def _toml(model: object, path: Path) -> Exported:
+    known = (
+        TransferFunctionModel | StateSpaceModel | PolynomialModel | InnovationsModel | NarxEquation
+    )
+    if not isinstance(model, known | LinearSystem):
+        raise ExportError(
+            "this is no model that a file could hold", found=type(model).__name__, needed="a model"
+        )
+    if path.suffix != ".toml":
+        raise OptionError("a TOML file ends in .toml", found=path.name)
+    write_model(model, path)
+    return Exported("toml", (path,), {"read": f"flightid.load_model({path.name!r})"})
+
+
+def _matrices(source: object, model: object, path: Path, format: str) -> Exported:
+    if isinstance(model, NarxEquation):
+        raise ExportError("a NARX equation has no matrices", needed="toml")
+    if path.suffix.lower() != f".{format}":
+        raise OptionError("the suffix is not that of the format", found=path.name, needed=format)
+    system = LinearSystem.of(model)
+    write_system(system, path, _parameters(source))
+    facts = {"read": f"flightid.read_system({path.name!r})"}
+    if format == "mat":
+        lines = [line.format(name=path.name.replace("'", "''")) for line in MATLAB_RECIPE]
+        facts["in MATLAB"] = "\n".join(lines)
+    findings = []
+    if isinstance(model, StateSpaceModel) and not model.is_linear:
+        findings.append(
+            Finding(
+                "linearised",
+                Light.AMBER,
+                "matrices hold the linearisation at the trim; what is nonlinear is left out",
+                "export the equations as toml, c or fmu",
+            )
+        )
+    return Exported(format, (path,), facts, tuple(findings))
+
+
+def _parameters(source: object) -> dict[str, object]:
+    """Names, values, units, standard errors and covariance, as far as they are known."""
+    if isinstance(source, Fit):
+        items = list(source.parameters.values())
+        found: dict[str, object] = {
+            "names": [item.name for item in items],
+            "values": [item.value for item in items],
+            "units": [item.unit for item in items],
+            "stderr": [item.stderr for item in items],
+            "free": list(source.names),
+        }
+        if source.covariance is not None:
+            found["covariance"] = np.asarray(source.covariance)
+        return found
+    model = model_of(source)
+    if isinstance(model, TransferFunctionModel | StateSpaceModel):
+        free = model.parameters.independent
+        return {
+            "names": [item.name for item in free],
+            "values": [float(value) for value in model.parameters.independent_values()],
+            "units": [item.unit for item in free],
+        }
+    return {}

@@ -1,0 +1,1 @@
+"""What records can support before a structure is chosen."""

@@ -1,0 +1,302 @@
+"""Advice before a fit: what the records can support, and what to do about what they cannot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import toeplitz
+
+from flightid.conventions import Light
+from flightid.errors import DataError, OptionError
+from flightid.findings import Finding
+from flightid.identification.advice.impulse_response import ImpulseResponse, impulse_response
+from flightid.models.polynomial.data import PolynomialData, gather_channels
+from flightid.record import Record
+from flightid.table import Column, Table
+
+Array = NDArray[np.float64]
+LARGEST_ORDER = 50
+SMALLEST_SHARE = 1e-6
+POOR_ORDER = 10
+ALIKE, RELATED = 0.95, 0.5
+SLOW = 0.999
+FEEDBACK_P = 0.01
+FEEDBACK_LAGS = 10
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Advice:
+    """Result of `flightid.advise`.
+
+    Attributes
+    ----------
+    output : str
+    inputs : tuple of str
+    n_samples, n_records : int
+    excitation_orders : mapping of str to int
+        Order of persistent excitation of each input, at most 50: how many coefficients of B and A
+        together it can tell apart.
+    response : ImpulseResponse or None
+        With the delays and the test for feedback; None where the records are too short for it.
+    findings : tuple of Finding
+
+    Example
+    -------
+    >>> Advice("y", ("u",), 500, 1, {"u": 2}, None, ())
+    Advice('y' from u, 500 samples in 1 record, excitation order 2)
+    """
+
+    output: str
+    inputs: tuple[str, ...]
+    n_samples: int
+    n_records: int
+    excitation_orders: Mapping[str, int]
+    response: ImpulseResponse | None
+    findings: tuple[Finding, ...] = field(default=())
+
+    @property
+    def delays(self) -> dict[str, int | None]:
+        """Samples until each input acts, where they could be estimated."""
+        return {} if self.response is None else dict(self.response.delays)
+
+    def summary(self) -> Table:
+        """Table by input, with the findings below."""
+        columns = (
+            Column("input"),
+            Column("excitation order"),
+            Column("delay", "samples"),
+            Column("feedback p", digits=3),
+        )
+        p = {} if self.response is None else self.response.feedback_p
+        rows = tuple(
+            (name, self.excitation_orders[name], self.delays.get(name), p.get(name))
+            for name in self.inputs
+        )
+        return Table(repr(self), columns, rows, tuple(map(str, self.findings)))
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key."""
+        return {
+            "schema": "flightid.advice/1",
+            "output": self.output,
+            "inputs": list(self.inputs),
+            "n_samples": self.n_samples,
+            "n_records": self.n_records,
+            "excitation_orders": dict(self.excitation_orders),
+            "response": None if self.response is None else self.response.to_dict(),
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def __repr__(self) -> str:
+        """Channels, size and the poorest excitation on one line."""
+        records = f"{self.n_records} record{'' if self.n_records == 1 else 's'}"
+        least = min(self.excitation_orders.values(), default=0)
+        return (
+            f"Advice({self.output!r} from {', '.join(self.inputs)}, {self.n_samples} samples in "
+            f"{records}, excitation order {least})"
+        )
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()
+
+
+def advise(
+    records: Record | Sequence[Record],
+    *,
+    output: str | None = None,
+    inputs: Sequence[str] | None = None,
+    n_lags: int = 40,
+) -> Advice:
+    """Judge records before a black-box fit: excitation, delay, feedback, sampling, offsets.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+    output : str, optional
+        Default: the only output.
+    inputs : sequence of str, optional
+        Default: all inputs.
+    n_lags : int
+        Lags of the pulse response behind delay and feedback.
+
+    Returns
+    -------
+    Advice
+
+    Raises
+    ------
+    OptionError
+        An output that is not said.
+    DataError
+        No record, constant channels, or sample times that differ.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., definition 13.2 (persistence of excitation), section
+    14.4 (feedback), section 13.7 (sampling interval).
+
+    Example
+    -------
+    >>> u = np.sin(0.3 * np.arange(600))
+    >>> y = np.convolve(u, [0.0, 0.5, 0.3])[:600]
+    >>> record = Record.from_arrays(np.arange(600) / 20, inputs={"u": u}, outputs={"y": y})
+    >>> advise(record).findings[0].code
+    'poor-excitation'
+    """
+    listed = [records] if isinstance(records, Record) else list(records)
+    if not listed:
+        raise DataError("there is no record", needed="one or more")
+    if output is None and len(listed[0].outputs) != 1:
+        raise OptionError(
+            "the output is not said", found=", ".join(listed[0].outputs), needed="output='…'"
+        )
+    name = listed[0].outputs[0] if output is None else output
+    names = tuple(listed[0].inputs if inputs is None else inputs)
+    data = gather_channels(listed, name, names, "mean")
+    data.require_change()
+    orders = {
+        each: excitation_order(row, data) for each, row in zip(names, data.inputs, strict=True)
+    }
+    response = None
+    reason = ""
+    try:
+        response = impulse_response(
+            listed, output=name, inputs=names, n_lags=n_lags, negative_lags=FEEDBACK_LAGS
+        )
+    except DataError as error:
+        reason = str(error)
+    findings = (
+        *_excitation(orders),
+        *_related(names, data),
+        *_responses(response, reason),
+        *_sampling(name, data),
+        *_levels(names, data),
+    )
+    return Advice(name, names, data.output.size, len(listed), orders, response, findings)
+
+
+def excitation_order(row: Array, data: PolynomialData) -> int:
+    """Order of persistent excitation: rank of the covariance of as many successive samples."""
+    size = min(LARGEST_ORDER, min(data.lengths) // 4)
+    sums = np.zeros(size)
+    for span in data.spans:
+        part = row[span] - row[span].mean()
+        for lag in range(size):
+            sums[lag] += part[lag:] @ part[: part.size - lag]
+    values = np.linalg.eigvalsh(toeplitz(sums / row.size))
+    # A record's end leaks a share of 1/N into directions that the input itself does not excite.
+    floor = max(SMALLEST_SHARE, 4.0 / row.size)
+    return int(np.sum(values > floor * values[-1]))
+
+
+def _excitation(orders: Mapping[str, int]) -> list[Finding]:
+    found = []
+    for name, order in orders.items():
+        if order < POOR_ORDER:
+            light = Light.RED if order < 4 else Light.AMBER
+            found.append(
+                Finding(
+                    "poor-excitation",
+                    light,
+                    f"input {name!r} is persistently exciting of order {order} only",
+                    f"fit at most {order} coefficients, or fly a sweep, multisine or PRBS",
+                )
+            )
+    return found
+
+
+def _related(names: Sequence[str], data: PolynomialData) -> list[Finding]:
+    found = []
+    matrix = np.atleast_2d(np.corrcoef(data.inputs))
+    for i in range(len(names)):
+        for j in range(i):
+            size = abs(float(matrix[i, j]))
+            if size > RELATED:
+                light = Light.RED if size > ALIKE else Light.AMBER
+                found.append(
+                    Finding(
+                        "related-inputs",
+                        light,
+                        f"inputs {names[j]!r} and {names[i]!r} are correlated, {size:.2f}",
+                        "excite one at a time, or with different sequences",
+                    )
+                )
+    return found
+
+
+def _responses(response: ImpulseResponse | None, reason: str) -> list[Finding]:
+    if response is None:
+        return [
+            Finding(
+                "no-pulse-response",
+                Light.AMBER,
+                f"delay and feedback are not judged: {reason}",
+                "use a richer input or longer records, or give fewer lags",
+            )
+        ]
+    found = []
+    for name, delay in response.delays.items():
+        if delay is None:
+            found.append(
+                Finding(
+                    "no-response",
+                    Light.RED,
+                    f"no response of {response.output!r} to {name!r} stands out of the noise",
+                    "leave this input out, or excite it more",
+                )
+            )
+        else:
+            found.append(
+                Finding(
+                    "delay",
+                    Light.GREEN,
+                    f"{response.output!r} answers {name!r} after {delay} samples "
+                    f"({delay * response.sample_time_s:.4g} s): nk = {delay}",
+                )
+            )
+    for name, p in response.feedback_p.items():
+        if p < FEEDBACK_P:
+            found.append(
+                Finding(
+                    "feedback",
+                    Light.AMBER,
+                    f"{name!r} answers {response.output!r} (p = {p:.2g}): a loop was closed",
+                    "fit a noise model (ARMAX, BJ); do not use OE, IV4 or the pulse response",
+                )
+            )
+    return found
+
+
+def _sampling(name: str, data: PolynomialData) -> list[Finding]:
+    pairs = [(data.output[s][1:], data.output[s][:-1]) for s in data.spans]
+    size = sum(float(a @ a + b @ b) / 2 for a, b in pairs)
+    share = sum(float(a @ b) for a, b in pairs) / size
+    if share <= SLOW:
+        return []
+    return [
+        Finding(
+            "sampled-fast",
+            Light.AMBER,
+            f"successive samples of {name!r} differ little (correlation {share:.5f}): discrete "
+            "poles crowd at one",
+            "resample to about ten times the bandwidth (conditioning.resample)",
+        )
+    ]
+
+
+def _levels(names: Sequence[str], data: PolynomialData) -> list[Finding]:
+    found = []
+    for name, row in zip(names, data.inputs, strict=True):
+        if all(np.unique(np.round(row[s], 12)).size == 2 for s in data.spans):
+            found.append(
+                Finding(
+                    "two-levels",
+                    Light.GREEN,
+                    f"input {name!r} has two levels: residual tests cannot see even nonlinearity",
+                    "add a record with more levels to see it",
+                )
+            )
+    return found

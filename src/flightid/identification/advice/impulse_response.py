@@ -1,0 +1,323 @@
+"""Pulse and step responses with intervals, straight from records, no order assumed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+from scipy.stats import chi2, norm
+
+from flightid.errors import DataError, OptionError
+from flightid.identification.prediction_error.kernel_regression import kernel_estimate
+from flightid.identification.prediction_error.linear_regression import Regression, regress
+from flightid.models.polynomial.data import PolynomialData, gather_channels
+from flightid.models.polynomial.structure import KERNELS
+from flightid.record import Record
+from flightid.table import Column, Table
+
+Array = NDArray[np.float64]
+LEVEL = 0.95
+WHITENER = 20
+SAMPLES_PER_COEFFICIENT = 3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ImpulseResponse:
+    """Response of one output to a pulse of one sample on each input.
+
+    Attributes
+    ----------
+    output : str
+    inputs : tuple of str
+    lags : ndarray of int, shape (n_lags,)
+        Samples after the pulse; negative ones are the response before it, which only feedback has.
+    values : ndarray, shape (n_inputs, n_lags)
+        In the output's unit per the input's.
+    covariance : ndarray, shape (n_inputs, n_lags, n_lags)
+    sample_time_s : float
+    kernel : str or None
+        Regularisation.
+    n_samples : int
+        Samples that were fitted.
+    delays : mapping of str to int or None
+        First lag from 0 on that chance does not explain, by input; None where no lag stands out.
+    feedback_p : mapping of str to float
+        Chance of so large a response before the pulse without feedback, by input.
+    units : mapping of str to str
+
+    Example
+    -------
+    >>> ImpulseResponse.__name__
+    'ImpulseResponse'
+    """
+
+    output: str
+    inputs: tuple[str, ...]
+    lags: NDArray[np.int64]
+    values: Array
+    covariance: Array
+    sample_time_s: float
+    kernel: str | None
+    n_samples: int
+    delays: Mapping[str, int | None]
+    feedback_p: Mapping[str, float]
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def time_s(self) -> Array:
+        """Lags in seconds, shape (n_lags,)."""
+        return np.asarray(self.lags * self.sample_time_s)
+
+    @property
+    def stderr(self) -> Array:
+        """Standard errors of `values`, shape (n_inputs, n_lags)."""
+        return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
+
+    def step(self) -> tuple[Array, Array]:
+        """Step response from lag 0 on and its standard errors, shapes (n_inputs, n_lags ≥ 0)."""
+        causal = self.lags >= 0
+        total = np.tril(np.ones((int(np.sum(causal)),) * 2))
+        values = self.values[:, causal] @ total.T
+        parts = self.covariance[:, causal][:, :, causal]
+        variance = np.diagonal(total @ parts @ total.T, axis1=1, axis2=2)
+        return values, np.sqrt(np.maximum(variance, 0.0))
+
+    def summary(self) -> Table:
+        """Table by input: delay, largest response, final step value, feedback."""
+        columns = (
+            Column("input"),
+            Column("delay", "samples"),
+            Column("delay", "s"),
+            Column("largest"),
+            Column("at", "s"),
+            Column("step at the end"),
+            Column("± step"),
+            Column("feedback p", digits=3),
+        )
+        steps, errors = self.step()
+        rows = []
+        for i, name in enumerate(self.inputs):
+            delay = self.delays[name]
+            peak = int(np.argmax(np.abs(self.values[i])))
+            rows.append(
+                (
+                    name,
+                    delay,
+                    None if delay is None else delay * self.sample_time_s,
+                    float(self.values[i, peak]),
+                    float(self.time_s[peak]),
+                    float(steps[i, -1]),
+                    float(1.96 * errors[i, -1]),
+                    self.feedback_p.get(name),
+                )
+            )
+        return Table(
+            repr(self), columns, tuple(rows), ("delay: first lag that chance does not explain",)
+        )
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key."""
+        return {
+            "schema": "flightid.impulse_response/1",
+            "output": self.output,
+            "inputs": list(self.inputs),
+            "sample_time_s": self.sample_time_s,
+            "lags": self.lags.tolist(),
+            "values": self.values.tolist(),
+            "stderr": self.stderr.tolist(),
+            "kernel": self.kernel,
+            "n_samples": self.n_samples,
+            "delays": dict(self.delays),
+            "feedback_p": dict(self.feedback_p),
+        }
+
+    def __repr__(self) -> str:
+        """Channels, lags and delays on one line."""
+        found = ", ".join(f"{name} delay {delay}" for name, delay in self.delays.items())
+        return f"ImpulseResponse({self.output!r}, {self.lags.size} lags, {found})"
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()
+
+
+def impulse_response(
+    records: Record | Sequence[Record],
+    *,
+    output: str | None = None,
+    inputs: Sequence[str] | None = None,
+    n_lags: int = 40,
+    negative_lags: int = 0,
+    kernel: str | None = None,
+    offsets: str = "mean",
+) -> ImpulseResponse:
+    """Estimate pulse responses from all inputs to one output, with their covariance.
+
+    Least squares on the lagged inputs; what it leaves gives a noise model that whitens everything,
+    and least squares again, so that intervals hold for coloured noise.
+
+    Parameters
+    ----------
+    records : Record or sequence of Record
+    output : str, optional
+        Default: the only output.
+    inputs : sequence of str, optional
+        Default: all inputs.
+    n_lags : int
+        Lags from 0 on; the response should have died out by then.
+    negative_lags : int
+        Lags before 0, for the test for feedback.
+    kernel : {"tc", "dc"}, optional
+        Decaying prior for few or poor data; not with negative lags.
+    offsets : {"mean", "trim", "none"}
+
+    Returns
+    -------
+    ImpulseResponse
+
+    Raises
+    ------
+    OptionError
+        Lags or kernel outside their range; an output that is not said.
+    DataError
+        Too few samples, constant or collinear channels.
+
+    Assumes
+    -------
+    A linear vehicle whose response ends within the lags. Biased when it does not, and under
+    feedback.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., section 6.1 and eq. 8.73; Pillonetto et al. (2014),
+    Automatica 50.
+
+    Example
+    -------
+    >>> u = np.random.default_rng(0).standard_normal(800)
+    >>> y = lfilter([0.0, 0.0, 0.0, 1.0], [1.0, -0.7], u)
+    >>> y += 0.1 * np.random.default_rng(1).standard_normal(800)
+    >>> record = Record.from_arrays(np.arange(800) / 50, inputs={"u": u}, outputs={"y": y})
+    >>> impulse_response(record).delays
+    {'u': 3}
+    """
+    listed = [records] if isinstance(records, Record) else list(records)
+    if not listed:
+        raise DataError("there is no record", needed="one or more")
+    if output is None and len(listed[0].outputs) != 1:
+        raise OptionError(
+            "the output is not said", found=", ".join(listed[0].outputs), needed="output='…'"
+        )
+    name = listed[0].outputs[0] if output is None else output
+    names = tuple(listed[0].inputs if inputs is None else inputs)
+    _require(names, n_lags, negative_lags, kernel)
+    data = _shifted(gather_channels(listed, name, names, offsets), negative_lags)
+    data.require_change()
+    n = n_lags + negative_lags
+    needed = SAMPLES_PER_COEFFICIENT * n * len(names)
+    room = sum(max(0, length - n - WHITENER) for length in data.lengths)
+    if room < needed or min(data.lengths) <= n + WHITENER:
+        raise DataError(
+            "too few samples for the lags",
+            found=f"{room} after the first {n + WHITENER} of each record",
+            needed=f"at least {needed}",
+            action="give longer records or fewer lags",
+        )
+    theta, covariance, rows = _estimate(data, n, kernel)
+    lags = np.arange(-negative_lags, n_lags)
+    parts = [slice(i * n, (i + 1) * n) for i in range(len(names))]
+    values = np.array([theta[part] for part in parts])
+    blocks = np.array([covariance[part, part] for part in parts])
+    return ImpulseResponse(
+        name,
+        names,
+        lags,
+        values,
+        blocks,
+        data.sample_time_s,
+        kernel,
+        rows,
+        {name: _delay(lags, v, c) for name, v, c in zip(names, values, blocks, strict=True)},
+        {
+            name: _feedback(v[:negative_lags], c[:negative_lags, :negative_lags])
+            for name, v, c in zip(names, values, blocks, strict=True)
+            if negative_lags
+        },
+        data.units,
+    )
+
+
+def _require(names: tuple[str, ...], n_lags: int, negative_lags: int, kernel: str | None) -> None:
+    if not names:
+        raise OptionError("there is no input", needed="one or more")
+    if n_lags < 1 or negative_lags < 0:
+        raise OptionError(
+            "lags are outside their range",
+            found=f"n_lags {n_lags}, negative_lags {negative_lags}",
+            needed="n_lags from 1, negative_lags from 0",
+        )
+    if kernel not in (None, *KERNELS):
+        raise OptionError("unknown kernel", found=kernel, needed=", ".join(KERNELS))
+    if kernel and negative_lags:
+        raise OptionError("a decaying prior has no lags before the pulse", needed="kernel=None")
+
+
+def _shifted(data: PolynomialData, negative: int) -> PolynomialData:
+    """Inputs `negative` samples early, so that lag 0 of the regression is lag -negative."""
+    if negative == 0:
+        return data
+    keep = [slice(span.start, span.stop - negative) for span in data.spans]
+    late = [slice(span.start + negative, span.stop) for span in data.spans]
+    output = np.concatenate([data.output[span] for span in keep])
+    inputs = np.concatenate([data.inputs[:, span] for span in late], axis=1)
+    lengths = tuple(length - negative for length in data.lengths)
+    return PolynomialData(output, inputs, lengths, data.offsets, data.units, data.sample_time_s)
+
+
+def _fir(output: Array, inputs: Array, lengths: Sequence[int], n: int, skip: int) -> Regression:
+    count = len(inputs)
+    return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip)
+
+
+def _estimate(data: PolynomialData, n: int, kernel: str | None) -> tuple[Array, Array, int]:
+    first = _fir(data.output, data.inputs, data.lengths, n, n - 1)
+    left = np.array(data.output)
+    for i, row in enumerate(data.inputs):
+        for span in data.spans:
+            left[span] -= lfilter(first.shortest[i * n : (i + 1) * n], [1.0], row[span])
+    inside = np.concatenate([left[span][n - 1 :] for span in data.spans])
+    lengths = [length - n + 1 for length in data.lengths]
+    noise = regress(inside, np.empty((0, inside.size)), lengths, WHITENER, [], []).shortest
+    whitener = np.concatenate([[1.0], noise])
+    signals = np.vstack([data.output, data.inputs])
+    for span in data.spans:
+        signals[:, span] = lfilter(whitener, [1.0], signals[:, span])
+    final = _fir(signals[0], signals[1:], data.lengths, n, n - 1 + WHITENER)
+    if final.dependent is not None:
+        raise DataError(
+            "the inputs do not determine the response at every lag",
+            found=f"{n} lags of {len(data.inputs)} inputs",
+            action="use fewer lags or a richer input",
+        )
+    if kernel is not None:
+        smooth = kernel_estimate(final, [n] * len(data.inputs), kernel)
+        return smooth.theta, smooth.covariance, final.n_rows
+    variance = final.sum_of_squares / (final.n_rows - final.theta.size)
+    inverse = np.linalg.inv(final.factor)
+    return final.theta, np.asarray(variance * inverse @ inverse.T), final.n_rows
+
+
+def _delay(lags: NDArray[np.int64], values: Array, covariance: Array) -> int | None:
+    """First causal lag outside a band that holds all of them in 95 % of cases without response."""
+    causal = lags >= 0
+    errors = np.sqrt(np.maximum(np.diag(covariance)[causal], 0.0))
+    limit = norm.ppf(0.5 + 0.5 * LEVEL ** (1.0 / int(np.sum(causal))))
+    outside = np.abs(values[causal]) > limit * errors
+    return int(np.argmax(outside)) if np.any(outside) else None
+
+
+def _feedback(values: Array, covariance: Array) -> float:
+    statistic = float(values @ np.linalg.solve(covariance, values))
+    return float(chi2.sf(statistic, values.size))

@@ -1,0 +1,1 @@
+"""Filter error: a steady Kalman filter with estimated process noise."""

@@ -1,0 +1,294 @@
+"""Filter error: maximum likelihood of records in turbulence, by innovations of a Kalman filter.
+
+Process noise drives chosen states; its densities and the deviations of the measurement noise are
+estimated beside the parameters. Measurement variances are exponentials of what is estimated, so
+they are positive and no constraint on the innovations' covariance is needed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid import _native
+from flightid.conditioning.smoothing import fourier_smooth
+from flightid.conventions import Light
+from flightid.errors import UnknownNameError
+from flightid.findings import Finding
+from flightid.identification.filter_error.innovations import (
+    FilteredData,
+    InnovationsProblem,
+    RecordInnovations,
+)
+from flightid.identification.fit import Fit, FittedParameter
+from flightid.identification.fitted_record import FittedRecord
+from flightid.identification.multistart import DenseEnd, cluster, collect, draw_starts
+from flightid.identification.regression.fit import (
+    Inner,
+    Knowledge,
+    assemble,
+    check_records,
+    limits_of,
+    require_seen,
+)
+from flightid.identification.regression.options import FilterErrorOptions
+from flightid.models import StateSpaceModel
+from flightid.record import Record, Step
+from flightid.uncertainty.cramer_rao import inverse_hessian
+
+Array = NDArray[np.float64]
+PROCESS_REACH = 12.0
+MEASUREMENT_REACH = 8.0
+"""Logarithms by which noises may differ from their first guess."""
+_FIRST_SHARE = 0.1
+_FLOOR = 1e-6
+_QUARTER_RATE = 0.25
+
+
+@dataclass(frozen=True)
+class _Noise:
+    """Absolute noises at the estimate."""
+
+    process: Mapping[str, float]
+    measurement: Array
+    innovation: Array
+
+
+def fit_filter_error(
+    model: StateSpaceModel, data: Record | Sequence[Record], options: FilterErrorOptions
+) -> Fit:
+    """Fit in process noise; see `flightid.identify`."""
+    records = check_records(model, data)
+    problem = _problem(model, records, options)
+    groups = cluster(_search(problem, options))
+    end = groups[0][0]
+    inner = Inner.of(model, end.x[: problem.n_free])
+    filtered = [found for found, _ in problem.records(end.x, with_slopes=False)]
+    freedom = _freedom(problem, filtered)
+    bounded = _noise_at_bound(problem, end)
+    columns = np.concatenate([inner.mask, ~bounded])
+    jacobian = end.jacobian[:, columns] / np.sqrt(end.cost / freedom)
+    require_seen(inner, jacobian[:, : len(inner.names)])
+    # Twice the inverse Hessian of Σ r², which is the inverse of Fisher's information.
+    covariance = 2.0 * inverse_hessian(jacobian)
+    count = len(inner.names)
+    known = Knowledge(
+        jacobian[:, :count], covariance[:count, :count], np.full(count, freedom), "innovations"
+    )
+    noise = _noises(problem, end, filtered)
+    return assemble(
+        "filter error",
+        inner,
+        [[replace(each, x=each.x[: problem.n_free]) for each in group] for group in groups],
+        known,
+        _costs(records, filtered, model.outputs),
+        records,
+        _fitted_records(problem, records, filtered),
+        options,
+        findings=_judge(problem, bounded),
+        extra={
+            "process_noise": dict(noise.process),
+            "innovation_covariance": noise.innovation.tolist(),
+        },
+        noise_covariance=noise.measurement,
+    )
+
+
+def _problem(
+    model: StateSpaceModel, records: Sequence[Record], options: FilterErrorOptions
+) -> InnovationsProblem:
+    data = tuple(
+        FilteredData(
+            record.matrix(model.inputs), record.matrix(model.outputs), record.sample_time_s
+        )
+        for record in records
+    )
+    p, n = len(model.outputs), len(model.states)
+    blank = InnovationsProblem(
+        model,
+        data,
+        (),
+        np.zeros(0),
+        np.ones(p),
+        options.free_bias,
+        options.free_reference,
+        options.hold,
+    )
+    start, _ = limits_of(model, options.maximum_iterations)
+    point, slopes = blank.points(np.concatenate([start, np.zeros(p - 1)]))
+    if options.process_noise is None:
+        moved = [np.any(slope.a, axis=1) | np.any(slope.b, axis=1) for slope in slopes]
+        noisy = tuple(map(int, np.flatnonzero(np.any(moved, axis=0)))) or tuple(range(n))
+    else:
+        noisy = _places(options.process_noise, list(model.states))
+    spread = np.sqrt(np.mean([np.var(each.outputs, axis=1) for each in data], axis=0))
+    level = np.sqrt(np.mean([_levels(each) ** 2 for each in data], axis=0))
+    reach = np.abs(np.linalg.pinv(point.c)) @ spread
+    reach = np.where(reach > 0.0, reach, reach.mean() or 1.0)
+    return replace(
+        blank,
+        noisy=noisy,
+        process_scale=_FIRST_SHARE * reach[list(noisy)],
+        output_scale=np.maximum(level, _FLOOR * spread + 1e-300),
+    )
+
+
+def _places(names: Sequence[str], states: list[str]) -> tuple[int, ...]:
+    for name in names:
+        if name not in states:
+            raise UnknownNameError(
+                "process_noise names an unknown state", found=repr(name), needed=", ".join(states)
+            )
+    return tuple(sorted({states.index(name) for name in names}))
+
+
+def _levels(data: FilteredData) -> Array:
+    """Deviation of each output's white noise."""
+    cutoff = _QUARTER_RATE / data.sample_time_s
+    rows = [fourier_smooth(row, data.sample_time_s, cutoff_hz=cutoff) for row in data.outputs]
+    return np.array([row.noise for row in rows])
+
+
+class _LastPoint:
+    """Residuals and Jacobian, computed once where both are asked for at one point."""
+
+    def __init__(self, problem: InnovationsProblem) -> None:
+        self._problem = problem
+        self._x = np.empty(0)
+        self._found = (np.empty(0), np.empty((0, 0)))
+
+    def residuals(self, x: Array) -> Array:
+        return self._at(x)[0]
+
+    def jacobian(self, x: Array) -> Array:
+        return self._at(x)[1]
+
+    def _at(self, x: Array) -> tuple[Array, Array]:
+        if not np.array_equal(x, self._x):
+            self._found = self._problem.residuals(x, with_slopes=True)
+            self._x = x.copy()
+        return self._found
+
+
+def _search(problem: InnovationsProblem, options: FilterErrorOptions) -> list[DenseEnd]:
+    model = problem.model
+    _, limits = limits_of(model, options.maximum_iterations)
+    others = problem.n_all - problem.n_free
+    reach = np.full(others, MEASUREMENT_REACH)
+    reach[: len(problem.noisy)] = PROCESS_REACH
+    found: list[DenseEnd | str] = []
+    for start in draw_starts(model.parameters.free, options.starts, options.seed):
+        whole = np.concatenate([start, np.zeros(others)])
+        if not np.all(np.isfinite(problem.residuals(whole, with_slopes=False)[0])):
+            found.append("no steady filter at the start")
+            continue
+        point = _LastPoint(problem)
+        ending = _native.least_squares(
+            point.residuals,
+            point.jacobian,
+            whole,
+            np.concatenate([limits.lower, -reach]),
+            np.concatenate([limits.upper, reach]),
+            problem.n_residuals,
+            limits.maximum_iterations,
+        )
+        found.append(DenseEnd.of_native(ending))
+    return collect(found)
+
+
+def _freedom(problem: InnovationsProblem, filtered: Sequence[RecordInnovations]) -> float:
+    """Measured numbers less what was estimated."""
+    own = sum(len(each.constants) for each in filtered)
+    return float(sum(each.outputs.size for each in problem.data) - own - problem.n_free)
+
+
+def _noise_at_bound(problem: InnovationsProblem, end: DenseEnd) -> NDArray[np.bool_]:
+    logs = np.abs(end.x[problem.n_free :])
+    reach = np.full(len(logs), MEASUREMENT_REACH)
+    reach[: len(problem.noisy)] = PROCESS_REACH
+    return np.asarray(logs >= reach - 1e-6)
+
+
+def _noises(
+    problem: InnovationsProblem, end: DenseEnd, filtered: Sequence[RecordInnovations]
+) -> _Noise:
+    whitened = [
+        np.linalg.solve(np.linalg.cholesky(each.filter.innovation), each.innovations.T)
+        for each in filtered
+    ]
+    total = sum(float(np.sum(white**2)) for white in whitened)
+    common = total / _freedom(problem, filtered)
+    process, measured = problem.noise(end.x)
+    states = list(problem.model.states)
+    densities = {states[k]: float(np.sqrt(common * process[k])) for k in problem.noisy}
+    return _Noise(densities, np.diag(common * measured), common * filtered[0].filter.innovation)
+
+
+def _costs(
+    records: Sequence[Record], filtered: Sequence[RecordInnovations], outputs: Sequence[str]
+) -> dict[str, float]:
+    """Percent of each output's variance that one-step predictions leave."""
+    left = np.sum([np.sum(each.innovations**2, axis=0) for each in filtered], axis=0)
+    whole = np.sum(
+        [record.n_samples * np.var(record.matrix(outputs), axis=1) for record in records], axis=0
+    )
+    return dict(zip(outputs, map(float, 100.0 * left / whole), strict=True))
+
+
+def _fitted_records(
+    problem: InnovationsProblem,
+    records: Sequence[Record],
+    filtered: Sequence[RecordInnovations],
+) -> list[FittedRecord]:
+    model = problem.model
+    n, m, p = len(model.states), len(model.inputs), len(model.outputs)
+    found = []
+    for record, each in zip(records, filtered, strict=True):
+        predicted = record.matrix(model.outputs) - each.innovations.T
+        names = [*model.inputs, *model.outputs]
+        step = Step("identify", {"method": "filter error, one-step predictions"})
+        made = record.select(names).replace(
+            dict(zip(model.outputs, predicted, strict=True)), step=step
+        )
+        constants = list(map(float, each.constants))
+        bias = constants[n : n + p] if problem.free_bias else []
+        shift = constants[len(constants) - m :] if problem.free_reference else []
+        found.append(
+            FittedRecord(
+                record,
+                made,
+                model.outputs,
+                _own(model.states, constants[:n], model.states),
+                _own(model.outputs, bias, model.units),
+                _own(model.inputs, shift, model.units),
+                dict(zip(model.states, each.states.T, strict=True)),
+            )
+        )
+    return found
+
+
+def _own(
+    names: Sequence[str] | Mapping[str, str], values: Sequence[float], units: Mapping[str, str]
+) -> dict[str, FittedParameter]:
+    reason = "estimated beside the parameters, without an interval"
+    return {
+        name: FittedParameter(name, units[name], value, "free", reason=reason)
+        for name, value in zip(names, values, strict=False)
+    }
+
+
+def _judge(problem: InnovationsProblem, bounded: NDArray[np.bool_]) -> list[Finding]:
+    states = list(problem.model.states)
+    return [
+        Finding(
+            "no-process-noise",
+            Light.AMBER,
+            f"no process noise is seen on {states[place]}",
+            "leave it out of process_noise; where no state has any, output error is the method",
+        )
+        for place, at_bound in zip(problem.noisy, bounded, strict=False)
+        if at_bound
+    ]

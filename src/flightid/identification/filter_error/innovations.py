@@ -1,0 +1,337 @@
+"""Innovations of a linear model with process noise on records, with exact slopes by everything.
+
+The recursion itself is native (`linear_recursion.rs`). The likelihood −2 ln p = N ln det B +
+Σ εᵀB⁻¹ε, its common scale put in at its best value, is the logarithm of a sum of squares: that of
+the whitened innovations times the geometric mean of their deviations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid import _native
+from flightid.errors import FlightidError
+from flightid.identification.filter_error.steady_filter import (
+    ContinuousPoint,
+    SteadyFilter,
+    steady_filter,
+)
+from flightid.identification.records.delayed_inputs import delayed_inputs
+from flightid.identification.records.nuisance import Nuisance
+from flightid.models import StateSpaceModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FilteredData:
+    """What one record gives to the filter.
+
+    Attributes
+    ----------
+    inputs : ndarray, shape (n_inputs, n_samples)
+    outputs : ndarray, shape (n_outputs, n_samples)
+    sample_time_s : float
+    """
+
+    inputs: Array
+    outputs: Array
+    sample_time_s: float
+
+
+@dataclass(frozen=True)
+class RecordInnovations:
+    """One record at one point.
+
+    Attributes
+    ----------
+    innovations : ndarray, shape (n_samples, n_outputs)
+    states : ndarray, shape (n_samples, n_states)
+        Predicted one sample ahead.
+    slopes : ndarray, shape (n_samples, n_outputs, n_all)
+        Derivatives of the innovations; constants of the record taken out.
+    constants : ndarray
+        Initial state, then output biases, then input shifts.
+    filter : SteadyFilter
+    """
+
+    innovations: Array
+    states: Array
+    slopes: Array
+    constants: Array
+    filter: SteadyFilter
+
+
+Filtered = tuple[RecordInnovations, list[SteadyFilter]]
+
+
+@dataclass(frozen=True)
+class InnovationsProblem:
+    """A model and its records; unknowns are θ, then log deviations of the noises.
+
+    Process noise acts on the derivatives of `noisy` states with density exp(2 λ) times that
+    state's `process_scale`²; outputs have deviation exp(ρ) times `output_scale`. The first output's
+    ρ is zero: one common factor of all noises is known from the sum of squares.
+
+    Attributes
+    ----------
+    model : StateSpaceModel
+    data : tuple of FilteredData
+    noisy : tuple of int
+        States with process noise.
+    process_scale : ndarray, shape (n_noisy,)
+    output_scale : ndarray, shape (n_outputs,)
+    free_bias, free_reference : bool
+        Whether each record has unknown output biases and input shifts.
+    hold : str
+    """
+
+    model: StateSpaceModel
+    data: tuple[FilteredData, ...]
+    noisy: tuple[int, ...]
+    process_scale: Array
+    output_scale: Array
+    free_bias: bool
+    free_reference: bool
+    hold: str
+
+    @property
+    def n_free(self) -> int:
+        """Free parameters of the model."""
+        return len(self.model.parameters.free)
+
+    @property
+    def n_all(self) -> int:
+        """All unknowns."""
+        return self.n_free + len(self.noisy) + len(self.model.outputs) - 1
+
+    @property
+    def n_residuals(self) -> int:
+        """Innovations of all records, and one row for each output of each record."""
+        return sum(each.outputs.size + len(each.outputs) for each in self.data)
+
+    def noise(self, unknowns: Array) -> tuple[Array, Array]:
+        """Process densities by state and output variances, relative to the common factor."""
+        process = np.zeros(len(self.model.states))
+        logs = unknowns[self.n_free :]
+        count = len(self.noisy)
+        process[list(self.noisy)] = self.process_scale**2 * np.exp(2.0 * logs[:count])
+        measured = self.output_scale**2 * np.exp(2.0 * np.concatenate([[0.0], logs[count:]]))
+        return process, measured
+
+    def points(self, unknowns: Array) -> tuple[ContinuousPoint, list[ContinuousPoint]]:
+        """State space with noise, and its derivatives by all unknowns."""
+        values, free = self._values(unknowns)
+        trim = np.array([self.model.trim.get(name, 0.0) for name in self.model.point_names])
+        n, m, p = len(self.model.states), len(self.model.inputs), len(self.model.outputs)
+        rows = self.model.native.linearise(values, trim)[1]
+        moved = self.model.native.sensitivities(values, trim, free)
+        rates: Array = np.asarray(-np.linalg.solve(rows[:n, :n], rows[:n, n:]), dtype=np.float64)
+        whole = np.vstack([rates, np.eye(n + m)])
+        measured = rows[n:] @ whole
+        d_rates = -np.linalg.solve(rows[:n, :n], moved[:, :n] @ whole)
+        d_measured = moved[:, n:] @ whole + rows[n:, :n] @ d_rates
+        process, variance = self.noise(unknowns)
+        point = ContinuousPoint(
+            rates[:, :n], rates[:, n:], measured[:, :n], measured[:, n:],
+            np.diag(process), np.diag(variance),
+        )  # fmt: skip
+        none_w, none_r = np.zeros((n, n)), np.zeros((p, p))
+        slopes = [
+            ContinuousPoint(dr[:, :n], dr[:, n:], dm[:, :n], dm[:, n:], none_w, none_r)
+            for dr, dm in zip(d_rates, d_measured, strict=True)
+        ]
+        still = (np.zeros((n, n)), np.zeros((n, m)), np.zeros((p, n)), np.zeros((p, m)))
+        for state in self.noisy:
+            density = np.zeros((n, n))
+            density[state, state] = 2.0 * process[state]
+            slopes.append(ContinuousPoint(*still, density, none_r))
+        for output in range(1, p):
+            wider = np.zeros((p, p))
+            wider[output, output] = 2.0 * variance[output]
+            slopes.append(ContinuousPoint(*still, none_w, wider))
+        return point, slopes
+
+    def _values(self, unknowns: Array) -> tuple[Array, list[int]]:
+        values = self.model.parameters.independent_values()
+        free = self.model.parameters.free_indices
+        values[free] = unknowns[: self.n_free]
+        return values, free
+
+    def records(self, unknowns: Array, *, with_slopes: bool) -> list[Filtered]:
+        """Innovations of every record, and the filter's derivatives.
+
+        Raises
+        ------
+        FitError
+            There is no steady filter.
+        """
+        point, slopes = self.points(unknowns)
+        filters = {
+            step: steady_filter(point, slopes if with_slopes else [], step)
+            for step in {each.sample_time_s for each in self.data}
+        }
+        return [
+            (
+                self._record(unknowns, each, *filters[each.sample_time_s]),
+                filters[each.sample_time_s][1],
+            )
+            for each in self.data
+        ]
+
+    def _record(
+        self,
+        unknowns: Array,
+        data: FilteredData,
+        found: SteadyFilter,
+        slopes: list[SteadyFilter],
+    ) -> RecordInnovations:
+        values, _ = self._values(unknowns)
+        delayed, rates, late = delayed_inputs(
+            self.model, values, data.inputs, data.sample_time_s, self.hold
+        )
+        inputs, outputs = delayed.T, data.outputs.T
+        whitener = np.linalg.inv(np.linalg.cholesky(found.innovation))
+        n, m, p = len(found.closed), inputs.shape[1], outputs.shape[1]
+        runs = [(np.zeros(n), outputs, inputs), *self._constants(n, m, p)]
+        states = _run(found, runs, len(outputs))
+        seen = np.array(
+            [_seen(found, y, u) - x @ found.c.T for x, (_, y, u) in zip(states, runs, strict=True)]
+        )
+        flat = (seen @ whitener.T).reshape(len(runs), -1)
+        nuisance = Nuisance.best(-flat[1:].T, flat[0])
+        state = np.tensordot(np.concatenate([[1.0], nuisance.values]), states, axes=1)
+        if self.free_bias:
+            outputs = outputs - nuisance.values[n : n + p]
+        if self.free_reference:
+            inputs = inputs + nuisance.values[len(nuisance.values) - m :]
+        innovations = _seen(found, outputs, inputs) - state @ found.c.T
+        moved = [
+            rates.T * -late[:, k] if k < self.n_free else np.zeros((1, m))
+            for k in range(len(slopes))
+        ]
+        slope = _slopes(found, slopes, state, (outputs, inputs), moved)
+        white = (slope.swapaxes(1, 2) @ whitener.T).swapaxes(1, 2)
+        kept = nuisance.removed_from(white.reshape(flat.shape[1], -1)).reshape(white.shape)
+        triangle = np.linalg.inv(whitener)
+        slope = (kept.swapaxes(1, 2) @ triangle.T).swapaxes(1, 2)
+        return RecordInnovations(innovations, state, slope, nuisance.values, found)
+
+    def _constants(self, n: int, m: int, p: int) -> list[tuple[Array, Array, Array]]:
+        """Start, outputs and inputs of one run for each constant of a record."""
+        no_output, no_input = np.zeros((1, p)), np.zeros((1, m))
+        runs = [(start, no_output, no_input) for start in np.eye(n)]
+        if self.free_bias:
+            runs += [(np.zeros(n), -bias[None], no_input) for bias in np.eye(p)]
+        if self.free_reference:
+            runs += [(np.zeros(n), no_output, shift[None]) for shift in np.eye(m)]
+        return runs
+
+    def residuals(self, unknowns: Array, *, with_slopes: bool) -> tuple[Array, Array]:
+        """Scaled whitened innovations of all records, and their Jacobian.
+
+        Squares of their slopes lack half of what a variance contributes to the information: rows
+        without residual, one for each output and record, bring it, so that the product of the
+        Jacobian is Fisher's information. A point without a steady filter has no residuals: they
+        are NaN, which shortens the step.
+        """
+        size = self.n_residuals
+        try:
+            found = self.records(unknowns, with_slopes=with_slopes)
+        except (FlightidError, np.linalg.LinAlgError):
+            return np.full(size, np.nan), np.full((size, self.n_all), np.nan)
+        count = self.n_all if with_slopes else 0
+        total = sum(each.outputs.size for each in self.data)
+        level, rise = 0.0, np.zeros(count)
+        widened: list[Array] = []
+        rows, jacobians = [], []
+        for each, slopes in found:
+            triangle = np.linalg.cholesky(each.filter.innovation)
+            inverse = np.linalg.inv(triangle)
+            white = each.innovations @ inverse.T
+            n_samples = len(white)
+            level += n_samples * float(np.sum(np.log(np.diag(triangle))))
+            jacobian = np.tensordot(inverse, each.slopes, axes=(1, 1)).transpose(1, 0, 2)
+            for place, slope in enumerate(slopes):
+                relative = inverse @ slope.innovation @ inverse.T
+                diagonal = np.diag(relative)
+                widened.append(0.5 * np.sqrt(n_samples) * (diagonal - diagonal.mean()))
+                turn = _lower(relative)
+                rise[place] += n_samples * float(np.trace(turn))
+                jacobian[:, :, place] -= white @ turn.T
+            rows.append(white.ravel())
+            jacobians.append(jacobian.reshape(white.size, count))
+        factor = np.exp(level / total)
+        white = np.concatenate(rows)
+        jacobian = np.concatenate(jacobians) + np.multiply.outer(white, rise / total)
+        still = np.zeros(size - total)
+        curvature = (
+            np.array(widened)
+            .reshape(len(found), count, len(still) // len(found))
+            .transpose(0, 2, 1)
+        )
+        curvature = np.sqrt(np.mean(white**2)) * curvature.reshape(len(still), count)
+        whole = np.concatenate([jacobian, curvature])
+        return factor * np.concatenate([white, still]), np.ascontiguousarray(factor * whole)
+
+
+def _lower(matrix: Array) -> Array:
+    """Lower triangle with half the diagonal: the slope of a Cholesky factor."""
+    return np.tril(matrix) - 0.5 * np.diag(np.diag(matrix))
+
+
+def _seen(found: SteadyFilter, outputs: Array, inputs: Array) -> Array:
+    """Z = y − D u."""
+    return np.asarray(outputs - inputs @ found.d.T)
+
+
+def _next(values: Array) -> Array:
+    """Each sample's successor; the last one stays."""
+    return np.concatenate([values[1:], values[-1:]])
+
+
+def _slopes(
+    found: SteadyFilter,
+    slopes: Sequence[SteadyFilter],
+    state: Array,
+    measured: tuple[Array, Array],
+    moved: Sequence[Array],
+) -> Array:
+    """Derivatives of the innovations, (n_samples, n_outputs, n_slopes): one more run for each."""
+    outputs, inputs = measured
+    seen, following = _seen(found, outputs, inputs), _next(inputs)
+    forcings, direct = [], []
+    for slope, shift in zip(slopes, moved, strict=True):
+        d_seen = -inputs @ slope.d.T - shift @ found.d.T
+        forcings.append(
+            state @ slope.closed.T
+            + seen @ slope.gain.T
+            + d_seen @ found.gain.T
+            + inputs @ slope.early.T
+            + following @ slope.late.T
+            + shift @ found.early.T
+            + _next(shift) @ found.late.T
+        )
+        direct.append(d_seen - state @ slope.c.T)
+    if not slopes:
+        return np.zeros((*outputs.shape, 0))
+    closed, rest = np.ascontiguousarray(found.closed), np.zeros((len(slopes), len(found.closed)))
+    paths = _native.linear_recursion(closed, np.array(forcings), rest)
+    return np.moveaxis(np.array(direct) - paths @ found.c.T, 0, 2)
+
+
+def _run(found: SteadyFilter, runs: Sequence[tuple[Array, Array, Array]], n_samples: int) -> Array:
+    forcing = [
+        np.broadcast_to(
+            _seen(found, y, u) @ found.gain.T + u @ found.early.T + _next(u) @ found.late.T,
+            (n_samples, len(found.closed)),
+        )
+        for _, y, u in runs
+    ]
+    starts = np.array([start for start, _, _ in runs])
+    closed = np.ascontiguousarray(found.closed)
+    return np.asarray(_native.linear_recursion(closed, np.array(forcing), starts))

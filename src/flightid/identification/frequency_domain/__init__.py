@@ -1,0 +1,1 @@
+"""Fits to frequency responses (native: `frequency_fit.rs`)."""

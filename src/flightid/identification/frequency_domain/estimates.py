@@ -1,0 +1,230 @@
+"""From the end of a search to estimates with errors, bounds and correlations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import FitError
+from flightid.identification.fit import FittedParameter
+from flightid.identification.frequency_domain.error_model import UNKNOWN, ErrorModel
+from flightid.identification.frequency_domain.selection import SelectedResponse
+from flightid.identification.multistart import DenseEnd
+from flightid.models import Model, Parameter
+from flightid.uncertainty import correlation as correlation_of
+from flightid.uncertainty import (
+    cramer_rao,
+    estimator_gain,
+    insensitivity,
+    interval95,
+    null_combination,
+)
+from flightid.uncertainty.cramer_rao import inverse_hessian
+
+Array = NDArray[np.float64]
+_DECIBEL = 20.0 / np.log(10.0)
+_DEGREE = 180.0 / np.pi
+_AT_BOUND = 1e-9
+_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What is known of the estimates.
+
+    Attributes
+    ----------
+    parameters : mapping of str to FittedParameter
+    names : tuple of str
+        Order of `covariance` and `correlation`.
+    covariance : ndarray or None
+    correlation : ndarray
+    source : str
+        Where the intervals come from.
+    outputs_apart : bool
+        Whether errors of different outputs were taken as independent for want of knowledge.
+    """
+
+    parameters: Mapping[str, FittedParameter]
+    names: tuple[str, ...]
+    covariance: Array | None
+    correlation: Array
+    source: str
+    outputs_apart: bool
+
+
+def statistics(
+    fitted: Model,
+    selected: Sequence[SelectedResponse],
+    errors: ErrorModel,
+    end: DenseEnd,
+    *,
+    sensitivity: Array | None,
+    following: Array | None = None,
+) -> Statistics:
+    """Standard errors, bounds and correlations at the end of a search.
+
+    `following` holds the derivatives of the data by the free parameters, where a correction makes
+    the data follow them.
+
+    Raises
+    ------
+    FitError
+        The data do not see a parameter, or a combination of parameters.
+    """
+    free = fitted.parameters.free
+    inner = np.array([not at_bound(parameter) for parameter in free], dtype=bool)
+    names = tuple(p.name for p, keep in zip(free, inner, strict=True) if keep)
+    jacobian = end.jacobian[:, inner]
+    require_identifiable(names, jacobian)
+    covariance = None
+    if sensitivity is not None and names:
+        total = None if following is None else jacobian + sensitivity @ following[:, inner]
+        covariance = errors.propagated(estimator_gain(jacobian, sensitivity, total=total))
+    weighted = coherence_jacobian(fitted, selected)[:, inner]
+    correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
+    parameters = fitted_parameters(fitted, names, covariance, weighted)
+    return Statistics(
+        parameters, names, covariance, correlation, errors.source, errors.outputs_apart
+    )
+
+
+def at_bound(parameter: Parameter) -> bool:
+    """Whether a parameter's value lies at one of its bounds."""
+    value = parameter.value or 0.0
+    margin = _AT_BOUND * max(abs(value), 1e-300)
+    return value - parameter.minimum <= margin or parameter.maximum - value <= margin
+
+
+def require_identifiable(names: tuple[str, ...], jacobian: Array) -> None:
+    """Refuse parameters that the data cannot see.
+
+    Raises
+    ------
+    FitError
+        Some combination of them leaves the residuals as they are.
+    """
+    if not names:
+        return
+    share = null_combination(jacobian)
+    if share is None:
+        return
+    guilty = [name for name, part in zip(names, share, strict=True) if part > _SHARE]
+    raise FitError(
+        "the data cannot tell these parameters apart"
+        if len(guilty) > 1
+        else "the data do not see a parameter",
+        found=", ".join(guilty),
+        needed="a different effect of each on the data",
+        action="fix or tie one of them, widen the band, or excite them apart",
+    )
+
+
+def coherence_jacobian(fitted: Model, selected: Sequence[SelectedResponse]) -> Array:
+    """Derivatives of the weighted dB and degree residuals with respect to the free parameters."""
+    values = fitted.parameters.independent_values()
+    free = fitted.parameters.free_indices
+    rows = []
+    # One call gives all responses at its frequencies, which most of them share.
+    known: dict[bytes, NDArray[np.complex128]] = {}
+    for place, each in enumerate(selected):
+        omega = each.omega_rad_s
+        if omega.tobytes() not in known:
+            known[omega.tobytes()] = fitted.native.log_gradient(values, free, omega)
+        slope = known[omega.tobytes()][place]
+        both = np.empty((2 * len(slope), len(free)))
+        both[0::2] = _DECIBEL * np.sqrt(each.weight_db)[:, None] * slope.real
+        both[1::2] = _DEGREE * np.sqrt(each.weight_deg)[:, None] * slope.imag
+        rows.append(both)
+    return np.vstack(rows)
+
+
+def fitted_parameters(
+    fitted: Model,
+    names: tuple[str, ...],
+    covariance: Array | None,
+    weighted: Array,
+    freedom: Array | None = None,
+) -> dict[str, FittedParameter]:
+    """Every parameter with what is known of it.
+
+    Parameters
+    ----------
+    fitted : TransferFunctionModel or StateSpaceModel
+        At the estimates.
+    names : tuple of str
+        Parameters of the arrays: free and not at a bound.
+    covariance : ndarray, shape (n, n), or None
+        Of the estimates over repeated flights.
+    weighted : ndarray, shape (n_residuals, n)
+        Derivatives of residuals whose squares add up to the cost, for the bounds of CIFER.
+    freedom : ndarray, shape (n,), optional
+        Degrees of freedom of the variances.
+
+    Returns
+    -------
+    dict of str to FittedParameter
+    """
+    bounds = dict(zip(names, cramer_rao(weighted), strict=True)) if names else {}
+    slack = dict(zip(names, insensitivity(weighted), strict=True)) if names else {}
+    errors = _standard_errors(fitted, names, covariance)
+    degrees = {} if freedom is None else dict(zip(names, map(float, freedom), strict=True))
+    result = {}
+    for name, parameter in fitted.parameters.items():
+        value = float(parameter.value or 0.0)
+        bound = parameter.free and name not in names
+        stderr = errors.get(name)
+        interval = None
+        if stderr is not None:
+            interval = interval95(value, stderr, degrees_of_freedom=degrees.get(name))
+        result[name] = FittedParameter(
+            name,
+            parameter.unit,
+            value,
+            "at bound" if bound else parameter.status,
+            stderr,
+            interval,
+            _percent(bounds.get(name), value),
+            _percent(slack.get(name), value),
+            _reason(parameter, at_bound=bound, known=covariance is not None, value=value),
+        )
+    return result
+
+
+def _percent(size: float | None, value: float) -> float | None:
+    return None if size is None or value == 0.0 else float(100.0 * size / abs(value))
+
+
+def _reason(parameter: Parameter, *, at_bound: bool, known: bool, value: float) -> str:
+    if at_bound:
+        return "at bound: the data would move it further"
+    if parameter.status == "fixed":
+        return "fixed"
+    if not known:
+        return f"errors of the response: {UNKNOWN} known"
+    if parameter.status == "tied":
+        return "tied: bounds belong to the parameters in its tie"
+    return "" if value != 0.0 else "percent of zero has no meaning"
+
+
+def _standard_errors(
+    fitted: Model, names: tuple[str, ...], covariance: Array | None
+) -> dict[str, float]:
+    """Of the estimated parameters and, through their ties, of the tied ones."""
+    if covariance is None:
+        return {}
+    parameters = fitted.parameters
+    result = dict(zip(names, map(float, np.sqrt(np.diag(covariance))), strict=True))
+    if parameters.tied:
+        independent = [parameter.name for parameter in parameters.independent]
+        directions = [independent.index(name) for name in names]
+        tape = parameters.tape([parameter.name for parameter in parameters.tied])
+        slope = tape.jacobian(parameters.independent_values(), directions)
+        variance = np.einsum("ij,jk,ik->i", slope, covariance, slope)
+        for parameter, each in zip(parameters.tied, variance, strict=True):
+            if each > 0.0:
+                result[parameter.name] = float(np.sqrt(each))
+    return result

@@ -1,0 +1,368 @@
+"""Fit of a model to frequency responses (native side: `frequency_fit.rs`).
+
+Cost of one response: (20/n) Σ W_γ [W_g (Δ dB)² + W_p (Δ phase in degrees)²], phase wrapped.
+Or, with ``cost="likelihood"``, the whitened complex error.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError, FitError, OptionError
+from flightid.findings import Finding
+from flightid.identification.fit import Fit, FittedResponse
+from flightid.identification.fit_findings import (
+    judge_correlation,
+    judge_cost,
+    judge_intervals,
+    judge_parameters,
+    judge_search,
+)
+from flightid.identification.frequency_domain.bias_rounds import (
+    BiasRounds,
+    iterate,
+    judge_bias,
+    provenance,
+    sizes,
+)
+from flightid.identification.frequency_domain.bias_statistics import errors_after, points_follow
+from flightid.identification.frequency_domain.error_model import (
+    ErrorModel,
+    coherence_sensitivity,
+    error_model,
+    whitening,
+)
+from flightid.identification.frequency_domain.estimates import Statistics, statistics
+from flightid.identification.frequency_domain.estimator_bias import Correction
+from flightid.identification.frequency_domain.search import minimise
+from flightid.identification.frequency_domain.selection import (
+    Bands,
+    SelectedResponse,
+    select_points,
+)
+from flightid.identification.frequency_domain.setup_checks import check_setup
+from flightid.identification.multistart import DenseEnd, cluster, local_minima
+from flightid.models import Model
+from flightid.responses import FrequencyResponse
+from flightid.simulation.model_outputs import HOLDS
+from flightid.units import require_match
+from flightid.version import VERSION
+
+Array = NDArray[np.float64]
+COSTS = ("coherence", "likelihood")
+_DECIBEL = 20.0 / np.log(10.0)
+_DEGREE = 180.0 / np.pi
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of a frequency-domain fit; see `flightid.identify`."""
+
+    starts: int = 1
+    seed: int = 0
+    omega_rad_s: Bands = None
+    n_omega: int = 20
+    minimum_coherence: float | None = 0.6
+    weight_gain: float = 1.0
+    weight_phase: float = 0.01745
+    cost: str = "coherence"
+    maximum_iterations: int = 200
+    correct_bias: bool = True
+    hold: str = "band_limited"
+
+    def check(self) -> None:
+        """Refuse options without a meaning.
+
+        Raises
+        ------
+        OptionError
+            The cost or the hold is not known, or no iteration is allowed.
+        """
+        if self.hold not in HOLDS:
+            raise OptionError("hold is not known", found=repr(self.hold), needed=" or ".join(HOLDS))
+        if self.cost not in COSTS:
+            raise OptionError("cost is not known", found=repr(self.cost), needed=" or ".join(COSTS))
+        if self.maximum_iterations < 1:
+            raise OptionError(
+                "maximum_iterations is too small", found=self.maximum_iterations, needed="1 or more"
+            )
+
+
+def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fit:
+    """Fit a model to measured responses; see `flightid.identify`."""
+    options.check()
+    check_channels(model, data)
+    selected = select_by(model, data, options)
+    setup = check_start(model, selected)
+    try:
+        return _fit_selected(model, data, selected, setup, options)
+    except FitError as error:
+        if not setup:
+            raise
+        # What looked wrong before the fit is the likeliest reason why there is none.
+        action = "; ".join(f"{each.message} — {each.action}" for each in setup)
+        raise FitError(
+            error.problem, found=error.found, needed=error.needed, action=action
+        ) from error
+
+
+def _fit_selected(
+    model: Model,
+    data: FrequencyResponse,
+    selected: list[SelectedResponse],
+    setup: list[Finding],
+    options: Options,
+) -> Fit:
+    errors = error_model(data, selected)
+    groups = cluster(_minimise(model, selected, errors, options))
+    fitted = _at(model, groups[0][0])
+    found = _statistics(fitted, selected, errors, groups[0][0], options)
+    correction: dict[str, object] = {"applied": False, "reason": "correct_bias=False"}
+    if options.correct_bias:
+        without = Correction(data, options.hold)
+        done = _without_bias(fitted, without, errors, found, options)
+        after = select_by(model, done.data, options)
+        if done.applied:
+            errors = errors_after(done, without, after) or errors
+        changes = sizes(selected, after, errors) if done.applied else {}
+        setup += judge_bias(done, changes)
+        correction = provenance(done, changes, options.hold)
+        if done.applied:
+            best = _minimise(done.model, after, errors, replace(options, starts=1))[0]
+            groups[0] = [best, *groups[0][1:]]
+            selected, fitted = after, _at(model, best)
+            following = points_follow(done, fitted, without, selected, errors)
+            found = _statistics(fitted, selected, errors, best, options, following)
+    responses = compare_responses(fitted, selected)
+    fit = _assemble(fitted, options, data, groups, responses, found, setup)
+    return replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
+
+
+def select_by(model: Model, data: FrequencyResponse, options: Options) -> list[SelectedResponse]:
+    """Points of the model's responses that the options choose."""
+    return select_points(
+        data,
+        model.response_names,
+        bands=options.omega_rad_s,
+        n_omega=options.n_omega,
+        minimum_coherence=options.minimum_coherence,
+        weight_gain=options.weight_gain,
+        weight_phase=options.weight_phase,
+    )
+
+
+def _at(model: Model, end: DenseEnd) -> Model:
+    names = (parameter.name for parameter in model.parameters.free)
+    return model.with_values(dict(zip(names, map(float, end.x), strict=True)))
+
+
+def _statistics(
+    fitted: Model,
+    selected: Sequence[SelectedResponse],
+    errors: ErrorModel,
+    end: DenseEnd,
+    options: Options,
+    following: Array | None = None,
+) -> Statistics:
+    sensitivity = _sensitivity(fitted, selected, errors, options)
+    return statistics(fitted, selected, errors, end, sensitivity=sensitivity, following=following)
+
+
+def _without_bias(
+    fitted: Model,
+    correction: Correction,
+    errors: ErrorModel,
+    found: Statistics,
+    options: Options,
+) -> BiasRounds:
+    once = replace(options, starts=1)
+
+    def refit(model: Model, corrected: FrequencyResponse) -> Model:
+        selected = select_by(model, corrected, options)
+        return _at(model, _minimise(model, selected, errors, once)[0])
+
+    scales = {p.name: p.stderr for p in found.parameters.values() if p.stderr}
+    return iterate(fitted, correction, scales, refit)
+
+
+def check_channels(model: Model, data: FrequencyResponse) -> None:
+    """Refuse a model without free parameters, and data without its channels or units.
+
+    Raises
+    ------
+    FitError
+        No free parameter.
+    UnknownNameError
+        A response of the model is not in the data.
+    UnitError
+        Data and model disagree on a unit.
+    """
+    if not model.parameters.free:
+        raise FitError(
+            "the model has no free parameter",
+            needed="at least one",
+            action="free a parameter with model.with_free(name)",
+        )
+    for response in model.responses:
+        data.pair(response.output, response.input)
+    # Outputs of a model that no fitted response needs may be missing from the data.
+    needed = (name for each in model.responses for name in (each.output, each.input))
+    for name in dict.fromkeys(needed):
+        require_match(data.units[name], model.units[name], subject=f"channel {name}")
+
+
+def response_at(model: Model, omega: Array, place: int) -> NDArray[np.complex128]:
+    """One response of the model, by its place."""
+    values = model.parameters.independent_values()
+    return np.asarray(model.native.response(values, np.ascontiguousarray(omega))[place])
+
+
+def check_start(model: Model, selected: Sequence[SelectedResponse]) -> list[Finding]:
+    """Look at the model's start values beside the data.
+
+    Raises
+    ------
+    FitError
+        The model has no response of a pair.
+    """
+    found: list[Finding] = []
+    for place, each in enumerate(selected):
+        try:
+            start = response_at(model, each.omega_rad_s, place)
+        except DataError:
+            continue  # no value at the start: the search will say so if no start has one
+        if not np.any(start):
+            raise FitError(
+                f"the model has no response of {each.name}",
+                found="zero at every frequency with the start values",
+                needed="a path from this input to this output",
+                action="leave the pair out, or start its parameters away from zero",
+            )
+        if np.all(np.isfinite(start)) and np.all(np.abs(start) > 0.0):
+            found += check_setup(each.name, each.omega_rad_s, each.response, start)
+    return found
+
+
+def _minimise(
+    model: Model,
+    selected: Sequence[SelectedResponse],
+    errors: ErrorModel,
+    options: Options,
+) -> list[DenseEnd]:
+    return minimise(
+        model,
+        selected,
+        errors,
+        starts=options.starts,
+        seed=options.seed,
+        cost=options.cost,
+        maximum_iterations=options.maximum_iterations,
+    )
+
+
+def _sensitivity(
+    fitted: Model,
+    selected: Sequence[SelectedResponse],
+    errors: ErrorModel,
+    options: Options,
+) -> Array | None:
+    """Derivatives of the minimised residuals with respect to the measured points."""
+    if not errors.runs:
+        return None
+    if options.cost == "likelihood":
+        from scipy.linalg import block_diag  # noqa: PLC0415
+
+        return np.asarray(-block_diag(*(matrix for *_, matrix in whitening(errors))))
+    curves = [response_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
+    return coherence_sensitivity(selected, curves, errors)
+
+
+def compare_responses(
+    fitted: Model, selected: Sequence[SelectedResponse]
+) -> tuple[FittedResponse, ...]:
+    """Measured and fitted responses side by side, each with its cost J."""
+    result = []
+    for place, each in enumerate(selected):
+        curve = response_at(fitted, each.measured.omega_rad_s, place)
+        ratio = curve[each.places] / each.response
+        cost = float(
+            np.sum(
+                each.weight_db * (_DECIBEL * np.log(np.abs(ratio))) ** 2
+                + each.weight_deg * (_DEGREE * np.angle(ratio)) ** 2
+            )
+        )
+        result.append(FittedResponse(each.name, cost, each.measured, each.omega_rad_s, curve))
+    return tuple(result)
+
+
+def _assemble(
+    fitted: Model,
+    options: Options,
+    data: FrequencyResponse,
+    groups: Sequence[Sequence[DenseEnd]],
+    responses: tuple[FittedResponse, ...],
+    found: Statistics,
+    setup: list[Finding],
+) -> Fit:
+    best = groups[0][0]
+    costs = {each.name: each.cost for each in responses}
+    total = sum(costs.values())
+    free = [parameter.name for parameter in fitted.parameters.free]
+    findings = (
+        *setup,
+        *judge_search(groups),
+        *judge_cost(costs, total / len(costs)),
+        *judge_parameters(found.parameters),
+        *judge_correlation(found.names, found.correlation),
+        *judge_intervals(found.source, outputs_apart=found.outputs_apart),
+    )
+    minima = local_minima(groups, free)
+    return Fit(
+        model=fitted,
+        parameters=found.parameters,
+        cost=total,
+        average_cost=total / len(costs),
+        costs=costs,
+        names=found.names,
+        covariance=found.covariance,
+        correlation=found.correlation,
+        responses=responses,
+        minima=minima,
+        objective=best.cost,
+        termination=best.termination,
+        iterations=best.iterations,
+        intervals_from=found.source,
+        findings=findings,
+        provenance=_provenance(data, options),
+    )
+
+
+def _provenance(data: FrequencyResponse, options: Options) -> dict[str, object]:
+    digest = hashlib.sha256()
+    for array in (data.omega_rad_s, data.response, data.coherence, data.random_error):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    bands = options.omega_rad_s
+    return {
+        "method": "frequency domain",
+        "flightid": VERSION,
+        "data_sha256": digest.hexdigest(),
+        "data_history": [str(step) for step in data.history],
+        "options": {
+            "starts": options.starts,
+            "seed": options.seed,
+            "omega_rad_s": dict(bands) if isinstance(bands, dict) else bands,
+            "n_omega": options.n_omega,
+            "minimum_coherence": options.minimum_coherence,
+            "weight_gain": options.weight_gain,
+            "weight_phase": options.weight_phase,
+            "cost": options.cost,
+            "maximum_iterations": options.maximum_iterations,
+            "correct_bias": options.correct_bias,
+            "hold": options.hold,
+        },
+    }

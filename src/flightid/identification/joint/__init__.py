@@ -1,0 +1,1 @@
+"""Fits to responses and records together."""

@@ -1,0 +1,227 @@
+"""Frequency responses and records of one vehicle in one fit, each weighed by its likelihood.
+
+Minimised is ½ eᵀP⁻¹e of the measured responses, with the covariance P of their errors, plus the
+negative logarithm of the records' likelihood; native: `joint_objective.rs`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError
+from flightid.findings import Finding
+from flightid.identification.fit import Fit
+from flightid.identification.fit_findings import judge_cost, judge_intervals
+from flightid.identification.frequency_domain.bias_rounds import (
+    iterate,
+    judge_bias,
+    provenance,
+    sizes,
+)
+from flightid.identification.frequency_domain.bias_statistics import errors_after, points_follow
+from flightid.identification.frequency_domain.error_model import ErrorModel, error_model, whitening
+from flightid.identification.frequency_domain.estimator_bias import Correction
+from flightid.identification.frequency_domain.fit import (
+    Options,
+    check_channels,
+    check_start,
+    compare_responses,
+    response_at,
+    select_by,
+)
+from flightid.identification.frequency_domain.selection import Bands, SelectedResponse
+from flightid.identification.joint.independence import judge_independence
+from flightid.identification.output_error.fit import (
+    Searched,
+    WhitenedResponses,
+    conclude,
+    searched,
+)
+from flightid.identification.records.findings import judge_channels
+from flightid.identification.records.options import RecordOptions
+from flightid.identification.records.setup import RecordSet, prepare_records
+from flightid.identification.records.statistics import Beside
+from flightid.models import Model
+from flightid.record import Record
+from flightid.responses import FrequencyResponse
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class JointOptions(RecordOptions):
+    """Options of a joint fit: those of records, and points of the response; see `identify`."""
+
+    omega_rad_s: Bands = None
+    n_omega: int = 20
+    minimum_coherence: float | None = 0.6
+    correct_bias: bool = True
+
+    @property
+    def of_responses(self) -> Options:
+        """The part that concerns the responses."""
+        return Options(
+            omega_rad_s=self.omega_rad_s,
+            n_omega=self.n_omega,
+            minimum_coherence=self.minimum_coherence,
+            cost="likelihood",
+            correct_bias=self.correct_bias,
+            hold=self.hold,
+        )
+
+
+@dataclass(frozen=True)
+class ChosenPoints:
+    """Fitted points of the responses, with the covariance of their errors."""
+
+    selected: list[SelectedResponse]
+    errors: ErrorModel
+
+    @property
+    def native(self) -> WhitenedResponses:
+        """As the native half takes it; weights of decibels and degrees are not used."""
+        none = [np.zeros(len(each.places)) for each in self.selected]
+        data = [
+            (each.omega_rad_s, each.response, zero, zero)
+            for each, zero in zip(self.selected, none, strict=True)
+        ]
+        return data, whitening(self.errors)
+
+    def beside(self, fitted: Model, following: Array | None = None) -> Beside:
+        """Derivatives of the whitened errors, of data at rest and of data that follow the model.
+
+        `following` are the derivatives of the points by the free parameters, run after run.
+        """
+        slopes = self._slopes(fitted)
+        if following is None:
+            return Beside(slopes, slopes)
+        matrices = [matrix for _, _, matrix in whitening(self.errors)]
+        ends = np.cumsum([matrix.shape[1] for matrix in matrices])[:-1]
+        moved = [
+            matrix @ part for matrix, part in zip(matrices, np.split(following, ends), strict=True)
+        ]
+        return Beside(slopes, slopes - np.vstack(moved))
+
+    def _slopes(self, fitted: Model) -> Array:
+        values, free = fitted.parameters.independent_values(), fitted.parameters.free_indices
+        by_response = []
+        for place, each in enumerate(self.selected):
+            curve = response_at(fitted, each.omega_rad_s, place)
+            slope = fitted.native.log_gradient(values, free, each.omega_rad_s)[place]
+            by_response.append(curve[:, None] * slope)
+        rows = []
+        for first, count, matrix in whitening(self.errors):
+            run = np.concatenate(by_response[first : first + count])
+            rows.append(matrix @ np.concatenate([run.real, run.imag]))
+        return np.vstack(rows)
+
+
+def fit_jointly(model: Model, data: Sequence[object], options: JointOptions) -> Fit:
+    """Fit a model to a frequency response and records together; see `flightid.identify`."""
+    response, records = _divided(data)
+    of_responses = options.of_responses
+    of_responses.check()
+    check_channels(model, response)
+    prepared = prepare_records(model, records, options)
+    points = _points(model, response, of_responses)
+    setup = [
+        *judge_independence(response, records, model.outputs),
+        *judge_channels(prepared),
+        *check_start(model, points.selected),
+    ]
+    found = searched(model, prepared, options, points.native)
+    correction: dict[str, object] = {"applied": False, "reason": "correct_bias=False"}
+    following: Array | None = None
+    if options.correct_bias:
+        found, points, following, correction, said = _without_bias(
+            found, prepared, response, points, options
+        )
+        setup += said
+    fit = conclude(found, options, setup, points.beside(found.fitted, following))
+    return _with_responses(fit, response, points, correction)
+
+
+def _divided(data: Sequence[object]) -> tuple[FrequencyResponse, list[Record]]:
+    responses = [item for item in data if isinstance(item, FrequencyResponse)]
+    if len(responses) != 1:
+        raise DataError(
+            "a joint fit takes one frequency response",
+            found=len(responses),
+            needed="one, of all inputs and outputs, beside the records",
+            action="estimate one response from all its records together",
+        )
+    return responses[0], [item for item in data if isinstance(item, Record)]
+
+
+def _points(model: Model, response: FrequencyResponse, options: Options) -> ChosenPoints:
+    selected = select_by(model, response, options)
+    return ChosenPoints(selected, error_model(response, selected))
+
+
+def _without_bias(
+    found: Searched,
+    prepared: RecordSet,
+    response: FrequencyResponse,
+    points: ChosenPoints,
+    options: JointOptions,
+) -> tuple[Searched, ChosenPoints, Array | None, dict[str, object], list[Finding]]:
+    """Take the estimator's bias out of the response, and fit again, until nothing moves."""
+    once = replace(options, starts=1)
+
+    def corrected_points(corrected: FrequencyResponse) -> ChosenPoints:
+        # The errors stay those of the response as it was measured.
+        return ChosenPoints(select_by(prepared.model, corrected, once.of_responses), points.errors)
+
+    def refit(model: Model, corrected: FrequencyResponse) -> Model:
+        return searched(model, prepared, once, corrected_points(corrected).native).fitted
+
+    first = conclude(found, options, (), points.beside(found.fitted))
+    scales = {p.name: p.stderr for p in first.parameters.values() if p.stderr}
+    without = Correction(response, options.hold)
+    done = iterate(found.fitted, without, scales, refit)
+    if not done.applied:
+        return found, points, None, provenance(done, {}, options.hold), judge_bias(done, {})
+    after = corrected_points(done.data)
+    known = errors_after(done, without, after.selected)
+    after = after if known is None else replace(after, errors=known)
+    # The last search weighs the points by the errors that the intervals are computed from.
+    last = searched(done.model, prepared, once, after.native)
+    following = points_follow(done, last.fitted, without, after.selected, after.errors)
+    moved = sizes(points.selected, after.selected, after.errors)
+    # The other minima are those of the first search.
+    found = replace(last, groups=[last.groups[0], *found.groups[1:]])
+    said = judge_bias(done, moved)
+    return found, after, following, provenance(done, moved, options.hold), said
+
+
+def _with_responses(
+    fit: Fit, response: FrequencyResponse, points: ChosenPoints, correction: Mapping[str, object]
+) -> Fit:
+    """The fit of the records with its responses beside them."""
+    compared = compare_responses(fit.model, points.selected)
+    costs = {each.name: each.cost for each in compared}
+    total = sum(costs.values())
+    source = points.errors.source
+    return replace(
+        fit,
+        cost=total,
+        average_cost=total / len(costs),
+        costs={**costs, **fit.costs},
+        responses=compared,
+        intervals_from=f"{source} and {fit.intervals_from}",
+        findings=(
+            *fit.findings,
+            *judge_cost(costs, total / len(costs)),
+            *judge_intervals(source, outputs_apart=points.errors.outputs_apart),
+        ),
+        provenance={
+            **fit.provenance,
+            "method": "joint",
+            "response_history": [str(step) for step in response.history],
+            "estimator_bias": dict(correction),
+        },
+    )

@@ -1,0 +1,1 @@
+"""NARX models by orthogonal least squares."""

@@ -1,0 +1,1 @@
+"""Output error: the model runs free through the records."""

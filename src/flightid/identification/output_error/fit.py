@@ -1,0 +1,362 @@
+"""Output error: maximum likelihood of records in the time domain (native: `output_error.rs`).
+
+The model runs free through every record. Minimised is ½ Σ vᵀR⁻¹v + (N/2) ln det R of measured minus
+model v, over the model's parameters and each record's initial state, biases and reference shifts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import FlightidError
+from flightid.findings import Finding
+from flightid.identification.fit import Fit
+from flightid.identification.fit_findings import (
+    judge_correlation,
+    judge_parameters,
+    judge_search,
+)
+from flightid.identification.fitted_record import FittedRecord
+from flightid.identification.multistart import End, cluster, collect, draw_starts, local_minima
+from flightid.identification.output_error.equation_records import (
+    EquationRuns,
+    equation_runs,
+    judge_runs,
+    segmented_starts,
+)
+from flightid.identification.records.findings import judge_channels, judge_fit
+from flightid.identification.records.options import RecordOptions
+from flightid.identification.records.setup import OwnNumbers, RecordSet, prepare_records
+from flightid.identification.records.statistics import (
+    Beside,
+    RecordStatistics,
+    record_statistics,
+)
+from flightid.identification.regression.equation_error import equation_error_start
+from flightid.identification.regression.fourier_output_error_fit import fit_fourier_output_error
+from flightid.identification.regression.options import FourierOutputErrorOptions
+from flightid.models import Model, StateSpaceModel
+from flightid.record import Channel, Record, Step
+from flightid.version import VERSION
+
+Array = NDArray[np.float64]
+_NEAR = 0.5 * np.log(1.1)
+"""Log-likelihood of a sample whose residual variance is ten percent larger."""
+ROUNDS = 3
+"""Most searches with a new choice of the modes that are set at the end of a record."""
+WhitenedResponses = tuple[
+    Sequence[tuple[Array, NDArray[np.complex128], Array, Array]], Sequence[tuple[int, int, Array]]
+]
+"""Frequencies, response and two weights, not used, of each; first response, number and matrix."""
+NativeEnd = tuple[Array, float, Array, list[Array], list[list[bool]], int, str]
+
+
+@dataclass(frozen=True)
+class RecordEnd(End):
+    """Where one start ended: also R, each record's own numbers and which are determined."""
+
+    noise: Array
+    own: list[Array]
+    determined: list[list[bool]]
+
+    @classmethod
+    def of_native(cls, found: NativeEnd) -> RecordEnd:
+        """From the native half's order."""
+        x, cost, noise, own, determined, iterations, termination = found
+        return cls(x, cost, iterations, termination, noise, own, determined)
+
+
+def fit_output_error(model: Model, data: Record | Sequence[Record], options: RecordOptions) -> Fit:
+    """Fit a model to records by output error; see `flightid.identify`."""
+    if options.start_from == "equation_error":
+        model = equation_error_start(model, data)
+    prepared = prepare_records(model, data, options)
+    setup = judge_channels(prepared)
+    return conclude(searched(model, prepared, options), options, setup)
+
+
+@dataclass(frozen=True)
+class Searched:
+    """Where a search over records ended.
+
+    Attributes
+    ----------
+    model : TransferFunctionModel or StateSpaceModel
+        From which the last round started.
+    prepared : RecordSet
+    runs_of : EquationRuns or None
+    groups : list of list of RecordEnd
+        Ends of all starts, best group first.
+    """
+
+    model: Model
+    prepared: RecordSet
+    runs_of: EquationRuns | None
+    groups: list[list[RecordEnd]]
+
+    @property
+    def fitted(self) -> Model:
+        """The model at the best end."""
+        return _with_estimates(self.model, self.groups[0][0])
+
+
+def conclude(
+    found: Searched,
+    options: RecordOptions,
+    setup: Sequence[Finding],
+    beside: Beside | None = None,
+) -> Fit:
+    """The result of a search.
+
+    Parameters
+    ----------
+    found : Searched
+    options : RecordOptions
+    setup : sequence of Finding
+        Put before those of the fit.
+    beside : Beside, optional
+        Residuals of unit variance that were fitted together with the records.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    FitError
+        The data do not see a parameter, or a combination of parameters.
+    """
+    model, prepared, runs_of, groups = found.model, found.prepared, found.runs_of, found.groups
+    best = groups[0][0]
+    fitted = _with_estimates(model, best)
+    own = [start.filled(end) for start, end in zip(prepared.own, best.own, strict=True)]
+    runs = [
+        _run(fitted, prepared, runs_of, place, numbers, with_slopes=True)
+        for place, numbers in enumerate(own)
+    ]
+    if runs_of is not None:
+        own = [runs_of.start(fitted, prepared, k, numbers) for k, numbers in enumerate(own)]
+        setup = [*setup, *judge_runs(runs_of)]
+    known = record_statistics(
+        fitted, prepared, own, best.determined, runs, best.noise, options.limit, beside
+    )
+    return _assemble(fitted, prepared, options, groups, runs, known, setup)
+
+
+def searched(
+    model: Model,
+    prepared: RecordSet,
+    options: RecordOptions,
+    responses: WhitenedResponses | None = None,
+) -> Searched:
+    """Search, again where the estimates have other growing modes than their start.
+
+    Parameters
+    ----------
+    model : TransferFunctionModel or StateSpaceModel
+    prepared : RecordSet
+    options : RecordOptions
+    responses : WhitenedResponses, optional
+        Fitted together with the records.
+
+    Returns
+    -------
+    Searched
+
+    Raises
+    ------
+    FitError
+        No start led anywhere.
+    """
+    starts = options
+    for _ in range(ROUNDS):
+        runs_of = equation_runs(model, prepared)
+        placed = prepared if runs_of is None else segmented_starts(prepared, runs_of)
+        placed = replace(placed, model=model)
+        groups = cluster(search_records(placed, starts, runs_of, responses))
+        fitted = _with_estimates(model, groups[0][0])
+        after = equation_runs(fitted, prepared)
+        if _growing(after) == _growing(runs_of):
+            break
+        model, starts = _overgrown(model, fitted, after, placed), replace(options, starts=1)
+    return Searched(model, placed, runs_of, groups)
+
+
+def _overgrown(
+    model: Model, fitted: Model, after: EquationRuns | None, prepared: RecordSet
+) -> Model:
+    """Where to search from, once the estimates grow otherwise than the model that was run.
+
+    A run from the first sample to the last of a vehicle that turns out unstable tells nothing, and
+    its estimates may grow without bound. Transforms of the records do not care which modes grow.
+    """
+    if not (after is not None and after.is_segmented and isinstance(model, StateSpaceModel)):
+        return fitted
+    options = FourierOutputErrorOptions(hold="first" if prepared.first_order_hold else "zero")
+    try:
+        return fit_fourier_output_error(model, prepared.records, options).model
+    except FlightidError:
+        # A nonlinear model, or records too short to transform: what was found is all there is.
+        return fitted
+
+
+def _growing(runs: EquationRuns | None) -> list[int]:
+    return [] if runs is None or not runs.is_segmented else runs.n_growing
+
+
+def _with_estimates(model: Model, end: RecordEnd) -> Model:
+    names = [parameter.name for parameter in model.parameters.free]
+    return model.with_values(dict(zip(names, map(float, end.x), strict=True)))
+
+
+def search_records(
+    prepared: RecordSet,
+    options: RecordOptions,
+    runs_of: EquationRuns | None = None,
+    responses: WhitenedResponses | None = None,
+) -> list[RecordEnd]:
+    """Ends of all starts, best first; no statistics."""
+    model = prepared.model
+    free = model.parameters.free
+    native = model.native if runs_of is None else runs_of.native
+    found = native.fit_records(
+        model.parameters.independent_values(),
+        model.parameters.free_indices,
+        prepared.arrays,
+        [numbers.native for numbers in prepared.own],
+        prepared.first_order_hold,
+        (options.noise_covariance == "full", options.limit, options.consistency),
+        (
+            draw_starts(free, options.starts, options.seed),
+            np.array([parameter.minimum for parameter in free]),
+            np.array([parameter.maximum for parameter in free]),
+            options.maximum_iterations,
+        ),
+        responses,
+    )
+    return collect([each if isinstance(each, str) else RecordEnd.of_native(each) for each in found])
+
+
+def _run(
+    fitted: Model,
+    prepared: RecordSet,
+    runs_of: EquationRuns | None,
+    place: int,
+    own: OwnNumbers,
+    *,
+    with_slopes: bool,
+) -> tuple[Array, Array]:
+    """Outputs with bias, and their derivatives by θ, initial states, shifts and biases."""
+    asked = (
+        fitted.parameters.independent_values(),
+        fitted.parameters.free_indices,
+        prepared.arrays[place],
+        own.native,
+        prepared.first_order_hold,
+        with_slopes,
+    )
+    outputs, slopes = (
+        fitted.native.run_record(*asked)
+        if runs_of is None
+        else runs_of.native.run_record(place, *asked)
+    )
+    n_outputs, n_samples = outputs.shape
+    biases = np.zeros((n_outputs, n_samples, len(own.free_bias)))
+    for column, output in enumerate(own.free_bias):
+        biases[output, :, column] = 1.0
+    return outputs + own.bias[:, None], np.concatenate([slopes, biases], axis=2)
+
+
+def _fitted_records(
+    prepared: RecordSet,
+    runs: Sequence[tuple[Array, Array]],
+    found: RecordStatistics,
+) -> tuple[FittedRecord, ...]:
+    model = prepared.model
+    result = []
+    for place, record in enumerate(prepared.records):
+        outputs = runs[place][0] + prepared.offsets[place]
+        known = record.channels
+        channels = [known[name] for name in model.inputs]
+        channels += [
+            Channel(name, known[name].unit, known[name].role, "model") for name in model.outputs
+        ]
+        made = record.replace(
+            dict(zip(model.outputs, outputs, strict=True)),
+            channels=channels,
+            step=Step("identify", {"method": "output error"}),
+        )
+        result.append(FittedRecord(record, made, model.outputs, *found.own[place]))
+    return tuple(result)
+
+
+def _assemble(
+    fitted: Model,
+    prepared: RecordSet,
+    options: RecordOptions,
+    groups: Sequence[Sequence[RecordEnd]],
+    runs: Sequence[tuple[Array, Array]],
+    found: RecordStatistics,
+    setup: Sequence[Finding],
+) -> Fit:
+    best = groups[0][0]
+    records = _fitted_records(replace(prepared, model=fitted), runs, found)
+    costs = _costs(records, fitted.outputs)
+    findings = (
+        *setup,
+        *judge_search(groups, best.cost + _NEAR * prepared.n_samples * len(fitted.outputs)),
+        *judge_parameters(found.parameters),
+        *judge_correlation(found.names, found.correlation),
+        *judge_fit(costs, found.inflation),
+    )
+    return Fit(
+        model=fitted,
+        parameters=found.parameters,
+        cost=sum(costs.values()),
+        average_cost=sum(costs.values()) / len(costs),
+        costs=costs,
+        names=found.names,
+        covariance=found.covariance,
+        correlation=found.correlation,
+        responses=(),
+        minima=local_minima(groups, [parameter.name for parameter in fitted.parameters.free]),
+        objective=best.cost,
+        termination=best.termination,
+        iterations=best.iterations,
+        intervals_from="coloured residuals",
+        findings=findings,
+        provenance=_provenance(prepared, options),
+        records=records,
+        noise_covariance=best.noise,
+    )
+
+
+def _costs(records: Sequence[FittedRecord], outputs: Sequence[str]) -> dict[str, float]:
+    """Percent of each output's variance, about the mean of each record, left in the residuals."""
+    result = {}
+    for name in outputs:
+        left = sum(float(np.sum(each.residual(name) ** 2)) for each in records)
+        spread = sum(
+            float(np.sum((each.measured[name] - np.mean(each.measured[name])) ** 2))
+            for each in records
+        )
+        result[name] = 100.0 * left / spread
+    return result
+
+
+def _provenance(prepared: RecordSet, options: RecordOptions) -> dict[str, object]:
+    digest = hashlib.sha256()
+    for inputs, outputs, sample_time_s in prepared.arrays:
+        digest.update(inputs.tobytes() + outputs.tobytes() + str(sample_time_s).encode())
+    return {
+        "method": "output error",
+        "flightid": VERSION,
+        "data_sha256": digest.hexdigest(),
+        "data_history": [[str(step) for step in record.history] for record in prepared.records],
+        "options": options.to_dict(),
+    }

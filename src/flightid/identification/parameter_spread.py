@@ -1,0 +1,60 @@
+"""Parameters of a fit or model as numbers with their spread: ties followed, bounds left out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import ModelError
+from flightid.identification.fit import Fit
+from flightid.identification.spread_of import NO_COVARIANCE
+from flightid.models import StateSpaceModel, TransferFunctionModel
+from flightid.uncertainty.spread import Spread
+
+
+def parameter_spread(source: object) -> Spread[dict[str, float]]:
+    """Values of all parameters by name, with the covariance of those that were fitted.
+
+    Parameters
+    ----------
+    source : Fit, StateSpaceModel or TransferFunctionModel
+
+    Returns
+    -------
+    Spread of dict of str to float
+
+    Raises
+    ------
+    ModelError
+        The source has no named parameters.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> parameter_spread(fid.load_model("r50_hover")).estimate["Krfb"]
+    -8.26
+    """
+    model = source.model if isinstance(source, Fit) else source
+    if not isinstance(model, StateSpaceModel | TransferFunctionModel):
+        raise ModelError(
+            "there are no named parameters in this",
+            found=type(model).__name__,
+            needed="a state-space or transfer-function model, or a fit of one",
+        )
+    parameters = model.parameters
+    tape = parameters.tape(parameters.names)
+    names = source.names if isinstance(source, Fit) else ()
+    covariance = source.covariance if isinstance(source, Fit) else None
+
+    def make(numbers: NDArray[np.float64]) -> dict[str, float]:
+        given: Mapping[str, float] = dict(zip(names, map(float, numbers), strict=True))
+        values = tape.evaluate(parameters.independent_values(given))
+        return dict(zip(parameters.names, map(float, values), strict=True))
+
+    centre = np.array([parameters[name].value for name in names], dtype=np.float64)
+    reason = "" if covariance is not None else NO_COVARIANCE
+    if isinstance(source, Fit) and covariance is None:
+        reason = "the fit knows no errors of its data"
+    return Spread(centre, covariance, make, None, reason)

@@ -1,0 +1,1 @@
+"""Polynomial models by prediction errors."""

@@ -1,0 +1,176 @@
+"""Verdicts on the fit of a polynomial model, each with what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.stats import chi2
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.identification.fit import FittedParameter, LocalMinimum
+from flightid.identification.prediction_error.roots import POLE, ZERO, FittedRoot
+from flightid.models.linear.discrete_modes import polynomial_roots
+from flightid.models.polynomial.model import PolynomialModel
+from flightid.models.polynomial.structure import PolynomialStructure
+
+CONVERGED = {"gradient", "step", "cost", "zero", "regression", "instruments", "kernel"}
+SAMPLES_PER_COEFFICIENT = 10
+AT_CIRCLE = 1e-4
+SAME_MINIMUM = 1e-4
+
+
+def judge_polynomial(
+    structure: PolynomialStructure,
+    model: PolynomialModel,
+    parameters: Mapping[str, FittedParameter],
+    roots: Sequence[FittedRoot],
+    minima: Sequence[LocalMinimum],
+    n_samples: int,
+) -> tuple[Finding, ...]:
+    """All verdicts that the fit itself allows; residual tests say more."""
+    return (
+        *_ending(minima),
+        *_circle(model),
+        *_stability(structure, model),
+        *(() if structure.kernel else _cancellation(model, roots)),
+        *_overfit(structure, parameters, n_samples),
+    )
+
+
+def _ending(minima: Sequence[LocalMinimum]) -> list[Finding]:
+    best = minima[0]
+    found = []
+    if best.termination not in CONVERGED:
+        found.append(
+            Finding(
+                "not-converged",
+                Light.RED,
+                f"the best start ended by {best.termination}, not at a minimum",
+                "raise maximum_iterations, lower the orders or give more starts",
+            )
+        )
+    others = [m for m in minima[1:] if m.objective > best.objective * (1 + SAME_MINIMUM)]
+    if others:
+        found.append(
+            Finding(
+                "local-minima",
+                Light.GREEN if best.count > 1 else Light.AMBER,
+                f"starts found {1 + len(others)} minima; the best, found {best.count} times, is "
+                f"{others[0].objective / best.objective:.4g} times below the next",
+                "" if best.count > 1 else "give more starts to see whether it is found again",
+            )
+        )
+    return found
+
+
+def _circle(model: PolynomialModel) -> list[Finding]:
+    rows = {"C": model.c, **{f"F of {u}": f for u, f in zip(model.inputs, model.f, strict=True)}}
+    found = []
+    for letter, row in rows.items():
+        if np.max(np.abs(polynomial_roots(np.asarray(row))), initial=0.0) > 1.0 - AT_CIRCLE:
+            found.append(
+                Finding(
+                    "root-at-circle",
+                    Light.AMBER,
+                    f"a root of {letter} lies at the unit circle, where intervals do not hold",
+                    "difference or detrend the data less, or lower the order",
+                )
+            )
+    return found
+
+
+def _stability(structure: PolynomialStructure, model: PolynomialModel) -> list[Finding]:
+    size = np.max(np.abs(polynomial_roots(np.asarray(model.a))), initial=0.0)
+    if structure.enforce_stability and size > 1.0 - AT_CIRCLE:
+        return [
+            Finding(
+                "stability-enforced",
+                Light.AMBER,
+                f"A was held inside the unit circle (largest root {size:.6f}); without that it "
+                "would leave it",
+                "compare with enforce_stability=False; the vehicle may be unstable or drifting",
+            )
+        ]
+    if size > 1.0:
+        return [
+            Finding(
+                "unstable-model",
+                Light.AMBER,
+                f"A has a root of size {size:.6g}: the free run grows",
+                "judge it by predictions a few samples ahead, or take enforce_stability=True",
+            )
+        ]
+    return []
+
+
+def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[Finding]:
+    """Pairs of pole and zero whose difference their joint error explains."""
+    found = []
+    covariance = model.covariance
+    for pole in (root for root in roots if root.kind == POLE):
+        for zero in (root for root in roots if root.kind == ZERO):
+            if covariance is None or pole.response != zero.response:
+                continue
+            if pole.gradient is None or zero.gradient is None:
+                continue
+            if (pole.z.imag == 0.0) != (zero.z.imag == 0.0):
+                continue
+            gap = pole.z - zero.z
+            rate = pole.gradient - zero.gradient
+            n = 2 if pole.z.imag else 1
+            rows = np.array([rate.real, rate.imag][:n])
+            errors = rows @ covariance @ rows.T
+            distance = np.array([gap.real, gap.imag][:n])
+            statistic = float(distance @ np.linalg.pinv(errors) @ distance)
+            if statistic < chi2.ppf(0.95, n):
+                found.append(
+                    Finding(
+                        "pole-zero-cancellation",
+                        Light.AMBER,
+                        f"{pole.response}: pole {pole.z:.4g} and zero {zero.z:.4g} cancel within "
+                        "their errors",
+                        f"lower na or nf and nb by {n}: the data do not show this mode",
+                    )
+                )
+    return found
+
+
+def _overfit(
+    structure: PolynomialStructure, parameters: Mapping[str, FittedParameter], n_samples: int
+) -> list[Finding]:
+    found = []
+    d = structure.n_parameters
+    if n_samples < SAMPLES_PER_COEFFICIENT * d and structure.kernel is None:
+        found.append(
+            Finding(
+                "few-samples",
+                Light.AMBER,
+                f"{n_samples} samples for {d} coefficients",
+                f"use at least {SAMPLES_PER_COEFFICIENT * d} samples, fewer coefficients, or "
+                "kernel='tc' for ARX",
+            )
+        )
+    last = [f"{letter}{n}" for letter, n in zip("acd", _degrees(structure), strict=True) if n]
+    useless = [name for name in last if _covers_zero(parameters[name])]
+    if useless:
+        found.append(
+            Finding(
+                "overfit",
+                Light.AMBER,
+                f"the last coefficient of a polynomial may be zero: {', '.join(useless)}",
+                "try the next lower order (flightid.scan_orders ranks them by free run)",
+            )
+        )
+    return found
+
+
+def _degrees(structure: PolynomialStructure) -> tuple[int, int, int]:
+    return structure.na, structure.nc, structure.nd
+
+
+def _covers_zero(parameter: FittedParameter) -> bool:
+    if parameter.interval95 is None:
+        return False
+    return parameter.interval95[0] <= 0.0 <= parameter.interval95[1]

@@ -1,0 +1,338 @@
+"""Fits of polynomial models to records (native side: `polynomial_fit.rs`)."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid import _native
+from flightid.errors import DataError, FitError
+from flightid.identification.fit import FittedParameter, LocalMinimum
+from flightid.identification.prediction_error.backcast import backcast
+from flightid.identification.prediction_error.findings import judge_polynomial
+from flightid.identification.prediction_error.information_criteria import criteria
+from flightid.identification.prediction_error.instrumental_variables import four_stage
+from flightid.identification.prediction_error.kernel_regression import kernel_estimate
+from flightid.identification.prediction_error.linear_regression import regress, require_independent
+from flightid.identification.prediction_error.result import FitScore, PolynomialFit
+from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
+from flightid.identification.prediction_error.starts import polynomial_starts
+from flightid.models.polynomial.data import PolynomialData, gather_channels
+from flightid.models.polynomial.model import PolynomialModel
+from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.record import Record
+from flightid.uncertainty import interval95
+from flightid.version import VERSION
+
+Array = NDArray[np.float64]
+BACKCASTS = 6
+SETTLED = 1e-6
+SAME_MINIMUM = 1e-6
+SPARE_SAMPLES = 3
+BEFORE = {"estimate": "unknown", "zero": "rest", "backcast": "given"}
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """Coefficients with what the search left; `skip` first errors of each record do not count."""
+
+    theta: Array
+    covariance: Array | None
+    degrees: int
+    minima: tuple[LocalMinimum, ...]
+    iterations: int
+    memory: list[list[float]]
+    skip: int
+
+
+def fit_polynomial(
+    structure: PolynomialStructure, data: Record | Sequence[Record]
+) -> PolynomialFit:
+    """Fit a polynomial structure to records; the structure holds all options.
+
+    Reference: Ljung, *System Identification*, 2nd ed., sections 10.2, 10.3, 9.4 and 15.3.
+    """
+    records = (data,) if isinstance(data, Record) else tuple(data)
+    channels = gather_channels(records, structure.output, structure.inputs, structure.offsets)
+    channels.require_change()
+    _require_samples(structure, channels)
+    found = _search(structure, channels)
+    return _assemble(structure, records, channels, found)
+
+
+def _require_samples(structure: PolynomialStructure, data: PolynomialData) -> None:
+    lag = structure.longest_lag
+    counted = sum(max(0, n - lag) for n in data.lengths)
+    least = structure.n_parameters + SPARE_SAMPLES
+    if counted < least or min(data.lengths) <= lag:
+        raise DataError(
+            "too few samples for the orders",
+            found=f"{counted} after the first {lag} of each record, the shortest record with "
+            f"{min(data.lengths)}",
+            needed=f"at least {least}, each record longer than {lag}",
+            action="give longer records or lower orders",
+        )
+
+
+def _search(structure: PolynomialStructure, data: PolynomialData) -> _Found:
+    if structure.is_regression and structure.initial != "backcast":
+        found = _regression(structure, data)
+        unstable = np.max(np.abs(np.roots([1.0, *found.theta[: structure.na]])), initial=0.0) >= 1.0
+        if not (structure.enforce_stability and unstable):
+            return found
+    if structure.initial == "backcast":
+        return _backcast_rounds(structure, data)
+    return _iterate(structure, data, polynomial_starts(structure, data), [])
+
+
+def _regression(structure: PolynomialStructure, data: PolynomialData) -> _Found:
+    """ARX: linear in the coefficients, so no iteration."""
+    skip = 0 if structure.initial == "zero" else structure.longest_lag
+    made = regress(
+        data.output, data.inputs, data.lengths, structure.na, structure.nb, structure.nk, skip
+    )
+    degrees = made.n_rows - made.theta.size
+    if structure.kernel is not None:
+        smooth = kernel_estimate(made, (structure.na, *structure.nb), structure.kernel)
+        return _linear(structure, smooth.theta, smooth.covariance, degrees, "kernel", skip)
+    require_independent(made, structure)
+    if structure.method == "iv4":
+        theta, covariance = four_stage(structure, data)
+        return _linear(structure, theta, covariance, degrees, "instruments", skip)
+    covariance = made.sum_of_squares / degrees * _inverse_square(made.factor)
+    return _linear(structure, made.theta, covariance, degrees, "regression", skip)
+
+
+def _linear(
+    structure: PolynomialStructure,
+    theta: Array,
+    covariance: Array,
+    degrees: int,
+    ending: str,
+    skip: int,
+) -> _Found:
+    values = dict(zip(structure.names, theta.tolist(), strict=True))
+    minimum = LocalMinimum(0.0, 1, values, ending)
+    return _Found(theta, covariance, degrees, (minimum,), 0, [], skip)
+
+
+def _inverse_square(factor: Array) -> Array:
+    """(RᵀR)⁻¹ of a triangle, through R⁻¹."""
+    inverse = np.linalg.inv(factor)
+    return np.asarray(inverse @ inverse.T)
+
+
+def _iterate(
+    structure: PolynomialStructure,
+    data: PolynomialData,
+    starts: Array,
+    memory: list[list[float]],
+) -> _Found:
+    """Gauss-Newton with the damping of Levenberg and Marquardt from every start."""
+    skip = structure.longest_lag if structure.is_regression and not memory else 0
+    outcomes = _native.polynomial_fit(
+        data.output,
+        data.inputs,
+        list(data.lengths),
+        structure.native,
+        starts,
+        BEFORE[structure.initial],
+        memory,
+        skip,
+        structure.enforce_stability,
+        structure.maximum_iterations,
+    )
+    ends = [end for end in outcomes if not isinstance(end, str) and np.isfinite(end[1])]
+    if not ends:
+        raise FitError(
+            "the fit diverged from every start",
+            found="; ".join(sorted({end for end in outcomes if isinstance(end, str)})),
+            action="lower the orders, or give more starts",
+        )
+    ends.sort(key=lambda end: end[1])
+    theta, squares, flat, iterations, _ = ends[0]
+    unknown = 0
+    if structure.initial == "estimate":
+        of_inputs, of_noise = _native.polynomial_memory(structure.native)
+        unknown = len(data.lengths) * (sum(of_inputs) + of_noise)
+    if structure.is_regression:
+        unknown = len(data.lengths) * skip
+    degrees = max(data.output.size - unknown - theta.size, 1)
+    factor = flat.reshape(theta.size, theta.size).T
+    covariance = None
+    if _is_determined(factor):
+        covariance = squares / degrees * _inverse_square(factor)
+    return _Found(theta, covariance, degrees, _minima(structure, ends), iterations, memory, skip)
+
+
+def _is_determined(factor: Array) -> bool:
+    lengths = np.linalg.norm(factor, axis=0)
+    return bool(np.all(np.abs(np.diag(factor)) > 1e-11 * np.maximum(lengths, 1e-300)))
+
+
+def _minima(
+    structure: PolynomialStructure, ends: Sequence[tuple[Array, float, Array, int, str]]
+) -> tuple[LocalMinimum, ...]:
+    groups: list[LocalMinimum] = []
+    for theta, squares, _, _, ending in ends:
+        if groups and squares <= groups[-1].objective * (1 + SAME_MINIMUM):
+            groups[-1] = replace(groups[-1], count=groups[-1].count + 1)
+        else:
+            values = dict(zip(structure.names, theta.tolist(), strict=True))
+            groups.append(LocalMinimum(squares, 1, values, ending))
+    return tuple(groups)
+
+
+def _backcast_rounds(structure: PolynomialStructure, data: PolynomialData) -> _Found:
+    """The past follows from the model and the model from the past, until both rest."""
+    of_inputs, of_noise = _native.polynomial_memory(structure.native)
+    memory = [[0.0] * (sum(of_inputs) + of_noise) for _ in data.lengths]
+    starts = polynomial_starts(structure, data)
+    found = _iterate(structure, data, starts, memory)
+    for _ in range(BACKCASTS):
+        model = PolynomialModel.from_theta(structure, found.theta, data.sample_time_s)
+        after = _iterate(structure, data, found.theta[None], backcast(model, data))
+        moved = np.abs(after.theta - found.theta)
+        found = replace(after, minima=(*after.minima[:1], *found.minima[1:]))
+        if found.covariance is None or np.all(
+            moved <= SETTLED * np.sqrt(np.diag(found.covariance))
+        ):
+            break
+    return found
+
+
+def _assemble(
+    structure: PolynomialStructure,
+    records: tuple[Record, ...],
+    data: PolynomialData,
+    found: _Found,
+) -> PolynomialFit:
+    errors = _native.polynomial_errors(
+        data.output,
+        data.inputs,
+        list(data.lengths),
+        structure.native,
+        found.theta,
+        BEFORE[structure.initial],
+        found.memory,
+    )
+    counted = tuple(errors[span][found.skip :] for span in data.spans)
+    squares = float(sum(row @ row for row in counted))
+    n_counted = sum(row.size for row in counted)
+    measures = criteria(squares, n_counted, structure.n_parameters)
+    model = PolynomialModel.from_theta(
+        structure,
+        found.theta,
+        data.sample_time_s,
+        noise_variance=squares / found.degrees,
+        covariance=found.covariance,
+        units=data.units,
+        name=f"{structure.kind} model of {structure.output}",
+    )
+    minima = tuple(
+        replace(m, objective=squares) if m.objective == 0.0 and found.iterations == 0 else m
+        for m in found.minima
+    )
+    parameters = _parameters(structure, model, found)
+    roots = fitted_roots(model, found.degrees)
+    return PolynomialFit(
+        model,
+        structure,
+        parameters,
+        roots,
+        fitted_gains(model, found.degrees),
+        measures,
+        _scores(structure, model, records, data, counted),
+        records,
+        counted,
+        minima,
+        minima[0].termination,
+        found.iterations,
+        judge_polynomial(structure, model, parameters, roots, minima, n_counted),
+        _provenance(structure, records, data),
+    )
+
+
+def _parameters(
+    structure: PolynomialStructure, model: PolynomialModel, found: _Found
+) -> dict[str, FittedParameter]:
+    made = {}
+    units = _units(structure, model)
+    for place, (name, value) in enumerate(zip(structure.names, found.theta.tolist(), strict=True)):
+        unit = units[place]
+        if found.covariance is None:
+            reason = "the data do not tell the coefficients apart"
+            made[name] = FittedParameter(name, unit, value, "free", reason=reason)
+            continue
+        stderr = float(np.sqrt(found.covariance[place, place]))
+        interval = interval95(value, stderr, degrees_of_freedom=found.degrees)
+        made[name] = FittedParameter(name, unit, value, "free", stderr, interval)
+    return made
+
+
+def _units(structure: PolynomialStructure, model: PolynomialModel) -> list[str]:
+    """B carries output over input, everything else is a plain number."""
+    found = ["1"] * structure.na
+    above = model.units.get(structure.output, "1")
+    for name, count in zip(structure.inputs, structure.nb, strict=True):
+        below = model.units.get(name, "1")
+        found += [above if below == "1" else f"{above}/({below})"] * count
+    return found + ["1"] * (structure.n_parameters - len(found))
+
+
+def _scores(
+    structure: PolynomialStructure,
+    model: PolynomialModel,
+    records: Sequence[Record],
+    data: PolynomialData,
+    counted: Sequence[Array],
+) -> tuple[FitScore, ...]:
+    """One step with the errors of the fit, and free run, over all records of the fit."""
+    about = np.concatenate([data.output[span] - data.output[span].mean() for span in data.spans])
+    size = float(np.sqrt(about @ about))
+    one_step = np.concatenate(counted)
+    runs = [model.predict(record, "free_run", offsets=structure.offsets) for record in records]
+    free = np.concatenate([run.residual for run in runs])
+    started = {
+        "estimate": "an estimated state",
+        "zero": "rest",
+        "backcast": "a backcast past",
+    }[structure.initial]
+
+    def score(words: str, errors: Array) -> FitScore:
+        norm = float(np.sqrt(errors @ errors))
+        rms = norm / float(np.sqrt(errors.size))
+        return FitScore(words, rms, 100.0 * (1.0 - norm / size))
+
+    return (
+        score(f"one step ahead from {started}, records of the fit", one_step),
+        score(f"{runs[0].words}, records of the fit", free),
+    )
+
+
+def _provenance(
+    structure: PolynomialStructure, records: Sequence[Record], data: PolynomialData
+) -> dict[str, object]:
+    digest = hashlib.sha256(data.output.tobytes())
+    digest.update(np.ascontiguousarray(data.inputs).tobytes())
+    return {
+        "method": structure.method.replace("_", " "),
+        "flightid": VERSION,
+        "data_sha256": digest.hexdigest(),
+        "data_history": [str(step) for record in records for step in record.history],
+        "records": [record.name for record in records],
+        "offsets": [dict(row) for row in data.offsets],
+        "options": {
+            "initial": structure.initial,
+            "offsets": structure.offsets,
+            "enforce_stability": structure.enforce_stability,
+            "kernel": structure.kernel,
+            "starts": structure.starts,
+            "seed": structure.seed,
+            "maximum_iterations": structure.maximum_iterations,
+        },
+    }

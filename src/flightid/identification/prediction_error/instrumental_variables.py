@@ -1,0 +1,116 @@
+"""ARX coefficients by four-stage instrumental variables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from flightid.errors import DataError
+from flightid.identification.prediction_error.linear_regression import reflected, regress
+from flightid.models.polynomial.data import PolynomialData
+from flightid.models.polynomial.structure import PolynomialStructure
+
+Array = NDArray[np.float64]
+SPARE_LAGS = 8
+ROWS_PER_LAG = 20
+
+
+def four_stage(structure: PolynomialStructure, data: PolynomialData) -> tuple[Array, Array]:
+    """Coefficients of A y = B u + v with v of any colour, and their covariance.
+
+    Least squares; instruments from its noise-free output; a long noise model of what is left; the
+    same instruments again, everything filtered by that model. Consistent in open loop.
+
+    Raises
+    ------
+    DataError
+        The instruments do not tell the coefficients apart.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., section 15.3, eqs. 15.20 to 15.27.
+    """
+    first = regress(
+        data.output, data.inputs, data.lengths, structure.na, structure.nb, structure.nk
+    ).shortest
+    second, _ = _instruments(structure, data, first, np.ones(1))
+    left = _left(structure, data, second)
+    none = np.empty((0, left.size))
+    # Longer than Ljung's na + nb: what a short noise model leaves coloured falsifies the intervals.
+    room = sum(data.lengths) // ROWS_PER_LAG
+    degree = min(structure.na + max(structure.nb, default=0) + SPARE_LAGS, max(room, 1))
+    noise = regress(left, none, data.lengths, degree, [], []).shortest
+    return _instruments(structure, data, second, np.concatenate([[1.0], noise]))
+
+
+def _filtered(above: Array, below: Array, row: Array, spans: Sequence[slice]) -> Array:
+    return np.concatenate([lfilter(above, below, row[span]) for span in spans])
+
+
+def _numerators(structure: PolynomialStructure, theta: Array) -> list[Array]:
+    parts = np.split(theta[structure.na :], np.cumsum(structure.nb)[:-1])
+    return [np.concatenate([np.zeros(k), b]) for k, b in zip(structure.nk, parts, strict=True)]
+
+
+def _left(structure: PolynomialStructure, data: PolynomialData, theta: Array) -> Array:
+    a = np.concatenate([[1.0], theta[: structure.na]])
+    left = _filtered(a, np.ones(1), data.output, data.spans)
+    for row, b in zip(data.inputs, _numerators(structure, theta), strict=True):
+        left -= _filtered(b, np.ones(1), row, data.spans)
+    return left
+
+
+def _instruments(
+    structure: PolynomialStructure, data: PolynomialData, theta: Array, whitener: Array
+) -> tuple[Array, Array]:
+    below = reflected(np.concatenate([[1.0], theta[: structure.na]]))
+    clean = np.zeros_like(data.output)
+    for row, b in zip(data.inputs, _numerators(structure, theta), strict=True):
+        clean += _filtered(b, below, row, data.spans)
+    signals = [
+        _filtered(whitener, np.ones(1), row, data.spans)
+        for row in (data.output, clean, *data.inputs)
+    ]
+    # Before this row the filter has not seen the equation with all its lags.
+    start = structure.longest_lag + whitener.size - 1
+    regressors = _columns(structure, data, signals[0], signals[2:], start)
+    instruments = _columns(structure, data, signals[1], signals[2:], start)
+    target = np.concatenate([signals[0][span][start:] for span in data.spans])
+    product = instruments.T @ regressors
+    scale = np.outer(np.linalg.norm(instruments, axis=0), np.linalg.norm(regressors, axis=0))
+    if np.any(scale == 0.0) or np.linalg.cond(product / scale) > 1e13:
+        raise DataError(
+            "the instruments do not tell the coefficients apart",
+            found=f"{structure.na} poles and inputs {', '.join(structure.inputs)}",
+            action="lower the orders or use a richer input",
+        )
+    found = np.linalg.solve(product, instruments.T @ target)
+    errors = target - regressors @ found
+    variance = float(errors @ errors) / (target.size - found.size)
+    inverse = np.linalg.inv(product)
+    covariance = variance * inverse @ (instruments.T @ instruments) @ inverse.T
+    return found, np.asarray(covariance)
+
+
+def _columns(
+    structure: PolynomialStructure,
+    data: PolynomialData,
+    output: Array,
+    inputs: Sequence[Array],
+    start: int,
+) -> Array:
+    lags = [(output, lag, -1.0) for lag in range(1, structure.na + 1)]
+    for row, count, delay in zip(inputs, structure.nb, structure.nk, strict=True):
+        lags += [(row, lag, 1.0) for lag in range(delay, delay + count)]
+    return np.array(
+        [
+            np.concatenate(
+                [sign * row[span][start - lag : n - lag]
+                 for span, n in zip(data.spans, data.lengths, strict=True)]
+            )
+            for row, lag, sign in lags
+        ]
+    ).T  # fmt: skip

@@ -1,0 +1,146 @@
+"""Regularised ARX and FIR models: decaying, smooth coefficients, as far as the data ask for it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+
+from flightid.errors import DataError
+from flightid.identification.prediction_error.linear_regression import Regression
+
+Array = NDArray[np.float64]
+LARGEST_DECAY = 0.995
+LARGEST_CORRELATION = 0.99
+
+
+@dataclass(frozen=True, eq=False)
+class KernelEstimate:
+    """Posterior mean and covariance, and what the data chose.
+
+    `settings` holds for each group of coefficients its size, decay and correlation;
+    `evidence` is minus twice the logarithm of the marginal likelihood.
+    """
+
+    theta: Array
+    covariance: Array
+    variance: float
+    settings: tuple[tuple[float, float, float], ...]
+    evidence: float
+
+
+def kernel(size: float, decay: float, correlation: float, count: int) -> Array:
+    """Prior covariance of `count` coefficients, DC; with correlation √decay it is TC.
+
+    Reference: Chen, Ohlsson & Ljung (2012), On the estimation of transfer functions,
+    regularizations and Gaussian processes - revisited, Automatica 48, eqs. 35 and 36.
+
+    Example
+    -------
+    >>> kernel(2.0, 0.25, 0.5, 2)
+    array([[0.5  , 0.125],
+           [0.125, 0.125]])
+    """
+    lag = np.arange(1, count + 1)
+    return np.asarray(
+        size
+        * decay ** ((lag[:, None] + lag[None, :]) / 2)
+        * correlation ** np.abs(lag[:, None] - lag[None, :])
+    )
+
+
+def kernel_estimate(
+    regression: Regression, groups: Sequence[int], kind: str, variance: float | None = None
+) -> KernelEstimate:
+    """Coefficients under a decaying prior whose shape maximises the marginal likelihood.
+
+    Parameters
+    ----------
+    regression : Regression
+        Triangle of all rows.
+    groups : sequence of int
+        Coefficients of each polynomial, which share size and decay.
+    kind : {"tc", "dc"}
+    variance : float, optional
+        Of the noise; default: of the least-squares residuals.
+
+    Returns
+    -------
+    KernelEstimate
+
+    Raises
+    ------
+    DataError
+        No degree of freedom is left to estimate the noise from.
+
+    Reference
+    ---------
+    Pillonetto et al. (2014), Kernel methods in system identification, Automatica 50, section 4.4.
+    """
+    n, count = regression.n_rows, regression.theta.size
+    if variance is None:
+        if n <= count:
+            raise DataError(
+                "the noise cannot be estimated",
+                found=f"{n} rows for {count} coefficients",
+                needed="more rows than coefficients",
+                action="give longer records or lower orders",
+            )
+        variance = regression.sum_of_squares / (n - count)
+    factor, wanted = regression.factor, -regression.triangle[:-1, -1]
+    used = [g for g in groups if g]
+    scale = _sizes(factor, wanted, used)
+
+    def unpack(x: Array) -> list[tuple[float, float, float]]:
+        found = []
+        for place, base in enumerate(scale):
+            size, decay, *rest = x[place * width : (place + 1) * width]
+            lam = LARGEST_DECAY / (1 + math.exp(-decay))
+            rho = LARGEST_CORRELATION * math.tanh(rest[0]) if rest else math.sqrt(lam)
+            found.append((base * math.exp(size), lam, rho))
+        return found
+
+    def prior(settings: Sequence[tuple[float, float, float]]) -> Array:
+        block = np.zeros((count, count))
+        first = 0
+        for (size, decay, correlation), g in zip(settings, used, strict=True):
+            block[first : first + g, first : first + g] = kernel(size, decay, correlation, g)
+            first += g
+        return block
+
+    def evidence(x: Array) -> float:
+        total = variance * np.eye(count) + factor @ prior(unpack(x)) @ factor.T
+        root = np.linalg.cholesky(total)
+        half = np.linalg.solve(root, wanted)
+        return float(half @ half + 2 * np.sum(np.log(np.diag(root))))
+
+    width = 3 if kind == "dc" else 2
+    start = np.tile([0.0, 1.5, 1.0][:width], len(used))
+    limits = [(-12.0, 12.0), (-6.0, 9.0), (-3.0, 3.0)][:width] * len(used)
+    best = minimize(evidence, start, method="L-BFGS-B", bounds=limits)
+    settings = unpack(best.x)
+    before = prior(settings)
+    gain = before @ factor.T
+    total = variance * np.eye(count) + factor @ gain
+    weights = np.linalg.solve(total, np.column_stack([wanted, gain.T]))
+    theta = gain @ weights[:, 0]
+    covariance = before - gain @ weights[:, 1:]
+    rest = (n - count) * math.log(variance) + regression.sum_of_squares / variance
+    return KernelEstimate(
+        theta,
+        np.asarray((covariance + covariance.T) / 2),
+        variance,
+        tuple(settings),
+        float(best.fun) + rest,
+    )
+
+
+def _sizes(factor: Array, wanted: Array, groups: Sequence[int]) -> list[float]:
+    """Mean square of the unregularised coefficients of each group, as the unit of its size."""
+    theta = np.linalg.lstsq(factor, wanted, rcond=1e-10)[0]
+    parts = np.split(theta, np.cumsum(groups)[:-1])
+    return [float(np.max(part**2)) or 1.0 for part in parts]

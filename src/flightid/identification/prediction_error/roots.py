@@ -1,0 +1,245 @@
+"""Poles, zeros, natural frequencies, dampings and gains with what the coefficients' errors make."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.identification.fit import FittedParameter
+from flightid.models.linear.discrete_modes import discrete_modes
+from flightid.models.polynomial.display import zero_note
+from flightid.models.polynomial.model import PolynomialModel
+from flightid.uncertainty import interval95
+
+Array = NDArray[np.float64]
+POLE, ZERO = "pole", "zero"
+DOUBLE = 1e-6
+"""Roots closer than this share of their size have no first-order error."""
+
+
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """Covariance of the coefficients of a model with its degrees of freedom, and its sample time.
+
+    Example
+    -------
+    >>> Errors(0.1, None, 100).covariance is None
+    True
+    """
+
+    sample_time_s: float
+    covariance: Array | None
+    degrees: int
+
+
+@dataclass(frozen=True, eq=False)
+class FittedRoot:
+    """One real pole or zero, or the upper one of a conjugate pair.
+
+    Attributes
+    ----------
+    response : str
+        ``"output/input"``.
+    kind : str
+        ``"pole"`` or ``"zero"``.
+    z : complex
+    covariance : ndarray, shape (2, 2), or None
+        Of its real and imaginary part.
+    natural_frequency, damping : FittedParameter or None
+        Of a pole with a continuous counterpart, rad/s and 1.
+    note : str
+        What to know about it.
+    gradient : ndarray of complex, shape (n_coefficients,), or None
+        Derivative by the model's coefficients; None for a double root.
+
+    Example
+    -------
+    >>> FittedRoot("y/u", "pole", 0.5 + 0j, None, None, None)
+    FittedRoot(pole of y/u at 0.5)
+    """
+
+    response: str
+    kind: str
+    z: complex
+    covariance: Array | None
+    natural_frequency: FittedParameter | None
+    damping: FittedParameter | None
+    note: str = ""
+    gradient: NDArray[np.complex128] | None = None
+
+    @property
+    def stderr(self) -> tuple[float, float] | None:
+        """Standard errors of real and imaginary part."""
+        if self.covariance is None:
+            return None
+        real, imaginary = np.sqrt(np.diag(self.covariance))
+        return float(real), float(imaginary)
+
+    def __repr__(self) -> str:
+        """Kind and place on one line."""
+        place = f"{self.z.real:.4g}" + (f" ± {self.z.imag:.4g}i" if self.z.imag else "")
+        return f"FittedRoot({self.kind} of {self.response} at {place})"
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        omega, zeta = self.natural_frequency, self.damping
+        return {
+            "response": self.response,
+            "kind": self.kind,
+            "z": [self.z.real, self.z.imag],
+            "covariance": None if self.covariance is None else self.covariance.tolist(),
+            "natural_frequency": None if omega is None else omega.to_dict(),
+            "damping": None if zeta is None else zeta.to_dict(),
+            "note": self.note,
+        }
+
+
+def fitted_roots(model: PolynomialModel, degrees: int) -> tuple[FittedRoot, ...]:
+    """Poles and zeros of each response, the slowest poles first.
+
+    Parameters
+    ----------
+    model : PolynomialModel
+        With or without covariance.
+    degrees : int
+        Degrees of freedom behind the covariance.
+    """
+    found = []
+    for name in model.inputs:
+        roots = list(_roots(model, name))
+        poles = [item for item in roots if item[0] == POLE]
+        order = [mode.z for mode in discrete_modes([z for _, z, _ in poles], model.sample_time_s)]
+        poles.sort(key=lambda item: order.index(item[1]))
+        zeros = [item for item in roots if item[0] == ZERO]
+        errors = Errors(model.sample_time_s, model.covariance, degrees)
+        response = f"{model.output}/{name}"
+        found += [fitted_root(response, errors, *item) for item in (*poles, *zeros)]
+    return tuple(found)
+
+
+def _places(model: PolynomialModel) -> dict[tuple[str, int], slice]:
+    """Where the coefficients of each polynomial stand."""
+    counts = {("a", 0): np.size(model.a) - 1}
+    counts |= {("b", i): np.size(row) for i, row in enumerate(model.b)}
+    counts |= {("c", 0): np.size(model.c) - 1, ("d", 0): np.size(model.d) - 1}
+    counts |= {("f", i): np.size(row) - 1 for i, row in enumerate(model.f)}
+    ends = np.cumsum([0, *counts.values()])
+    return {key: slice(int(a), int(b)) for key, a, b in zip(counts, ends, ends[1:], strict=False)}
+
+
+def _roots(
+    model: PolynomialModel, name: str
+) -> Iterator[tuple[str, complex, NDArray[np.complex128] | None]]:
+    i = model.inputs.index(name)
+    places = _places(model)
+    for kind, key, row, free in (
+        (POLE, ("a", 0), model.a, 1),
+        (POLE, ("f", i), model.f[i], 1),
+        (ZERO, ("b", i), model.b[i], 0),
+    ):
+        polynomial = np.asarray(row, dtype=np.float64)
+        if polynomial.size < 2 or polynomial[0] == 0.0:
+            continue
+        slope = np.asarray(np.polyder(polynomial), dtype=np.float64)
+        curve = float(np.max(np.abs(polynomial)))
+        for z in np.roots(polynomial):
+            if z.imag < 0.0 or z == 0.0:
+                continue
+            gradient = np.zeros(model.theta.size, dtype=np.complex128)
+            below = complex(np.polyval(slope, z))
+            if abs(below) <= DOUBLE * curve * max(1.0, abs(z)) ** (polynomial.size - 2):
+                yield kind, complex(z), None
+                continue
+            powers = z ** np.arange(polynomial.size - 1, -1, -1)
+            gradient[places[key]] = (-powers / below)[free:]
+            yield kind, complex(z), gradient
+
+
+def fitted_root(
+    response: str,
+    errors: Errors,
+    kind: str,
+    z: complex,
+    gradient: NDArray[np.complex128] | None,
+) -> FittedRoot:
+    """A pole or zero with the errors that its gradient by the coefficients makes.
+
+    Parameters
+    ----------
+    response : str
+        ``"output/input"``.
+    errors : Errors
+        Of the coefficients.
+    kind : {"pole", "zero"}
+    z : complex
+    gradient : ndarray of complex, shape (n_coefficients,), or None
+    """
+    note = zero_note(z) if kind == ZERO else ""
+    mode = discrete_modes([z], errors.sample_time_s)[0] if kind == POLE else None
+    if mode is not None:
+        note = "; ".join(filter(None, (mode.reason, "unstable" if abs(z) > 1.0 else "")))
+    covariance = None
+    if gradient is not None and errors.covariance is not None:
+        rows = np.array([gradient.real, gradient.imag])
+        covariance = np.asarray(rows @ errors.covariance @ rows.T)
+    omega = zeta = None
+    if mode is not None and mode.s is not None and mode.s != 0.0 and mode.damping is not None:
+        s, size = mode.s, abs(mode.s)
+        rate = None if gradient is None else gradient / (z * errors.sample_time_s)
+        towards = None if rate is None else np.real(np.conj(s) * rate) / size
+        sideways = (
+            None
+            if rate is None or towards is None or not mode.is_pair
+            else -rate.real / size + s.real * towards / size**2
+        )
+        omega = propagated(f"natural frequency at z = {z:.4g}", "rad/s", size, towards, errors)
+        zeta = propagated(f"damping at z = {z:.4g}", "1", mode.damping, sideways, errors)
+    return FittedRoot(response, kind, z, covariance, omega, zeta, note, gradient)
+
+
+def propagated(
+    name: str, unit: str, value: float, gradient: Array | None, errors: Errors
+) -> FittedParameter:
+    """A function of the coefficients with its first-order interval.
+
+    Reference: Ljung, *System Identification*, 2nd ed., eq. 9.56 (Gauss' approximation).
+    """
+    if gradient is None or errors.covariance is None:
+        reason = (
+            "no error to first order" if gradient is None else "the coefficients have no errors"
+        )
+        return FittedParameter(name, unit, value, "derived", reason=reason)
+    variance = float(gradient @ errors.covariance @ gradient)
+    stderr = max(variance, 0.0) ** 0.5
+    return FittedParameter(
+        name,
+        unit,
+        value,
+        "derived",
+        stderr,
+        interval95(value, stderr, degrees_of_freedom=errors.degrees),
+    )
+
+
+def fitted_gains(model: PolynomialModel, degrees: int) -> dict[str, FittedParameter]:
+    """Steady gains by ``"output/input"`` with intervals; an integrator has none."""
+    places = _places(model)
+    found = {}
+    for i, name in enumerate(model.inputs):
+        response = f"{model.output}/{name}"
+        value = model.gains()[response]
+        if value is None:
+            continue
+        a, f = float(np.sum(model.a)), float(np.sum(model.f[i]))
+        gradient = np.zeros(model.theta.size)
+        gradient[places["b", i]] = 1.0 / (a * f)
+        gradient[places["a", 0]] = -value / a
+        gradient[places["f", i]] = -value / f
+        units = (model.units.get(model.output, "1"), model.units.get(name, "1"))
+        unit = units[0] if units[1] == "1" else f"{units[0]}/({units[1]})"
+        errors = Errors(model.sample_time_s, model.covariance, degrees)
+        found[response] = propagated(f"gain {response}", unit, value, gradient, errors)
+    return found

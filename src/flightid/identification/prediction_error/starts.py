@@ -1,0 +1,194 @@
+"""Starts of a prediction-error fit: two-stage least squares, reduced plants, random noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from flightid.identification.prediction_error.linear_regression import reflected, regress
+from flightid.models.polynomial.data import PolynomialData
+from flightid.models.polynomial.structure import PolynomialStructure
+
+Array = NDArray[np.float64]
+ROUNDS = 8
+"""Of the Steiglitz-McBride iteration, which a start need not finish."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Plant:
+    a: Array
+    b: list[Array]
+    f: list[Array]
+
+
+def polynomial_starts(structure: PolynomialStructure, data: PolynomialData) -> Array:
+    """Coefficients to start from, shape (n_starts, n_coefficients), the systematic ones first.
+
+    Reference: Ljung, *System Identification*, 2nd ed., section 10.5 (eqs. 10.66 to 10.73);
+    Hannan & Rissanen (1982), Biometrika 69; Steiglitz & McBride (1965), IEEE Trans. AC 10.
+    """
+    innovations, long_a, long_b = _long_model(structure, data)
+    found = []
+    for plant in _plants(structure, data, innovations, long_a, long_b):
+        noise = _noise(structure, data, plant)
+        found.append(_flat(plant, *noise))
+        if structure.nc or structure.nd:
+            found.append(_flat(plant, np.zeros(structure.nc), np.zeros(structure.nd)))
+    generator = np.random.default_rng(structure.seed)
+    plant = _plants(structure, data, innovations, long_a, long_b)[0]
+    while len(found) < structure.starts and (structure.nc or structure.nd):
+        noise = (_random(generator, structure.nc), _random(generator, structure.nd))
+        found.append(_flat(plant, *noise))
+    starts = np.array(found[: max(structure.starts, 1)])
+    return np.ascontiguousarray(np.where(np.isfinite(starts), starts, 0.0))
+
+
+def _flat(plant: _Plant, c: Array, d: Array) -> Array:
+    return np.concatenate([plant.a, *plant.b, c, d, *plant.f])
+
+
+def _long_model(
+    structure: PolynomialStructure, data: PolynomialData
+) -> tuple[Array, Array, list[Array]]:
+    """Innovations and polynomials of a long ARX model, which mimics every noise model."""
+    n_inputs = len(structure.inputs)
+    degree = max(structure.na + structure.nd, structure.nc, *structure.nf, *structure.nb, 1)
+    shortest = min(data.lengths)
+    room = min(sum(data.lengths) // (4 * (n_inputs + 1)), shortest // 3)
+    length = max(1, min(20 + 2 * degree, room))
+    model = regress(
+        data.output, data.inputs, data.lengths, length, [length] * n_inputs, structure.nk
+    )
+    theta = model.shortest
+    a = np.concatenate([[1.0], theta[:length]])
+    b = [theta[length * (i + 1) : length * (i + 2)] for i in range(n_inputs)]
+    innovations = np.zeros_like(data.output)
+    for span in data.spans:
+        part = lfilter(a, [1.0], data.output[span])
+        for row, numerator, delay in zip(data.inputs, b, structure.nk, strict=True):
+            part -= lfilter(np.concatenate([np.zeros(delay), numerator]), [1.0], row[span])
+        part[: length + max([0, *structure.nk])] = 0.0
+        innovations[span] = part
+    return innovations, a, b
+
+
+def _plants(
+    structure: PolynomialStructure,
+    data: PolynomialData,
+    innovations: Array,
+    long_a: Array,
+    long_b: list[Array],
+) -> list[_Plant]:
+    if not any(structure.nf):
+        return [_with_innovations(structure, data, innovations), _plain(structure, data)]
+    reduced = [
+        _reduced(long_a, b, n_b, n_f)
+        for b, n_b, n_f in zip(long_b, structure.nb, structure.nf, strict=True)
+    ]
+    at_once = _filtered(structure, data)
+    one = _Plant(np.zeros(structure.na), [b for b, _ in reduced], [f for _, f in reduced])
+    return [one, at_once]
+
+
+def _split(structure: PolynomialStructure, theta: Array) -> tuple[Array, list[Array]]:
+    parts = np.split(theta, np.cumsum([structure.na, *structure.nb]))
+    return parts[0], list(parts[1 : len(structure.nb) + 1])
+
+
+def _empty(structure: PolynomialStructure) -> list[Array]:
+    return [np.zeros(n) for n in structure.nf]
+
+
+def _with_innovations(
+    structure: PolynomialStructure, data: PolynomialData, innovations: Array
+) -> _Plant:
+    """Second stage: the estimated innovations stand in for the noise as one more input."""
+    inputs = np.vstack([data.inputs, innovations])
+    nb, nk = [*structure.nb, structure.nc], [*structure.nk, 1]
+    theta = regress(data.output, inputs, data.lengths, structure.na, nb, nk).shortest
+    return _Plant(*_split(structure, theta), _empty(structure))
+
+
+def _plain(structure: PolynomialStructure, data: PolynomialData) -> _Plant:
+    theta = regress(
+        data.output, data.inputs, data.lengths, structure.na, structure.nb, structure.nk
+    ).shortest
+    return _Plant(*_split(structure, theta), _empty(structure))
+
+
+def _reduced(long_a: Array, long_b: Array, nb: int, nf: int) -> tuple[Array, Array]:
+    """B/F whose pulse response is that of the long model's channel, its delay aside."""
+    length = 20 * long_a.size
+    pulse = np.zeros(length)
+    pulse[0] = 1.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        response = lfilter(long_b, long_a, pulse)
+    size = np.max(np.abs(response))
+    if nb == 0 or not np.isfinite(size) or size == 0.0 or abs(response[-1]) > 0.5 * size:
+        return long_b[:nb], np.zeros(nf)
+    return _steiglitz_mcbride(response, pulse[None], [length], [nb], nf, [0])
+
+
+def _filtered(structure: PolynomialStructure, data: PolynomialData) -> _Plant:
+    """One denominator for all inputs, from the data themselves."""
+    nf = max(structure.nf)
+    b, f = _steiglitz_mcbride(
+        data.output, data.inputs, list(data.lengths), list(structure.nb), nf, list(structure.nk)
+    )
+    rows = list(np.split(b, np.cumsum(structure.nb)[:-1]))
+    return _Plant(np.zeros(structure.na), rows, [f[:n] for n in structure.nf])
+
+
+def _steiglitz_mcbride(
+    output: Array, inputs: Array, lengths: list[int], nb: list[int], nf: int, nk: list[int]
+) -> tuple[Array, Array]:
+    """Numerators end to end and denominator of an output-error model, by repeated prefilters."""
+    f = np.zeros(nf)
+    ends = np.cumsum([0, *lengths])
+    b = np.zeros(sum(nb))
+    for _ in range(ROUNDS):
+        below = reflected(np.concatenate([[1.0], f]))
+        signals = np.vstack([output, inputs])
+        for first, last in pairwise(ends):
+            signals[:, first:last] = lfilter([1.0], below, signals[:, first:last])
+        theta = regress(signals[0], signals[1:], lengths, nf, nb, nk, skip=0).shortest
+        f, b = theta[:nf], theta[nf:]
+    return b, f
+
+
+def _noise(
+    structure: PolynomialStructure, data: PolynomialData, plant: _Plant
+) -> tuple[Array, Array]:
+    """C and D of what the plant leaves, by long autoregression and then least squares."""
+    nc, nd = structure.nc, structure.nd
+    if nc + nd == 0:
+        return np.zeros(0), np.zeros(0)
+    left = np.zeros_like(data.output)
+    for span in data.spans:
+        part = lfilter(np.concatenate([[1.0], plant.a]), [1.0], data.output[span])
+        for row, b, f, k in zip(data.inputs, plant.b, plant.f, structure.nk, strict=True):
+            below = reflected(np.concatenate([[1.0], f]))
+            part -= lfilter(np.concatenate([np.zeros(k), b]), below, row[span])
+        left[span] = part
+    none = np.empty((0, left.size))
+    length = max(1, min(20 + 2 * (nc + nd), min(data.lengths) // 4))
+    long_d = regress(left, none, data.lengths, length, [], []).shortest
+    innovations = np.concatenate(
+        [lfilter(np.concatenate([[1.0], long_d]), [1.0], left[span]) for span in data.spans]
+    )
+    theta = regress(left, innovations[None], data.lengths, nd, [nc], [1]).shortest
+    return theta[nd:], theta[:nd]
+
+
+def _random(generator: np.random.Generator, degree: int) -> Array:
+    """Coefficients after the leading one of a polynomial with roots anywhere in the circle."""
+    if degree == 0:
+        return np.zeros(0)
+    radius = np.sqrt(generator.uniform(0.0, 0.95, degree // 2))
+    pairs = radius * np.exp(1j * generator.uniform(0.0, np.pi, degree // 2))
+    single = generator.uniform(-0.95, 0.95, degree % 2)
+    return np.asarray(np.real(np.poly(np.concatenate([pairs, np.conj(pairs), single])))[1:])

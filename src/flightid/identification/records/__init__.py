@@ -1,0 +1,1 @@
+"""What all fits to records share: options, set-up, statistics."""

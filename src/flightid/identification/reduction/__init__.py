@@ -1,0 +1,1 @@
+"""Structures that the data determine."""

@@ -1,0 +1,293 @@
+"""The reduction: every step from a full structure to one whose parameters the data determine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from flightid.conventions import Light
+from flightid.errors import OptionError
+from flightid.findings import Finding
+from flightid.identification.fit import Fit
+from flightid.identification.reduction.rules import ReductionLimits
+from flightid.table import Cell, Column, Table
+
+SCHEMA = "flightid.reduction/1"
+
+
+@dataclass(frozen=True, eq=False)
+class ReductionStep:
+    """One parameter that was dropped, or was tried and had to stay.
+
+    Attributes
+    ----------
+    name : str
+        Parameter.
+    value : float
+        At which it was fixed, in its unit: zero, or what the note explains.
+    reason : str
+        Why it was chosen: the guide it breaks, or ``"by hand"``.
+    cost_before, cost_after : float or None
+        Average cost without and with the step; None where the smaller model has no fit.
+    accepted : bool
+        Whether the parameter is out.
+    fit : Fit or None
+        Of the smaller model.
+    note : str
+        Why it had to stay, or why it was not fixed at zero.
+
+    Example
+    -------
+    >>> ReductionStep("Lu", 0.0, "insensitivity 31 %", 20.0, 20.1, True).rise_percent
+    0.5
+    """
+
+    name: str
+    value: float
+    reason: str
+    cost_before: float
+    cost_after: float | None
+    accepted: bool
+    fit: Fit | None = None
+    note: str = ""
+
+    @property
+    def rise_percent(self) -> float | None:
+        """Rise of the average cost, percent; None where it has no meaning."""
+        if self.cost_after is None or self.cost_before == 0.0:
+            return None
+        return round(100.0 * (self.cost_after / self.cost_before - 1.0), 9)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values; the fit as its parameters."""
+        shown = {k: v for k, v in vars(self).items() if k != "fit"}
+        values = None
+        if self.fit is not None:
+            values = {name: p.to_dict() for name, p in self.fit.parameters.items()}
+        return {**shown, "rise_percent": self.rise_percent, "parameters": values}
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class Reduction:
+    """Result of `flightid.reduce`.
+
+    Attributes
+    ----------
+    start : Fit
+        The fit that was reduced.
+    path : tuple of ReductionStep
+        Every step in order, those that were undone among them.
+    stopped : str
+        Why it ended.
+    limits : ReductionLimits
+    keep : tuple of str
+        Parameters that had to stay.
+    at : mapping of str to float
+        Values other than zero at which parameters are fixed.
+    after_rise : str
+    options : mapping
+        Options of the fits.
+    data : FrequencyResponse, or Record or sequence of Record
+        What was fitted.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> import flightid as fid
+    >>> truth = fid.load_model("rate_first_order").with_values({"Lp": -6.0, "tau": 0.0})
+    >>> omega = np.geomspace(1.0, 30.0, 50)
+    >>> data = fid.FrequencyResponse.from_values(omega, truth.frequency_response(omega),
+    ...     inputs=["tau_phi"], outputs=["p"], units={"p": "rad/s"})
+    >>> fit = fid.identify(fid.load_model("rate_first_order"), data)
+    >>> found = fid.reduce(fit, data, drop=["tau"])
+    >>> found
+    Reduction('Roll rate, first order', 3 to 2 free parameters in 1 step, average cost 0.00)
+    """
+
+    start: Fit
+    path: tuple[ReductionStep, ...]
+    stopped: str
+    limits: ReductionLimits
+    keep: tuple[str, ...] = ()
+    at: Mapping[str, float] = field(default_factory=dict)
+    after_rise: str = "stop"
+    options: Mapping[str, object] = field(default_factory=dict)
+    data: object = None
+
+    @property
+    def fit(self) -> Fit:
+        """The fit of the reduced model, with the path's findings beside its own."""
+        return self.fit_after(len(self.path))
+
+    def fit_after(self, step: int) -> Fit:
+        """The fit that stood after some steps of the path; 0 is the start.
+
+        Raises
+        ------
+        OptionError
+            The path has fewer steps.
+        """
+        if not 0 <= step <= len(self.path):
+            raise OptionError(
+                "the path has no such step", found=step, needed=f"0 to {len(self.path)}"
+            )
+        fits = [each.fit for each in self.path[:step] if each.accepted and each.fit is not None]
+        return fits[-1] if fits else self.start
+
+    @property
+    def dropped(self) -> dict[str, float]:
+        """Parameters that are out, with the values at which they are fixed."""
+        return {each.name: each.value for each in self.path if each.accepted}
+
+    def resume(
+        self,
+        step: int | None = None,
+        *,
+        keep: Iterable[str] = (),
+        drop: Iterable[str] = (),
+        at: Mapping[str, float] | None = None,
+        **changes: object,
+    ) -> Reduction:
+        """Go on from any step of the path, with other choices.
+
+        Parameters
+        ----------
+        step : int, optional
+            Steps of the path that stay; default: all of them. 0 begins again.
+        keep, drop, at
+            As of `flightid.reduce`, added to what was asked before.
+        **changes
+            Other options of `flightid.reduce` than before.
+
+        Returns
+        -------
+        Reduction
+            With the steps that stayed and the new ones.
+
+        Raises
+        ------
+        OptionError
+            The path has no such step.
+        """
+        from flightid.identification.reduction.reduce import reduce  # noqa: PLC0415 (a result needs no verb)
+
+        last = len(self.path) if step is None else step
+        given: dict[str, object] = {
+            **vars(self.limits),
+            "after_rise": self.after_rise,
+            **self.options,
+            **changes,
+        }
+        again = reduce(
+            self.fit_after(last),
+            self.data,  # type: ignore[arg-type]  # what reduce was given
+            keep=(*self.keep, *keep),
+            drop=drop,
+            at={**self.at, **(at or {})},
+            **given,  # type: ignore[arg-type]
+        )
+        path = (*self.path[:last], *again.path)
+        return Reduction(**{**vars(again), "start": self.start, "path": path})
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Verdict on the path, and those on the reduced fit."""
+        return (*self.path_findings, *self.fit.findings)
+
+    @property
+    def path_findings(self) -> tuple[Finding, ...]:
+        """Verdict on the path alone."""
+        before, after = self.start.average_cost, self.fit.average_cost
+        out = ", ".join(self.dropped) or "nothing"
+        found = [
+            Finding(
+                "reduction",
+                Light.GREEN,
+                f"dropped {out}; average cost {before:.4g} to {after:.4g}; {self.stopped}",
+            )
+        ]
+        found += [
+            Finding("reduction-held", Light.AMBER, f"{each.name}: {each.note}")
+            for each in self.path
+            if each.accepted and each.note
+        ]
+        last = self.path[-1] if self.path else None
+        if last is not None and not last.accepted:
+            found.append(
+                Finding(
+                    "reduction-stays",
+                    Light.AMBER,
+                    f"{last.name} stays though it breaks a guide ({last.reason}): {last.note}",
+                    f"go on without it by resume(keep=[{last.name!r}]), or judge its interval",
+                )
+            )
+        return tuple(found)
+
+    def __repr__(self) -> str:
+        """Parameters before and after, steps and average cost on one line."""
+        sizes = [len(fit.model.parameters.free) for fit in (self.start, self.fit)]
+        n = len(self.path)
+        return (
+            f"Reduction({self.start.model.name!r}, {sizes[0]} to {sizes[1]} free parameters in {n} "
+            f"step{'' if n == 1 else 's'}, average cost {self.fit.average_cost:.2f})"
+        )
+
+    def summary(self) -> Table:
+        """Table of the path: what was dropped, why, and what it cost.
+
+        Returns
+        -------
+        Table
+        """
+        columns = (
+            Column("step"),
+            Column("parameter"),
+            Column("why"),
+            Column("fixed at"),
+            Column("cost", digits=5),
+            Column("rise", "%", 3),
+            Column("insensitivity", "%", 3),
+            Column("Cramér–Rao", "%", 3),
+            Column("out"),
+        )
+        percents = worst_percents(self.start)
+        first = (0, "", "start", None, self.start.average_cost, None, *percents, None)
+        rows: list[tuple[Cell, ...]] = [first]
+        for number, each in enumerate(self.path, 1):
+            percents = (None, None) if each.fit is None else worst_percents(each.fit)
+            row = (number, each.name, each.reason, each.value, each.cost_after)
+            rows.append((*row, each.rise_percent, *percents, each.accepted))
+        remarks = (
+            f"Step {number}, {each.name}: {each.note.removesuffix('.')}."
+            for number, each in enumerate(self.path, 1)
+            if each.note
+        )
+        legend = "Average cost, and the worst percentages of all parameters, after the step."
+        notes = (f"Ended: {self.stopped}.", legend, *remarks, *map(str, self.findings))
+        return Table(f"Reduction of {self.start.model.name}", columns, tuple(rows), notes)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key, without the data."""
+        return {
+            "schema": SCHEMA,
+            "start": self.start.to_dict(),
+            "path": [each.to_dict() for each in self.path],
+            "fit": self.fit.to_dict(),
+            "stopped": self.stopped,
+            "limits": vars(self.limits).copy(),
+            "keep": list(self.keep),
+            "at": dict(self.at),
+            "after_rise": self.after_rise,
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()
+
+
+def worst_percents(fit: Fit) -> tuple[float | None, float | None]:
+    """Largest insensitivity and largest Cramér–Rao bound of a fit, percent."""
+    known = [fit.parameters[name] for name in fit.names]
+    slack = [p.insensitivity_percent for p in known if p.insensitivity_percent is not None]
+    bounds = [p.cramer_rao_percent for p in known if p.cramer_rao_percent is not None]
+    return max(slack, default=None), max(bounds, default=None)

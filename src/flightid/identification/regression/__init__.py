@@ -1,0 +1,1 @@
+"""Equation error and the Fourier methods."""

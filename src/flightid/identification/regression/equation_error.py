@@ -1,0 +1,184 @@
+"""Equation error: least squares on the equations of motion themselves, in time or frequency.
+
+Every state is measured; both sides of ẋ = f(x, u, θ) are compared, through a local derivative with
+its own mean, or as Fourier integrals over the record. Where parameters enter linearly one step
+solves it, from any start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import OptionError
+from flightid.identification.fit import Fit
+from flightid.identification.regression.attenuation import attenuation, judge_attenuation
+from flightid.identification.regression.coloured_regression import coloured_covariance
+from flightid.identification.regression.compared_equations import compared_costs, compared_records
+from flightid.identification.regression.equation_operators import FourierRows, LocalMeans, Operator
+from flightid.identification.regression.equation_regression import EquationRegression
+from flightid.identification.regression.fit import (
+    Inner,
+    Knowledge,
+    assemble,
+    check_records,
+    limits_of,
+    require_seen,
+)
+from flightid.identification.regression.options import (
+    EquationErrorOptions,
+    FourierOptions,
+    RegressionOptions,
+)
+from flightid.identification.regression.rounds import Limits, Settled, settle, solve, stack
+from flightid.identification.regression.sampled_equations import (
+    MeasuredMotion,
+    Reconstruction,
+    RightSide,
+)
+from flightid.identification.regression.weights import (
+    fourier_covariance,
+    level_weights,
+    spectral_weights,
+)
+from flightid.models import Model, StateSpaceModel
+from flightid.record import Record
+
+Array = NDArray[np.float64]
+
+
+def fit_equation_error(
+    model: StateSpaceModel, data: Record | Sequence[Record], options: EquationErrorOptions
+) -> Fit:
+    """Fit by least squares on state derivatives; see `flightid.identify`."""
+
+    def operator(motion: MeasuredMotion) -> Operator:
+        return LocalMeans(motion, options.half_width, options.free_bias)
+
+    problem, start, limits = _problem(model, data, options, operator)
+    count = len(problem.motions)
+    settled = settle(problem, start, level_weights, limits, count)
+    inner = Inner.of(model, settled.end.x)
+    weighed = [
+        (rows.residuals * weight, rows.slopes[:, :, inner.mask] * weight[:, :, None])
+        for rows, weight in zip(settled.rows, settled.weights, strict=True)
+    ]
+    require_seen(inner, stack([slopes for _, slopes in weighed]))
+    constants = [_constants(each[0].shape, options.free_bias) for each in weighed]
+    covariance, freedom, inflation = coloured_covariance(weighed, constants)
+    jacobian = stack([slopes for _, slopes in weighed])
+    known = Knowledge(jacobian, covariance, freedom, "coloured residuals", inflation)
+    return _finish("equation error", problem, data, options, settled, limits, inner, known)
+
+
+def fit_fourier_regression(
+    model: StateSpaceModel, data: Record | Sequence[Record], options: FourierOptions
+) -> Fit:
+    """Fit by least squares on Fourier integrals of the equations; see `flightid.identify`."""
+
+    def operator(motion: MeasuredMotion) -> Operator:
+        return FourierRows(motion, options.omega_rad_s)
+
+    problem, start, limits = _problem(model, data, options, operator)
+    omegas = [each.grid.omega_rad_s for each in problem.operators if isinstance(each, FourierRows)]
+    count = len(problem.motions)
+    settled = settle(problem, start, lambda rows: spectral_weights(rows, omegas), limits, count)
+    inner = Inner.of(model, settled.end.x)
+    kept = [replace(rows, slopes=rows.slopes[:, :, inner.mask]) for rows in settled.rows]
+    jacobian = stack(
+        [each.slopes * w[:, :, None] for each, w in zip(kept, settled.weights, strict=True)]
+    )
+    require_seen(inner, jacobian)
+    covariance, freedom = fourier_covariance(kept, settled.weights, omegas)
+    known = Knowledge(
+        jacobian, covariance, np.full(len(inner.names), freedom), "spectra of residuals"
+    )
+    return _finish("Fourier regression", problem, data, options, settled, limits, inner, known)
+
+
+def equation_error_start(model: Model, data: Record | Sequence[Record]) -> Model:
+    """Copy of a model with the values that equation error finds, as a start for output error.
+
+    Raises
+    ------
+    OptionError
+        The model has no equations of motion.
+    FitError
+        Some states are not measured.
+    """
+    if not isinstance(model, StateSpaceModel):
+        raise OptionError(
+            "start_from='equation_error' needs equations of motion",
+            found=type(model).__name__,
+            needed="a StateSpaceModel",
+            action="start from the model, or raise starts",
+        )
+    problem, start, limits = _problem(
+        model, data, EquationErrorOptions(), lambda motion: LocalMeans(motion, 2)
+    )
+    settled = settle(problem, start, level_weights, limits, len(problem.motions))
+    fitted = Inner.of(model, settled.end.x).fitted
+    return model.with_values({p.name: float(p.value or 0.0) for p in fitted.parameters.free})
+
+
+def _problem(
+    model: StateSpaceModel,
+    data: Record | Sequence[Record],
+    options: RegressionOptions,
+    operator: Callable[[MeasuredMotion], Operator],
+) -> tuple[EquationRegression, Array, Limits]:
+    records = check_records(model, data)
+    reconstruction = Reconstruction.of(model)
+    motions = [reconstruction.measured(record) for record in records]
+    start, limits = limits_of(model, options.maximum_iterations)
+    right = RightSide(reconstruction, options.hold)
+    operators = [operator(motion) for motion in motions]
+    return EquationRegression.of(right, motions, operators, start), start, limits
+
+
+def _finish(
+    method: str,
+    problem: EquationRegression,
+    data: Record | Sequence[Record],
+    options: RegressionOptions,
+    settled: Settled,
+    limits: Limits,
+    inner: Inner,
+    known: Knowledge,
+) -> Fit:
+    end = settled.end
+
+    def refit(motions: Sequence[MeasuredMotion]) -> Array:
+        operators = [
+            each.with_motion(motion)
+            for each, motion in zip(problem.operators, motions, strict=True)
+        ]
+        noisier = replace(problem, motions=tuple(motions), operators=tuple(operators))
+        return solve(noisier, end.x, settled.weights, limits)[0].x
+
+    moved = attenuation(problem.motions, refit, end.x)[inner.mask]
+    bias = dict(zip(inner.names, map(float, moved), strict=True))
+    records = (data,) if isinstance(data, Record) else tuple(data)
+    fit = assemble(
+        method,
+        inner,
+        [[end]],
+        known,
+        compared_costs(problem, settled.rows),
+        records,
+        compared_records(problem, settled, records),
+        options,
+        extra={"attenuation": bias, "rounds": settled.rounds},
+    )
+    return replace(fit, findings=(*fit.findings, *judge_attenuation(bias, fit.parameters)))
+
+
+def _constants(shape: tuple[int, ...], free_bias: bool) -> Array:
+    """Orthonormal directions of the equations' constants, (n_equations · n_rows, n_constants)."""
+    n_equations, n_rows = shape
+    if not free_bias:
+        return np.zeros((n_equations * n_rows, 0))
+    return np.kron(np.eye(n_equations), np.full((n_rows, 1), 1.0 / np.sqrt(n_rows)))

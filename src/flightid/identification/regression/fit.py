@@ -1,0 +1,192 @@
+"""From settled regressions to a `Fit`: parameters with intervals, costs, records, findings."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError, FitError
+from flightid.findings import Finding
+from flightid.identification.fit import Fit
+from flightid.identification.fit_findings import judge_correlation, judge_parameters, judge_search
+from flightid.identification.fitted_record import FittedRecord
+from flightid.identification.frequency_domain.estimates import (
+    at_bound,
+    fitted_parameters,
+    require_identifiable,
+)
+from flightid.identification.multistart import DenseEnd, local_minima
+from flightid.identification.records.findings import judge_fit
+from flightid.identification.regression.options import RegressionOptions
+from flightid.identification.regression.rounds import Limits
+from flightid.models import Model, StateSpaceModel
+from flightid.record import Record
+from flightid.uncertainty import correlation as correlation_of
+from flightid.uncertainty.cramer_rao import inverse_hessian
+from flightid.units import require_match
+from flightid.version import VERSION
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Inner:
+    """A model at its estimates, and which free parameters lie inside their bounds."""
+
+    fitted: Model
+    mask: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, model: Model, theta: Array) -> Inner:
+        """Put estimates into a model."""
+        names = (parameter.name for parameter in model.parameters.free)
+        fitted = model.with_values(dict(zip(names, map(float, theta), strict=True)))
+        free = fitted.parameters.free
+        return cls(fitted, np.array([not at_bound(parameter) for parameter in free], dtype=bool))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters that the data decide."""
+        free = self.fitted.parameters.free
+        return tuple(p.name for p, keep in zip(free, self.mask, strict=True) if keep)
+
+
+@dataclass(frozen=True)
+class Knowledge:
+    """What a method says about its estimates.
+
+    Attributes
+    ----------
+    jacobian : ndarray, shape (n_residuals, n_inner)
+        Of residuals with unit variance.
+    covariance : ndarray, shape (n_inner, n_inner)
+    freedom : ndarray, shape (n_inner,)
+        Degrees of freedom of the variances.
+    source : str
+        Where the intervals come from.
+    inflation : float
+        Largest ratio of a standard error to that for white residuals.
+    """
+
+    jacobian: Array
+    covariance: Array
+    freedom: Array
+    source: str
+    inflation: float = 1.0
+
+
+def check_records(model: StateSpaceModel, data: Record | Sequence[Record]) -> tuple[Record, ...]:
+    """Records as a tuple, with the model's channels in the model's units.
+
+    Raises
+    ------
+    FitError
+        No free parameter.
+    DataError
+        No record.
+    UnitError
+        Record and model disagree on a unit.
+    """
+    records = (data,) if isinstance(data, Record) else tuple(data)
+    if not records:
+        raise DataError("there is no record", needed="at least one")
+    if not model.parameters.free:
+        raise FitError(
+            "the model has no free parameter",
+            needed="at least one",
+            action="free a parameter with model.with_free(name)",
+        )
+    for record in records:
+        for name in (*model.inputs, *model.outputs):
+            require_match(record.unit(name), model.units[name], subject=f"channel {name}")
+    return records
+
+
+def limits_of(model: Model, maximum_iterations: int) -> tuple[Array, Limits]:
+    """Start values and bounds of the free parameters."""
+    free = model.parameters.free
+    start = np.array([float(parameter.value or 0.0) for parameter in free])
+    lower = np.array([parameter.minimum for parameter in free])
+    upper = np.array([parameter.maximum for parameter in free])
+    return start, Limits(lower, upper, maximum_iterations)
+
+
+def require_seen(inner: Inner, jacobian: Array) -> None:
+    """Refuse parameters that the data cannot tell apart.
+
+    Raises
+    ------
+    FitError
+        Some combination of them leaves the residuals as they are.
+    """
+    require_identifiable(inner.names, jacobian)
+
+
+def assemble(
+    method: str,
+    inner: Inner,
+    groups: Sequence[Sequence[DenseEnd]],
+    known: Knowledge,
+    costs: Mapping[str, float],
+    records: Sequence[Record],
+    fitted_records: Sequence[FittedRecord],
+    options: RegressionOptions,
+    *,
+    findings: Sequence[Finding] = (),
+    extra: Mapping[str, object] | None = None,
+    noise_covariance: Array | None = None,
+) -> Fit:
+    """The result of a regression method."""
+    fitted, names = inner.fitted, inner.names
+    weighted = known.jacobian / np.sqrt(2.0)
+    parameters = fitted_parameters(fitted, names, known.covariance, weighted, known.freedom)
+    # Orthogonal residuals of unit variance: the inverse Hessian of ½ Σ r².
+    correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
+    best = groups[0][0]
+    total = sum(costs.values())
+    return Fit(
+        model=fitted,
+        parameters=parameters,
+        cost=total,
+        average_cost=total / len(costs),
+        costs=dict(costs),
+        names=names,
+        covariance=known.covariance,
+        correlation=correlation,
+        responses=(),
+        minima=local_minima(groups, [parameter.name for parameter in fitted.parameters.free]),
+        objective=best.cost,
+        termination=best.termination,
+        iterations=best.iterations,
+        intervals_from=known.source,
+        findings=(
+            *findings,
+            *judge_search(groups),
+            *judge_parameters(parameters),
+            *judge_correlation(names, correlation),
+            *judge_fit(costs, known.inflation),
+        ),
+        provenance={**_provenance(method, fitted, records, options), **(extra or {})},
+        records=tuple(fitted_records),
+        noise_covariance=noise_covariance,
+    )
+
+
+def _provenance(
+    method: str, model: Model, records: Sequence[Record], options: RegressionOptions
+) -> dict[str, object]:
+    digest = hashlib.sha256()
+    for record in records:
+        digest.update(record.matrix([*model.inputs, *model.outputs]).tobytes())
+        digest.update(str(record.sample_time_s).encode())
+    return {
+        "method": method,
+        "flightid": VERSION,
+        "data_sha256": digest.hexdigest(),
+        "data_history": [[str(step) for step in record.history] for record in records],
+        "options": options.to_dict(),
+    }

@@ -1,0 +1,159 @@
+"""The spread of a fit, a model or a measured response."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import OptionError
+from flightid.identification.fit import Fit
+from flightid.identification.prediction_error.result import PolynomialFit
+from flightid.identification.subspace.result import InnovationsFit
+from flightid.models import InnovationsModel, Model, PolynomialModel
+from flightid.responses import FrequencyResponse
+from flightid.uncertainty.spread import Spread
+
+Array = NDArray[np.float64]
+NO_COVARIANCE = "the model is given as numbers, without a covariance"
+
+
+def spread_of(source: object, output: str | None = None, input: str | None = None) -> Spread[Any]:
+    """The uncertainty of a fit or a measured response, ready to be carried on.
+
+    Parameters
+    ----------
+    source : Fit, PolynomialFit, InnovationsFit, FrequencyResponse, or a model or system
+        A model without fit has no covariance: what is computed from it has no interval. Of a
+        polynomial model its own covariance is taken.
+    output, input : str, optional
+        Pair of a response; left out, it must have one output.
+
+    Returns
+    -------
+    Spread
+        Of a model of the same kind, or of a `FrequencyResponse` (real and imaginary parts at all
+        its frequencies).
+
+    Raises
+    ------
+    OptionError
+        A response of several outputs without a choice.
+
+    Assumes
+    -------
+    Parameters at a bound or fixed are known exactly, so that intervals leave them out. A response
+    with random errors alone has errors that do not hang together across frequencies.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> truth = fid.load_model("rate_first_order").with_values({"Lp": -5.0, "Ltphi": 150.0})
+    >>> omega = np.geomspace(0.5, 20.0, 30)
+    >>> data = fid.FrequencyResponse.from_values(
+    ...     omega, truth.frequency_response(omega), inputs=truth.inputs, outputs=truth.outputs,
+    ...     units=truth.units, random_error=np.full((1, 1, 30), 0.02))
+    >>> spread = spread_of(fid.identify(truth, data))
+    >>> spread
+    Spread(3 numbers, covariance known)
+    >>> pole = spread.propagate(lambda model: model.parameters["Lp"].value)
+    >>> bool(0.01 < pole.stderr[0] < 1.0)
+    True
+    """
+    if isinstance(source, Spread):
+        return source
+    if isinstance(source, Fit):
+        return _of_fit(source)
+    polynomial = source.model if isinstance(source, PolynomialFit) else source
+    if isinstance(polynomial, PolynomialModel):
+        return _of_polynomial(polynomial)
+    if isinstance(source, InnovationsFit):
+        return _of_innovations(source)
+    if isinstance(source, FrequencyResponse):
+        return _of_response(source, output, input)
+    return Spread(np.zeros(0), None, lambda _: source, None, NO_COVARIANCE)
+
+
+def _of_fit(fit: Fit) -> Spread[Model]:
+    model, names = fit.model, fit.names
+    centre = np.array([fit.parameters[name].value for name in names])
+    parameters = [model.parameters[name] for name in names]
+    bounds = np.array([p.minimum for p in parameters]), np.array([p.maximum for p in parameters])
+
+    def make(numbers: Array) -> Model:
+        return model.with_values(dict(zip(names, map(float, numbers), strict=True)))
+
+    reason = "" if fit.covariance is not None else "the fit knows no errors of its data"
+    return Spread(centre, fit.covariance, make, bounds, reason)
+
+
+def _of_polynomial(model: PolynomialModel) -> Spread[PolynomialModel]:
+    structure = model.structure
+
+    def make(numbers: Array) -> PolynomialModel:
+        return PolynomialModel.from_theta(
+            structure,
+            numbers,
+            model.sample_time_s,
+            noise_variance=model.noise_variance,
+            covariance=model.covariance,
+            units=model.units,
+            name=model.name,
+        )
+
+    reason = "" if model.covariance is not None else NO_COVARIANCE
+    return Spread(model.theta, model.covariance, make, None, reason)
+
+
+def _of_innovations(fit: InnovationsFit) -> Spread[InnovationsModel]:
+    model = fit.model
+    keys = "abcdk" if fit.structure.direct else "abck"
+    parts = {key: np.asarray(getattr(model, key)) for key in keys}
+    cuts = np.cumsum([part.size for part in parts.values()])[:-1]
+
+    def make(numbers: Array) -> InnovationsModel:
+        pieces = np.split(numbers, cuts)
+        shaped = {k: p.reshape(parts[k].shape) for k, p in zip(parts, pieces, strict=True)}
+        changes: dict[str, Any] = dict(shaped)
+        return replace(model, **changes)
+
+    centre = np.concatenate([part.ravel() for part in parts.values()])
+    reason = "" if fit.covariance is not None else "the fit gave no covariance"
+    return Spread(centre, fit.covariance, make, None, reason)
+
+
+def _of_response(
+    response: FrequencyResponse, output: str | None, input: str | None
+) -> Spread[FrequencyResponse]:
+    chosen = response.select(
+        outputs=None if output is None else [output], inputs=None if input is None else [input]
+    )
+    if len(chosen.outputs) > 1:
+        raise OptionError(
+            "a response of several outputs needs a choice",
+            found=", ".join(chosen.outputs),
+            needed="output=…",
+        )
+    values = chosen.response[0]
+    shape = values.shape
+
+    def make(numbers: Array) -> FrequencyResponse:
+        real, imaginary = numbers.reshape(2, *shape)
+        return replace(chosen, response=(real + 1j * imaginary)[None])
+
+    centre = np.concatenate([values.real.ravel(), values.imag.ravel()])
+    covariance, reason = _errors(chosen)
+    return Spread(centre, covariance, make, None, reason)
+
+
+def _errors(chosen: FrequencyResponse) -> tuple[Array | None, str]:
+    if chosen.errors is not None:
+        return chosen.covariance_at(chosen.omega_rad_s)[0], ""
+    error = chosen.random_error[0]
+    if not (np.all(np.isfinite(error)) and np.any(error > 0.0)):
+        return None, "the errors of the response are not known"
+    # Magnitude and phase in rad have the same relative error, so both parts of H have it.
+    spread = (np.abs(chosen.response[0]) * error).ravel()
+    return np.diag(np.tile(spread, 2) ** 2), "random errors alone, none across frequencies"

@@ -1,0 +1,1 @@
+"""Innovations models by subspace methods, refined by prediction errors."""

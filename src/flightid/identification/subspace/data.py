@@ -1,0 +1,212 @@
+"""Records as block Hankel matrices, and their one triangular factor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError
+from flightid.models.innovations.structure import SubspaceStructure
+from flightid.models.polynomial.data import PolynomialData, gather_channels
+from flightid.record import Record
+
+Array = NDArray[np.float64]
+USUAL_HORIZON = 15
+BLOCK = 20_000
+"""Columns that are folded into the triangular factor at a time."""
+POOR = 1e-9
+"""Ratio of singular values of the inputs' blocks below which they do not excite."""
+
+
+@dataclass(frozen=True, eq=False)
+class SubspaceData:
+    """Outputs and inputs of each record, the outputs divided by their sizes.
+
+    Attributes
+    ----------
+    outputs, inputs : tuple of ndarray, shapes (p, n_samples) and (m, n_samples)
+        For each record.
+    scales : ndarray, shape (p,)
+        Root mean square of each output, so that no unit outweighs another.
+    channels : PolynomialData
+        The same end to end, with units and offsets.
+    """
+
+    outputs: tuple[Array, ...]
+    inputs: tuple[Array, ...]
+    scales: Array
+    channels: PolynomialData
+
+    @property
+    def n_outputs(self) -> int:
+        """Number of outputs p."""
+        return self.scales.size
+
+    @property
+    def n_inputs(self) -> int:
+        """Number of inputs m."""
+        return int(self.inputs[0].shape[0])
+
+    def horizon(self, structure: SubspaceStructure) -> int:
+        """Block rows: as asked, or the usual number, fewer where records are short."""
+        if structure.horizon is not None:
+            return structure.horizon
+        least = structure.least_horizon
+        for rows in range(max(USUAL_HORIZON, least), least, -1):
+            columns = sum(max(0, y.shape[1] - 2 * rows + 1) for y in self.outputs)
+            if columns >= 4 * rows * (self.n_outputs + self.n_inputs):
+                return rows
+        return least
+
+    def lagged(self, horizon: int) -> tuple[Array, Array, Array]:
+        """Past inputs and outputs (oldest first), outputs and inputs now, over all records."""
+        past, now, driven = [], [], []
+        for y, u in zip(self.outputs, self.inputs, strict=True):
+            if y.shape[1] <= horizon:
+                continue
+            past.append(_hankel(np.vstack([u, y]), horizon)[:, :-1])
+            now.append(y[:, horizon:])
+            driven.append(u[:, horizon:])
+        if not past:
+            return tuple(np.zeros((0, 0)) for _ in range(3))  # type: ignore[return-value]
+        return np.hstack(past), np.hstack(now), np.hstack(driven)
+
+    def neighbours(self, horizon: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Columns of `lagged` with a successor in the same record, and the successors."""
+        counts = [y.shape[1] - horizon for y in self.outputs if y.shape[1] > horizon]
+        ends = np.cumsum(counts)
+        before = np.setdiff1d(np.arange(ends[-1]), ends - 1)
+        return before, before + 1
+
+
+def gather(structure: SubspaceStructure, records: Sequence[Record]) -> SubspaceData:
+    """Channels of the records after their checks."""
+    p = len(structure.outputs)
+    others = (*structure.outputs[1:], *structure.inputs)
+    channels = gather_channels(records, structure.outputs[0], others, structure.offsets)
+    channels.require_change()
+    y = np.vstack([channels.output[None], channels.inputs[: p - 1]])
+    u = channels.inputs[p - 1 :]
+    scales = np.sqrt(np.mean(y**2, axis=1))
+    spans = channels.spans
+    return SubspaceData(
+        tuple(y[:, span] / scales[:, None] for span in spans),
+        tuple(u[:, span] for span in spans),
+        scales,
+        channels,
+    )
+
+
+def _hankel(rows: Array, blocks: int) -> Array:
+    """Block Hankel matrix, shape (blocks · channels, n_samples - blocks + 1), time by time."""
+    windows = np.lib.stride_tricks.sliding_window_view(rows, blocks, axis=1)
+    return np.moveaxis(windows, 2, 0).reshape(blocks * rows.shape[0], -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Compressed:
+    """Lower triangular factor of [U_f; U_p; Y_p; Y_f]: every row space without its length.
+
+    Attributes
+    ----------
+    factor : ndarray
+        L of the Hankel matrix L Qᵀ.
+    horizon, n_inputs, n_outputs, n_columns : int
+    """
+
+    factor: Array
+    horizon: int
+    n_inputs: int
+    n_outputs: int
+    n_columns: int
+
+    @property
+    def _ends(self) -> tuple[int, int, int]:
+        m, p = self.horizon * self.n_inputs, self.horizon * self.n_outputs
+        return m, 2 * m + p, 2 * m + 2 * p
+
+    @property
+    def future_on_past(self) -> Array:
+        """Part of the future outputs in the past, future inputs taken out."""
+        first, second, _ = self._ends
+        return self.factor[second:, first:second]
+
+    @property
+    def future_noise(self) -> Array:
+        """Part of the future outputs in neither."""
+        return self.factor[self._ends[1] :, self._ends[1] :]
+
+    def oblique(self) -> Array:
+        """Future outputs on the past along the future inputs."""
+        first, second, _ = self._ends
+        past = self.factor[first:second, :second]
+        corner = self.factor[first:second, first:second]
+        return np.asarray(self.future_on_past @ np.linalg.pinv(corner, rcond=POOR) @ past)
+
+    def residual_covariance(self, gamma: Array, a: Array, c: Array) -> tuple[Array, Array, Array]:
+        """Covariances Q, S, R of what A and C leave of the next states and of the outputs.
+
+        Reference: Van Overschee & De Moor (1996), section 4.4.3.
+        """
+        s, m, p = self.horizon, self.n_inputs, self.n_outputs
+        first, second, _ = self._ends
+        u_future, u_past = self.factor[:first], self.factor[first : 2 * first]
+        y_past, y_future = self.factor[2 * first : second], self.factor[second:]
+        here = self._states(gamma, y_future, u_future, np.vstack([u_past, y_past]))
+        longer = np.vstack([u_past, u_future[:m], y_past, y_future[:p]])
+        ahead = self._states(gamma[: (s - 1) * p], y_future[p:], u_future[m:], longer)
+        left = np.vstack([ahead - a @ here, y_future[:p] - c @ here])
+        weights = np.linalg.lstsq(u_future.T, left.T, rcond=None)[0]
+        left = left - weights.T @ u_future
+        n = a.shape[0]
+        joint = left @ left.T / self.n_columns
+        return joint[:n, :n], joint[:n, n:], joint[n:, n:]
+
+    @staticmethod
+    def _states(gamma: Array, future: Array, inputs: Array, past: Array) -> Array:
+        rows = np.vstack([past, inputs])
+        weights = np.linalg.lstsq(rows.T, future.T, rcond=POOR)[0][: past.shape[0]]
+        return np.asarray(np.linalg.lstsq(gamma, weights.T @ past, rcond=None)[0])
+
+
+def compress(data: SubspaceData, horizon: int) -> Compressed:
+    """One QR of the Hankel matrices of all records, folded block by block.
+
+    Raises
+    ------
+    DataError
+        Too few samples, or inputs that do not excite 2·horizon lags.
+    """
+    p, m = data.n_outputs, data.n_inputs
+    needed = 2 * horizon * (p + m)
+    columns = sum(max(0, y.shape[1] - 2 * horizon + 1) for y in data.outputs)
+    if columns < needed:
+        raise DataError(
+            "the records are too short for the horizon",
+            found=f"{columns} columns with {horizon} block rows of past and future",
+            needed=f"at least {needed}",
+            action="give longer records, a shorter horizon or a smaller maximum_order",
+        )
+    triangle: Array = np.zeros((0, needed))
+    for y, u in zip(data.outputs, data.inputs, strict=True):
+        if y.shape[1] < 2 * horizon:
+            continue
+        inputs, outputs = _hankel(u, 2 * horizon), _hankel(y, 2 * horizon)
+        split = horizon * m
+        for start in range(0, inputs.shape[1], BLOCK):
+            part = slice(start, start + BLOCK)
+            rows = np.vstack([inputs[split:, part], inputs[:split, part], outputs[:, part]])
+            triangle = np.asarray(np.linalg.qr(np.vstack([triangle, rows.T]), mode="r"))
+    excited = np.linalg.svd(triangle[: 2 * horizon * m, : 2 * horizon * m], compute_uv=False)
+    if excited[-1] < POOR * excited[0]:
+        order = int(np.sum(excited > POOR * excited[0]))
+        raise DataError(
+            "the inputs are not persistently exciting",
+            found=f"{order} independent input lags",
+            needed=f"{2 * horizon * m} for a horizon of {horizon}",
+            action="excite more frequencies, or shorten the horizon",
+        )
+    return Compressed(triangle.T, horizon, m, p, columns)

@@ -1,0 +1,282 @@
+"""Prediction-error refinement of innovations models in data-driven local coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid import _native
+from flightid.identification.subspace.data import SubspaceData
+from flightid.identification.subspace.matrices import STABLE, adjoint_run
+from flightid.models.innovations.prediction import RANK
+from flightid.models.linear.recursion import run_recursion, spectral_radius
+from flightid.progress import progress
+
+Array = NDArray[np.float64]
+Matrices = tuple[Array, Array, Array, Array, Array]
+ROUNDS = 12
+SETTLED = 1e-10
+"""Relative change of the log determinant of the innovations between rounds."""
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """Outcome of the search.
+
+    Attributes
+    ----------
+    matrices : tuple of ndarray
+        A, B, C, D, K.
+    errors : tuple of ndarray, shape (p, n_samples)
+        For each record.
+    covariance : ndarray, shape (d, d), or None
+        Of the entries of A, B, C, (D,) K, row by row, singular along changes of coordinates.
+    degrees : int
+        Degrees of freedom of the errors.
+    iterations : int
+    termination : str
+    """
+
+    matrices: Matrices
+    errors: tuple[Array, ...]
+    covariance: Array | None
+    degrees: int
+    iterations: int
+    termination: str
+
+
+@dataclass(frozen=True, eq=False)
+class Predictor:
+    """Whitened prediction errors of all records as a function of the entries of the matrices."""
+
+    data: SubspaceData
+    shapes: tuple[tuple[int, int], ...]
+    direct: bool
+    free_initial: bool
+
+    def unpack(self, theta: Array) -> Matrices:
+        """A, B, C, D, K from their entries."""
+        n, p, m = self.shapes[0][0], self.data.n_outputs, self.data.n_inputs
+        parts = np.split(theta, np.cumsum([r * c for r, c in self.shapes])[:-1])
+        found = [part.reshape(shape) for part, shape in zip(parts, self.shapes, strict=True)]
+        if not self.direct:
+            found.insert(3, np.zeros((p, m)))
+        a, b, c, d, k = found
+        return a.reshape(n, n), b, c, d, k
+
+    def pack(self, matrices: Matrices) -> Array:
+        """Entries of the free matrices, row by row."""
+        a, b, c, d, k = matrices
+        free = (a, b, c, d, k) if self.direct else (a, b, c, k)
+        return np.concatenate([matrix.ravel() for matrix in free])
+
+    def errors(self, matrices: Matrices) -> list[tuple[Array, Array, Array]]:
+        """Errors, states and free motions of each record, its initial state fitted."""
+        a, b, c, d, k = matrices
+        closed, found = a - k @ c, []
+        for y, u in zip(self.data.outputs, self.data.inputs, strict=True):
+            state = run_recursion(closed, (b - k @ d) @ u + k @ y)
+            error = y - c @ state - d @ u
+            n = a.shape[0]
+            moved = run_recursion(closed, np.zeros((n, n, y.shape[1])), np.eye(n))
+            found.append((error, state, moved))
+        return found
+
+    def residuals(self, matrices: Matrices, whiten: Array) -> tuple[list[Array], list[Array]]:
+        """Whitened errors of each record after the initial state, and the bases taken out."""
+        c, out, bases = matrices[2], [], []
+        for error, _, moved in self.errors(matrices):
+            basis = self._basis(whiten @ (c @ moved))
+            flat = (whiten @ error).ravel()
+            out.append(flat - basis @ (basis.T @ flat))
+            bases.append(basis)
+        return out, bases
+
+    def _basis(self, motion: Array) -> Array:
+        columns = motion.reshape(motion.shape[0], -1).T
+        if not self.free_initial:
+            return np.zeros((columns.shape[0], 0))
+        left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+        return np.asarray(left[:, sizes > RANK * max(float(sizes[0]), 1e-300)])
+
+    def fitted_errors(self, matrices: Matrices, whiten: Array) -> tuple[Array, ...]:
+        """Errors of each record with its initial state, in the outputs' units."""
+        rows, _ = self.residuals(matrices, whiten)
+        return tuple(
+            np.asarray(np.linalg.solve(whiten, row.reshape(y.shape)), dtype=np.float64)
+            for row, y in zip(rows, self.data.outputs, strict=True)
+        )
+
+    def jacobian(self, matrices: Matrices, whiten: Array, basis: Array) -> Array:
+        """Derivatives of `residuals` along the columns of a basis, shape (rows, n_basis).
+
+        Reference: Kaufman (1975), *BIT* 15, for the elimination of the initial states.
+        """
+        c = matrices[2]
+        parts = []
+        for (error, state, moved), u in zip(self.errors(matrices), self.data.inputs, strict=True):
+            taken = self._basis(whiten @ (c @ moved))
+            motion = self._fitted_motion(c, error, moved)
+            made = np.zeros((basis.shape[1], *error.shape))
+            signals = (error - c @ motion, state + motion, u)
+            self._add_slopes(made, matrices, basis, signals)
+            flat = (whiten @ made).reshape(basis.shape[1], -1).T
+            parts.append(flat - taken @ (taken.T @ flat))
+        return np.ascontiguousarray(np.vstack(parts))
+
+    def _fitted_motion(self, c: Array, error: Array, moved: Array) -> Array:
+        if not self.free_initial:
+            return np.zeros(moved.shape[1:])
+        columns = (c @ moved).reshape(moved.shape[0], -1).T
+        start = np.linalg.lstsq(columns, error.ravel(), rcond=RANK)[0]
+        return np.tensordot(start, moved, axes=1)
+
+    def _add_slopes(
+        self, made: Array, matrices: Matrices, basis: Array, signals: tuple[Array, Array, Array]
+    ) -> None:
+        """De = -C (q - A + K C)⁻¹ (dA x + dB u + dK e - K dC x - K dD u) - dC x - dD u."""
+        a, _, c, _, k = matrices
+        error, state, u = signals
+        closed = a - k @ c
+        by = iter(np.split(basis, np.cumsum([r * w for r, w in self.shapes])[:-1]))
+        slopes = [each.reshape(*s, -1) for each, s in zip(by, self.shapes, strict=True)]
+        da, db, dc = slopes[:3]
+        dk = slopes[-1]
+        groups = [(state, da - np.tensordot(k, dc, axes=1), dc), (error, dk, None)]
+        if self.direct:
+            dd = slopes[3]
+            groups.append((u, db - np.tensordot(k, dd, axes=1), dd))
+        else:
+            groups.append((u, db, None))
+        for signal, entering, straight in groups:
+            for j, row in enumerate(signal):
+                passed = adjoint_run(closed, c, row)
+                made -= np.tensordot(entering[:, j].T, passed, axes=1)
+                if straight is not None:
+                    made -= straight[:, j].T[:, :, None] * row
+
+
+def refine(
+    data: SubspaceData,
+    start: Matrices,
+    *,
+    direct: bool,
+    initial: str,
+    maximum_iterations: int,
+) -> Refined:
+    """Smallest log determinant of the innovations' covariance, from a subspace estimate.
+
+    Each round weights the errors of different outputs by their covariance and searches along the
+    directions that change the model's behaviour, not only its coordinates.
+
+    Reference: McKelvey, Helmersson & Ribarits (2004), *Automatica* 40, data-driven local
+    coordinates; Ljung, *System Identification*, 2nd ed., eq. 15.39.
+    """
+    n = start[0].shape[0]
+    shapes = [each.shape for each in start]
+    free = tuple(shapes) if direct else (*shapes[:3], shapes[4])
+    predictor = Predictor(data, free, direct, initial == "estimate")
+    matrices = _balanced(predictor, start)
+    iterations, termination, last = 0, "rounds", np.inf
+    errors = predictor.fitted_errors(matrices, np.eye(data.n_outputs))
+    with progress(ROUNDS, "refining the model") as advance:
+        for _ in range(ROUNDS):
+            level = _level(errors)
+            if not np.isfinite(level) or last - level <= SETTLED * max(1.0, abs(level)):
+                termination = "cost" if np.isfinite(level) else "zero"
+                break
+            last = level
+            whiten = _whitener(errors)
+            matrices, steps, ended = _search(predictor, matrices, whiten, maximum_iterations)
+            errors = predictor.fitted_errors(matrices, whiten)
+            iterations += steps
+            advance()
+            if ended == "iterations":
+                termination = ended
+                break
+    samples = sum(e.shape[1] for e in errors)
+    own = n * len(errors) if initial == "estimate" else 0
+    degrees = max(samples * data.n_outputs - _count(free, n) - own, 1)
+    covariance = _covariance(predictor, matrices, errors, degrees)
+    return Refined(matrices, errors, covariance, degrees, iterations, termination)
+
+
+def _count(shapes: tuple[tuple[int, ...], ...], n: int) -> int:
+    return sum(r * c for r, c in shapes) - n * n
+
+
+def _level(errors: tuple[Array, ...]) -> float:
+    joint = np.hstack(errors)
+    covariance = joint @ joint.T / joint.shape[1]
+    sign, value = np.linalg.slogdet(covariance)
+    return float(value) if sign > 0 and value > -60.0 * len(joint) else -np.inf
+
+
+def _balanced(predictor: Predictor, matrices: Matrices) -> Matrices:
+    """States of unit covariance over the records, so that steps have one size."""
+    a, b, c, d, k = matrices
+    states = np.hstack([state for _, state, _ in predictor.errors(matrices)])
+    left, sizes, _ = np.linalg.svd(states @ states.T / states.shape[1])
+    size = np.sqrt(np.maximum(sizes, 1e-24 * sizes[0]))
+    to, back = left.T / size[:, None], left * size
+    return to @ a @ back, to @ b, c @ back, d, to @ k
+
+
+def _tangent(predictor: Predictor, matrices: Matrices) -> Array:
+    """Orthonormal directions that leave the orbit of changes of coordinates, (d, d - n²)."""
+    a, b, c, d, k = matrices
+    n = a.shape[0]
+    moves = []
+    for i in range(n):
+        for j in range(n):
+            x = np.zeros((n, n))
+            x[i, j] = 1.0
+            moves.append(predictor.pack((x @ a - a @ x, x @ b, -c @ x, 0.0 * d, x @ k)))
+    full = np.linalg.qr(np.array(moves).T, mode="complete")[0]
+    return np.asarray(full[:, n * n :])
+
+
+def _whitener(errors: tuple[Array, ...], degrees: int | None = None) -> Array:
+    joint = np.hstack(errors)
+    count = joint.shape[1] if degrees is None else degrees / len(joint)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(joint @ joint.T / count)))
+
+
+def _search(
+    predictor: Predictor, matrices: Matrices, whiten: Array, maximum_iterations: int
+) -> tuple[Matrices, int, str]:
+    basis = _tangent(predictor, matrices)
+    origin = predictor.pack(matrices)
+    rows = sum(y.size for y in predictor.data.outputs)
+
+    def residuals(step: Array) -> Array:
+        trial = predictor.unpack(origin + basis @ step)
+        if spectral_radius(trial[0] - trial[4] @ trial[2]) >= STABLE:
+            return np.full(rows, np.inf)
+        return np.concatenate(predictor.residuals(trial, whiten)[0])
+
+    def jacobian(step: Array) -> Array:
+        return predictor.jacobian(predictor.unpack(origin + basis @ step), whiten, basis)
+
+    free = np.full(basis.shape[1], np.inf)
+    found = _native.least_squares(
+        residuals, jacobian, np.zeros(basis.shape[1]), -free, free, rows, maximum_iterations
+    )
+    return predictor.unpack(origin + basis @ found[0]), found[4], found[5]
+
+
+def _covariance(
+    predictor: Predictor, matrices: Matrices, errors: tuple[Array, ...], degrees: int
+) -> Array | None:
+    if not np.isfinite(_level(errors)):
+        return None
+    basis = _tangent(predictor, matrices)
+    jacobian = predictor.jacobian(matrices, _whitener(errors, degrees), basis)
+    triangle = np.linalg.qr(jacobian, mode="r")
+    lengths = np.linalg.norm(triangle, axis=0)
+    if np.any(np.abs(np.diag(triangle)) <= 1e-11 * np.maximum(lengths, 1e-300)):
+        return None
+    root = basis @ np.linalg.inv(triangle)
+    return np.asarray(root @ root.T)

@@ -1,0 +1,351 @@
+"""ArduPilot DataFlash logs as a `LogSource` (native side: `crates/logs/src/dataflash.rs`)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid import _native
+from flightid.conventions import Light
+from flightid.errors import MissingColumnError
+from flightid.findings import Finding
+from flightid.logs.dataflash.events import error_text, event_text, mode_text, vehicle_of
+from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange
+from flightid.units import DIMENSIONLESS
+
+GAP_S = 0.2
+"""Silence of all messages together that counts as a gap, s: even the slowest standard log bitmask
+writes the inertial sensors at 25 Hz."""
+
+# The labels of ArduPilot's unit table (AP_Logger/LogStructure.h) in flightid's spelling.
+UNITS = {
+    "": "1", "UNKNOWN": "1", "instance": "1", "satellites": "1", "%": "%", "ppm": "ppm",
+    "A": "A", "Ah": "A*h", "A.s": "A*s", "W": "W", "Watt": "W", "W.h": "h*W", "W.s": "s*W",
+    "J": "J", "V": "V", "Ohm": "Ω", "mV": "mV", "B": "B", "B/s": "B/s", "deg": "deg",
+    "deglatitude": "deg", "deglongitude": "deg", "degheading": "deg", "deg/s": "deg/s",
+    "deg/s/s": "deg/s^2", "rad": "rad", "rad/s": "rad/s", "rad/s/s": "rad/s^2", "m": "m",
+    "m/s": "m/s", "m/s/s": "m/s^2", "degC": "°C", "s": "s", "us": "µs", "Hz": "Hz",
+    "rpm": "rpm", "l": "l", "l/s": "l/s", "N.m": "m*N", "Pa": "Pa", "Gauss": "G", "mGauss": "mG",
+}  # fmt: skip
+_VERSION = re.compile(r"^(?P<name>[\w:+ -]*?(?:[Cc]opter|[Pp]lane|[Rr]over|Sub|Tracker|Blimp|Heli)"
+                      r"[\w-]*) V\d")  # fmt: skip
+
+
+class _Column(NamedTuple):
+    label: str
+    code: str
+    unit: str
+    multiplier: float
+    width: int
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """A table of the file; most are never asked for, so what follows from it waits for that."""
+
+    file: _native.DataflashFile
+    table: int
+    n_rows: int
+
+    @cached_property
+    def fields(self) -> list[_Column]:
+        return [_Column(*field) for field in self.file.fields(self.table)]
+
+    @cached_property
+    def columns(self) -> dict[str, int]:
+        """Place of each label, the first where one stands twice."""
+        return {field.label: place for place, field in reversed(list(enumerate(self.fields)))}
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        return {field.label: UNITS.get(field.unit, DIMENSIONLESS) for field in self.fields}
+
+    @cached_property
+    def text_fields(self) -> tuple[str, ...]:
+        return tuple(field.label for field in self.fields if field.width == 0)
+
+
+class _Messages(Mapping[str, MessageInfo]):
+    """Message infos by name, each made when it is asked for: describing reads every row."""
+
+    def __init__(self, file: _native.DataflashFile, layouts: dict[str, _Layout]) -> None:
+        self._file = file
+        self._layouts = layouts
+        self._made: dict[str, MessageInfo] = {}
+
+    def __getitem__(self, name: str) -> MessageInfo:
+        if name not in self._made:
+            self._made[name] = self._describe(name, self._layouts[name])
+        return self._made[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._layouts
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._layouts)
+
+    def __len__(self) -> int:
+        return len(self._layouts)
+
+    def _describe(self, name: str, layout: _Layout) -> MessageInfo:
+        instances, stamps = self._file.describe(layout.table)
+        first_s, last_s, step_s = stamps or (None, None, None)
+        return MessageInfo(
+            name,
+            layout.n_rows,
+            tuple(instances),
+            layout.units,
+            layout.text_fields,
+            None if step_s is None else 1.0 / step_s,
+            first_s,
+            last_s,
+        )
+
+
+def open_dataflash(path: Path) -> DataflashSource:
+    """Map and index a DataFlash log.
+
+    Raises
+    ------
+    LogFormatError
+        The file holds no DataFlash message.
+    OSError
+        The file cannot be read.
+    """
+    return DataflashSource(_native.open_dataflash(str(path)))
+
+
+class DataflashSource:
+    """A DataFlash log, indexed; implements `LogSource`.
+
+    Parameters
+    ----------
+    file : _native.DataflashFile
+        The indexed file.
+    """
+
+    kind = "ardupilot"
+
+    def __init__(self, file: _native.DataflashFile) -> None:
+        self._file = file
+        self._layouts: dict[str, _Layout] = {}
+        self._renamed: list[str] = []
+        for index, (name, _, count) in enumerate(file.tables()):
+            if count > 0:
+                self._adopt(name, _Layout(file, index, count))
+        self._messages = _Messages(file, self._layouts)
+
+    def _adopt(self, name: str, layout: _Layout) -> None:
+        """Take in a table of the file; a second layout under one name becomes ``NAME~2``."""
+        label, copy = name, 1
+        while label in self._layouts:
+            copy += 1
+            label = f"{name}~{copy}"
+        if copy > 1:
+            self._renamed.append(label)
+        self._layouts[label] = layout
+
+    @property
+    def messages(self) -> Mapping[str, MessageInfo]:
+        """Message types that have rows, in order of definition."""
+        return self._messages
+
+    def fields(self, message: str) -> tuple[Mapping[str, str], tuple[str, ...]]:
+        """Unit by field name, and which fields hold text."""
+        layout = self._layouts[message]
+        return layout.units, layout.text_fields
+
+    def rows(self, message: str, instance: int | None) -> int:
+        """Rows of a message, or of one of its instances."""
+        return self._file.rows(self._layouts[message].table, instance)
+
+    def numbers(self, message: str, field: str, instance: int | None) -> NDArray[np.float64]:
+        """Scaled numbers; an int16[32] field has shape (n_rows, 32)."""
+        return self.columns(message, [field], instance)[0]
+
+    def columns(
+        self, message: str, fields: Sequence[str], instance: int | None
+    ) -> list[NDArray[np.float64]]:
+        """Scaled numbers of several fields in one pass over the rows."""
+        layout = self._layouts[message]
+        places = [layout.columns[field] for field in fields]
+        widths = [layout.fields[place].width for place in places]
+        found = self._file.columns(layout.table, places, instance)
+        return [
+            values.reshape(-1, width) if width > 1 else values
+            for values, width in zip(found, widths, strict=True)
+        ]
+
+    def texts(self, message: str, field: str, instance: int | None) -> list[str]:
+        """Texts up to their first zero byte."""
+        layout = self._layouts[message]
+        return self._file.texts(layout.table, layout.columns[field], instance)
+
+    def time_s(self, message: str, instance: int | None) -> NDArray[np.float64]:
+        """Stamps on the autopilot's clock, s."""
+        stamps = self._file.stamps(self._layouts[message].table, instance)
+        if stamps is None:
+            raise MissingColumnError(
+                f"message {message} has no stamp", needed="a field TimeUS or TimeMS"
+            )
+        return stamps
+
+    @cached_property
+    def firmware(self) -> str:
+        """First text message that names a vehicle and a version."""
+        texts = self.texts("MSG", "Message", None) if self._has("MSG", "Message") else []
+        return next((text for text in texts if _VERSION.match(text)), "")
+
+    @cached_property
+    def vehicle(self) -> str | None:
+        """Vehicle named by the firmware text."""
+        return vehicle_of(self.firmware) if self.firmware else None
+
+    @cached_property
+    def _parameter_rows(self) -> list[tuple[float | None, str, float]]:
+        if not self._has("PARM", "Name", "Value"):
+            return []
+        names = self.texts("PARM", "Name", None)
+        values = self.numbers("PARM", "Value", None).tolist()
+        return list(zip(self._stamps_or_none("PARM"), names, values, strict=True))
+
+    @cached_property
+    def parameters(self) -> dict[str, float]:
+        """Last value by parameter name."""
+        return {name: value for _, name, value in self._parameter_rows}
+
+    @cached_property
+    def parameter_changes(self) -> list[ParameterChange]:
+        """Values that differ from the one logged before."""
+        last: dict[str, float] = {}
+        changes = []
+        for time_s, name, value in self._parameter_rows:
+            if last.get(name, value) != value:
+                changes.append(ParameterChange(time_s, name, last[name], value))
+            last[name] = value
+        return changes
+
+    @cached_property
+    def events(self) -> list[Event]:
+        """Modes, events, errors, arming and texts, in order of time."""
+        found = [*self._modes(), *self._numbered(), *self._errors(), *self._texts()]
+        return sorted(found, key=lambda event: -np.inf if event.time_s is None else event.time_s)
+
+    def _modes(self) -> Iterator[Event]:
+        field = "ModeNum" if self._has("MODE", "ModeNum") else "Mode"
+        if not self._has("MODE", field) or field in self._messages["MODE"].text_fields:
+            return
+        reasons = self._integers("MODE", "Rsn") if self._has("MODE", "Rsn") else None
+        for row, (time_s, number) in enumerate(self._stamped("MODE", field)):
+            reason = None if reasons is None else reasons[row]
+            yield Event(time_s, "mode", mode_text(self.vehicle, number, reason))
+
+    def _numbered(self) -> Iterator[Event]:
+        for time_s, number in self._stamped("EV", "Id"):
+            kind = "arming" if number in (10, 11) else "event"
+            yield Event(time_s, kind, event_text(number))
+
+    def _errors(self) -> Iterator[Event]:
+        if self._has("ERR", "Subsys", "ECode"):
+            codes = self._integers("ERR", "ECode")
+            for row, (time_s, subsystem) in enumerate(self._stamped("ERR", "Subsys")):
+                yield Event(time_s, "error", error_text(subsystem, codes[row]))
+
+    def _texts(self) -> Iterator[Event]:
+        if self._has("MSG", "Message"):
+            texts = self.texts("MSG", "Message", None)
+            for time_s, text in zip(self._stamps_or_none("MSG"), texts, strict=True):
+                yield Event(time_s, "text", text)
+
+    @cached_property
+    def skipped(self) -> tuple[ByteRange, ...]:
+        """Byte ranges in no message."""
+        return tuple(ByteRange(*item) for item in self._file.skipped())
+
+    @cached_property
+    def gaps(self) -> list[Gap]:
+        """Spans above `GAP_S` in which no message of any kind is stamped."""
+        stamped = [m.name for m in self._messages.values() if m.first_s is not None]
+        if not stamped:
+            return []
+        stamps = np.sort(np.concatenate([self.time_s(name, None) for name in stamped]))
+        places = np.flatnonzero(np.diff(stamps) > GAP_S)
+        return [
+            Gap(float(stamps[i]), float(stamps[i + 1]), "no message of any kind") for i in places
+        ]
+
+    @cached_property
+    def findings(self) -> list[Finding]:
+        """Bytes lost, messages dropped by the logger, units that are not known."""
+        return [*self._loss(), *self._dropped(), *self._doubts()]
+
+    def _loss(self) -> Iterator[Finding]:
+        harmless = ("filled with", "the file ends inside")
+        lost = [r for r in self.skipped if not r.reason.startswith(harmless)]
+        if lost:
+            size = sum(r.size for r in lost)
+            yield Finding(
+                "bytes-skipped",
+                Light.AMBER,
+                f"{size} of {self._file.size()} bytes in {len(lost)} places are no message",
+                "copy the log from the vehicle again; look for gaps in the span you use",
+            )
+
+    def _dropped(self) -> Iterator[Finding]:
+        if self._has("DSF", "Dp"):
+            counts = self.numbers("DSF", "Dp", None)
+            dropped = int(counts[-1] - counts[0])
+            if dropped > 0:
+                yield Finding(
+                    "messages-dropped",
+                    Light.AMBER,
+                    f"the logger dropped {dropped} messages while it ran",
+                    "log fewer messages (LOG_BITMASK) or use a faster card",
+                )
+
+    def _doubts(self) -> Iterator[Finding]:
+        units = {field.unit for layout in self._layouts.values() for field in layout.fields}
+        if unknown := units - set(UNITS):
+            names = ", ".join(sorted(map(repr, unknown)))
+            yield Finding(
+                "unit-unknown",
+                Light.AMBER,
+                f"the log declares units that flightid does not know: {names}",
+                "their fields are read as dimensionless",
+            )
+        if self._renamed:
+            yield Finding(
+                "layout-changed",
+                Light.AMBER,
+                f"messages change their layout inside the file: {', '.join(self._renamed)}",
+                "this is probably two logs in one file; read them apart",
+            )
+        if "FMTU" not in self._messages:
+            yield Finding(
+                "no-units", Light.AMBER, "the log declares no units (firmware before 2018)"
+            )
+
+    def _has(self, message: str, *fields: str) -> bool:
+        info = self._messages.get(message)
+        return info is not None and all(field in info.fields for field in fields)
+
+    def _stamps_or_none(self, message: str) -> Sequence[float | None]:
+        info = self._messages[message]
+        if info.first_s is None:
+            return [None] * info.count
+        return list(map(float, self.time_s(message, None)))
+
+    def _integers(self, message: str, field: str) -> list[int]:
+        return [int(value) for value in self.numbers(message, field, None)]
+
+    def _stamped(self, message: str, field: str) -> Iterator[tuple[float | None, int]]:
+        if self._has(message, field):
+            numbers = self._integers(message, field)
+            yield from zip(self._stamps_or_none(message), numbers, strict=True)

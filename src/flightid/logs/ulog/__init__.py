@@ -1,0 +1,1 @@
+"""ULog files of PX4."""

@@ -1,0 +1,1 @@
+"""The model language: formulas, units, blocks, tables and what reads them."""

@@ -1,0 +1,1 @@
+"""Linear systems: matrices with delays, sampling, realisation, interchange with other tools."""

@@ -1,0 +1,1 @@
+"""Nonlinear autoregressive models with products and radial functions."""

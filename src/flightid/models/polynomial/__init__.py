@@ -1,0 +1,1 @@
+"""Polynomial models, ARX to Box-Jenkins."""

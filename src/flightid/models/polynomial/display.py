@@ -1,0 +1,103 @@
+"""Polynomial models as text: the difference equation, and the table of poles and zeros."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flightid.models.linear.discrete_modes import discrete_modes
+from flightid.table import Cell, Column, Table
+
+if TYPE_CHECKING:
+    from flightid.models.polynomial.model import PolynomialModel
+
+
+def difference_equation(model: PolynomialModel) -> str:
+    """The model in samples where it is ARX or ARMAX, else with its polynomials named."""
+    if np.size(model.d) > 1 or any(np.size(row) > 1 for row in model.f):
+        return _in_polynomials(model)
+    terms = [(-x, f"{model.output}(t-{k})") for k, x in enumerate(np.asarray(model.a)[1:], 1)]
+    for name, row, delay in zip(model.inputs, model.b, model.nk, strict=True):
+        for k, x in enumerate(np.asarray(row), delay):
+            terms.append((x, f"{name}(t-{k})" if k else f"{name}(t)"))
+    tail = [(x, f"e(t-{k})") for k, x in enumerate(np.asarray(model.c)[1:], 1)]
+    text = "".join(_term(value, word) for value, word in terms)
+    text += " + e(t)" + "".join(_term(value, word) for value, word in tail)
+    return f"{model.output}(t) = {text.removeprefix(' + ').removeprefix(' ')}"
+
+
+def _term(value: float, word: str) -> str:
+    return f" {'-' if value < 0 else '+'} {abs(value):.6g} {word}"
+
+
+def _in_polynomials(model: PolynomialModel) -> str:
+    parts = [
+        f"[{_polynomial(row, k)} / {_polynomial(f, 0)}] {name}(t)"
+        for name, row, k, f in zip(model.inputs, model.b, model.nk, model.f, strict=True)
+    ]
+    noise = f"[{_polynomial(model.c, 0)} / {_polynomial(model.d, 0)}] e(t)"
+    left = "" if np.size(model.a) == 1 else f"[{_polynomial(model.a, 0)}] "
+    return f"{left}{model.output}(t) = " + " + ".join([*parts, noise])
+
+
+def _polynomial(row: object, delay: int) -> str:
+    values = np.asarray(row, dtype=np.float64)
+    words = [_term(value, f"q^-{k}" if k else "").rstrip() for k, value in enumerate(values, delay)]
+    text = "".join(words).strip().removeprefix("+ ")
+    return text or "0"
+
+
+def roots_table(model: PolynomialModel) -> Table:
+    """Poles and zeros of each response with natural frequency, damping and what to know."""
+    columns = (
+        Column("response"),
+        Column("root"),
+        Column("z real", digits=5),
+        Column("z imaginary", digits=5),
+        Column("|z|", digits=5),
+        Column("natural frequency", "rad/s"),
+        Column("damping"),
+        Column("note"),
+    )
+    rows: list[tuple[Cell, ...]] = []
+    for (response, poles), zeros in zip(model.poles().items(), model.zeros().values(), strict=True):
+        for mode in discrete_modes(poles, model.sample_time_s):
+            unstable = "unstable" if abs(mode.z) > 1.0 else ""
+            note = "; ".join(filter(None, (mode.reason, unstable)))
+            shown = (mode.natural_frequency_rad_s, mode.damping, note)
+            rows.append((response, "pole", *_parts(mode.z), *shown))
+        rows.extend(
+            (response, "zero", *_parts(complex(zero)), None, None, zero_note(zero))
+            for zero in zeros[zeros.imag >= 0]
+        )
+    notes = (
+        model.difference_equation(),
+        "steady gains: "
+        + ", ".join(
+            f"{name} {'none (integrator)' if gain is None else f'{gain:.5g}'}"
+            for name, gain in model.gains().items()
+        ),
+        f"delays: {', '.join(f'{k} samples' for k in model.nk)}",
+        "one line for each conjugate pair",
+    )
+    return Table(repr(model), columns, tuple(rows), notes)
+
+
+def zero_note(zero: complex | np.complex128) -> str:
+    """What a zero outside the unit circle means; a negative real one comes from sampling.
+
+    Example
+    -------
+    >>> zero_note(1.2)
+    'non-minimum phase'
+    """
+    if abs(zero) <= 1.0:
+        return ""
+    if zero.imag == 0.0 and zero.real < 0.0:
+        return "outside the circle on the negative axis: sampling makes such zeros"
+    return "non-minimum phase"
+
+
+def _parts(root: complex) -> tuple[float, float, float]:
+    return float(root.real), float(root.imag), abs(root)

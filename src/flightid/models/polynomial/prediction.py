@@ -1,0 +1,176 @@
+"""Prediction with a polynomial model: one step, k steps, free run (`polynomial_predictor.rs`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from flightid import _native
+from flightid.errors import DataError, OptionError, UnitError
+from flightid.models.polynomial.data import SAME_SAMPLE_TIME, gather_channels
+from flightid.models.polynomial.structure import OFFSETS
+from flightid.record import Record
+
+if TYPE_CHECKING:
+    from flightid.models.innovations.model import InnovationsModel
+    from flightid.models.polynomial.model import PolynomialModel
+
+Array = NDArray[np.float64]
+LARGEST = 1e100
+"""A run beyond this is held at the last sample before it: its squares still are numbers."""
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialPrediction:
+    """Output of a polynomial model on a record.
+
+    Attributes
+    ----------
+    measured, predicted : ndarray, shape (n_samples,)
+        In the output's unit, the operating point included.
+    horizon : int or str
+        Samples ahead, or ``"free_run"``.
+    initial : str
+        ``"estimate"`` or ``"zero"``.
+    diverged : bool
+        Whether the run left the range of numbers and was held.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> PolynomialPrediction(np.array([1.0, 3.0]), np.array([1.0, 2.0]), 1, "zero")
+    PolynomialPrediction(1 ahead from rest, 2 samples, rms 0.7071)
+    """
+
+    measured: Array
+    predicted: Array
+    horizon: int | str
+    initial: str
+    diverged: bool = False
+
+    @property
+    def residual(self) -> Array:
+        """Measured minus predicted, shape (n_samples,)."""
+        return np.asarray(self.measured - self.predicted)
+
+    @property
+    def error_rms(self) -> float:
+        """Root mean square of the residual, in the output's unit."""
+        return float(np.sqrt(np.mean(self.residual**2)))
+
+    @property
+    def words(self) -> str:
+        """Horizon and initial state in words."""
+        ahead = "free run" if self.horizon == "free_run" else f"{self.horizon} ahead"
+        return f"{ahead} from {'rest' if self.initial == 'zero' else 'an estimated state'}"
+
+    def __repr__(self) -> str:
+        """Horizon, initial state, size and error on one line."""
+        left = ", diverged" if self.diverged else ""
+        return (
+            f"PolynomialPrediction({self.words}, {self.measured.size} samples, "
+            f"rms {self.error_rms:.4g}{left})"
+        )
+
+
+def predict(
+    model: PolynomialModel, record: Record, horizon: int | str, *, initial: str, offsets: str
+) -> PolynomialPrediction:
+    """Predict one record; `PolynomialModel.predict` says how."""
+    if horizon != "free_run" and not (isinstance(horizon, int) and horizon > 0):
+        raise OptionError("unknown horizon", found=horizon, needed="1, 2, … or 'free_run'")
+    for what, value, allowed in (
+        ("initial state", initial, ("estimate", "zero")),
+        ("offsets", offsets, OFFSETS),
+    ):
+        if value not in allowed:
+            raise OptionError(f"unknown {what}", found=value, needed=", ".join(allowed))
+    data = gather_channels([record], model.output, model.inputs, offsets)
+    require_same(model, data.units, data.sample_time_s)
+    if horizon == "free_run":
+        deviation = free_run(model, data.output, data.inputs, initial=initial)
+    else:
+        deviation = _ahead(model, data.output, data.inputs, int(horizon), initial)
+    usable = np.abs(deviation) < LARGEST
+    diverged = not bool(np.all(usable))
+    if diverged:
+        last = int(np.argmin(usable))
+        deviation[last:] = deviation[last - 1]
+    offset = data.offsets[0][model.output]
+    return PolynomialPrediction(
+        record[model.output], deviation + offset, horizon, initial, diverged
+    )
+
+
+def require_same(
+    model: PolynomialModel | InnovationsModel, units: Mapping[str, str], sample_time_s: float
+) -> None:
+    """Refuse records with another sample time or other units than the model's."""
+    if abs(sample_time_s / model.sample_time_s - 1.0) > SAME_SAMPLE_TIME:
+        raise DataError(
+            "the record has another sample time than the model",
+            found=f"{sample_time_s:.6g} s",
+            needed=f"{model.sample_time_s:.6g} s",
+            action="resample it with conditioning.resample",
+        )
+    for name, unit in units.items():
+        if unit != model.units.get(name, unit):
+            raise UnitError(
+                f"channel {name!r} has another unit than the model",
+                found=unit,
+                needed=model.units[name],
+                action="convert it with Record.to_units",
+            )
+
+
+def one_step_errors(model: PolynomialModel, output: Array, inputs: Array, initial: str) -> Array:
+    """Prediction errors one step ahead, shape (n_samples,), of deviations from trim."""
+    return _native.polynomial_errors(
+        output,
+        np.ascontiguousarray(inputs),
+        [output.size],
+        model.structure.native,
+        model.theta,
+        "unknown" if initial == "estimate" else "rest",
+        [],
+    )
+
+
+def _ahead(
+    model: PolynomialModel, output: Array, inputs: Array, horizon: int, initial: str
+) -> Array:
+    """y(t) minus the part of the noise that is younger than the horizon."""
+    errors = one_step_errors(model, output, inputs, initial)
+    above, below = model.noise_transfer
+    impulse = np.zeros(horizon)
+    impulse[0] = 1.0
+    young = lfilter(above, below, impulse)
+    return np.asarray(output - lfilter(young, [1.0], errors))
+
+
+def free_run(model: PolynomialModel, output: Array, inputs: Array, *, initial: str) -> Array:
+    """Response to the inputs alone, and with ``"estimate"`` the free motion that fits best."""
+    run = np.zeros(output.size)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for name, row in zip(model.inputs, inputs, strict=True):
+            run += lfilter(*model.transfer(name), row)
+        if initial == "zero":
+            return run
+        below = np.asarray(model.a)
+        for row in model.f:
+            below = np.convolve(below, np.asarray(row))
+        count = below.size - 1
+        if count == 0 or not np.all(np.isfinite(run)):
+            return run
+        impulse = np.zeros((count, output.size))
+        np.fill_diagonal(impulse, 1.0)
+        motion = lfilter([1.0], below, impulse)
+    if not np.all(np.isfinite(motion)):
+        return run
+    weights = np.linalg.lstsq(motion.T, output - run, rcond=None)[0]
+    return np.asarray(run + weights @ motion)

@@ -1,0 +1,1 @@
+"""State-space models: equations with units (native: `model_tape.rs`)."""

@@ -1,0 +1,143 @@
+"""The matrices of a state-space model as printed formulas."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+from flightid.models.language.symbolic import ZERO, Printer, Term, latex_name
+from flightid.models.state_space.checks import derivative
+
+if TYPE_CHECKING:
+    from flightid.models.state_space.model import StateSpaceModel
+
+_BREAK = r" \\ "
+Rows = tuple[tuple[Term, ...], ...]
+
+
+@dataclass(frozen=True)
+class MatrixDisplay:
+    """Symbolic matrices.
+
+    Attributes
+    ----------
+    m, f, g, h1, h0, d : tuple of tuple of Term
+        Rows of the matrices.
+    states, inputs, outputs : tuple of str
+        Names along rows and columns.
+    delays : tuple of Term
+        Delay of each input.
+    definitions : tuple of (str, Term)
+        Auxiliary quantities: printed name and formula.
+    is_linear : bool
+        Whether no entry holds a state, input or state derivative.
+    """
+
+    m: Rows
+    f: Rows
+    g: Rows
+    h1: Rows
+    h0: Rows
+    d: Rows
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    delays: tuple[Term, ...]
+    definitions: tuple[tuple[str, Term], ...]
+    is_linear: bool
+
+    def motion(self) -> str:
+        """M ẋ = F x + G u as LaTeX."""
+        rates = _column([derivative(name) for name in self.states])
+        forced = f"{_matrix(self.f)} {_column(self.states)} + {_matrix(self.g)}"
+        return f"{_matrix(self.m)} {rates} = {forced} {self._late_inputs()}"
+
+    def _late_inputs(self) -> str:
+        """Inputs, those with a delay at their earlier time."""
+        if all(delay == ZERO for delay in self.delays):
+            return _column(self.inputs)
+        times = ["t" if delay == ZERO else f"t - {delay.latex}" for delay in self.delays]
+        names = [
+            rf"{latex_name(name)}({time})" for name, time in zip(self.inputs, times, strict=True)
+        ]
+        return rf"\begin{{bmatrix}} {_BREAK.join(names)} \end{{bmatrix}}"
+
+    def measurement(self) -> str:
+        """Outputs y = H₁ ẋ + H₀ x + D u as LaTeX, without the matrices that are zero."""
+        rates = _column([derivative(name) for name in self.states])
+        terms = [(self.h1, rates), (self.h0, _column(self.states)), (self.d, self._late_inputs())]
+        shown = " + ".join(f"{_matrix(rows)} {names}" for rows, names in terms if _filled(rows))
+        return f"{_column(self.outputs)} = {shown or '0'}"
+
+    def _lines(self) -> list[str]:
+        where = [f"{name} = {term.latex}" for name, term in self.definitions]
+        return [self.motion(), self.measurement(), *where]
+
+    def latex(self) -> str:
+        """Both, with the definitions below, in a gathered environment."""
+        return rf"\begin{{gathered}} {_BREAK.join(self._lines())} \end{{gathered}}"
+
+    def html(self) -> str:
+        """Both, with the definitions below, for a notebook."""
+        return "".join(f"<div>$${escape(each, quote=False)}$$</div>" for each in self._lines())
+
+
+def matrices_as_latex(model: StateSpaceModel) -> MatrixDisplay:
+    """Derive the matrices of a model symbolically.
+
+    Parameters
+    ----------
+    model : StateSpaceModel
+
+    Returns
+    -------
+    MatrixDisplay
+
+    Raises
+    ------
+    ModelError
+        A derivative is too long to be shown.
+    """
+    n, names = len(model.states), model.point_names
+    definitions = {name: output.expression for name, output in model.definitions.items()}
+    printer = Printer(names, definitions, list(model.tables))
+    by_names = printer.derivatives
+    sides = model.equations.items()
+    equations = [by_names(f"({left}) - ({right})") for left, right in sides]
+    forces = [by_names(f"({right}) - ({left})") for left, right in sides]
+    outputs = [by_names(output.expression) for output in model.measurements.values()]
+    entries = [term for row in (*equations, *outputs) for term in row]
+    return MatrixDisplay(
+        _part(equations, 0, n),
+        _part(forces, n, 2 * n),
+        _part(forces, 2 * n, len(names)),
+        _part(outputs, 0, n),
+        _part(outputs, n, 2 * n),
+        _part(outputs, 2 * n, len(names)),
+        tuple(model.states),
+        tuple(model.inputs),
+        tuple(model.outputs),
+        tuple(printer.value(delay) for delay in model.delays.values()),
+        tuple((latex_name(name), printer.value(text)) for name, text in definitions.items()),
+        not frozenset(names) & frozenset().union(*(term.names for term in entries)),
+    )
+
+
+def _part(rows: Sequence[Sequence[Term]], start: int, stop: int) -> Rows:
+    return tuple(tuple(row[start:stop]) for row in rows)
+
+
+def _filled(rows: Rows) -> bool:
+    return any(term != ZERO for row in rows for term in row)
+
+
+def _matrix(rows: Rows) -> str:
+    body = _BREAK.join(" & ".join(term.latex for term in row) for row in rows)
+    return rf"\begin{{bmatrix}} {body} \end{{bmatrix}}"
+
+
+def _column(names: Sequence[str]) -> str:
+    body = _BREAK.join(map(latex_name, names))
+    return rf"\begin{{bmatrix}} {body} \end{{bmatrix}}"

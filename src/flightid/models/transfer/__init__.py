@@ -1,0 +1,1 @@
+"""Transfer-function models (native: `transfer.rs`)."""

@@ -1,0 +1,1 @@
+"""Covariance and random error of response estimates."""

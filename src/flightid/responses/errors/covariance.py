@@ -1,0 +1,298 @@
+"""Covariance of windowed estimates across frequencies and inputs.
+
+Every estimate of this stage is, to first order, linear in the output noise v: an error is
+``δH(ω) = Σ_t g(t; ω) v(t)``, with g known from the inputs, the windows and the conditioning. The
+covariance is then the Gram matrix of the g under the noise spectrum. It holds for overlapped
+windows, for neighbouring frequencies inside one window's bandwidth, and for sweeps, whose power
+passes a frequency once: none of which coherence and a count of windows can know. The g do not know
+the output, so the cross-spectra of the noise give the covariance between outputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+
+from flightid.responses.errors.noise import NoiseSpectrum
+from flightid.responses.errors.random_error import Points, union
+from flightid.responses.estimators.window_weights import WindowShare, WindowWeights
+
+COLUMNS = 128
+"""Frequencies of the noise that are worked on at a time: bounds memory, and suits caches."""
+SIDE_LOBES = 40.0
+"""Bins of the shortest window beyond the highest frequency, past which noise does not reach the
+estimate: a Hann window's side lobes are down by 1e-9 in power there."""
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class WindowedErrors:
+    """Errors of a composite (or single-window) estimate; the covariance is made when asked for.
+
+    Attributes
+    ----------
+    windows : WindowWeights
+    sample_time_s : float
+    sensitivity : ndarray, shape (n_windows, 2, 2, n_out, n_in, n_f)
+        From real and imaginary part of a window's response to those of the estimate.
+    noise : NoiseSpectrum
+    """
+
+    windows: WindowWeights
+    sample_time_s: float
+    sensitivity: Real
+    noise: NoiseSpectrum
+
+    def covariance(
+        self, outputs: NDArray[np.intp], inputs: NDArray[np.intp], frequencies: NDArray[np.intp]
+    ) -> Real:
+        """See `CovarianceSource`."""
+        return np.stack(
+            self.covariances([Points(int(output), inputs, frequencies) for output in outputs])
+        )
+
+    def covariances(self, wanted: Sequence[Points]) -> list[Real]:
+        """See `JointErrors`: the kernels of the noise do not depend on the output."""
+        inputs, frequencies = union(wanted)
+        parts = [self._part(each, inputs, frequencies) for each in wanted]
+        totals = [np.zeros(2 * (2 * len(each.inputs) * len(each.frequencies),)) for each in wanted]
+        for noise, kernels, near in self._kernels(inputs, frequencies):
+            for part, total in zip(parts, totals, strict=True):
+                part.add(kernels, near, noise.level[part.output], total)
+        return totals
+
+    def combined(self, wanted: Sequence[Points], gains: Sequence[Real]) -> Real:
+        """See `JointErrors`."""
+        inputs, frequencies = union(wanted)
+        parts = [
+            self._part(each, inputs, frequencies).through(gain)
+            for each, gain in zip(wanted, gains, strict=True)
+        ]
+        total = np.zeros(2 * (len(gains[0]),))
+        for noise, kernels, near in self._kernels(inputs, frequencies):
+            moved = [part.combine(kernels, near) * noise.level[part.output] for part in parts]
+            for place, (part, row) in enumerate(zip(parts, moved, strict=True)):
+                for other, column in zip(parts[: place + 1], moved[: place + 1], strict=True):
+                    turn = noise.coherency[:, part.output, other.output]
+                    block = np.real((row * turn) @ column.conj().T)
+                    total += block if part is other else block + block.T
+        return total
+
+    def _kernels(
+        self, inputs: Places, frequencies: Places
+    ) -> Iterator[tuple[_Noise, Complex, Places]]:
+        """Kernels of all records, some bins of the noise at a time, with the noise there."""
+        chosen = self.windows.weights_at(inputs, frequencies)
+        lengths = [record.shape[1] for record in self.windows.instruments]
+        for n_samples in sorted(set(lengths)):
+            weights = [each for each, n in zip(chosen, lengths, strict=True) if n == n_samples]
+            length, bins = self._noise_bins(n_samples, frequencies)
+            for columns in np.array_split(bins, -(-len(bins) // COLUMNS)):
+                yield from self._of_bins(columns, length, weights, frequencies)
+
+    def _part(self, wanted: Points, inputs: Places, frequencies: Places) -> _Part:
+        turns = self.sensitivity[:, :, :, wanted.output][:, :, :, wanted.inputs]
+        return _Part(
+            wanted.output,
+            np.searchsorted(inputs, wanted.inputs),
+            np.searchsorted(frequencies, wanted.frequencies),
+            _mixing(turns[..., wanted.frequencies]),
+        )
+
+    def _noise_bins(
+        self, n_samples: int, frequencies: NDArray[np.intp]
+    ) -> tuple[int, NDArray[np.intp]]:
+        """Length of the noise's Fourier transform, and its bins that reach the estimate."""
+        longest = max(share.plan.length for share in self.windows.shares)
+        length = int(next_fast_len(n_samples + longest // 2, real=True))
+        highest = float(self.windows.omega[frequencies].max()) + self._reach()
+        last = min(length // 2, int(highest * length / (2.0 * np.pi)) + 1)
+        return length, np.arange(last + 1)
+
+    def _reach(self) -> float:
+        """How far above a frequency noise reaches its estimate, rad per sample."""
+        return SIDE_LOBES * 2.0 * np.pi / min(share.plan.length for share in self.windows.shares)
+
+    def _of_bins(
+        self,
+        columns: Places,
+        length: int,
+        records: Sequence[Sequence[Complex]],
+        frequencies: Places,
+    ) -> Iterator[tuple[_Noise, Complex, Places]]:
+        """Noise and kernels at some bins, for all records of one length."""
+        angle = 2.0 * np.pi * columns / length
+        noise = self._noise_at(columns, length)
+        omega = self.windows.omega[frequencies]
+        near = np.flatnonzero(omega + self._reach() >= angle[0])
+        shares, detrend = self.windows.shares, self.windows.detrend
+        bases = [
+            tuple(
+                basis_transform(share.plan.length, omega[near], sign * angle, detrend)
+                for sign in (1.0, -1.0)
+            )
+            for share in shares
+        ]
+        turns = [_turns(*one, angle) for one in zip(shares, records[0], strict=True)]
+        for weights in records:
+            kernels = []
+            for weight, turn, (above, below) in zip(weights, turns, bases, strict=True):
+                ahead = (weight[:, near] @ turn) * above
+                mirrored = ((weight[:, near] @ turn.conj()) * below).conj()
+                kernels += [(ahead + mirrored) / 2.0, (ahead - mirrored) / 2.0j]
+            yield noise, np.stack(kernels, axis=2), near
+
+    def _noise_at(self, columns: Places, length: int) -> _Noise:
+        omega: Real = np.asarray(2.0 * np.pi * columns / (length * self.sample_time_s))
+        density = self.noise.at(omega) / (2.0 * self.sample_time_s)
+        twice = np.where((columns == 0) | (2 * columns == length), 1.0, 2.0) / length
+        return _Noise(np.sqrt(twice * density), self.noise.coherency_at(omega))
+
+
+@dataclass(frozen=True)
+class _Noise:
+    """Noise at some bins.
+
+    Attributes
+    ----------
+    level : ndarray, shape (n_out, n_bins)
+        Root of the noise power at each bin.
+    coherency : ndarray of complex, shape (n_bins, n_out, n_out)
+        Conjugate on the first index.
+    """
+
+    level: Real
+    coherency: Complex
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Errors of one output at chosen points, as combinations of the kernels.
+
+    Attributes
+    ----------
+    output : int
+    inputs, frequencies : ndarray of int
+        Places among those that the kernels are made for.
+    mixing : ndarray, shape (n_in, n_f, n_rows, 2 · n_windows)
+        Weights of the windows' kernels at each point: for its real and imaginary part, or for
+        each row of a gain.
+    """
+
+    output: int
+    inputs: Places
+    frequencies: Places
+    mixing: Real
+
+    def through(self, gain: Real) -> _Part:
+        """The same errors after a gain, shape (n_rows, 2 n_in n_f)."""
+        n_in, n_f = self.mixing.shape[:2]
+        split = gain.reshape(len(gain), 2, n_in, n_f)
+        return replace(self, mixing=np.einsum("paif,ifak->ifpk", split, self.mixing))
+
+    def combine(self, kernels: Complex, near: Places) -> Complex:
+        """Sum of the mixed kernels over all points, shape (n_rows, n_bins).
+
+        Parameters
+        ----------
+        kernels : ndarray of complex, shape (all inputs, n_near, 2 · n_windows, n_bins)
+            Of real and imaginary part for each window length.
+        near : ndarray of int
+            Frequencies, among all, that the kernels are for.
+        """
+        here, mine = self._mine(kernels, near)
+        rows = self.mixing[:, here].transpose(2, 0, 1, 3).reshape(self.mixing.shape[2], -1)
+        flat = mine.view(np.float64).reshape(rows.shape[1], 2 * kernels.shape[-1])
+        return np.asarray((rows @ flat).view(np.complex128))
+
+    def add(self, kernels: Complex, near: Places, level: Real, total: Real) -> None:
+        """Add the Gram matrix of the weighted kernels of all points to `total`."""
+        here, mine = self._mine(kernels, near)
+        mixed = self.mixing[:, here] @ mine.view(np.float64)
+        both = np.repeat(level, 2)
+        flat = (mixed.transpose(2, 0, 1, 3) * both).reshape(-1, len(both))
+        places = np.add.outer(np.arange(2 * len(self.inputs)) * len(self.frequencies), here).ravel()
+        total[places[:, None], places] += flat @ flat.T
+
+    def _mine(self, kernels: Complex, near: Places) -> tuple[Places, Complex]:
+        """Which of the frequencies the kernels reach, and the kernels there."""
+        here = np.flatnonzero(np.isin(self.frequencies, near))
+        columns = np.searchsorted(near, self.frequencies[here])
+        return here, kernels[self.inputs[:, None], columns]
+
+
+def _mixing(sensitivity: Real) -> Real:
+    """Sensitivities (n_windows, 2, 2, n_in, n_f) as one matrix for each input and frequency."""
+    windows, _, _, inputs, count = sensitivity.shape
+    ordered = sensitivity.transpose(3, 4, 1, 0, 2)
+    return np.ascontiguousarray(ordered).reshape(inputs, count, 2, 2 * windows)
+
+
+def _turns(share: WindowShare, weight: Complex, angle: Real) -> Complex:
+    """Transform of unit samples at the windows' middles, shape (n_windows, n_angles).
+
+    Windows are copies of one basis function, so the transform of g is that of the windows' weights
+    at their places times the function's.
+    """
+    middles = share.plan.length // 2 + share.plan.hop * np.arange(weight.shape[2])
+    return np.asarray(np.exp(-1j * np.multiply.outer(middles, angle)))
+
+
+def basis_transform(length: int, omega: Real, angle: Real, detrend: str) -> Complex:
+    """Transform of the tapered, detrended exponential about the window's middle.
+
+    Parameters
+    ----------
+    length : int
+    omega, angle : ndarray
+        Rad per sample.
+    detrend : {"none", "mean", "line"}
+
+    Returns
+    -------
+    ndarray of complex, shape (n_omega, n_angle)
+    """
+    found = _hann(length, np.add.outer(omega, angle))
+    if detrend == "none":
+        return found
+    flat = _dirichlet(length, angle)
+    found = found - np.multiply.outer(_hann(length, omega) / length, flat)
+    if detrend == "line":
+        norm = length * (length**2 - 1.0) / 12.0
+        found = found - np.multiply.outer(_hann_slope(length, omega) / norm, _slope(length, angle))
+    return found
+
+
+def _dirichlet(length: int, x: Real) -> Complex:
+    """``Σ exp(−jxm)`` over m = −length/2 … length/2 − 1."""
+    half = np.sin(x / 2.0)
+    small = np.abs(half) < 1e-12
+    ratio = np.sin(length * x / 2.0) / np.where(small, 1.0, half)
+    return np.asarray(np.exp(0.5j * x) * np.where(small, length, ratio))
+
+
+def _hann(length: int, x: Real) -> Complex:
+    step = 2.0 * np.pi / length
+    sides = _dirichlet(length, x - step) + _dirichlet(length, x + step)
+    return 0.5 * _dirichlet(length, x) + 0.25 * sides
+
+
+def _slope(length: int, x: Real) -> Complex:
+    """``Σ (m + ½) exp(−jxm)``: the derivative of the sum above."""
+    half, wide = x / 2.0, length * x / 2.0
+    small = np.abs(np.sin(half)) < 1e-12
+    below = np.where(small, 1.0, np.sin(half) ** 2)
+    above = 0.5 * length * np.cos(wide) * np.sin(half) - 0.5 * np.sin(wide) * np.cos(half)
+    return np.asarray(1j * np.exp(1j * half) * np.where(small, 0.0, above / below))
+
+
+def _hann_slope(length: int, x: Real) -> Complex:
+    step = 2.0 * np.pi / length
+    sides = _slope(length, x - step) + _slope(length, x + step)
+    return 0.5 * _slope(length, x) + 0.25 * sides

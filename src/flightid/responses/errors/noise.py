@@ -1,0 +1,196 @@
+"""Noise spectra of the outputs: what the inputs do not explain, without leakage.
+
+A gust moves all outputs of a vehicle at once, so their noise hangs together; errors that are taken
+as independent would count one cause as many.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError
+from flightid.responses.estimators.local_fit import Bins, bins_needed, fit_locally
+from flightid.responses.estimators.samples import Samples
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+
+BEYOND_BAND = 1.5
+"""Noise is estimated up to this multiple of the highest frequency of the response."""
+
+
+@dataclass(frozen=True)
+class NoiseSpectrum:
+    """One-sided noise spectra of the outputs on a grid of their own.
+
+    Attributes
+    ----------
+    omega_rad_s : ndarray, shape (n,)
+    density : ndarray, shape (n_out, n)
+        unit² per Hz, positive.
+    coherency : ndarray of complex, shape (n, n_out, n_out), optional
+        Cross-spectra over the roots of both densities, conjugate on the first index, with ones on
+        the diagonal; without it the noises are independent.
+    """
+
+    omega_rad_s: Real
+    density: Real
+    coherency: Complex | None = None
+
+    @classmethod
+    def of_matrices(cls, omega_rad_s: Real, matrices: Complex) -> NoiseSpectrum:
+        """From spectral matrices, shape (n, n_out, n_out), conjugate on the first index."""
+        density = np.real(np.einsum("nii->ni", matrices))
+        root = np.sqrt(np.maximum(density, np.finfo(float).tiny))
+        coherency = matrices / (root[:, :, None] * root[:, None, :])
+        places = np.arange(density.shape[1])
+        coherency[:, places, places] = 1.0
+        return cls(omega_rad_s, np.maximum(density, 0.0).T, coherency)
+
+    def at(self, omega_rad_s: Real) -> Real:
+        """Density between the grid's frequencies, log-linear; held beyond its ends."""
+        logs = np.log(np.maximum(self.density, np.finfo(float).tiny))
+        return np.exp([np.interp(omega_rad_s, self.omega_rad_s, row) for row in logs])
+
+    def coherency_at(self, omega_rad_s: Real) -> Complex:
+        """Coherency between the grid's frequencies, shape (n, n_out, n_out).
+
+        Linear, so that matrices stay positive; held beyond the grid's ends.
+        """
+        if self.coherency is None:
+            identity = np.eye(len(self.density), dtype=np.complex128)
+            return np.broadcast_to(identity, (len(omega_rad_s), *identity.shape))
+        last = len(self.omega_rad_s) - 1
+        place = np.interp(omega_rad_s, self.omega_rad_s, np.arange(last + 1.0))
+        below = np.minimum(place.astype(np.intp), max(last - 1, 0))
+        share = (place - below)[:, None, None]
+        above = np.minimum(below + 1, last)
+        return np.asarray((1.0 - share) * self.coherency[below] + share * self.coherency[above])
+
+
+def estimate_noise(samples: Samples, omega: Real, response: Complex) -> NoiseSpectrum:
+    """Noise spectra from local polynomial fits on neighbouring groups of bins.
+
+    With excitations, outputs and inputs are both fitted on them and the noise of ``y − H u`` is
+    formed from their joint residual: fitting y on u would absorb what the loop feeds back.
+
+    Parameters
+    ----------
+    samples : Samples
+    omega : ndarray, shape (n_f,)
+        Frequencies of `response`, rad/s.
+    response : ndarray of complex, shape (n_out, n_in, n_f)
+        Needed with excitations only.
+
+    Returns
+    -------
+    NoiseSpectrum
+
+    Raises
+    ------
+    DataError
+        The records hold too few samples.
+
+    Notes
+    -----
+    What remains of leakage is the part of third degree over a group of bins; a mode whose bandwidth
+    is below a few bins of the record still raises the estimate there. Noise is taken to be
+    stationary over all records.
+    """
+    joint = bool(samples.excitations)
+    order = ("excitations", "inputs", "outputs") if joint else ("inputs", "outputs")
+    rows = np.concatenate([np.arange(len(samples.records[0]))[samples.rows(k)] for k in order])
+    n_regressors = len(samples.excitations if joint else samples.inputs)
+    records = [Bins.of(record[rows], samples.sample_time_s) for record in samples.records]
+    found = [
+        (centre, _of_outputs(residual, joint, centre, omega, response))
+        for centre, residual in _groups(records, n_regressors, float(omega[-1]))
+    ]
+    return _gather(found)
+
+
+def noise_of_residuals(
+    residuals: Sequence[Real],
+    regressors: Sequence[Real],
+    sample_time_s: float,
+    highest_rad_s: float,
+) -> NoiseSpectrum:
+    """Noise spectra from what a model leaves of the outputs.
+
+    A model takes out the motion whose leakage no local polynomial follows: modes narrower than a
+    few bins, and vehicles that only a loop holds. What the regressors still explain, the model's
+    own errors, is fitted locally and counts as no noise.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, each shape (n_out, n_samples)
+        Measured less modelled outputs of each record.
+    regressors : sequence of ndarray, each shape (n_regressors, n_samples)
+        Inputs, or excitations of a closed loop.
+    sample_time_s : float
+    highest_rad_s : float
+        Highest frequency of the response.
+
+    Returns
+    -------
+    NoiseSpectrum
+    """
+    records = [
+        Bins.of(np.concatenate([given, left]), sample_time_s)
+        for given, left in zip(regressors, residuals, strict=True)
+    ]
+    return _gather(list(_groups(records, len(regressors[0]), highest_rad_s)))
+
+
+def _gather(found: Sequence[tuple[float, Complex]]) -> NoiseSpectrum:
+    matrices = np.array([matrix for _, matrix in found])
+    return NoiseSpectrum.of_matrices(np.array([centre for centre, _ in found]), matrices)
+
+
+def _groups(
+    records: Sequence[Bins], n_regressors: int, highest_rad_s: float
+) -> Iterator[tuple[float, Complex]]:
+    """Centre of each group of neighbouring bins, and the residual of its local fit."""
+    count = bins_needed(n_regressors, len(records))
+    size = min(len(bins.omega) for bins in records)
+    if size < count:
+        raise DataError(
+            "the records are too short for a noise spectrum",
+            found=f"{size} Fourier bins",
+            needed=f"{count}",
+            action="use longer records, or covariance=False",
+        )
+    at_longest = int(np.argmax([len(bins.omega) for bins in records]))
+    longest = records[at_longest]
+    # A window's side lobes beyond this are far below its main lobe; the last density is held there.
+    stride = max(count, len(longest.omega) * count // size)
+    edges = np.append(longest.omega[::stride], np.inf)
+    inside_band = int(np.searchsorted(edges, BEYOND_BAND * highest_rad_s))
+    edges = edges[: max(inside_band + 1, 2)]
+    for low, high in pairwise(edges):
+        places = [
+            slice(*np.searchsorted(bins.omega, [low * (1 - 1e-12), high * (1 - 1e-12)]))
+            for bins in records
+        ]
+        if sum(place.stop - place.start for place in places) < 0.9 * count * len(records):
+            continue
+        inside = longest.omega[places[at_longest]]
+        centre = float(0.5 * (inside[0] + inside[-1]))
+        yield centre, fit_locally(records, places, centre, n_regressors).residual
+
+
+def _of_outputs(
+    residual: Complex, joint: bool, centre: float, omega: Real, response: Complex
+) -> Complex:
+    if not joint:
+        return residual
+    n_out = response.shape[0]
+    nearest = int(np.argmin(np.abs(omega - centre)))
+    combine = np.concatenate([-response[:, :, nearest], np.eye(n_out)], axis=1)
+    # residual has its conjugate on the first index.
+    return np.asarray(combine.conj() @ residual @ combine.T)

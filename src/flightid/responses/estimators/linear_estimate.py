@@ -1,0 +1,234 @@
+"""An estimate as what it is in its outputs: linear, with weights that the inputs have fixed.
+
+Windows and polynomials resolve a finite band, so the expected estimate of a known model is not the
+model's response but this functional of the model's outputs. The difference is the estimator's bias
+(leakage and resolution), which more signal does not shrink; with the functional it can be computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import ShapeError
+from flightid.responses.errors.covariance import WindowedErrors
+from flightid.responses.errors.noise import NoiseSpectrum, noise_of_residuals
+from flightid.responses.errors.random_error import CovarianceSource, Selected
+from flightid.responses.estimators.local_fit import Bins, LocalFit
+from flightid.responses.estimators.samples import Samples
+from flightid.responses.estimators.transform import transform
+
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+Places = NDArray[np.intp]
+
+LEAST_NOISE = 1e-12
+"""Share of its first estimate below which noise is rounding."""
+
+
+Functional = Callable[[Sequence[Real]], Complex]
+"""From changes of the outputs, one array (n_out, n_samples) for each record, to the change of the
+response, shape (n_out, n_in, n_f)."""
+
+
+class OutputWeights(Protocol):
+    """The weights of an estimate on its outputs."""
+
+    def functional(self, outputs: Places, inputs: Places, frequencies: Places) -> Functional:
+        """The weights at some places, made ready to be applied again and again."""
+        ...
+
+    def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
+        """Errors of the whole estimate with the noise of a model's residuals in some outputs.
+
+        None where the estimate's own noise is as good.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class WindowedWeights:
+    """Weights of a windowed estimate; a composite to first order, its window shares held fixed.
+
+    Attributes
+    ----------
+    errors : WindowedErrors
+    """
+
+    errors: WindowedErrors
+
+    def functional(self, outputs: Places, inputs: Places, frequencies: Places) -> Functional:
+        """See `OutputWeights`."""
+        windows = self.errors.windows
+        bases = windows.bases(frequencies)
+        weights = windows.weights_by(bases, inputs, frequencies)
+        turns = self.errors.sensitivity[:, :, :, outputs][:, :, :, :, inputs][..., frequencies]
+        shape = (len(outputs), len(inputs), len(frequencies))
+
+        def apply(changes: Sequence[Real]) -> Complex:
+            total = np.zeros((2, *shape))
+            for place, (basis, turn) in enumerate(zip(bases, turns, strict=True)):
+                moved = np.zeros(shape, dtype=np.complex128)
+                for each, change in zip(weights, changes, strict=True):
+                    if not basis.plan.count(change.shape[1]):
+                        continue
+                    real, imaginary = transform(change, basis, windows.detrend)
+                    window = (real + 1j * imaginary).transpose(0, 2, 1)
+                    moved += (each[place].transpose(1, 0, 2) @ window).transpose(2, 1, 0)
+                parts = np.stack([moved.real, moved.imag])
+                total += np.einsum("aboif,boif->aoif", turn, parts)
+            return np.asarray(total[0] + 1j * total[1])
+
+        return apply
+
+    def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
+        """See `OutputWeights`; outputs without a residual keep their noise, as independent."""
+        errors, before = self.errors, self.errors.noise
+        step = errors.sample_time_s
+        highest = float(errors.windows.omega[-1]) / step
+        found = noise_of_residuals(residuals, errors.windows.instruments, step, highest)
+        density = before.density.copy()
+        least = LEAST_NOISE * before.density[outputs]
+        density[outputs] = np.maximum(found.at(before.omega_rad_s), least)
+        coherency = np.tile(np.eye(len(density), dtype=np.complex128), (density.shape[1], 1, 1))
+        coherency[:, outputs[:, None], outputs] = found.coherency_at(before.omega_rad_s)
+        return replace(errors, noise=NoiseSpectrum(before.omega_rad_s, density, coherency))
+
+
+@dataclass(frozen=True)
+class LocalWeights:
+    """Weights of local polynomial estimates on the Fourier bins of whole records.
+
+    Attributes
+    ----------
+    fits : tuple of LocalFit
+    sample_time_s : float
+    """
+
+    fits: tuple[LocalFit, ...]
+    sample_time_s: float
+
+    def functional(self, outputs: Places, inputs: Places, frequencies: Places) -> Functional:
+        """See `OutputWeights`."""
+        fits = [self.fits[frequency] for frequency in frequencies]
+
+        def apply(changes: Sequence[Real]) -> Complex:
+            found = np.zeros((len(outputs), len(inputs), len(fits)), dtype=np.complex128)
+            for index, change in enumerate(changes):
+                values = Bins.of(change, self.sample_time_s).values
+                for place, fit in enumerate(fits):
+                    bins = values[:, fit.places[index]]
+                    found[:, :, place] += bins @ fit.weights[index][inputs].T
+            return found
+
+        return apply
+
+    def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
+        """None: local polynomials have taken the leakage out of their noise already."""
+        del residuals, outputs
+        return None
+
+
+@dataclass(frozen=True)
+class LinearEstimate:
+    """What a response was estimated from, and the weights by which.
+
+    Attributes
+    ----------
+    weights : OutputWeights
+    inputs : tuple of str
+        Names of all inputs that the estimate was conditioned on.
+    input_records, output_records : tuple of ndarray, shapes (n_inputs, n) and (n_outputs, n)
+        Measured samples, one array for each record, means removed as for the estimate.
+    sample_time_s : float
+    places : tuple of ndarray of int
+        Outputs, inputs and frequencies of the estimate that the response holds.
+
+    Example
+    -------
+    >>> import numpy as np, flightid as fid
+    >>> u = np.random.default_rng(0).standard_normal(2000)
+    >>> record = fid.Record.from_arrays(np.arange(2000) / 100, inputs={"u": u},
+    ...                                 outputs={"y": np.convolve(u, [0.5, 0.5])[:2000]})
+    >>> response = fid.estimate_response(record, omega_rad_s=(2.0, 50.0, 5))
+    >>> again = response.linear.apply([record.matrix(["y"])])
+    >>> bool(np.allclose(again, response.response, rtol=0.01))
+    True
+    """
+
+    weights: OutputWeights
+    inputs: tuple[str, ...]
+    input_records: tuple[Real, ...]
+    output_records: tuple[Real, ...]
+    sample_time_s: float
+    places: tuple[Places, Places, Places]
+
+    @classmethod
+    def of(cls, samples: Samples, weights: OutputWeights, n_f: int) -> LinearEstimate:
+        """All outputs, inputs and frequencies of an estimate from `samples`."""
+        sizes = (len(samples.outputs), len(samples.inputs), n_f)
+        places = tuple(np.arange(size) for size in sizes)
+        return cls(
+            weights,
+            samples.inputs,
+            tuple(samples.part("inputs")),
+            tuple(samples.part("outputs")),
+            samples.sample_time_s,
+            (places[0], places[1], places[2]),
+        )
+
+    def select(self, outputs: Places, inputs: Places, frequencies: Places) -> LinearEstimate:
+        """Follow a selection of the response."""
+        rows, columns, points = self.places
+        return replace(
+            self,
+            output_records=tuple(record[outputs] for record in self.output_records),
+            places=(rows[outputs], columns[inputs], points[frequencies]),
+        )
+
+    def apply(self, changes: Sequence[Real]) -> Complex:
+        """Change of the response for changes of its outputs, to first order in a composite.
+
+        Parameters
+        ----------
+        changes : sequence of ndarray, each shape (n_out, n_samples)
+            One for each record, for the outputs of the response in their order and unit.
+
+        Returns
+        -------
+        ndarray of complex, shape (n_out, n_in, n_f)
+
+        Raises
+        ------
+        ShapeError
+            Changes do not fit the records.
+        """
+        needed = [record.shape for record in self.output_records]
+        found = [np.shape(change) for change in changes]
+        if found != needed:
+            raise ShapeError("changes do not fit the records", found=found, needed=needed)
+        return self.functional()(changes)
+
+    def functional(self) -> Functional:
+        """The weights made ready to be applied again and again: no shape is checked."""
+        return self.weights.functional(*self.places)
+
+    def errors_of(self, residuals: Sequence[Real]) -> CovarianceSource | None:
+        """Errors of the response with the noise that a model's residuals show.
+
+        Parameters
+        ----------
+        residuals : sequence of ndarray, each shape (n_out, n_samples)
+            Measured less modelled outputs of each record.
+
+        Returns
+        -------
+        CovarianceSource or None
+            None where the estimate's own noise is as good.
+        """
+        found = self.weights.errors_of(residuals, self.places[0])
+        return None if found is None else Selected(found, *self.places)

@@ -1,0 +1,219 @@
+"""The local polynomial method: no windows, no leakage of a record's ends, a noise covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError
+from flightid.record.history import Step
+from flightid.responses.cautions import correlation_findings
+from flightid.responses.errors.noise import NoiseSpectrum
+from flightid.responses.errors.random_error import Points, union
+from flightid.responses.estimators.conditioned import random_error
+from flightid.responses.estimators.linear_estimate import LinearEstimate, LocalWeights
+from flightid.responses.estimators.local_fit import Bins, LocalFit, around, bins_needed, fit_locally
+from flightid.responses.estimators.samples import Samples
+from flightid.responses.response import FrequencyResponse
+
+
+def estimate_local_polynomial(
+    samples: Samples, omega: NDArray[np.float64], step: Step, *, covariance: bool
+) -> FrequencyResponse:
+    """Responses by local polynomial fits, each centred at a requested frequency.
+
+    The bins of a record lie where its length puts them; a fit takes those nearest to the requested
+    frequency and evaluates its polynomial there, so nothing is interpolated afterwards.
+
+    Raises
+    ------
+    DataError
+        The records hold too few samples, or inputs that cannot be told apart.
+
+    Reference
+    ---------
+    Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., chapter 7.
+    """
+    records = [Bins.of(record, samples.sample_time_s) for record in samples.records]
+    n_in = len(samples.inputs)
+    count = bins_needed(n_in, len(records))
+    size = min(len(bins.omega) for bins in records)
+    if size < count:
+        raise DataError(
+            "the records are too short for local polynomials",
+            found=f"{size} Fourier bins in the shortest",
+            needed=f"{count}",
+            action="leave the short record out",
+        )
+    fits = []
+    for one in omega:
+        places = [around(bins, one, count) for bins in records]
+        fit = fit_locally(records, places, one, n_in)
+        if not fit.full_rank:
+            raise DataError(
+                f"inputs {', '.join(samples.inputs)} cannot be told apart",
+                found=f"linearly dependent bins around {one:.4g} rad/s",
+                needed="inputs that move independently in the band",
+                action="leave out an input, or narrow omega_rad_s",
+            )
+        fits.append(fit)
+    return _response(samples, omega, records, fits, step, covariance)
+
+
+def _response(
+    samples: Samples,
+    omega: NDArray[np.float64],
+    records: Sequence[Bins],
+    fits: Sequence[LocalFit],
+    step: Step,
+    covariance: bool,
+) -> FrequencyResponse:
+    n_in = len(samples.inputs)
+    response = np.array([fit.gain.T for fit in fits]).transpose(1, 2, 0)
+    residuals = np.array([fit.residual for fit in fits])
+    noise = np.real(np.einsum("fii->if", residuals))
+    # Variance of a gain for unit noise: what conditioning on other inputs and leakage leave.
+    spread = np.array([sum(np.sum(np.abs(w) ** 2, axis=1) for w in fit.weights) for fit in fits]).T
+    n_bins = np.array([fit.n_bins for fit in fits], dtype=np.float64)
+    unexplained = n_bins * spread[None] * noise[:, None]
+    power = np.abs(response) ** 2
+    coherence = power / np.maximum(power + unexplained, np.finfo(float).tiny)
+    spectrum = _mean_spectra(records, fits)
+    outputs = np.real(np.einsum("iif->if", spectrum[n_in:, n_in:]))
+    multiple = 1.0 - noise / np.maximum(outputs, np.finfo(float).tiny)
+    independent = np.broadcast_to(n_bins, response.shape)
+    return FrequencyResponse(
+        omega_rad_s=omega,
+        inputs=samples.inputs,
+        outputs=samples.outputs,
+        units=samples.units,
+        response=response,
+        coherence=coherence,
+        multiple_coherence=np.clip(multiple, 0.0, 1.0),
+        random_error=random_error(coherence, independent, 1),
+        n_independent=independent,
+        input_spectrum=spectrum[:n_in, :n_in],
+        cross_spectrum=spectrum[:n_in, n_in:].transpose(1, 0, 2),
+        output_spectrum=outputs,
+        method="local_polynomial",
+        findings=tuple(correlation_findings(samples.inputs, spectrum[:n_in, :n_in])),
+        history=(*samples.history, step),
+        errors=LocalErrors(tuple(fits), NoiseSpectrum.of_matrices(omega, residuals))
+        if covariance
+        else None,
+        linear=LinearEstimate.of(
+            samples, LocalWeights(tuple(fits), samples.sample_time_s), len(omega)
+        )
+        if covariance
+        else None,
+    )
+
+
+def _mean_spectra(records: Sequence[Bins], fits: Sequence[LocalFit]) -> NDArray[np.complex128]:
+    found = []
+    for fit in fits:
+        values = np.concatenate(
+            [bins.values[:, place] for bins, place in zip(records, fit.places, strict=True)], axis=1
+        )
+        found.append(values.conj() @ values.T / values.shape[1])
+    return np.array(found).transpose(1, 2, 0)
+
+
+@dataclass(frozen=True)
+class LocalErrors:
+    """Errors of local polynomial estimates: two frequencies share the bins that both fits use.
+
+    Attributes
+    ----------
+    fits : tuple of LocalFit
+    noise : NoiseSpectrum
+        At the estimate's frequencies.
+    """
+
+    fits: tuple[LocalFit, ...]
+    noise: NoiseSpectrum
+
+    def covariance(
+        self,
+        outputs: NDArray[np.intp],
+        inputs: NDArray[np.intp],
+        frequencies: NDArray[np.intp],
+    ) -> NDArray[np.float64]:
+        """See `CovarianceSource`; bins of noise are circular, so there is no pseudo-covariance."""
+        return np.stack(
+            self.covariances([Points(int(output), inputs, frequencies) for output in outputs])
+        )
+
+    def covariances(self, wanted: Sequence[Points]) -> list[NDArray[np.float64]]:
+        """See `JointErrors`: shares of bins do not depend on the output."""
+        overlap = self._overlaps(*union(wanted))
+        return [self._block(overlap, wanted, each, each) for each in wanted]
+
+    def combined(
+        self, wanted: Sequence[Points], gains: Sequence[NDArray[np.float64]]
+    ) -> NDArray[np.float64]:
+        """See `JointErrors`."""
+        overlap = self._overlaps(*union(wanted))
+        total = np.zeros(2 * (len(gains[0]),))
+        for place, (one, left) in enumerate(zip(wanted, gains, strict=True)):
+            for other, right in zip(wanted[: place + 1], gains[: place + 1], strict=True):
+                block = left @ self._block(overlap, wanted, one, other) @ right.T
+                total += block if one is other else block + block.T
+        return total
+
+    def _overlaps(
+        self, inputs: NDArray[np.intp], frequencies: NDArray[np.intp]
+    ) -> NDArray[np.complex128]:
+        """What any two points share for unit noise, shape (n_in, n_f, n_in, n_f)."""
+        n_in, n_f = len(inputs), len(frequencies)
+        shared = np.zeros((n_in, n_f, n_in, n_f), dtype=np.complex128)
+        for a, first in enumerate(frequencies):
+            for b, second in enumerate(frequencies[: a + 1]):
+                overlap = _overlap(self.fits[first], self.fits[second])[np.ix_(inputs, inputs)]
+                shared[:, a, :, b], shared[:, b, :, a] = overlap, overlap.conj().T
+        return shared
+
+    def _block(
+        self,
+        overlap: NDArray[np.complex128],
+        wanted: Sequence[Points],
+        one: Points,
+        other: Points,
+    ) -> NDArray[np.float64]:
+        """Covariance of the points of one output with those of another."""
+        inputs, frequencies = union(wanted)
+        rows = np.searchsorted(inputs, one.inputs)
+        columns = np.searchsorted(inputs, other.inputs)
+        first = np.searchsorted(frequencies, one.frequencies)
+        second = np.searchsorted(frequencies, other.frequencies)
+        shared = overlap[np.ix_(rows, first, columns, second)]
+        level = np.sqrt(
+            np.multiply.outer(
+                self.noise.density[one.output, one.frequencies],
+                self.noise.density[other.output, other.frequencies],
+            )
+        )
+        turn = self.noise.coherency_at(self.noise.omega_rad_s)[:, other.output, one.output]
+        # The conjugate is on the first index of coherency; between two frequencies, their mean.
+        both = 0.5 * np.add.outer(turn[one.frequencies], turn[other.frequencies])
+        found = (shared * (level * both)[None, :, None, :]).reshape(
+            len(rows) * len(first), len(columns) * len(second)
+        )
+        return np.asarray(0.5 * np.block([[found.real, -found.imag], [found.imag, found.real]]))
+
+
+def _overlap(first: LocalFit, second: LocalFit) -> NDArray[np.complex128]:
+    n_in = first.gain.shape[0]
+    total = np.zeros((n_in, n_in), dtype=np.complex128)
+    for one, other, a, b in zip(
+        first.weights, second.weights, first.places, second.places, strict=True
+    ):
+        start, stop = max(a.start, b.start), min(a.stop, b.stop)
+        if start < stop:
+            left = one[:, start - a.start : stop - a.start]
+            right = other[:, start - b.start : stop - b.start]
+            total += left @ right.conj().T
+    return total

@@ -1,5 +1,0 @@
-"""Export of models to other tools."""
-
-from flightid.simulation.export.exported import Exported
-
-__all__ = ["Exported"]

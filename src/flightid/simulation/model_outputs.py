@@ -1,0 +1,235 @@
+"""A model's outputs on measured inputs, without noise (native side: `linear_simulation.rs`).
+
+Modes that would grow over the record are followed from its end backwards, where they decay. What
+comes out is a solution of the same equations, with the state of those modes given at the last
+sample instead of the first, and it stays near its inputs however long the record is: the steady
+response G(jω) of an unstable model is the transform of this two-sided response.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+from scipy.linalg import schur, solve_sylvester
+
+from flightid import _native
+from flightid.errors import ModelError
+from flightid.models import Model, TransferFunctionModel
+from flightid.models.linear.realisation import canonical_form
+
+Array = NDArray[np.float64]
+HOLDS = ("band_limited", "first", "zero")
+FINER = 4
+"""Steps within a sample in which a band-limited input is followed."""
+SPLINE_DEGREE = 5
+SLOW, FAST = 0.5, 7.0
+"""Growth exponents over a record: below the first a mode is followed forwards, above the second
+backwards, and between them the modes are parted where their rates lie furthest from each other."""
+
+
+@dataclass(frozen=True)
+class System:
+    """State space of one response, or of all responses of a state-space model.
+
+    Attributes
+    ----------
+    outputs, inputs : tuple of str
+    matrices : tuple of ndarray
+        A (n, n), B (n, m), C (p, n), D (p, m).
+    delays_s : ndarray, shape (m,)
+    """
+
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    matrices: tuple[Array, ...]
+    delays_s: Array
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Those modes of a system that are followed in one direction of time."""
+
+    matrices: tuple[Array, ...]
+    delays_s: Array
+    backwards: bool
+
+
+def systems_of(model: Model) -> list[System]:
+    """State spaces of a model: one of a state-space model, one for each response of the others.
+
+    Responses of a transfer-function model may each have a delay of their own.
+
+    Raises
+    ------
+    ModelError
+        More zeros than poles, or a negative delay.
+    SingularError
+        The equations do not give every state derivative.
+    """
+    if not isinstance(model, TransferFunctionModel):
+        a, b, c, d, delays = model.state_space()
+        return [System(model.outputs, model.inputs, (a, b, c, d), delays)]
+    systems = []
+    for response, (gain, above, below, delay) in zip(
+        model.responses, model.factored().values(), strict=True
+    ):
+        if delay < 0.0:
+            raise ModelError(
+                "a negative delay cannot be simulated", found=f"{delay:g} s", needed="0 s or more"
+            )
+        matrices = canonical_form((1, 1), [(0, 0, gain, above, below)])
+        systems.append(System((response.output,), (response.input,), matrices, np.array([delay])))
+    return systems
+
+
+def split_modes(system: System, duration_s: float) -> list[Modes]:
+    """Part a system into modes that are followed forwards and modes followed backwards.
+
+    Parameters
+    ----------
+    system : System
+    duration_s : float
+        Length of the record, s.
+
+    Returns
+    -------
+    list of Modes
+        Their outputs add up to the system's.
+
+    Reference
+    ---------
+    Golub & Van Loan, *Matrix Computations*, 4th ed., §7.6.3: block diagonalisation by an ordered
+    Schur form and a Sylvester equation.
+    """
+    a, b, c, d = system.matrices
+    growth = np.linalg.eigvals(a).real * duration_s
+    if np.max(growth, initial=-np.inf) <= SLOW:
+        return [Modes(system.matrices, system.delays_s, backwards=False)]
+    between = np.sort(growth[(growth > SLOW) & (growth < FAST)])
+    edges = np.concatenate([[SLOW], between, [FAST]])
+    widest = int(np.argmax(np.diff(edges)))
+    parting = 0.5 * (edges[widest] + edges[widest + 1]) / duration_s
+    triangle, turn, n = schur(a, output="real", sort=lambda re, _: re <= parting)
+    cross = solve_sylvester(triangle[:n, :n], -triangle[n:, n:], -triangle[:n, n:])
+    to_modes, from_modes = turn.T.copy(), turn.copy()
+    to_modes[:n] -= cross @ turn.T[n:]
+    from_modes[:, n:] += turn[:, :n] @ cross
+    slow = (triangle[:n, :n], to_modes[:n] @ b, c @ from_modes[:, :n], d)
+    fast = (triangle[n:, n:], to_modes[n:] @ b, c @ from_modes[:, n:], np.zeros_like(d))
+    return [
+        Modes(slow, system.delays_s, backwards=False),
+        Modes(fast, system.delays_s, backwards=True),
+    ]
+
+
+def between_samples(values: Array, hold: str) -> Array:
+    """Inputs as `driven_outputs` takes them: where band-limited, at finer steps.
+
+    Parameters
+    ----------
+    values : ndarray, shape (m, n_samples)
+        The measured inputs.
+    hold : {"band_limited", "first", "zero"}
+        What the inputs do between their samples.
+
+    Returns
+    -------
+    ndarray, shape (m, n_samples) or (m, FINER (n_samples − 1) + 1)
+
+    Reference
+    ---------
+    Unser, "Splines: a perfect fit for signal and image processing", *IEEE Signal Processing
+    Magazine* 16 (1999): an interpolating spline tends to the band-limited interpolation.
+    """
+    if hold != "band_limited":
+        return values
+    n = values.shape[1]
+    fine = np.arange(FINER * (n - 1) + 1) / FINER
+    spline = make_interp_spline(np.arange(n), values, k=min(SPLINE_DEGREE, n - 1), axis=1)
+    dense = np.array(spline(fine))
+    # Straight lines between points weaken ω by sinc²(ωT/2) = 1 − (ωT)²/12 + …: given back here.
+    dense[:, 1:-1] -= np.diff(dense, 2, axis=1) / 12.0
+    return dense
+
+
+def driven_outputs(
+    modes: list[Modes], between: Array, sample_time_s: float, hold: str
+) -> NDArray[np.float64]:
+    """Outputs that the inputs drive, from rest at the end from which each mode is followed.
+
+    Parameters
+    ----------
+    modes : list of Modes
+    between : ndarray
+        The measured inputs from `between_samples`.
+    sample_time_s : float
+    hold : {"band_limited", "first", "zero"}
+        What the inputs do between their samples.
+
+    Returns
+    -------
+    ndarray, shape (p, n_samples)
+    """
+    if hold != "band_limited":
+        return np.asarray(sum(_driven(each, between, sample_time_s, hold) for each in modes))
+    step = sample_time_s / FINER
+    return np.asarray(sum(_driven(each, between, step, "first")[:, ::FINER] for each in modes))
+
+
+def free_outputs(modes: list[Modes], n_samples: int, sample_time_s: float) -> Array:
+    """What unknown states and unknown trims of the inputs add.
+
+    Returns
+    -------
+    ndarray, shape (n_states + m, p, n_samples)
+        States at the first sample, or at the last for modes that are followed backwards.
+    """
+    columns = []
+    m = len(modes[0].delays_s)
+    still = np.zeros((m, n_samples))
+    for each in modes:
+        for start in np.eye(len(each.matrices[0])):
+            found = _run(each, still, start, each.delays_s, sample_time_s, first=True)
+            columns.append(found[:, ::-1] if each.backwards else found)
+    for steady in np.eye(m):
+        values = np.repeat(steady[:, None], n_samples, axis=1)
+        columns.append(driven_outputs(modes, values, sample_time_s, "first"))
+    return np.stack(columns)
+
+
+def _driven(modes: Modes, values: Array, sample_time_s: float, hold: str) -> Array:
+    start = np.zeros(len(modes.matrices[0]))
+    first = hold == "first"
+    if not modes.backwards:
+        return _run(modes, values, start, modes.delays_s, sample_time_s, first=first)
+    # From the end a delay is a lead. The run starts so long after the record, whose last samples
+    # last on, that what is left of the lead is a delay again; it starts from a free state anyway.
+    extra = int(np.ceil(np.max(modes.delays_s, initial=0.0) / sample_time_s - 1e-9))
+    rest = np.maximum(extra * sample_time_s - modes.delays_s, 0.0)
+    turned = np.pad(values[:, ::-1], ((0, 0), (0, extra + 1)), mode="edge")
+    # A step held after its sample is held before it when time runs backwards.
+    turned = turned[:, :-1] if first else turned[:, 1:]
+    found = _run(modes, turned, start, rest, sample_time_s, first=first)
+    return np.asarray(found[:, extra:][:, ::-1])
+
+
+def _run(
+    modes: Modes,
+    values: Array,
+    start: Array,
+    delays_s: Array,
+    sample_time_s: float,
+    *,
+    first: bool,
+) -> Array:
+    sign = -1.0 if modes.backwards else 1.0
+    a, b, c, d = (np.ascontiguousarray(each, dtype=np.float64) for each in modes.matrices)
+    driven = np.ascontiguousarray(values, dtype=np.float64)
+    late, at_rest = np.ascontiguousarray(delays_s), np.ascontiguousarray(start)
+    _, found = _native.simulate_linear(
+        sign * a, sign * b, c, d, late, driven, at_rest, sample_time_s, first
+    )
+    return np.asarray(found)

@@ -1,0 +1,398 @@
+"""Covariance of least-squares estimates whose residuals are coloured.
+
+The usual inverse information assumes white residuals. Residuals of flight data are not: sensors and
+filters colour them, and gyro noise integrates to a random walk, which is not stationary. Here the
+walk goes its own way to the covariance (`input_noise.py`), and what else an output's residual holds
+gets an autoregressive model (order by the Bayesian information criterion), whose autocovariance
+stands for the noise in ``D [sum_ij s_i R(i - j) s_j'] D``. Sample autocovariances alone would give
+too little: the fit has already taken out of the residuals what lies along the sensitivities. How
+much that is, draws from the model tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, linalg, signal
+
+from flightid.uncertainty.input_noise import InputNoise
+
+Array = NDArray[np.float64]
+LARGEST_ORDER = 20
+SEPARATIONS = 20
+RESTORATIONS = 2
+DRAWS = 32
+"""Draws of random walks."""
+
+
+@dataclass(frozen=True)
+class Autoregression:
+    """Autoregressive model of a stationary residual.
+
+    Attributes
+    ----------
+    lags : ndarray, shape (largest_order + 1,)
+        Autocovariance at the first lags, square of the residual's unit.
+    weights : ndarray, shape (order,)
+        Weights of the past samples.
+    n : int
+        Number of samples of the residual.
+    length : int
+        Transform length of its periodogram.
+    """
+
+    lags: Array
+    weights: Array
+    n: int
+    length: int
+
+    def autocovariance(self, n_lags: int) -> Array:
+        """Autocovariance at lags 0 to ``n_lags - 1``."""
+        result = np.zeros(n_lags)
+        order = self.weights.size
+        result[: order + 1] = self.lags[: order + 1]
+        if order:
+            # Beyond its order the model continues its autocovariance by its own recursion.
+            denominator = np.concatenate(([1.0], -self.weights))
+            state = signal.lfiltic([1.0], denominator, y=result[order:0:-1])
+            result[order + 1 :] = signal.lfilter(
+                [1.0], denominator, np.zeros(n_lags - order - 1), zi=state
+            )[0]
+        return result
+
+    def product(self, columns: Array) -> Array:
+        """Covariance matrix of the residual times columns, shape (n, k)."""
+        if not self.weights.size:
+            return np.asarray(self.lags[0] * columns)
+        return toeplitz_product(self.autocovariance(len(columns)), columns)
+
+    def freedom(self) -> float:
+        """Degrees of freedom of the model's level at zero frequency, where slow sensitivities look.
+
+        Weights are known to ``innovation / n`` times the inverse of their autocovariance, and the
+        level goes with the inverse square of one less their sum.
+        """
+        order = self.weights.size
+        share = 2.0 / self.n
+        if order:
+            innovation = float(self.lags[0] - self.weights @ self.lags[1 : order + 1])
+            ones = np.ones(order)
+            spread = linalg.solve_toeplitz(self.lags[:order], ones) @ ones * innovation / self.n
+            share += 4.0 * max(float(spread), 0.0) / (1.0 - float(self.weights.sum())) ** 2
+        return 2.0 / share
+
+    def spectrum(self) -> Array:
+        """Spectrum at the frequencies of `periodogram`."""
+        order = self.weights.size
+        innovation = float(self.lags[0] - self.weights @ self.lags[1 : order + 1])
+        gain = fft.rfft(np.concatenate(([1.0], -self.weights)), self.length)
+        return np.asarray(max(innovation, 0.0) / np.abs(gain) ** 2)
+
+
+def autoregression(
+    power: Array, n: int, known: Array | None = None, length: int | None = None
+) -> Autoregression:
+    """Autoregressive model of a residual by its `periodogram`.
+
+    A part of the residual whose mean periodogram is `known` is left out of the model, by
+    expectation and maximisation over the spectrum: both parts keep positive spectra.
+
+    Parameters
+    ----------
+    power : ndarray, shape (n_bins,)
+        Periodogram of the residual.
+    n : int
+        Number of samples of the residual.
+    known : ndarray, shape (n_bins,), optional
+        Mean periodogram of the part to leave out.
+    length : int, optional
+        Transform length of the periodogram; default: that of n samples.
+
+    Returns
+    -------
+    Autoregression
+
+    Reference
+    ---------
+    Brockwell & Davis, Time Series: Theory and Methods (2nd ed.), sections 8.1-8.2 (Yule-Walker);
+    Dempster, Laird & Rubin (1977), J. Royal Statistical Society B 39(1), section 2.
+
+    Example
+    -------
+    >>> white = np.random.default_rng(0).standard_normal((4000, 1))
+    >>> autoregression(periodogram(white), 4000).autocovariance(3).round(1)
+    array([1., 0., 0.])
+    """
+    largest = min(LARGEST_ORDER, n // 20)
+    length = _length(n) if length is None else length
+    lags = _lags(power, length, largest)
+    model = Autoregression(lags, _weights(lags, n), n, length)
+    if known is None:
+        return model
+    for _ in range(SEPARATIONS):
+        own = model.spectrum()
+        share = own / np.maximum(own + known, np.finfo(float).tiny)
+        lags = _lags(share**2 * power + share * known, length, largest)
+        model = Autoregression(lags, _weights(lags, n), n, length)
+    return model
+
+
+def periodogram(columns: Array, length: int | None = None) -> Array:
+    """Mean periodogram of columns (n, k), zero-padded to the next fast length from 2 n."""
+    n = columns.shape[0]
+    transform = fft.rfft(columns, _length(n) if length is None else length, axis=0)
+    return np.asarray(np.mean(np.abs(transform) ** 2, axis=1) / n)
+
+
+def pooled(records: Sequence[Array], length: int) -> Array:
+    """Mean periodogram of records (n, k) of several lengths, by their samples."""
+    total = sum(len(each) for each in records)
+    return np.asarray(sum(len(each) * periodogram(each, length) for each in records) / total)
+
+
+def _length(n: int) -> int:
+    """Fast transform length with room for all lags of n samples."""
+    return int(fft.next_fast_len(2 * n, real=True))
+
+
+def _leaking(spectrum: Array, lengths: Sequence[int], length: int) -> Array:
+    """Mean periodogram of records with this spectrum: lag k is seen n - k times in n."""
+    k = np.arange(max(lengths))
+    seen = sum(np.maximum(n - k, 0) for n in lengths) / sum(lengths)
+    lags = fft.irfft(spectrum, length)[: k.size] * seen
+    return np.asarray(2 * fft.rfft(lags, length).real - lags[0])
+
+
+def _lags(power: Array, length: int, largest: int) -> Array:
+    """Autocovariance at lags 0 to `largest` from a zero-padded periodogram."""
+    return np.asarray(fft.irfft(power, length)[: largest + 1])
+
+
+def _weights(sample: Array, n: int) -> Array:
+    """Weights of the best autoregression by Levinson's recursion over the orders."""
+    trial = best = np.empty(0)
+    innovation = float(sample[0])
+    criterion = n * np.log(innovation) if innovation > 0 else -np.inf
+    for order in range(1, sample.size):
+        # A residual that predicts itself to rounding has no further order.
+        if not innovation > 1e-12 * sample[0]:
+            break
+        reflection = float(sample[order] - trial @ sample[order - 1 : 0 : -1]) / innovation
+        trial = np.concatenate((trial - reflection * trial[::-1], [reflection]))
+        innovation *= 1 - reflection**2
+        worth = n * np.log(max(innovation, 1e-300)) + order * np.log(n)
+        if worth < criterion:
+            criterion, best = worth, trial
+    return best
+
+
+def corrected_covariance(
+    slopes: Array, residuals: Array, deviations: Array, noise: InputNoise | None = None
+) -> tuple[Array, Array, Array]:
+    """Covariance for white residuals, the one corrected for their colour, and its freedom.
+
+    Parameters
+    ----------
+    slopes : ndarray, shape (n_outputs, n, n_parameters)
+        Derivatives of the outputs by the parameters.
+    residuals : ndarray, shape (n_outputs, n)
+        Residuals.
+    deviations : ndarray, shape (n_outputs,)
+        Standard deviations by which the fit weighed the outputs.
+    noise : InputNoise, optional
+        Noise of the inputs; None where the inputs are exact.
+
+    Returns
+    -------
+    white, corrected : ndarray, shape (n_parameters, n_parameters)
+    freedom : ndarray, shape (n_parameters,)
+        Degrees of freedom of the corrected variances: noise models of one record are themselves
+        estimates. The noise of the inputs, seen at many frequencies, counts as known.
+
+    Reference
+    ---------
+    Morelli & Klein (1997), Accuracy of aerodynamic model parameters estimated from flight test
+    data, J. Guidance, Control and Dynamics 20(1), eqs. 19-25; Satterthwaite (1946), An approximate
+    distribution of estimates of variance components, Biometrics Bulletin 2(6), eq. 17.
+
+    Example
+    -------
+    >>> slopes = np.ones((1, 400, 1))
+    >>> residuals = np.random.default_rng(1).standard_normal((1, 400))
+    >>> white, corrected, freedom = corrected_covariance(slopes, residuals, np.ones(1))
+    >>> float(white[0, 0])
+    0.0025
+    """
+    weighed = slopes / deviations[:, None, None] ** 2
+    information = np.einsum("onp,onq->pq", slopes, weighed, optimize=True)
+    # Columns differ by many orders of magnitude: scale them before inverting.
+    size = np.sqrt(np.diag(information))
+    inverse = np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size)
+    projection = _Projection(slopes, weighed, inverse)
+    walks = None if noise is None else projection.walks(noise)
+    total = np.zeros_like(information)
+    doubt = np.zeros(len(information))
+    models = projection.models(residuals, deviations, walks)
+    for scaled, model in zip(weighed, models, strict=True):
+        part = inverse @ (scaled.T @ model.product(scaled)) @ inverse
+        total += part
+        doubt += np.diag(part) ** 2 / model.freedom()
+    if noise is not None:
+        paths = noise.transposed(weighed)
+        total += inverse @ np.einsum("sjp,sjq->pq", paths, paths, optimize=True) @ inverse
+    tiny = np.finfo(float).tiny
+    return inverse, total, np.diag(total) ** 2 / np.maximum(doubt, tiny)
+
+
+@dataclass(frozen=True)
+class _Projection:
+    """What the fit leaves of noise in the residuals.
+
+    Draws come from a fixed seed: the same record gives the same intervals.
+    """
+
+    slopes: Array
+    weighed: Array
+    inverse: Array
+
+    def left(self, noise: Array) -> Array:
+        """Noise of the outputs (n_outputs, n, n_draws) less the share that the fit takes."""
+        taken = self.inverse @ np.einsum("onp,ond->pd", self.weighed, noise, optimize=True)
+        return np.asarray(noise - self.slopes @ taken)
+
+    def walks(self, noise: InputNoise) -> Array:
+        """Mean periodogram of each residual's random walk."""
+        n = self.slopes.shape[1]
+        draws = np.random.default_rng(0).standard_normal((n - 1, noise.steps.shape[2], DRAWS))
+        return np.array([periodogram(walk) for walk in self.left(noise.outputs_of(draws))])
+
+    def models(
+        self, residuals: Array, deviations: Array, walks: Array | None
+    ) -> list[Autoregression]:
+        """Models of the outputs' own noise."""
+        white = self.slopes / deviations[:, None, None]
+        taken = Taken(np.zeros((*white.shape[:2], 0)), white @ np.linalg.cholesky(self.inverse))
+        size = deviations[:, None]
+        models = noise_models(
+            [residuals / size], [taken], None if walks is None else walks / size**2
+        )
+        return [
+            replace(model, lags=model.lags * deviation**2)
+            for model, deviation in zip(models, deviations, strict=True)
+        ]
+
+
+@dataclass(frozen=True)
+class Taken:
+    """Orthonormal directions along which a fit takes noise out of one record's residuals.
+
+    Attributes
+    ----------
+    own : ndarray, shape (n_outputs, n, n_own)
+        Of numbers that belong to this record.
+    shared : ndarray, shape (n_outputs, n, n_shared)
+        Of parameters; orthonormal over all records together.
+    """
+
+    own: Array
+    shared: Array
+
+
+def noise_models(
+    residuals: Sequence[Array], taken: Sequence[Taken], known: Array | None = None
+) -> list[Autoregression]:
+    """Models of the outputs' noise, in rounds: what the fit took of it is given back.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, shape (n_outputs, n)
+        By record.
+    taken : sequence of Taken
+        By record, in the residuals' own metric.
+    known : ndarray, shape (n_outputs, n_bins), optional
+        Mean periodograms of parts to leave out of the models; one record alone.
+
+    Returns
+    -------
+    list of Autoregression
+        By output.
+
+    Example
+    -------
+    >>> white = np.random.default_rng(0).standard_normal((1, 2000))
+    >>> model, = noise_models([white], [Taken(np.zeros((1, 2000, 0)), np.zeros((1, 2000, 0)))])
+    >>> model.autocovariance(2).round(1) + 0.0
+    array([1., 0.])
+    """
+    lengths = [each.shape[1] for each in residuals]
+    total, length, n_outputs = sum(lengths), _length(max(lengths)), residuals[0].shape[0]
+    outputs = range(n_outputs)
+    seen = np.array([pooled([each[o][:, None] for each in residuals], length) for o in outputs])
+    directions = [
+        fft.rfft(np.concatenate([each.own, each.shared], axis=2), length, axis=1) for each in taken
+    ]
+    lost = np.zeros_like(seen)
+    models: list[Autoregression] = []
+    for _ in range(RESTORATIONS + 1):
+        models = [
+            autoregression(power, total, None if known is None else known[o], length)
+            for o, power in enumerate(seen + lost)
+        ]
+        lost = _lost(models, directions, lengths, [each.own.shape[2] for each in taken])
+        for o, model in enumerate(models):
+            spectrum = model.spectrum()
+            lost[o] += spectrum - _leaking(spectrum, lengths, length)
+    return models
+
+
+def _lost(
+    models: Sequence[Autoregression],
+    directions: Sequence[Array],
+    lengths: Sequence[int],
+    n_own: Sequence[int],
+) -> Array:
+    """Mean periodogram of noise less that of what a fit leaves of it.
+
+    With orthonormal directions Q it leaves w - Q Qᵀ w, whose mean periodogram lies below that of w
+    by 2 Re F(Ω q) F(q)* - F(q) Qᵀ Ω Q F(q)*, F the transform over an output's samples.
+    """
+    length = models[0].length
+    spectra = [model.spectrum() for model in models]
+    twice = np.full(len(spectra[0]), 2.0)
+    twice[0] = 1.0
+    if length % 2 == 0:
+        twice[-1] = 1.0
+    inner = [
+        np.asarray(
+            sum(
+                (each.conj().T @ (each * (twice * spectrum / length)[:, None])).real
+                for each, spectrum in zip(parts, spectra, strict=True)
+            )
+        )
+        for parts in directions
+    ]
+    shared = sum(each[m:, m:] for each, m in zip(inner, n_own, strict=True))
+    lost = np.zeros((len(models), len(spectra[0])))
+    for parts, each, m, n in zip(directions, inner, n_own, lengths, strict=True):
+        each[m:, m:] = shared
+        for o, (part, spectrum, model) in enumerate(zip(parts, spectra, models, strict=True)):
+            shaped = part * spectrum[:, None]
+            if model.weights.size:
+                # Noise ends with the record.
+                shaped = fft.rfft(fft.irfft(shaped, length, axis=0)[:n], length, axis=0)
+            lost[o] += np.sum(((2.0 * shaped - part @ each) * part.conj()).real, axis=1)
+    return lost / sum(lengths)
+
+
+def toeplitz_product(first: Array, columns: Array) -> Array:
+    """Product of a symmetric Toeplitz matrix with columns, by one circulant of twice the size."""
+    n = first.size
+    length = _length(n)
+    ring = np.zeros(length)
+    ring[:n] = first
+    ring[length - n + 1 :] = first[:0:-1]
+    spectrum = fft.rfft(ring)[:, None] * fft.rfft(columns, length, axis=0)
+    return np.asarray(fft.irfft(spectrum, length, axis=0)[:n])

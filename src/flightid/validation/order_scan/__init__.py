@@ -1,0 +1,1 @@
+"""Structures ranked on records they have not seen."""

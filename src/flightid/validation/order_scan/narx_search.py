@@ -1,0 +1,253 @@
+"""Search of NARX lags and widths by the error that counts: free run on records not trained on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from flightid.conventions import Light
+from flightid.errors import FitError, OptionError
+from flightid.findings import Finding
+from flightid.identification.identify import identify
+from flightid.identification.narx.result import NarxFit
+from flightid.models.narx.model import NarxEquation, NarxModel
+from flightid.progress import track
+from flightid.record import Record
+from flightid.table import Cell, Column, Table
+from flightid.validation.metrics import fit_percent, rms_error
+
+
+@dataclass(frozen=True)
+class FreeRunScore:
+    """Free run of one model over the validation records.
+
+    `rms` is in the output's unit; `fit_percent` 100 is perfect; `held` tells that the guard held
+    the prediction somewhere.
+    """
+
+    rms: float
+    fit_percent: float
+    held: bool
+
+
+@dataclass(frozen=True)
+class NarxTrial:
+    """One structure of a search: its fit (None with the reason where there is none) and scores."""
+
+    model: NarxModel
+    fit: NarxFit | None
+    score: FreeRunScore | None
+    baseline: FreeRunScore | None
+    one_step_rms: float | None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class NarxSearch:
+    """Trials in the order of their free-run error on the validation records, the best first.
+
+    Example
+    -------
+    See `search_narx`:
+
+    >>> NarxSearch.__name__
+    'NarxSearch'
+    """
+
+    trials: tuple[NarxTrial, ...]
+    findings: tuple[Finding, ...]
+
+    @property
+    def best(self) -> NarxFit:
+        """The fit with the smallest free-run error."""
+        fit = self.trials[0].fit
+        if fit is None:
+            raise FitError("no structure of the search could be fitted")
+        return fit
+
+    def summary(self) -> Table:
+        """Table of the trials with the free run of the linear model of the same lags."""
+        columns = (
+            Column("output lags"),
+            Column("input lags"),
+            Column("width β"),
+            Column("terms"),
+            Column("one-step rms"),
+            Column("free-run rms"),
+            Column("free-run fit", "%"),
+            Column("linear free-run rms"),
+            Column("beats linear"),
+            Column("note"),
+        )
+        notes = (
+            "all errors on validation records; the samples that start the lags are not counted",
+            *map(str, self.findings),
+        )
+        return Table("NARX search", columns, tuple(map(_row, self.trials)), notes)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values: ``schema``, the table of trials, the best fit, findings."""
+        return {
+            "schema": "flightid.narx_search/1",
+            "trials": self.summary().to_dict(),
+            "best": self.best.to_dict(),
+            "findings": [finding.to_dict() for finding in self.findings],
+        }
+
+    def __repr__(self) -> str:
+        """Number of trials and the best one on one line."""
+        return f"NarxSearch({len(self.trials)} structures, best {self.best!r})"
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()
+
+
+def search_narx(
+    model: NarxModel,
+    training: Record | Sequence[Record],
+    validation: Record | Sequence[Record],
+    *,
+    lags: Sequence[tuple[int, int]] = (),
+    widths: Sequence[float] = (),
+) -> NarxSearch:
+    """Fit a NARX model with several lags and widths and rank them by free run on unseen records.
+
+    Structures are compared by their own error over each record after the longest lag of the whole
+    search, so that all are judged on the same samples.
+
+    Parameters
+    ----------
+    model : NarxModel
+        What all trials share.
+    training, validation : Record or sequence of Record
+    lags : sequence of (int, int)
+        Pairs (output_lags, input_lags); default: the model's own.
+    widths : sequence of float
+        In the model's width convention; default: the model's own.
+
+    Returns
+    -------
+    NarxSearch
+        Ranked trials, the linear model of the same lags beside each; a finding where the best
+        loses to it or has to be held.
+
+    Raises
+    ------
+    FitError
+        No structure could be fitted.
+    OptionError
+        A structure outside its range, or no validation record.
+    DataError
+        Constant channels, too few samples, another sample time.
+
+    Reference
+    ---------
+    Billings, *Nonlinear System Identification*, Wiley 2013, section 5.5: one-step errors do not
+    tell models apart, model predicted outputs do.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> import flightid as fid
+    >>> def fly(seed):
+    ...     u = np.random.default_rng(seed).uniform(-1, 1, 200)
+    ...     y = np.zeros(200)
+    ...     for t in range(2, 200):
+    ...         y[t] = 0.8 * np.tanh(y[t - 1]) + 0.5 * u[t - 2]
+    ...     return fid.Record.from_arrays(np.arange(200) / 5, inputs={"u": u}, outputs={"y": y})
+    >>> search = search_narx(fid.NarxModel("y", ("u",), 1, 1, maximum_terms=8), fly(0), fly(1),
+    ...                      lags=[(1, 1), (1, 2)])
+    >>> search.best.model.input_lags, search.trials[0].baseline.rms > search.trials[0].score.rms
+    (2, True)
+    """
+    unseen = [validation] if isinstance(validation, Record) else list(validation)
+    if not unseen:
+        raise OptionError("a search has no validation record", needed="at least one")
+    pairs = list(lags) or [(model.output_lags, model.input_lags)]
+    models = [
+        replace(model, output_lags=n_y, input_lags=n_u, width=width)
+        for (n_y, n_u), width in product(pairs, list(widths) or [model.width])
+    ]
+    start = max(lag.lag for trial in models for lag in trial.lags)
+    trials = [
+        _trial(trial, training, unseen, start) for trial in track(models, "NARX lags and widths")
+    ]
+    if all(trial.fit is None for trial in trials):
+        raise FitError(
+            "no structure of the search could be fitted",
+            found=trials[0].reason,
+            action="use fewer lags, longer or richer records",
+        )
+    trials.sort(key=lambda trial: np.inf if trial.score is None else trial.score.rms)
+    return NarxSearch(tuple(trials), _findings(trials[0]))
+
+
+def _trial(
+    model: NarxModel, training: Record | Sequence[Record], unseen: Sequence[Record], start: int
+) -> NarxTrial:
+    try:
+        fit = identify(model, training)
+    except FitError as error:
+        return NarxTrial(model, None, None, None, None, str(error))
+    one_step = _score(fit.equation, unseen, start, 1).rms
+    score = _score(fit.equation, unseen, start, "free_run")
+    return NarxTrial(model, fit, score, _score(fit.baseline, unseen, start, "free_run"), one_step)
+
+
+def _score(
+    equation: NarxEquation, records: Sequence[Record], start: int, horizon: int | str
+) -> FreeRunScore:
+    runs = [equation.predict(record, horizon) for record in records]
+    measured = np.concatenate([run.measured[start:] for run in runs])
+    predicted = np.concatenate([run.predicted[start:] for run in runs])
+    return FreeRunScore(
+        float(rms_error(measured, predicted)),
+        float(fit_percent(measured, predicted)),
+        any(run.diverged_at is not None for run in runs),
+    )
+
+
+def _row(trial: NarxTrial) -> tuple[Cell, ...]:
+    model = trial.model
+    head = (model.output_lags, model.input_lags, model.beta if model.kernel else None)
+    if trial.fit is None or trial.score is None or trial.baseline is None:
+        return (*head, None, None, None, None, None, None, trial.reason)
+    return (
+        *head,
+        len(trial.fit.chosen),
+        trial.one_step_rms,
+        trial.score.rms,
+        trial.score.fit_percent,
+        trial.baseline.rms,
+        trial.score.rms < trial.baseline.rms,
+        "free run was held by the guard" if trial.score.held else "",
+    )
+
+
+def _findings(best: NarxTrial) -> tuple[Finding, ...]:
+    found = []
+    if best.score is None or best.baseline is None:
+        return ()
+    if best.score.held:
+        found.append(
+            Finding(
+                "free-run-unstable",
+                Light.RED,
+                "the best model left the guarded range in free run on a validation record",
+                "use fewer terms, a wider kernel, or training records that cover the manoeuvre",
+            )
+        )
+    if best.score.rms > best.baseline.rms * (1 + 1e-9):
+        found.append(
+            Finding(
+                "loses-to-linear",
+                Light.RED,
+                f"in free run the best model (rms {best.score.rms:.4g}) is worse than the linear "
+                f"model of the same lags (rms {best.baseline.rms:.4g})",
+                "use the linear model (best.baseline)",
+            )
+        )
+    return tuple(found)

@@ -1,0 +1,288 @@
+"""Scan of polynomial orders and delays, ranked by free run on unseen records (`order_scan.rs`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Unpack
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid import _native
+from flightid.errors import DataError, FitError, OptionError
+from flightid.identification.identify import identify
+from flightid.identification.prediction_error.information_criteria import criteria
+from flightid.identification.prediction_error.result import PolynomialFit
+from flightid.models.polynomial.data import PolynomialData, gather_channels
+from flightid.models.polynomial.model import PolynomialModel
+from flightid.models.polynomial.structure import PolynomialOptions, PolynomialStructure
+from flightid.progress import progress, track
+from flightid.record import Record
+from flightid.validation.order_scan.result import OrderScan, OrderTrial
+
+Array = NDArray[np.float64]
+Range = int | Iterable[int]
+KINDS = ("arx", "armax", "oe", "bj")
+MOST = 20_000
+LONGEST = 40
+ITERATIONS = 40
+
+
+def scan_orders(
+    records: Record | Sequence[Record],
+    validation: Record | Sequence[Record],
+    *,
+    output: str | None = None,
+    inputs: Sequence[str] | None = None,
+    kind: str = "armax",
+    na: Range = range(1, 5),
+    nb: Range = range(1, 5),
+    nc: Range = range(1, 4),
+    nd: Range = range(1, 3),
+    nf: Range = range(1, 5),
+    nk: Range = 1,
+    **options: Unpack[PolynomialOptions],
+) -> OrderScan:
+    """Fit all combinations of orders and delays; rank them by free run on records not fitted.
+
+    ARX and ARMAX structures come from one triangle of the largest regressor matrix, ARMAX refined
+    by prediction errors from there; OE and BJ are fitted one by one. All are judged on the same
+    samples, those after the longest lag of the scan; a free run starts from the first measured
+    outputs. The information criteria are shown beside it, and which structure each would take: the
+    smallest value over the whole scan, not the first increase.
+
+    Parameters
+    ----------
+    records, validation : Record or sequence of Record
+        Records of the fits and of the free runs.
+    output : str, optional
+        Default: the only output.
+    inputs : sequence of str, optional
+        Default: all inputs.
+    kind : {"armax", "arx", "oe", "bj"}
+    na, nb, nc, nd, nf, nk : int or iterable of int
+        Orders to try, those that the kind has; nb, nf and nk alike for all inputs.
+    **options
+        Of the fit of the best structure and of OE and BJ fits; see `PolynomialStructure`.
+
+    Returns
+    -------
+    OrderScan
+        Trials, the smallest free-run error first, and the full fit of the best.
+
+    Raises
+    ------
+    OptionError
+        An unknown kind, an empty or too large scan, several outputs.
+    DataError
+        Constant channels, records shorter than the lags, other sample times.
+    FitError
+        No structure could be fitted.
+
+    Assumes
+    -------
+    Validation records with other inputs than those of the fit: on the same record a free run
+    still favours large models.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., sections 10.1, 16.4 and 16.5.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> import flightid as fid
+    >>> truth = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], nk=(2,))
+    >>> def fly(seed):
+    ...     u, noise = np.random.default_rng(seed).standard_normal((2, 400))
+    ...     record = fid.Record.from_arrays(np.arange(400) / 10, inputs={"u": u},
+    ...                                     outputs={"y": np.zeros(400)})
+    ...     return record.replace({"y": truth.simulate(record) + 0.05 * noise})
+    >>> scan = scan_orders(fly(0), fly(1), nk=range(1, 4))
+    >>> scan.smallest("bic").structure.nk
+    (2,)
+    """
+    fitted = [records] if isinstance(records, Record) else list(records)
+    unseen = [validation] if isinstance(validation, Record) else list(validation)
+    if not fitted or not unseen:
+        raise OptionError("a scan needs records to fit and records to validate on")
+    name, names = _channels(fitted[0], output, inputs)
+    orders = {"na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}
+    structures = _structures(kind, name, names, orders, options)
+    offsets = structures[0].offsets
+    data = gather_channels(fitted, name, names, offsets)
+    data.require_change()
+    check = gather_channels(unseen, name, names, offsets)
+    if abs(check.sample_time_s / data.sample_time_s - 1.0) > 1e-6:
+        raise DataError(
+            "records and validation have different sample times",
+            found=f"{data.sample_time_s:.6g} and {check.sample_time_s:.6g} s",
+            action="resample them with conditioning.resample",
+        )
+    trials = (
+        _native_trials(structures, data, check)
+        if kind in ("arx", "armax")
+        else _fitted_trials(structures, fitted, unseen)
+    )
+    trials.sort(key=lambda trial: np.inf if trial.free_run_rms is None else trial.free_run_rms)
+    best = _best(trials, fitted)
+    start = max(s.longest_lag for s in structures)
+    return OrderScan(
+        kind, tuple(trials), best, tuple(r.name for r in unseen), start, data.units[name]
+    )
+
+
+def _channels(
+    record: Record, output: str | None, inputs: Sequence[str] | None
+) -> tuple[str, tuple[str, ...]]:
+    if output is None:
+        if len(record.outputs) != 1:
+            raise OptionError(
+                "the output to model is not said",
+                found=", ".join(record.outputs) or "no output",
+                needed="output='…'",
+            )
+        output = record.outputs[0]
+    return output, tuple(record.inputs if inputs is None else inputs)
+
+
+def _values(name: str, item: Range) -> list[int]:
+    found = [item] if isinstance(item, int) else list(item)
+    if not found or min(found) < 0:
+        raise OptionError(f"{name} has nothing to try", found=found, needed="orders from 0 up")
+    return found
+
+
+def _structures(
+    kind: str,
+    output: str,
+    inputs: tuple[str, ...],
+    orders: dict[str, Range],
+    options: PolynomialOptions,
+) -> list[PolynomialStructure]:
+    used = {
+        "arx": ("na", "nb", "nk"),
+        "armax": ("na", "nb", "nc", "nk"),
+        "oe": ("nb", "nf", "nk"),
+        "bj": ("nb", "nc", "nd", "nf", "nk"),
+    }
+    if kind not in used:
+        raise OptionError("unknown kind of model", found=kind, needed=", ".join(KINDS))
+    choices = [_values(name, orders[name]) for name in used[kind]]
+    count = int(np.prod([len(choice) for choice in choices]))
+    if count > MOST:
+        raise OptionError(
+            "the scan is too large", found=f"{count} structures", needed=f"at most {MOST}"
+        )
+    made = []
+    for values in product(*choices):
+        chosen = dict(zip(used[kind], values, strict=True))
+        made.append(PolynomialModel.general(output, inputs, **chosen, **options))
+    return made
+
+
+def _native_trials(
+    structures: Sequence[PolynomialStructure], data: PolynomialData, check: PolynomialData
+) -> list[OrderTrial]:
+    start = max(max(s.longest_lag + 1, s.nc) for s in structures)
+    shortest = min(*data.lengths, *check.lengths)
+    wide = len(data.inputs) + 1
+    degree = max(max(s.na, *s.nb, s.nc) for s in structures)
+    room = min((shortest - start) // 2, sum(data.lengths) // (4 * wide))
+    long = min(20 + 2 * degree, LONGEST, room)
+    if long < 1:
+        raise DataError(
+            "a record is too short for the scan",
+            found=f"{shortest} samples",
+            needed=f"more than {start + 2}",
+            action="scan lower orders or give longer records",
+        )
+    with progress(None, "Scanning orders"):
+        found = _native.scan_polynomials(
+            data.output,
+            data.inputs,
+            list(data.lengths),
+            check.output,
+            check.inputs,
+            list(check.lengths),
+            [s.native for s in structures],
+            long,
+            ITERATIONS,
+        )
+    skip = _common_skip(structures)
+    n = sum(length - skip for length in data.lengths)
+    n_check = sum(length - skip for length in check.lengths)
+    about = np.concatenate([check.output[s][skip:] for s in check.spans])
+    size = float(np.linalg.norm(about - about.mean()))
+    trials = []
+    for structure, each in zip(structures, found, strict=True):
+        if each is None:
+            trials.append(OrderTrial(structure, None, None, None, None, "collinear regressors"))
+            continue
+        theta, squares, free, _, converged = each
+        measures = criteria(squares, n, structure.n_parameters)
+        note = "" if converged else "not converged"
+        model = PolynomialModel.from_theta(structure, theta, data.sample_time_s)
+        if not np.isfinite(free):
+            note = "free run diverged"
+            trials.append(OrderTrial(structure, model, measures, None, None, note))
+            continue
+        rms = float(np.sqrt(free / n_check))
+        percent = 100.0 * (1.0 - float(np.sqrt(free)) / size)
+        trials.append(OrderTrial(structure, model, measures, rms, percent, note))
+    return trials
+
+
+def _common_skip(structures: Sequence[PolynomialStructure]) -> int:
+    """Samples that the native scan leaves out at the start of each record."""
+    n_inputs = len(structures[0].inputs)
+    spans = [max((s.nb[i] + s.nk[i] for s in structures), default=0) for i in range(n_inputs)]
+    return max([*spans, *(s.na for s in structures), *(s.nc for s in structures)])
+
+
+def _fitted_trials(
+    structures: Sequence[PolynomialStructure], fitted: Sequence[Record], unseen: Sequence[Record]
+) -> list[OrderTrial]:
+    trials = []
+    for structure in track(structures, "Scanning orders"):
+        try:
+            fit = identify(structure, fitted)
+        except FitError as error:
+            trials.append(OrderTrial(structure, None, None, None, None, str(error)))
+            continue
+        runs = [fit.predict(record) for record in unseen]
+        errors = np.concatenate([run.residual for run in runs])
+        about = np.concatenate([run.measured - run.measured.mean() for run in runs])
+        rms = float(np.sqrt(np.mean(errors**2)))
+        percent = 100.0 * (1.0 - float(np.linalg.norm(errors) / np.linalg.norm(about)))
+        diverged = any(run.diverged for run in runs)
+        trials.append(
+            OrderTrial(
+                structure,
+                fit.model,
+                fit.criteria,
+                None if diverged else rms,
+                None if diverged else percent,
+                "free run diverged" if diverged else "",
+            )
+        )
+    return trials
+
+
+def _best(trials: Sequence[OrderTrial], fitted: Sequence[Record]) -> PolynomialFit:
+    """Full fit of the first trial that allows one."""
+    reasons = []
+    for trial in trials:
+        if trial.model is None:
+            continue
+        try:
+            return identify(replace(trial.structure), fitted)
+        except (DataError, FitError) as error:
+            reasons.append(str(error))
+    raise FitError(
+        "no structure of the scan could be fitted",
+        found=reasons[0] if reasons else "collinear regressors throughout",
+        action="scan lower orders, or use longer or richer records",
+    )

@@ -1,0 +1,1 @@
+"""Whether inputs or the past still predict what a model leaves."""

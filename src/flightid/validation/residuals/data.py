@@ -1,0 +1,346 @@
+"""Residuals and inputs as plain series, from a verification, records or arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flightid.errors import DataError, OptionError, ShapeError
+from flightid.identification import Fit
+from flightid.identification.prediction_error.result import PolynomialFit
+from flightid.identification.subspace.result import InnovationsFit
+from flightid.record import Record
+from flightid.validation.residuals.correlation import Series
+from flightid.validation.residuals.correlation_result import Horizon
+from flightid.validation.verification.result import Verification
+
+Residuals = (
+    Fit
+    | Verification
+    | PolynomialFit
+    | InnovationsFit
+    | Sequence[PolynomialFit]
+    | Record
+    | Sequence[Record]
+    | Mapping[str, ArrayLike]
+    | ArrayLike
+)
+Inputs = Iterable[str] | Mapping[str, ArrayLike] | ArrayLike
+SAME_SAMPLE_TIME = 1e-6
+"""Largest relative difference of sample times that still counts as the same."""
+
+_ONE_STEP = "Residuals of the one-step-ahead predictor: a good model leaves them white."
+_FREE_RUN = (
+    "Residuals of a free run hold the noise as it is, coloured or not: only independence of the "
+    "inputs counts."
+)
+
+
+@dataclass(frozen=True)
+class ResidualData:
+    """Series by channel name, and what they are.
+
+    Attributes
+    ----------
+    residuals, inputs : mapping of str to tuple of ndarray
+        One array for each record.
+    scale : mapping of str to float
+        Size of the measured output where it is known: a residual far below it is rounding noise.
+    horizon : Horizon
+    predictor : str
+        Which predictor made the residuals, in words.
+    fitted_noise, fitted_input : int
+        Parameters that were fitted to these samples, as `residual_tests` counts them.
+    """
+
+    residuals: Mapping[str, Series]
+    inputs: Mapping[str, Series]
+    scale: Mapping[str, float]
+    horizon: Horizon
+    predictor: str
+    fitted_noise: int = 0
+    fitted_input: int = 0
+
+    @property
+    def lengths(self) -> tuple[int, ...]:
+        """Samples of each record."""
+        return tuple(record.size for record in next(iter(self.residuals.values())))
+
+
+def gather_residuals(
+    residuals: Residuals,
+    inputs: Inputs | None,
+    outputs: Iterable[str] | None,
+    horizon: Horizon | None,
+) -> ResidualData:
+    """Bring every form of residuals to series.
+
+    Raises
+    ------
+    OptionError
+        The horizon is not said, or contradicts a verification; names with bare arrays.
+    ShapeError
+        Arrays that do not fit.
+    DataError
+        A sample that is not finite, nothing to test, or sample times that differ.
+    UnknownNameError
+        A record lacks a channel.
+    """
+    if isinstance(residuals, Fit):
+        return _of_fit(residuals, _channel_names(inputs), outputs, horizon)
+    if isinstance(residuals, Verification):
+        return _of_verification(residuals, _channel_names(inputs), outputs, horizon)
+    if isinstance(residuals, InnovationsFit):
+        return _of_innovations(residuals, _channel_names(inputs), outputs, horizon)
+    if isinstance(residuals, PolynomialFit):
+        residuals = (residuals,)
+    if isinstance(residuals, Sequence) and residuals and isinstance(residuals[0], PolynomialFit):
+        fits = tuple(fit for fit in residuals if isinstance(fit, PolynomialFit))
+        return _of_fits(fits, _channel_names(inputs), outputs, horizon)
+    if horizon is None:
+        raise OptionError(
+            "the predictor is not said",
+            needed="horizon='one step ahead' or 'free run'",
+            action="say which predictor made the residuals: a free run need not leave them white",
+        )
+    predictor = _ONE_STEP if horizon is Horizon.ONE_STEP else _FREE_RUN
+    if isinstance(residuals, Record):
+        residuals = (residuals,)
+    if isinstance(residuals, Sequence) and residuals and isinstance(residuals[0], Record):
+        records = tuple(record for record in residuals if isinstance(record, Record))
+        names = tuple(records[0].outputs if outputs is None else outputs)
+        given = _channel_names(inputs)
+        driven = tuple(records[0].inputs if given is None else given)
+        _require_one_sample_time(records)
+        return _checked(_columns(records, names), _columns(records, driven), {}, horizon, predictor)
+    if outputs is not None:
+        raise OptionError(
+            "names choose channels of records", found="arrays", action="give a mapping instead"
+        )
+    named = {} if inputs is None else _named(inputs, "u")
+    return _checked(_named(residuals, "e"), named, {}, horizon, predictor)
+
+
+def _of_fit(
+    fit: Fit,
+    inputs: Iterable[str] | None,
+    outputs: Iterable[str] | None,
+    horizon: Horizon | None,
+) -> ResidualData:
+    if not fit.records:
+        raise DataError(
+            "the fit has no residuals in time",
+            found="a fit of frequency responses",
+            needed="a fit of records",
+            action="verify it on records first: flightid.verify",
+        )
+    if horizon is Horizon.ONE_STEP:
+        raise OptionError(
+            "an output-error fit is a free run", found=str(horizon), needed=str(Horizon.FREE_RUN)
+        )
+    names = tuple(fit.records[0].outputs if outputs is None else outputs)
+    driven = tuple(fit.records[0].modelled.inputs if inputs is None else inputs)
+    measured = tuple(item.measured for item in fit.records)
+    _require_one_sample_time(measured)
+    made = {name: tuple(item.residual(name) for item in fit.records) for name in names}
+    return _checked(
+        made, _columns(measured, driven), _sizes(measured, names), Horizon.FREE_RUN, _FREE_RUN
+    )
+
+
+def _sizes(measured: Sequence[Record], names: Iterable[str]) -> dict[str, float]:
+    """Root mean square of each output over all records."""
+    return {
+        name: float(np.sqrt(np.mean(np.concatenate(series) ** 2)))
+        for name, series in _columns(measured, names).items()
+    }
+
+
+def _of_verification(
+    verification: Verification,
+    inputs: Iterable[str] | None,
+    outputs: Iterable[str] | None,
+    horizon: Horizon | None,
+) -> ResidualData:
+    if horizon is Horizon.ONE_STEP:
+        raise OptionError(
+            "a verification is a free run", found=str(horizon), needed=str(Horizon.FREE_RUN)
+        )
+    names = tuple(verification.outputs if outputs is None else outputs)
+    driven = tuple(verification.predicted.inputs if inputs is None else inputs)
+    measured = tuple(item.measured for item in verification.predictions)
+    _require_one_sample_time(measured)
+    made = {name: tuple(item.residual(name) for item in verification.predictions) for name in names}
+    predictor = f"{verification.horizon} {_FREE_RUN}"
+    sizes = _sizes(measured, names)
+    return _checked(made, _columns(measured, driven), sizes, Horizon.FREE_RUN, predictor)
+
+
+def _of_fits(
+    fits: Sequence[PolynomialFit],
+    inputs: Iterable[str] | None,
+    outputs: Iterable[str] | None,
+    horizon: Horizon | None,
+) -> ResidualData:
+    """Errors one step ahead of models of one output each, cut to their common samples."""
+    if outputs is not None:
+        fits = [fit for fit in fits if fit.structure.output in tuple(outputs)]
+    records = fits[0].records if fits else ()
+    if any([*fit.records] != [*records] for fit in fits):
+        raise DataError(
+            "fits of different records have no common residuals",
+            found=", ".join(record.name for fit in fits for record in fit.records),
+            needed="the same records",
+            action="fit all outputs to the same records",
+        )
+    # Output error and instruments promise no white residual: what they leave is a free run's.
+    coloured = any(f.structure.kind == "OE" or f.structure.method == "iv4" for f in fits)
+    found = Horizon.FREE_RUN if coloured else Horizon.ONE_STEP
+    if horizon is not None and horizon is not found:
+        raise OptionError(
+            "these fits have another predictor", found=str(horizon), needed=str(found)
+        )
+    skips = [
+        max(record.n_samples - fit.errors[i].size for fit in fits)
+        for i, record in enumerate(records)
+    ]
+    series = {
+        fit.structure.output: tuple(
+            row[skip - (record.n_samples - row.size) :]
+            for row, skip, record in zip(fit.errors, skips, records, strict=True)
+        )
+        for fit in fits
+    }
+    names = dict.fromkeys(name for fit in fits for name in fit.structure.inputs)
+    driven = {
+        name: tuple(record[name][skip:] for record, skip in zip(records, skips, strict=True))
+        for name in (names if inputs is None else inputs)
+    }
+    scale = {
+        name: float(
+            np.sqrt(np.mean(np.concatenate([r[name] - r[name].mean() for r in records]) ** 2))
+        )
+        for name in series
+    }
+    structures = [fit.structure for fit in fits]
+    noise = max((s.na + s.nc + s.nd for s in structures), default=0)
+    spent = max((b + f for s in structures for b, f in zip(s.nb, s.nf, strict=True)), default=0)
+    words = _FREE_RUN if coloured else _ONE_STEP
+    made = _checked(series, driven, scale, found, words)
+    return replace(made, fitted_noise=noise, fitted_input=spent)
+
+
+def _of_innovations(
+    fit: InnovationsFit,
+    inputs: Iterable[str] | None,
+    outputs: Iterable[str] | None,
+    horizon: Horizon | None,
+) -> ResidualData:
+    """Errors one step ahead of all outputs of one model."""
+    if horizon not in (None, Horizon.ONE_STEP):
+        raise OptionError(
+            "these fits have another predictor", found=str(horizon), needed=str(Horizon.ONE_STEP)
+        )
+    names = tuple(fit.structure.outputs if outputs is None else outputs)
+    places = [fit.structure.outputs.index(name) for name in names]
+    driven = fit.structure.inputs if inputs is None else inputs
+    series = {name: tuple(e[i] for e in fit.errors) for name, i in zip(names, places, strict=True)}
+    made = _checked(
+        series,
+        _columns(fit.records, driven),
+        _sizes(fit.records, names),
+        Horizon.ONE_STEP,
+        _ONE_STEP,
+    )
+    # Poles and gains of the predictor shape each correlation; input matrices the other.
+    n = fit.model.order
+    return replace(made, fitted_noise=2 * n, fitted_input=n)
+
+
+def _channel_names(inputs: Inputs | None) -> tuple[str, ...] | None:
+    if inputs is None:
+        return None
+    if isinstance(inputs, str):
+        return (inputs,)
+    names = tuple(inputs) if isinstance(inputs, Iterable) else ()
+    texts = tuple(name for name in names if isinstance(name, str))
+    if isinstance(inputs, Mapping) or len(texts) != len(names) or not names:
+        raise OptionError(
+            "inputs of records are channel names", found=type(inputs).__name__, needed="names"
+        )
+    return texts
+
+
+def _columns(records: Sequence[Record], names: Iterable[str]) -> dict[str, Series]:
+    return {name: tuple(record[name] for record in records) for name in names}
+
+
+def _require_one_sample_time(records: Sequence[Record]) -> None:
+    times = [record.sample_time_s for record in records]
+    if max(times) - min(times) > SAME_SAMPLE_TIME * times[0]:
+        raise DataError(
+            "records have different sample times",
+            found=f"{min(times):.6g} to {max(times):.6g} s",
+            needed="one: a lag is a number of samples",
+            action="resample them with conditioning.resample",
+        )
+
+
+def _named(values: object, stem: str) -> dict[str, Series]:
+    if isinstance(values, Mapping):
+        return {name: (_row(samples),) for name, samples in values.items()}
+    try:
+        matrix = np.atleast_2d(np.asarray(values, dtype=np.float64))
+    except ValueError as error:
+        raise ShapeError(
+            "residuals or inputs are not numbers in rows", needed="(n_samples,) or (n, n_samples)"
+        ) from error
+    if matrix.ndim != 2:
+        raise ShapeError(
+            "residuals or inputs are not rows of samples",
+            found=matrix.shape,
+            needed="(n_samples,) or (n_channels, n_samples)",
+        )
+    return {f"{stem}{index}": (row,) for index, row in enumerate(matrix, start=1)}
+
+
+def _row(samples: ArrayLike) -> NDArray[np.float64]:
+    row = np.asarray(samples, dtype=np.float64)
+    if row.ndim != 1:
+        raise ShapeError("a named series is one row", found=row.shape, needed="(n_samples,)")
+    return row
+
+
+def _checked(
+    residuals: dict[str, Series],
+    inputs: dict[str, Series],
+    scale: dict[str, float],
+    horizon: Horizon,
+    predictor: str,
+) -> ResidualData:
+    if not residuals:
+        raise DataError("there are no residuals", needed="one output or more")
+    if horizon is Horizon.FREE_RUN and not inputs:
+        raise DataError(
+            "a free run without inputs leaves nothing to test",
+            needed="inputs",
+            action="give the inputs that drove the run",
+        )
+    lengths = [record.size for record in next(iter(residuals.values()))]
+    for name, series in (*residuals.items(), *inputs.items()):
+        if [record.size for record in series] != lengths:
+            raise ShapeError(
+                f"{name} does not fit the residuals",
+                found=[record.size for record in series],
+                needed=lengths,
+            )
+        if not all(np.all(np.isfinite(record)) for record in series):
+            raise DataError(
+                f"{name} holds samples that are not finite",
+                needed="finite numbers",
+                action="cut the record before the gap",
+            )
+    return ResidualData(residuals, inputs, scale, horizon, predictor)

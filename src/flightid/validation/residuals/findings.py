@@ -1,0 +1,80 @@
+"""Verdicts on a model from the correlation tests of its residuals."""
+
+from __future__ import annotations
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.validation.residuals.correlation import LEVEL
+from flightid.validation.residuals.correlation_result import CorrelationTest, Kind, Verdict
+
+_CODES = {
+    Kind.WHITENESS: "residuals-not-white",
+    Kind.INDEPENDENCE: "residuals-follow-input",
+    Kind.EVEN: "residuals-follow-input-squared",
+    Kind.EVEN_SQUARED: "residual-power-follows-input",
+    Kind.BILINEAR: "residuals-follow-product",
+    Kind.CROSS: "residuals-follow-other-output",
+}
+_ACTIONS = {
+    Kind.WHITENESS: "raise the order of the noise model, or of the whole model",
+    Kind.INDEPENDENCE: "dynamics from this input are missing: check its delay and order",
+    Kind.EVEN: "an even nonlinearity is missing: add terms such as u²",
+    Kind.EVEN_SQUARED: "terms in this input are missing, linear or not: see which other test fails",
+    Kind.BILINEAR: "products of noise and input are missing: add bilinear terms",
+    Kind.CROSS: "the outputs share noise or dynamics: give the other output as an input, or fit a "
+    "state space with both",
+}
+_FEEDBACK = "the residual comes before the input: a loop is closed; declare loop='closed'"
+
+
+def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]:
+    """Findings: red where a failure survives the number of tests made, amber where chance may do.
+
+    Example
+    -------
+    >>> residual_findings(())[0].code
+    'residuals-not-testable'
+    """
+    made = [test for test in tests if test.counts and test.verdict is not Verdict.NOT_TESTABLE]
+    failed = [test for test in made if test.verdict is Verdict.FAIL]
+    found = [_failure(test, len(made)) for test in failed]
+    if made and not failed:
+        found.append(
+            Finding(
+                "residuals-pass", Light.GREEN, f"all {len(made)} residual tests that count pass"
+            )
+        )
+    missed = dict.fromkeys(
+        test.reason for test in tests if test.counts and test.verdict is Verdict.NOT_TESTABLE
+    )
+    for reason in missed:
+        names = ", ".join(test.name for test in tests if test.counts and test.reason == reason)
+        found.append(
+            Finding("residuals-not-testable", Light.UNKNOWN, f"not testable: {names}: {reason}")
+        )
+    if not tests:
+        found.append(Finding("residuals-not-testable", Light.UNKNOWN, "there are no tests"))
+    return tuple(found)
+
+
+def _failure(test: CorrelationTest, n_tests: int) -> Finding:
+    p_value = test.p_value or 0.0
+    sure = p_value * n_tests < 1.0 - LEVEL
+    chance = "" if sure else f"; among {n_tests} tests chance alone may do that"
+    message = (
+        f"{test.name} fails: p = {p_value:.2g}, {test.exceedances} lags outside where "
+        f"{test.exceedance_limit} are allowed, largest {test.largest:.3f} against "
+        f"{test.simultaneous_band:.3f}{chance}"
+    )
+    action = _FEEDBACK if _leads(test) else _ACTIONS[test.kind]
+    return Finding(_CODES[test.kind], Light.RED if sure else Light.AMBER, message, action)
+
+
+def _leads(test: CorrelationTest) -> bool:
+    """Whether the largest judged correlation is with a later input."""
+    judged = [
+        (abs(value), lag)
+        for value, lag, used in zip(test.values, test.lags, test.judged, strict=True)
+        if used
+    ]
+    return test.kind is Kind.INDEPENDENCE and max(judged)[1] < 0

@@ -1,0 +1,365 @@
+"""The verb `residual_tests`: whether inputs or the past still predict the residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError, OptionError
+from flightid.validation.residuals.correlation import (
+    Series,
+    centred,
+    cross_correlation,
+    exceedance_limit,
+    independence_portmanteau,
+    lag_covariance,
+    pointwise_factor,
+    simultaneous_factor,
+    white_portmanteau,
+)
+from flightid.validation.residuals.correlation_result import (
+    NEEDS_ONE_STEP,
+    CorrelationTest,
+    Horizon,
+    Kind,
+    Loop,
+    Verdict,
+    passes,
+)
+from flightid.validation.residuals.data import Inputs, ResidualData, Residuals, gather_residuals
+from flightid.validation.residuals.findings import residual_findings
+from flightid.validation.residuals.result import ResidualTests
+
+Choice = TypeVar("Choice", Horizon, Loop)
+
+TWO_LEVELS = 1e-6
+"""Variance of u² beyond what u itself explains, over its squared mean, of a two-level input."""
+ROUNDING = 1e-9
+"""A residual below this share of the output is rounding noise."""
+SAMPLES_PER_LAG = 4
+FIRST_JUDGED_LAG = {Loop.CLOSED: 0, Loop.CLOSED_WITHIN_SAMPLE: 1}
+
+
+def residual_tests(
+    residuals: Residuals,
+    inputs: Inputs | None = None,
+    *,
+    outputs: Iterable[str] | None = None,
+    horizon: Horizon | str | None = None,
+    loop: Loop | str = Loop.OPEN,
+    maximum_lag: int = 25,
+    fitted_noise: int | None = None,
+    fitted_input: int | None = None,
+) -> ResidualTests:
+    """Test residuals for whiteness and independence of the inputs, linear and nonlinear.
+
+    For each output φ_εε, against each other output φ_ε′ε (whether its past foretells this
+    residual), and for each input φ_uε, φ_(u²)'ε, φ_(u²)'ε² and φ_ε(εu), about means, in
+    units of the standard deviations. Whiteness takes the Ljung–Box statistic, independence a
+    quadratic form in the inverse of the correlations' own covariance, which knows the colour of
+    input and residual. `CorrelationTest` states the pass rule.
+
+    Assumes stationary residuals. Biased when inputs are not persistent (a doublet): correlations
+    with few independent samples leave the bands in either direction. A loop that is closed around
+    a free run makes residual and input dependent for every model; then give the injected
+    excitation as input.
+
+    Parameters
+    ----------
+    residuals : Fit, PolynomialFit, Verification, Record, sequence, mapping or array_like
+        A fit of records or a verification (measured minus free run), polynomial fits of one output
+        each to the same records, records whose outputs are residuals, or samples, shape
+        (n_samples,) or (n_outputs, n_samples), by name or bare.
+    inputs : names, mapping or array_like, optional
+        With records: channel names; default: their inputs. Else samples as for `residuals`.
+    outputs : iterable of str, optional
+        Channels of records to test; default: all outputs.
+    horizon : {"one step ahead", "free run"}
+        Which predictor made the residuals; a fit or verification knows.
+    loop : {"open", "closed", "closed within the sample"}
+        Whether residuals reach the inputs. Closed: lags τ ≥ 0 are judged; within the sample
+        (u(t) already holds y(t)): τ ≥ 1.
+    maximum_lag : int
+        Largest lag, samples.
+    fitted_noise, fitted_input : int
+        Parameters fitted to these very samples that whiten the residual (of A, C, D), and that
+        take out the inputs (of B, F, per input); zero on records the fit has not seen. Default:
+        those of a given fit, else zero.
+
+    Returns
+    -------
+    ResidualTests
+
+    Raises
+    ------
+    OptionError
+        The horizon is not said, more parameters than lags, or an option that is not known.
+    ShapeError
+        Arrays that do not fit.
+    DataError
+        Too few samples, a sample that is not finite, or nothing to test.
+    UnknownNameError
+        A record lacks a channel.
+
+    Reference
+    ---------
+    Billings & Voon (1986), Correlation based model validity tests for non-linear models,
+    Int. J. Control 44(1); Ljung, System Identification, 2nd ed., section 16.6.
+
+    Example
+    -------
+    >>> rng = np.random.default_rng(0)
+    >>> u, noise = rng.uniform(-1.0, 1.0, 2000), rng.standard_normal(2000)
+    >>> missed = noise + 0.5 * np.roll(u, 3) ** 2
+    >>> tests = residual_tests(missed, u, horizon="one step ahead")
+    >>> [test.kind.value for test in tests.tests if test.verdict == "fail"]
+    ['u²ε']
+    """
+    data = gather_residuals(
+        residuals, inputs, outputs, None if horizon is None else _choice(Horizon, horizon)
+    )
+    fitted_noise = data.fitted_noise if fitted_noise is None else fitted_noise
+    fitted_input = data.fitted_input if fitted_input is None else fitted_input
+    setup = _Setup(data, _choice(Loop, loop), maximum_lag, fitted_noise, fitted_input)
+    _require_lags(setup)
+    tests = tuple(
+        setup.test(kind, output, name)
+        for output in data.residuals
+        for kind, name in _kinds(data, output)
+    )
+    return ResidualTests(
+        tuple(data.residuals),
+        tuple(data.inputs),
+        tests,
+        data.horizon,
+        data.predictor,
+        setup.loop,
+        maximum_lag,
+        setup.n_samples,
+        len(data.lengths),
+        fitted_noise,
+        fitted_input,
+        residual_findings(tests),
+    )
+
+
+def _kinds(data: ResidualData, output: str) -> list[tuple[Kind, str | None]]:
+    with_input = [kind for kind in Kind if kind not in (Kind.WHITENESS, Kind.CROSS)]
+    pairs = [(kind, name) for name in data.inputs for kind in with_input]
+    others = [(Kind.CROSS, name) for name in data.residuals if name != output]
+    return [(Kind.WHITENESS, None), *others, *pairs]
+
+
+@dataclass(frozen=True)
+class _Setup:
+    data: ResidualData
+    loop: Loop
+    maximum_lag: int
+    fitted_noise: int
+    fitted_input: int
+
+    @property
+    def n_samples(self) -> int:
+        return sum(self.data.lengths)
+
+    @property
+    def first_judged(self) -> int:
+        return FIRST_JUDGED_LAG.get(self.loop, -self.maximum_lag)
+
+    def test(self, kind: Kind, output: str, name: str | None) -> CorrelationTest:
+        """One test, or why it cannot be made."""
+        e = self.data.residuals[output]
+        group = self.data.residuals if kind is Kind.CROSS else self.data.inputs
+        u = e if name is None else group[name]
+        counts = self.data.horizon is Horizon.ONE_STEP or kind not in NEEDS_ONE_STEP
+        reason = self._obstacle(kind, output, e, u)
+        if reason:
+            return _not_testable(kind, output, name, counts, reason)
+        note = "" if counts else "a free run need not leave white residuals; shown, not counted"
+        if kind in NEEDS_ONE_STEP:
+            return self._white(kind, output, name, counts, note)
+        return self._independent(kind, output, name, note)
+
+    def _obstacle(self, kind: Kind, output: str, e: Series, u: Series) -> str:
+        if _is_constant(e, self.data.scale.get(output, 0.0) * ROUNDING):
+            return "the residual does not change beyond rounding"
+        if kind is Kind.CROSS:
+            return "the other residual does not change" if _is_constant(u, 0.0) else ""
+        return "" if kind is Kind.WHITENESS else self._obstacle_of_input(kind, e, u)
+
+    def _obstacle_of_input(self, kind: Kind, e: Series, u: Series) -> str:
+        if _is_constant(u, 0.0):
+            return "the input does not change"
+        free_run = self.data.horizon is Horizon.FREE_RUN and kind not in NEEDS_ONE_STEP
+        if free_run and self.loop is not Loop.OPEN:
+            return (
+                "a closed loop brings the coloured residual of a free run into the input, whatever "
+                "the model; test against the injected excitation"
+            )
+        if kind in (Kind.EVEN, Kind.EVEN_SQUARED) and is_two_level(u):
+            return "the input has two levels, so its square is constant or a copy of the input"
+        if kind is Kind.EVEN_SQUARED and is_two_level(e):
+            return "the residual has two levels, so its square is constant"
+        return ""
+
+    def _white(
+        self, kind: Kind, output: str, name: str | None, counts: bool, note: str
+    ) -> CorrelationTest:
+        """Whiteness, φ_ε′ε and φ_ε(εu): successive lags are independent for a good model."""
+        e = self.data.residuals[output]
+        lags = np.arange(1, self.maximum_lag + 1)
+        first, fitted = e, self.fitted_noise
+        if kind is Kind.CROSS:
+            first, fitted = self.data.residuals[name or ""], 0
+        elif name is not None:
+            # φ_ε(εu)(τ) pairs ε(t) with the product at t − 1 − τ: lag τ + 1 of the product.
+            lags, fitted = np.arange(self.maximum_lag + 1), 0
+            u = centred(self.data.inputs[name])
+            first = tuple(x * y for x, y in zip(centred(e), u, strict=True))
+        every = cross_correlation(first, e, self.maximum_lag + 1)
+        # Lag one stands there for φ_ε(εu)'s τ = 0 too.
+        values = every[self.maximum_lag + 2 :][: lags.size]
+        measures = white_portmanteau(values, self.n_samples, fitted)
+        judged = np.ones(lags.size, dtype=np.bool_)
+        return self._judged(
+            _Found(kind, output, name, counts, note, lags, values, judged), 1.0, measures
+        )
+
+    def _independent(self, kind: Kind, output: str, name: str | None, note: str) -> CorrelationTest:
+        e = self.data.residuals[output]
+        u = self.data.inputs[name or ""]
+        a = u if kind is Kind.INDEPENDENCE else _squared(u)
+        b = _squared(e) if kind is Kind.EVEN_SQUARED else e
+        lags = np.arange(-self.maximum_lag, self.maximum_lag + 1)
+        values = cross_correlation(a, b, self.maximum_lag)
+        judged = lags >= self.first_judged
+        covariance = lag_covariance(a, b, lags.size)
+        fitted = self.fitted_input if kind is Kind.INDEPENDENCE else 0
+        measures = independence_portmanteau(values[judged], covariance, self.n_samples, fitted)
+        if measures[1] < 1:
+            reason = "the input's band is too narrow for so many fitted parameters; use more lags"
+            return _not_testable(kind, output, name, True, reason)
+        found = _Found(kind, output, name, True, note, lags, values, judged)
+        return self._judged(found, float(covariance[0]), measures)
+
+    def _judged(
+        self, found: _Found, variance: float, measures: tuple[float, int, float]
+    ) -> CorrelationTest:
+        error = float(np.sqrt(max(variance, 0.0) / self.n_samples))
+        sizes = np.abs(found.values[found.judged])
+        pointwise, whole = pointwise_factor(), simultaneous_factor(sizes.size)
+        outside = int(np.count_nonzero(sizes > pointwise * error))
+        limit = exceedance_limit(sizes.size)
+        statistic, degrees, p_value = measures
+        inside = bool(np.all(sizes <= whole * error))
+        good = passes(p_value, outside, limit, all_inside=inside)
+        return CorrelationTest(
+            found.kind,
+            found.output,
+            found.input,
+            Verdict.PASS if good else Verdict.FAIL,
+            found.counts,
+            found.note,
+            found.lags,
+            found.values,
+            found.judged,
+            error,
+            pointwise / float(np.sqrt(self.n_samples)),
+            pointwise * error,
+            whole * error,
+            statistic,
+            degrees,
+            p_value,
+            outside,
+            limit,
+        )
+
+
+@dataclass(frozen=True)
+class _Found:
+    kind: Kind
+    output: str
+    input: str | None
+    counts: bool
+    note: str
+    lags: NDArray[np.int64]
+    values: NDArray[np.float64]
+    judged: NDArray[np.bool_]
+
+
+def is_two_level(series: Series) -> bool:
+    """Whether a signal's square holds nothing that the signal itself does not.
+
+    A signal of two levels has a square that is constant about its midpoint, and about any other
+    value a copy of the signal: an unbalanced sequence must not pass for one with a usable square.
+
+    Example
+    -------
+    >>> is_two_level((np.array([0.0, 1.0, 1.0, 0.0, 1.0]),))
+    True
+    """
+    u = np.concatenate(centred(series))
+    square = u**2
+    about = square - np.mean(square)
+    left = about - u * (u @ about) / (u @ u)
+    return bool(np.var(left) < TWO_LEVELS * np.mean(square) ** 2)
+
+
+def _squared(series: Series) -> Series:
+    return tuple(record**2 for record in centred(series))
+
+
+def _is_constant(series: Series, floor: float) -> bool:
+    spread = float(np.std(np.concatenate(centred(series))))
+    size = max(float(np.max(np.abs(record))) for record in series)
+    return spread <= max(floor, 1e-12 * size)
+
+
+def _not_testable(
+    kind: Kind, output: str, name: str | None, counts: bool, reason: str
+) -> CorrelationTest:
+    nothing = np.empty(0)
+    return CorrelationTest(
+        kind, output, name, Verdict.NOT_TESTABLE, counts, reason,
+        nothing.astype(np.int64), nothing, nothing.astype(np.bool_),
+    )  # fmt: skip
+
+
+def _choice(kind: type[Choice], value: str) -> Choice:
+    try:
+        return kind(value)
+    except ValueError:
+        raise OptionError(
+            f"the {kind.__name__.lower()} is not known",
+            found=repr(str(value)),
+            needed="one of " + ", ".join(repr(str(item)) for item in kind),
+        ) from None
+
+
+def _require_lags(setup: _Setup) -> None:
+    lags = setup.maximum_lag
+    if lags < 1:
+        raise OptionError("the largest lag is below one sample", found=lags, needed="1 or more")
+    fitted = {
+        "fitted_noise": (setup.fitted_noise, lags),
+        "fitted_input": (setup.fitted_input, lags - setup.first_judged + 1),
+    }
+    for name, (count, limit) in fitted.items():
+        if not 0 <= count < limit:
+            raise OptionError(
+                f"{name} leaves no degree of freedom",
+                found=count,
+                needed=f"0 to {limit - 1} with {lags} lags",
+                action="raise maximum_lag",
+            )
+    if setup.n_samples < SAMPLES_PER_LAG * (lags + 1) or min(setup.data.lengths) < lags + 2:
+        raise DataError(
+            "the records are too short for so many lags",
+            found=f"{setup.n_samples} samples, the shortest record {min(setup.data.lengths)}",
+            needed=f"{SAMPLES_PER_LAG * (lags + 1)} samples, each record at least {lags + 2}",
+            action="use longer records or a smaller maximum_lag",
+        )

@@ -1,0 +1,285 @@
+"""Spectra of residuals, and of measurement and prediction side by side with their peaks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import signal, stats
+
+from flightid.conventions import Light
+from flightid.errors import OptionError
+from flightid.findings import Finding
+from flightid.record import Record
+from flightid.responses import FrequencyResponse, estimate_response
+from flightid.responses.estimators.windows import longest_window, overlap_factor, shifts_of
+from flightid.validation.residuals.correlation import LEVEL
+from flightid.validation.spectra.result import Peak, ResidualSpectra, SpectrumComparison
+from flightid.validation.verification.result import Verification
+
+OVERLAP = 0.5
+PEAK_DB = 3.0
+"""Least height of a peak above its surroundings, dB; more where the spectrum is less certain."""
+SHARE_ALLOWED = 0.10
+"""Share of frequencies with significant coherence that is still green: neighbours hang together."""
+SAME_PEAK = 0.25
+"""Largest relative distance of frequencies of a measured peak and the predicted one it matches."""
+
+
+def residual_spectra(
+    residuals: Verification | Record | Sequence[Record],
+    inputs: Iterable[str] | None = None,
+    *,
+    outputs: Iterable[str] | None = None,
+    omega_rad_s: ArrayLike | None = None,
+    window_s: float | None = None,
+) -> ResidualSpectra:
+    """Power spectra of residuals with chi-square bounds, and their coherence with each input.
+
+    Coherence above its limit tells at which frequencies the model misses what the input does.
+    Assumes stationary residuals; biased near peaks narrower than a few cycles in the window.
+
+    Parameters
+    ----------
+    residuals : Verification, Record or sequence of Record
+        Measured minus free run, or records whose outputs are residuals.
+    inputs, outputs : iterable of str, optional
+        Channels; default: by role, and those that were verified.
+    omega_rad_s : tuple (low, high, n) or array_like, optional
+        Frequencies, as for `flightid.estimate_response`.
+    window_s : float, optional
+        Window, s; default: half of the automatic longest, about ten in all records.
+
+    Returns
+    -------
+    ResidualSpectra
+
+    Raises
+    ------
+    DataError
+        Records too short, or an input without power.
+    UnknownNameError
+        A record lacks a channel.
+
+    Reference
+    ---------
+    Bendat & Piersol, Random Data, 4th ed., chapter 8 (chi-square bounds); Carter (1987), Coherence
+    and time delay estimation, Proc. IEEE 75(2) (significant coherence).
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> rng = np.random.default_rng(0)
+    >>> record = fid.Record.from_arrays(np.arange(4000) * 0.02,
+    ...     inputs={"u": rng.normal(size=4000)}, outputs={"e": rng.normal(size=4000)})
+    >>> spectra = residual_spectra(record)
+    >>> level = 2 * 0.02  # of white noise of variance one, per Hz
+    >>> inside = (spectra.low < level) & (level < spectra.high)
+    >>> bool(inside.mean() > 0.8)
+    True
+    """
+    records = _residual_records(residuals)
+    response = _estimate(records, inputs, outputs, omega_rad_s, window_s)
+    density, low, high = _with_bounds(response)
+    n_effective = response.n_independent[:, :1, :] / overlap_factor(shifts_of(OVERLAP)) ** 2
+    free = np.maximum(n_effective - len(response.inputs), 1.0)
+    limit = np.broadcast_to(1.0 - (1.0 - LEVEL) ** (1.0 / free), response.coherence.shape)
+    return ResidualSpectra(
+        response.omega_rad_s,
+        response.outputs,
+        response.inputs,
+        dict(response.units),
+        density,
+        low,
+        high,
+        response.coherence,
+        limit,
+        response.window_s[0],
+        _coherence_findings(response, limit),
+    )
+
+
+def compare_spectra(
+    measured: Verification | Record,
+    predicted: Record | None = None,
+    *,
+    outputs: Iterable[str] | None = None,
+    omega_rad_s: ArrayLike | None = None,
+    window_s: float | None = None,
+) -> SpectrumComparison:
+    """Power spectra of measured and predicted outputs on one grid, with the peaks of both.
+
+    Parameters
+    ----------
+    measured : Verification or Record
+        A verification, or the measured record.
+    predicted : Record, optional
+        Predicted outputs under the same names; needed with a record.
+    outputs : iterable of str, optional
+        Outputs to compare; default: all.
+    omega_rad_s, window_s : optional
+        As for `residual_spectra`.
+
+    Returns
+    -------
+    SpectrumComparison
+
+    Raises
+    ------
+    OptionError
+        A record without its prediction, or a verification with one.
+    DataError
+        Records too short, or an input without power.
+    UnknownNameError
+        A record lacks a channel.
+
+    Reference
+    ---------
+    Bendat & Piersol, Random Data, 4th ed., chapter 8.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> time_s, rng = np.arange(3000) * 0.02, np.random.default_rng(0)
+    >>> mode = fid.LinearSystem([[0.0, 1.0], [-16.0, -0.8]], [[0.0], [16.0]], [[1.0, 0.0]],
+    ...                         [[0.0]], ("u",), ("y",))
+    >>> seen = fid.simulate(mode, fid.Record.from_arrays(time_s,
+    ...                     inputs={"u": rng.normal(size=3000)}))
+    >>> [round(peak.omega_rad_s) for peak in compare_spectra(seen, seen).peaks][:1]
+    [4]
+    """
+    if isinstance(measured, Verification) is (predicted is not None):
+        raise OptionError(
+            "a comparison needs one measurement and one prediction",
+            needed="a verification alone, or two records",
+        )
+    if isinstance(measured, Verification):
+        flown = tuple(item.measured for item in measured.predictions)
+        made = tuple(item.predicted for item in measured.predictions)
+        names = measured.outputs if outputs is None else tuple(outputs)
+        driven: tuple[str, ...] = made[0].inputs
+    else:
+        flown, made = (measured,), (predicted,) if predicted is not None else ()
+        names = measured.outputs if outputs is None else tuple(outputs)
+        driven = measured.inputs
+    one = _estimate(flown, driven, names, omega_rad_s, window_s)
+    two = _estimate(made, driven, names, one.omega_rad_s, window_s)
+    density, low, high = _with_bounds(one)
+    model, model_low, model_high = _with_bounds(two)
+    peaks = []
+    for index, name in enumerate(names):
+        mine = _peaks(one.omega_rad_s, density[index], low[index], high[index])
+        theirs = _peaks(one.omega_rad_s, model[index], model_low[index], model_high[index])
+        peaks += _matched(name, mine, theirs)
+    return SpectrumComparison(
+        one.omega_rad_s, names, dict(one.units), density, low, high, model, tuple(peaks),
+        one.window_s[0], tuple(_peak_finding(peak) for peak in peaks),
+    )  # fmt: skip
+
+
+def _residual_records(residuals: Verification | Record | Sequence[Record]) -> tuple[Record, ...]:
+    if isinstance(residuals, Record):
+        return (residuals,)
+    if not isinstance(residuals, Verification):
+        return tuple(residuals)
+    return tuple(
+        item.measured.replace({name: item.residual(name) for name in residuals.outputs}).with_roles(
+            **dict.fromkeys(residuals.outputs, "output")
+        )
+        for item in residuals.predictions
+    )
+
+
+def _estimate(
+    records: Sequence[Record],
+    inputs: Iterable[str] | None,
+    outputs: Iterable[str] | None,
+    omega_rad_s: ArrayLike | None,
+    window_s: float | None,
+) -> FrequencyResponse:
+    length = window_s or 0.5 * longest_window([record.duration_s for record in records])
+    return estimate_response(
+        records,
+        inputs=inputs,
+        outputs=outputs,
+        omega_rad_s=omega_rad_s,
+        window_s=[length],
+        overlap=OVERLAP,
+        covariance=False,
+    )
+
+
+def _with_bounds(response: FrequencyResponse) -> tuple[NDArray[np.float64], ...]:
+    """Auto-spectra with their 95 % intervals, each shape (n_out, n_f)."""
+    density = np.asarray(response.output_spectrum, dtype=np.float64)
+    degrees = 2.0 * response.n_independent[:, 0, :] / overlap_factor(shifts_of(OVERLAP)) ** 2
+    low = density * degrees / stats.chi2.ppf(0.5 + 0.5 * LEVEL, degrees)
+    high = density * degrees / stats.chi2.ppf(0.5 - 0.5 * LEVEL, degrees)
+    return density, low, high
+
+
+def _coherence_findings(
+    response: FrequencyResponse, limit: NDArray[np.float64]
+) -> tuple[Finding, ...]:
+    found = []
+    for row, output in enumerate(response.outputs):
+        for column, name in enumerate(response.inputs):
+            coherence = response.coherence[row, column]
+            share = float(np.mean(coherence > limit[row, column]))
+            top = int(np.argmax(coherence))
+            good = share <= SHARE_ALLOWED
+            found.append(
+                Finding(
+                    "residual-coherence",
+                    Light.GREEN if good else Light.AMBER,
+                    f"{output}, {name}: residual and input cohere at {100 * share:.0f} % of "
+                    f"frequencies (chance: 5 %), most at {response.omega_rad_s[top]:.3g} rad/s",
+                    "" if good else "mend the model near that frequency",
+                )
+            )
+    return tuple(found)
+
+
+def _peaks(
+    omega: NDArray[np.float64],
+    density: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+) -> list[tuple[float, float]]:
+    """Frequency and density of each peak that stands out of its own uncertainty."""
+    level = 10.0 * np.log10(np.maximum(density, np.finfo(float).tiny))
+    width = 10.0 * np.log10(np.maximum(high, 1e-300) / np.maximum(low, 1e-300))
+    places, _ = signal.find_peaks(level, prominence=np.maximum(PEAK_DB, width))
+    return [(float(omega[place]), float(density[place])) for place in places]
+
+
+def _matched(
+    name: str, measured: list[tuple[float, float]], predicted: list[tuple[float, float]]
+) -> list[Peak]:
+    """Each measured peak with the nearest predicted one, then predicted peaks left over."""
+    left = list(predicted)
+    peaks = []
+    for omega, density in measured:
+        near = [item for item in left if abs(item[0] - omega) <= SAME_PEAK * omega]
+        best = min(near, key=lambda item: abs(item[0] - omega), default=None)
+        if best is None:
+            peaks.append(Peak(name, omega, density, None, None))
+        else:
+            left.remove(best)
+            peaks.append(Peak(name, omega, density, *best))
+    return peaks + [Peak(name, None, None, *item) for item in left]
+
+
+def _peak_finding(peak: Peak) -> Finding:
+    if peak.omega_rad_s is None:
+        message = f"{peak.output}: the model has a peak at {peak.predicted_rad_s:.3g} rad/s alone"
+        return Finding("peak-of-model-alone", Light.AMBER, message, "look at the model's modes")
+    if peak.predicted_rad_s is None:
+        message = f"{peak.output}: the peak at {peak.omega_rad_s:.3g} rad/s is not in the model"
+        return Finding("peak-missed", Light.AMBER, message, "raise the order of the model")
+    return Finding(
+        "peak-matched",
+        Light.GREEN,
+        f"{peak.output}: peak at {peak.omega_rad_s:.3g} rad/s, model {peak.predicted_rad_s:.3g}",
+    )

@@ -1,0 +1,1 @@
+"""How models predict records they have not seen."""

@@ -1,0 +1,177 @@
+"""Free run of a nonlinear model through one record, with the shifts that fit it best.
+
+The equations are integrated as for a fit of output error, with the parameters held: only initial
+state, input shifts and output biases of the record are solved for, by Gauss-Newton.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid import _native
+from flightid.identification.multistart import DenseEnd
+from flightid.identification.records.setup import OwnNumbers
+from flightid.models import StateSpaceModel
+from flightid.models.state_space.integration_steps import steps_per_sample
+from flightid.validation.verification.shifts import RANK_TOLERANCE, Freedom, Shifts
+
+Array = NDArray[np.float64]
+MOST_STEPS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class NonlinearRun:
+    """Runs of a model over the inputs of one record.
+
+    Attributes
+    ----------
+    model : StateSpaceModel
+    native : _native.EquationRecords
+    inputs : ndarray, shape (n_inputs, n_samples)
+        Whole, in the model's units.
+    sample_time_s : float
+    first_order_hold : bool
+    rows : list of int
+        Places of the compared outputs.
+    start : OwnNumbers
+        At trim, without shifts; its free places are solved for.
+    """
+
+    model: StateSpaceModel
+    native: _native.EquationRecords
+    inputs: Array
+    sample_time_s: float
+    first_order_hold: bool
+    rows: list[int]
+    start: OwnNumbers
+
+    @classmethod
+    def of(
+        cls,
+        model: StateSpaceModel,
+        inputs: Array,
+        sample_time_s: float,
+        rows: list[int],
+        freedom: Freedom,
+        hold: str,
+    ) -> NonlinearRun:
+        """Prepare the runs of one record."""
+        n, m, p = len(model.states), len(model.inputs), len(model.outputs)
+        cuts: list[int] = []
+        whole = (cuts, np.zeros((0, 0)), 0, np.zeros((0, 0)))
+        steps = steps_per_sample(model, sample_time_s, None)
+        start = OwnNumbers(
+            np.array([float(model.trim.get(name, 0.0)) for name in model.states]),
+            np.zeros(m),
+            np.zeros(p),
+            list(range(n)) if freedom.initial_state else [],
+            list(range(m)) if freedom.bias else [],
+            rows if freedom.reference else [],
+        )
+        native = _native.EquationRecords(model.native, [steps], [whole])
+        return cls(model, native, inputs, sample_time_s, hold == "first", rows, start)
+
+    def outputs(self, own: OwnNumbers) -> tuple[Array, Array]:
+        """Compared outputs (n_rows, n_samples), and their slopes by the free numbers."""
+        blank = np.zeros((len(self.model.outputs), self.inputs.shape[1]))
+        run, slopes = self.native.run_record(
+            0,
+            self.model.parameters.independent_values(),
+            [],
+            (self.inputs, blank, self.sample_time_s),
+            own.native,
+            self.first_order_hold,
+            True,
+        )
+        biases = np.zeros((*blank.shape, len(own.free_bias)))
+        for column, row in enumerate(own.free_bias):
+            biases[row, :, column] = 1.0
+        whole = np.concatenate([slopes, biases], axis=2)
+        return (run + own.bias[:, None])[self.rows], whole[self.rows]
+
+
+def predict_equations(
+    model: StateSpaceModel,
+    inputs: Array,
+    measured: Array,
+    sample_time_s: float,
+    *,
+    rows: list[int],
+    freedom: Freedom,
+    weights: Array,
+    hold: str,
+) -> tuple[Array, Shifts]:
+    """Free run of a nonlinear model through one record with the best shifts.
+
+    Parameters
+    ----------
+    model : StateSpaceModel
+    inputs : ndarray, shape (n_inputs, n_samples)
+    measured : ndarray, shape (n_compared, n_samples)
+    sample_time_s : float
+        Time between samples, s.
+    rows : list of int
+        Places of the compared outputs in the model.
+    freedom : Freedom
+        A free bias is a constant shift of every input.
+    weights : ndarray, shape (n_compared,)
+        What the square of one unit of error counts.
+    hold : {"first", "zero"}
+
+    Returns
+    -------
+    tuple of ndarray and Shifts
+        Prediction, shape (n_compared, n_samples), and the shifts.
+
+    Raises
+    ------
+    DataError
+        The run from trim diverges, or a formula has no value.
+    """
+    run = NonlinearRun.of(model, inputs, sample_time_s, rows, freedom, hold)
+    scale = np.sqrt(weights)[:, None]
+    best, rank = run.start, 0
+    n_free = run.start.n_free
+    if n_free:
+        start, size = _places(run.start), measured.size
+
+        def residuals(x: Array) -> Array:
+            return np.asarray((scale * (run.outputs(run.start.filled(x))[0] - measured)).ravel())
+
+        def jacobian(x: Array) -> Array:
+            slopes = scale[..., None] * run.outputs(run.start.filled(x))[1]
+            return np.ascontiguousarray(slopes.reshape(size, n_free))
+
+        open_ = np.full(n_free, np.inf)
+        found = _native.least_squares(residuals, jacobian, start, -open_, open_, size, MOST_STEPS)
+        end = DenseEnd.of_native(found)
+        best, rank = run.start.filled(end.x), _rank(end.jacobian)
+    predicted, _ = run.outputs(best)
+    shifts = Shifts(
+        np.zeros(len(model.states)),
+        best.bias[rows],
+        best.initial,
+        n_free,
+        rank,
+        input_shift=best.shift,
+    )
+    return predicted, shifts
+
+
+def _places(own: OwnNumbers) -> Array:
+    parts = (
+        own.initial[own.free_initial],
+        own.shift[own.free_shift],
+        own.bias[own.free_bias],
+    )
+    return np.concatenate(parts)
+
+
+def _rank(jacobian: Array) -> int:
+    length = np.linalg.norm(jacobian, axis=0)
+    scaled = jacobian / np.where(length > 0.0, length, 1.0)
+    values = np.linalg.svd(scaled, compute_uv=False)
+    return int(np.sum(values > RANK_TOLERANCE * values.max(initial=0.0)))

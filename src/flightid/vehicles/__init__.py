@@ -1,0 +1,40 @@
+"""Vehicles: simulated ones with their autopilots and logs, whose truth is known."""
+
+from flightid.vehicles.ardupilot_log import write_ardupilot_log
+from flightid.vehicles.autopilot import Autopilot, PilotDoublet, RateGains, SidRun
+from flightid.vehicles.flight import Flight, fly
+from flightid.vehicles.quadrotor import QuadrotorParameters, Sensors, Turbulence
+from flightid.vehicles.quadrotor_loop import (
+    CrudePilot,
+    Disturbance,
+    FlightConditions,
+    fly_closed_loop,
+)
+from flightid.vehicles.scenario import fly_scenario
+from flightid.vehicles.truth import RateTruth, rate_truth
+from flightid.vehicles.twin_rotor import TwinRotor
+from flightid.vehicles.twin_rotor_parameters import Draught, Encoders, TwinRotorParameters
+
+__all__ = [
+    "Autopilot",
+    "CrudePilot",
+    "Disturbance",
+    "Draught",
+    "Encoders",
+    "Flight",
+    "FlightConditions",
+    "PilotDoublet",
+    "QuadrotorParameters",
+    "RateGains",
+    "RateTruth",
+    "Sensors",
+    "SidRun",
+    "Turbulence",
+    "TwinRotor",
+    "TwinRotorParameters",
+    "fly",
+    "fly_closed_loop",
+    "fly_scenario",
+    "rate_truth",
+    "write_ardupilot_log",
+]
