@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use flightid_core::expression::Expression;
-use flightid_core::polynomial;
-use flightid_core::tape::{Registers, Tape};
+use flightid_core::language::expression::Expression;
+use flightid_core::language::laplace_polynomial;
+use flightid_core::tape::expression_tape::{Registers, Tape};
 use libfuzzer_sys::fuzz_target;
 
 fuzz_target!(|text: &str| {
@@ -13,7 +13,7 @@ fuzz_target!(|text: &str| {
         return;
     };
     let names: Vec<String> = expression.names().into_iter().map(String::from).collect();
-    let factors = polynomial::coefficients(&expression, "s").unwrap_or_default();
+    let factors = laplace_polynomial::coefficients(&expression, "s").unwrap_or_default();
     for each in [vec![expression], factors] {
         let Ok(tape) = Tape::compile(&each, &names, &BTreeMap::new()) else {
             continue;

@@ -2,8 +2,8 @@
 //! compile, linearise, and take first and second derivatives by the parameters.
 #![no_main]
 
-use flightid_core::lookup_table::{Interpolation, LookupTable, Outside};
-use flightid_core::model_tape::{ModelTape, ModelText};
+use flightid_core::language::lookup_table::{Interpolation, LookupTable, Outside};
+use flightid_core::state_space::model_tape::{ModelTape, ModelText};
 use libfuzzer_sys::fuzz_target;
 
 const MOST: usize = 6;

@@ -2,11 +2,13 @@
 //! runs in the firmware's single precision or, for linear views, in double.
 
 use crate::group::read;
-use flightid_core::ardupilot_mode::square_root_law;
-use flightid_core::ardupilot_pid::{Pid, PidGains};
-use flightid_core::gyro_filter::low_pass;
-use flightid_core::notch_filter::{Section, ardupilot_notch, ardupilot_quality, px4_notch};
-use flightid_core::px4_rate_control::{RateControl, RateGains, RateInputs, gyro_chain};
+use flightid_core::autopilots::ardupilot_mode::square_root_law;
+use flightid_core::autopilots::ardupilot_pid::{Pid, PidGains};
+use flightid_core::autopilots::gyro_filter::low_pass;
+use flightid_core::autopilots::notch_filter::{
+    Section, ardupilot_notch, ardupilot_quality, px4_notch,
+};
+use flightid_core::autopilots::px4_rate_control::{RateControl, RateGains, RateInputs, gyro_chain};
 use num_traits::{Float, FloatConst};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};

@@ -1,7 +1,7 @@
-//! Binding of `flightid_core::chirp` (used by `excitation/sweep.py`).
+//! Binding of `flightid_core::autopilots::ardupilot_chirp` (used by `excitation/sweep.py`).
 
 use flightid_core::CoreError;
-use flightid_core::chirp::Chirp;
+use flightid_core::autopilots::ardupilot_chirp::Chirp;
 use num_traits::{Float, FloatConst};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;

@@ -1,11 +1,12 @@
-//! Face of `flightid_core::nonlinear_output_error`. (Python side: identification/output_error/equation_records.py)
+//! Face of `flightid_core::records::nonlinear_output_error`. (Python side:
+//! identification/output_error/equation_records.py)
 
-use flightid_core::linear_output_error::Driven;
-use flightid_core::motion::Motion;
-use flightid_core::nonlinear_output_error::{EquationTrajectories, Passage};
-use flightid_core::output_error::Wanted;
-use flightid_core::record_data::RecordData;
-use flightid_core::shooting::Plan;
+use flightid_core::records::linear_output_error::Driven;
+use flightid_core::records::nonlinear_output_error::{EquationTrajectories, Passage};
+use flightid_core::records::output_error::Wanted;
+use flightid_core::records::record_data::RecordData;
+use flightid_core::state_space::ode_model::Motion;
+use flightid_core::trajectories::shooting::Plan;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
 };

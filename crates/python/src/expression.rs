@@ -1,9 +1,9 @@
-//! Face of `flightid_core::expression` and `tape`. (Python side: models/expression.py)
+//! Face of `flightid_core::language::expression` and `tape`. (Python side: models/expression.py)
 
 use std::collections::BTreeMap;
 
-use flightid_core::expression::{Expression, Node};
-use flightid_core::tape::{Registers, Tape as CoreTape};
+use flightid_core::language::expression::{Expression, Node};
+use flightid_core::tape::expression_tape::{Registers, Tape as CoreTape};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 

@@ -1,11 +1,11 @@
-//! Face of `flightid_core::frequency_fit` for every kind of model. (Python side:
+//! Face of `flightid_core::frequency_domain::frequency_fit` for every kind of model. (Python side:
 //! identification/frequency_domain/fit.py)
 
 use flightid_core::CoreError;
-use flightid_core::frequency_fit::{
+use flightid_core::fits::least_squares::{Minimum, Options};
+use flightid_core::frequency_domain::frequency_fit::{
     Cost, FrequencyFit, Measured, ResponseModel, Whitening, minimise_from,
 };
-use flightid_core::least_squares::{Minimum, Options};
 use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;

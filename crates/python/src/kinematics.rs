@@ -1,7 +1,7 @@
 //! Binding of kinematic reconstruction (Python side: `conditioning/kinematics.py`).
 
 use crate::error::from_core;
-use flightid_core::kinematics::{COLUMNS, N, reconstruct};
+use flightid_core::trajectories::kinematics::{COLUMNS, N, reconstruct};
 use numpy::ndarray::{Array2, Array3};
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;

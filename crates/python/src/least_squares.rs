@@ -1,9 +1,9 @@
-//! Face of `flightid_core::levenberg_marquardt` for residuals written in Python.
+//! Face of `flightid_core::fits::levenberg_marquardt` for residuals written in Python.
 //! (Python side: identification/least_squares.py)
 
 use flightid_core::CoreError;
-use flightid_core::least_squares::{Minimum, Options, Problem};
-use flightid_core::levenberg_marquardt::minimise;
+use flightid_core::fits::least_squares::{Minimum, Options, Problem};
+use flightid_core::fits::levenberg_marquardt::minimise;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 

@@ -1,6 +1,7 @@
-//! Face of `flightid_core::linear_recursion`. (Python side: identification/filter_error/fit.py)
+//! Face of `flightid_core::linear::linear_recursion`. (Python side:
+//! identification/filter_error/fit.py)
 
-use flightid_core::linear_recursion::recurse;
+use flightid_core::linear::linear_recursion::recurse;
 use numpy::{IntoPyArray, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 

@@ -1,9 +1,9 @@
 //! Binding of linear simulation (Python side: `simulation/simulate.py`).
 
 use crate::error::from_core;
-use flightid_core::discretisation::discretise;
-use flightid_core::linear_simulation::{Discrete, Hold, StateSpace};
-use flightid_core::matrix_exponential::exponential;
+use flightid_core::linear::discretisation::discretise;
+use flightid_core::linear::linear_simulation::{Discrete, Hold, StateSpace};
+use flightid_core::numerics::matrix_exponential::exponential;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;

@@ -1,9 +1,9 @@
-//! Face of `flightid_core::lookup_table`. (Python side: models/language/tables.py)
+//! Face of `flightid_core::language::lookup_table`. (Python side: models/language/tables.py)
 
 use std::collections::BTreeMap;
 
 use flightid_core::CoreError;
-use flightid_core::lookup_table::{Interpolation, LookupTable as CoreTable, Outside};
+use flightid_core::language::lookup_table::{Interpolation, LookupTable as CoreTable, Outside};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

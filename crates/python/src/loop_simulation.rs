@@ -4,9 +4,11 @@ use crate::closed_loop::{Matrices, system};
 use crate::error::from_core;
 use crate::linear_simulation::matrix;
 use crate::state_space::StateSpace;
-use flightid_core::equation_step::EquationStep;
-use flightid_core::linear_simulation::{Discrete, Hold};
-use flightid_core::loop_simulation::{Element, Equations, Kept, Port, Recursion, simulate};
+use flightid_core::linear::linear_simulation::{Discrete, Hold};
+use flightid_core::trajectories::equation_step::EquationStep;
+use flightid_core::trajectories::loop_simulation::{
+    Element, Equations, Kept, Port, Recursion, simulate,
+};
 use numpy::{PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

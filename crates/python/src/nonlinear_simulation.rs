@@ -1,8 +1,8 @@
 //! Binding of simulation by Runge–Kutta steps (Python side: `simulation/nonlinear.py`).
 
-use flightid_core::linear_simulation::Hold;
-use flightid_core::motion::Motion;
-use flightid_core::runge_kutta::{Course, Setting};
+use flightid_core::linear::linear_simulation::Hold;
+use flightid_core::state_space::ode_model::Motion;
+use flightid_core::trajectories::runge_kutta::{Course, Setting};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 

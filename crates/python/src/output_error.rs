@@ -1,13 +1,13 @@
-//! Face of `flightid_core::output_error` for every kind of model. (Python side:
+//! Face of `flightid_core::records::output_error` for every kind of model. (Python side:
 //! identification/output_error/fit.py)
 
 use flightid_core::CoreError;
-use flightid_core::least_squares::{Options, Problem};
-use flightid_core::linear_output_error::{Driven, LinearFamily, LinearTrajectories};
-use flightid_core::linear_simulation::Hold;
-use flightid_core::output_error::{Estimate, Trajectories, Wanted, fit_from};
-use flightid_core::output_error_weights::Noise;
-use flightid_core::record_data::RecordData;
+use flightid_core::fits::least_squares::{Options, Problem};
+use flightid_core::linear::linear_simulation::Hold;
+use flightid_core::records::linear_output_error::{Driven, LinearFamily, LinearTrajectories};
+use flightid_core::records::output_error::{Estimate, Trajectories, Wanted, fit_from};
+use flightid_core::records::output_error_weights::Noise;
+use flightid_core::records::record_data::RecordData;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
 };

@@ -4,10 +4,10 @@
 use crate::error::from_core;
 use crate::interrupt;
 use flightid_core::CoreError;
-use flightid_core::least_squares::{Minimum, Options};
-use flightid_core::order_scan::{Scan, scan};
-use flightid_core::polynomial_fit::{Before, PredictionError, fit_from, regress};
-use flightid_core::polynomial_predictor::{Orders, Samples};
+use flightid_core::black_box::order_scan::{Scan, scan};
+use flightid_core::black_box::polynomial_fit::{Before, PredictionError, fit_from, regress};
+use flightid_core::black_box::polynomial_predictor::{Orders, Samples};
+use flightid_core::fits::least_squares::{Minimum, Options};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 

@@ -4,11 +4,11 @@
 use crate::autopilots::pid_gains;
 use crate::error::from_core;
 use crate::group::{item, read};
-use flightid_core::ardupilot_mixer::Mixer;
-use flightid_core::ardupilot_mode::{AttitudeGains, SidRun};
-use flightid_core::quadrotor::{Gust, N_STATES, Quadrotor};
-use flightid_core::quadrotor_flight::{Autopilot, COLUMNS, Plan, Sensors, fly};
-use flightid_core::turbulence::Turbulence;
+use flightid_core::autopilots::ardupilot_mixer::Mixer;
+use flightid_core::autopilots::ardupilot_mode::{AttitudeGains, SidRun};
+use flightid_core::vehicles::quadrotor::{Gust, N_STATES, Quadrotor};
+use flightid_core::vehicles::quadrotor_flight::{Autopilot, COLUMNS, Plan, Sensors, fly};
+use flightid_core::vehicles::turbulence::Turbulence;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;

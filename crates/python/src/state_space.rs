@@ -1,12 +1,13 @@
-//! Face of `flightid_core::model_tape` and `state_space_fit`. (Python side: models/state_space/model.py)
+//! Face of `flightid_core::state_space::model_tape` and `frequency_domain::state_space_response`.
+//! (Python side: models/state_space/model.py)
 
 use std::collections::BTreeMap;
 
-use flightid_core::frequency_fit::{FrequencyFit, ResponseModel};
-use flightid_core::linear_family::StateSpaceFamily;
-use flightid_core::model_samples::sample;
-use flightid_core::model_tape::{ModelTape, ModelText};
-use flightid_core::state_space_fit::FreeStateSpace;
+use flightid_core::frequency_domain::frequency_fit::{FrequencyFit, ResponseModel};
+use flightid_core::frequency_domain::state_space_response::FreeStateSpace;
+use flightid_core::records::linear_family::StateSpaceFamily;
+use flightid_core::state_space::model_samples::sample;
+use flightid_core::state_space::model_tape::{ModelTape, ModelText};
 use num_complex::Complex64;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,

@@ -1,10 +1,13 @@
-//! Face of `flightid_core::transfer` and `frequency_fit`. (Python side: models/transfer/model.py)
+//! Face of `flightid_core::frequency_domain::transfer` and `frequency_fit`. (Python side:
+//! models/transfer/model.py)
 
 use std::collections::BTreeMap;
 
-use flightid_core::frequency_fit::ResponseModel;
-use flightid_core::linear_family::TransferFamily;
-use flightid_core::transfer::{FreeTransfer, ResponseText, TransferFunctions as Functions};
+use flightid_core::frequency_domain::frequency_fit::ResponseModel;
+use flightid_core::frequency_domain::transfer::{
+    FreeTransfer, ResponseText, TransferFunctions as Functions,
+};
+use flightid_core::records::linear_family::TransferFamily;
 use num_complex::Complex64;
 use numpy::{PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;

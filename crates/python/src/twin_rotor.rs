@@ -3,7 +3,7 @@
 
 use crate::error::from_core;
 use crate::group::read;
-use flightid_core::twin_rotor::{Draught, Encoders, N_STATES, Run, TwinRotor};
+use flightid_core::vehicles::twin_rotor::{Draught, Encoders, N_STATES, Run, TwinRotor};
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;

@@ -1,0 +1,14 @@
+//! Polynomial models and NARX: predictors, fits, scans of orders, choice of terms.
+
+pub(crate) mod candidates;
+pub mod digital_filter;
+pub mod local_regularisation;
+pub(crate) mod look_ahead;
+pub mod narx;
+pub mod order_scan;
+pub mod orthogonal_least_squares;
+pub mod polynomial_fit;
+pub mod polynomial_normal;
+pub mod polynomial_predictor;
+pub mod radial_basis;
+pub mod stop_rule;

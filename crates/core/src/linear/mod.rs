@@ -1,0 +1,7 @@
+//! Linear systems in time: exact hold discretisation, simulation and recursions.
+
+pub(crate) mod block_recursion;
+pub mod discretisation;
+pub mod hold_integrals;
+pub mod linear_recursion;
+pub mod linear_simulation;

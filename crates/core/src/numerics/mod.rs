@@ -1,0 +1,12 @@
+//! Linear algebra, dual numbers and random numbers: no flight, no models.
+
+pub mod complex_lanes;
+pub mod complex_lu;
+pub mod dual;
+pub(crate) mod gram_schmidt;
+pub mod householder;
+pub mod matrix_exponential;
+pub mod polynomial_roots;
+pub mod random;
+pub mod sparse_lu;
+pub(crate) mod widest;

@@ -1,0 +1,12 @@
+//! Output error: models on records, the records' own numbers, weights and sums.
+
+pub mod linear_family;
+pub mod linear_output_error;
+pub mod nonlinear_output_error;
+pub mod normal_equations;
+pub mod output_error;
+pub mod output_error_weights;
+pub mod output_sums;
+pub mod record_data;
+pub mod record_pass;
+pub(crate) mod sensitivity_recursion;

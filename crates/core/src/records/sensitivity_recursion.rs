@@ -1,0 +1,292 @@
+//! Sensitivities of a linear model by one recursion, a block of samples at a time.
+//! (Python side: identification/output_error/fit.py)
+//!
+//! The state and its derivatives by θ, initial state and input shifts are columns of one matrix S:
+//! S⁺ = Φ S + Σ_q K_q · source_q, where the sources are the states themselves (for ∂Φ/∂θ x) and the
+//! samples of the inputs. The state passes through a block alone; then the sum over the sources,
+//! which waits for nothing, fills a few columns of all samples before the recursion runs through.
+
+use crate::linear::block_recursion::{Acting, BLOCK, Line, carry};
+use crate::linear::discretisation::Sampled;
+use crate::numerics::widest::widest;
+use crate::records::linear_output_error::LinearPoint;
+use crate::records::output_error::{LANES, Wanted};
+
+/// One number at each sample.
+type Scalars = Line<1>;
+/// A few columns at each sample.
+type Columns = Line<LANES>;
+
+/// Reused room of a run.
+#[derive(Debug, Clone)]
+pub struct Room {
+    n_states: usize,
+    /// States, taps, the constant.
+    sources: Vec<Scalars>,
+    /// What is left of one output.
+    output: Scalars,
+    /// The state at the first sample of the block.
+    state: Vec<[f64; 1]>,
+    /// Its derivatives there, by chunk and state.
+    slopes: Vec<[f64; LANES]>,
+    /// The same at each sample.
+    moved: Vec<Columns>,
+    /// Derivatives of one output.
+    moved_output: Columns,
+}
+
+impl Room {
+    /// Room for the samples behind each tap.
+    pub fn taps(&mut self) -> impl Iterator<Item = &mut [f64]> {
+        self.sources[self.n_states..].iter_mut().map(|line| line.as_flattened_mut())
+    }
+}
+
+/// Coefficients of the recursion, the columns in chunks of `LANES`.
+#[derive(Debug, Clone)]
+pub struct Recursion {
+    n: usize,
+    p: usize,
+    /// Columns by θ.
+    n_theta: usize,
+    stride: usize,
+    /// Chunks with derivatives.
+    n_chunks: usize,
+    /// Number of states, taps and the constant.
+    n_sources: usize,
+    /// Φ then C, (n + p) × n.
+    matrix: Vec<f64>,
+    /// By chunk, row and source; the first column is the state itself.
+    forcing: Vec<[f64; LANES]>,
+    /// What acts on the state and, with the state itself, on the outputs, by row.
+    plain: Vec<Acting<1>>,
+    /// By row of C: entries that are not zero.
+    seen: Vec<Vec<(usize, f64)>>,
+    /// What acts on the derivatives, by chunk and row.
+    acting: Vec<Acting<LANES>>,
+    /// Measured input and samples ahead of each tap; None for a constant 1.
+    taps: Vec<(Option<usize>, isize)>,
+}
+
+impl Recursion {
+    /// Of a model at one θ and one sample time; `columns` are the inputs behind those of B.
+    pub fn new(
+        n_outputs: usize,
+        columns: &[Option<usize>],
+        continuous: &LinearPoint,
+        discrete: &Sampled,
+        slopes: &[Sampled],
+        wanted: &Wanted<'_>,
+    ) -> Self {
+        let n = discrete.transition.len().isqrt();
+        let p = n_outputs;
+        let n_theta = if wanted.theta { slopes.len() } else { 0 };
+        let stride = wanted.stride(n_theta);
+        let used: Vec<usize> = (0..discrete.taps.len())
+            .filter(|&t| {
+                let acts = |each: &Sampled| {
+                    let tap = &each.taps[t];
+                    tap.state.iter().chain(&tap.output).any(|&weight| weight != 0.0)
+                };
+                acts(discrete) || slopes[..n_theta].iter().any(acts)
+            })
+            .collect();
+        let taps: Vec<_> = used
+            .iter()
+            .map(|&t| (columns[discrete.taps[t].input], discrete.taps[t].ahead))
+            .collect();
+        // The last source is the constant that drives the shifts' columns.
+        let n_sources = n + taps.len() + 1;
+        let rows = n + p;
+        let mut layout = Self {
+            n,
+            p,
+            n_theta,
+            stride,
+            n_chunks: if wanted.columns(n_theta) > 1 { stride / LANES } else { 0 },
+            n_sources,
+            matrix: [discrete.transition.as_slice(), &continuous.c].concat(),
+            forcing: vec![[0.0; LANES]; stride / LANES * rows * n_sources],
+            plain: Vec::new(),
+            seen: Vec::new(),
+            acting: Vec::new(),
+            taps,
+        };
+        for (place, &t) in used.iter().enumerate() {
+            layout.add_tap(discrete, t, n + place, 0);
+            for (j, slope) in slopes[..n_theta].iter().enumerate() {
+                layout.add_tap(slope, t, n + place, 1 + j);
+            }
+            if let (Some(input), _) = layout.taps[place] {
+                for (s, _) in wanted.shift.iter().enumerate().filter(|&(_, &each)| each == input) {
+                    let column = 1 + n_theta + wanted.initial.len() + s;
+                    layout.add_tap(discrete, t, n_sources - 1, column);
+                }
+            }
+        }
+        for (j, slope) in slopes[..n_theta].iter().enumerate() {
+            let rates = slope.transition.chunks_exact(n.max(1));
+            let outputs = continuous.slopes[j].c.chunks_exact(n.max(1));
+            for (row, weights) in rates.chain(outputs).enumerate() {
+                for (source, &weight) in weights.iter().enumerate() {
+                    layout.add(row, source, 1 + j, weight);
+                }
+            }
+        }
+        layout.keep_what_acts();
+        layout
+    }
+
+    /// Most weights of a model are zero: the recursion passes over the others alone.
+    fn keep_what_acts(&mut self) {
+        let (n, rows) = (self.n, self.n + self.p);
+        let line = |row: usize| &self.matrix[row * n..(row + 1) * n];
+        let entries = |row: usize| line(row).iter().copied().enumerate();
+        self.seen =
+            (n..rows).map(|row| entries(row).filter(|&(_, each)| each != 0.0).collect()).collect();
+        let first = self.forcing.chunks_exact(self.n_sources).take(rows);
+        let plain = first.enumerate().map(|(row, weights)| {
+            let states = entries(row).filter(|_| row >= n).map(|(at, each)| (at, [each]));
+            let sources = weights.iter().enumerate().map(|(at, each)| (at, [each[0]]));
+            Acting::of(states.chain(sources))
+        });
+        self.plain = plain.collect();
+        // The state has had its own pass.
+        self.forcing.iter_mut().take(rows * self.n_sources).for_each(|weights| weights[0] = 0.0);
+        let each = self.forcing.chunks_exact(self.n_sources).take(self.n_chunks * rows);
+        self.acting = each.map(|weights| Acting::of(weights.iter().copied().enumerate())).collect();
+    }
+
+    fn add_tap(&mut self, discrete: &Sampled, tap: usize, source: usize, column: usize) {
+        let each = &discrete.taps[tap];
+        for (row, &weight) in each.state.iter().chain(&each.output).enumerate() {
+            self.add(row, source, column, weight);
+        }
+    }
+
+    fn add(&mut self, row: usize, source: usize, column: usize, weight: f64) {
+        let (chunk, lane) = (column / LANES, column % LANES);
+        let rows = self.n + self.p;
+        self.forcing[(chunk * rows + row) * self.n_sources + source][lane] += weight;
+    }
+
+    /// Length of all rows of one sample.
+    pub fn row_length(&self) -> usize {
+        self.p * self.stride
+    }
+
+    /// Measured input and samples ahead of each tap; None for a constant 1.
+    pub fn taps(&self) -> &[(Option<usize>, isize)] {
+        &self.taps
+    }
+
+    /// Room with S at the first sample.
+    pub fn room(&self, initial: &[f64], wanted: &Wanted<'_>) -> Room {
+        let mut slopes = vec![[0.0; LANES]; self.n_chunks * self.n];
+        for (offset, &l) in wanted.initial.iter().enumerate() {
+            let column = 1 + self.n_theta + offset;
+            slopes[column / LANES * self.n + l][column % LANES] = 1.0;
+        }
+        Room {
+            n_states: self.n,
+            sources: vec![[[1.0]; BLOCK]; self.n_sources],
+            output: [[0.0]; BLOCK],
+            state: initial.iter().map(|&value| [value]).collect(),
+            moved: vec![[[0.0; LANES]; BLOCK]; slopes.len()],
+            slopes,
+            moved_output: [[0.0; LANES]; BLOCK],
+        }
+    }
+
+    /// Carry state and derivatives through a block and write its rows, as many as there is room for.
+    pub fn advance(&self, room: &mut Room, rows: &mut [f64]) {
+        widest(
+            #[inline(always)]
+            || {
+                self.advance_state(room);
+                for chunk in 0..self.n_chunks {
+                    self.drive(chunk, room);
+                }
+                let transition = &self.matrix[..self.n * self.n];
+                carry(transition, &mut room.slopes, &mut room.moved);
+                for chunk in 0..self.n_chunks {
+                    self.write_slopes(chunk, room, rows);
+                }
+                self.write_outputs(room, rows);
+            },
+        );
+    }
+
+    /// The state itself, into the sources.
+    #[inline(always)]
+    fn advance_state(&self, room: &mut Room) {
+        let (states, others) = room.sources.split_at_mut(self.n);
+        for (line, acting) in states.iter_mut().zip(&self.plain) {
+            *line = [[0.0]; BLOCK];
+            acting.drive(line, others, self.n);
+        }
+        carry(&self.matrix[..self.n * self.n], &mut room.state, states);
+    }
+
+    /// What drives the derivatives of the states.
+    #[inline(always)]
+    fn drive(&self, chunk: usize, room: &mut Room) {
+        let acting = &self.acting[chunk * (self.n + self.p)..];
+        let lines = &mut room.moved[chunk * self.n..(chunk + 1) * self.n];
+        for (line, acting) in lines.iter_mut().zip(acting) {
+            *line = [[0.0; LANES]; BLOCK];
+            acting.drive(line, &room.sources, 0);
+        }
+    }
+
+    /// Outputs' derivatives from those of the state.
+    #[inline(always)]
+    fn write_slopes(&self, chunk: usize, room: &mut Room, rows: &mut [f64]) {
+        let Room { sources, moved, moved_output, .. } = room;
+        let lines = &moved[chunk * self.n..(chunk + 1) * self.n];
+        let acting = &self.acting[chunk * (self.n + self.p) + self.n..];
+        for (o, (seen, acting)) in self.seen.iter().zip(acting).enumerate() {
+            let at = o * self.stride + chunk * LANES;
+            let place = |line: &Columns, factor: f64, rows: &mut [f64]| {
+                let places = rows.chunks_exact_mut(self.row_length());
+                for (row, values) in places.zip(line) {
+                    if let Some(into) = row[at..].first_chunk_mut::<LANES>() {
+                        *into = values.map(|value| factor * value);
+                    }
+                }
+            };
+            match seen[..] {
+                [(column, factor)] if acting.is_empty() => place(&lines[column], factor, rows),
+                _ => {
+                    *moved_output = [[0.0; LANES]; BLOCK];
+                    acting.drive(moved_output, sources, 0);
+                    for &(column, factor) in seen {
+                        for (into, values) in moved_output.iter_mut().zip(&lines[column]) {
+                            into.iter_mut()
+                                .zip(values)
+                                .for_each(|(sum, value)| *sum += factor * value);
+                        }
+                    }
+                    place(moved_output, 1.0, rows);
+                }
+            }
+        }
+    }
+
+    /// The outputs themselves, into the first column.
+    #[inline(always)]
+    fn write_outputs(&self, room: &mut Room, rows: &mut [f64]) {
+        for (o, acting) in self.plain[self.n..].iter().enumerate() {
+            room.output = [[0.0]; BLOCK];
+            acting.drive(&mut room.output, &room.sources, 0);
+            let places = rows.chunks_exact_mut(self.row_length());
+            for (row, value) in places.zip(room.output.as_flattened()) {
+                let row = &mut row[o * self.stride..(o + 1) * self.stride];
+                if self.n_chunks == 0 {
+                    row.fill(0.0);
+                }
+                row[0] = *value;
+            }
+        }
+    }
+}

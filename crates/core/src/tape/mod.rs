@@ -1,0 +1,6 @@
+//! Formulas flattened to tapes of operations, their derivatives, and tapes ready to run.
+
+pub(crate) mod assembly;
+pub(crate) mod derivative_tape;
+pub mod expression_tape;
+pub(crate) mod tape_program;

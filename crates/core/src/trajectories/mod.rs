@@ -1,0 +1,12 @@
+//! Differential equations integrated in time, sensitivities, shooting, loops.
+
+pub(crate) mod boundary_system;
+pub mod equation_step;
+pub mod held_input;
+pub mod kinematics;
+pub mod loop_simulation;
+pub mod runge_kutta;
+pub mod sensitivity;
+pub mod sensitivity_pattern;
+pub mod shooting;
+pub mod trajectory;

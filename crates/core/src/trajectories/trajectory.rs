@@ -1,0 +1,50 @@
+//! A run along a trajectory that is known, as its derivatives are taken.
+
+use std::ops::Range;
+
+use crate::state_space::ode_model::Motion;
+use crate::trajectories::runge_kutta::Setting;
+
+/// One run to be differentiated.
+#[derive(Debug, Clone)]
+pub struct Walk<'a> {
+    /// The model.
+    pub motion: &'a Motion,
+    /// Parameters and record.
+    pub setting: &'a Setting,
+    /// Its samples.
+    pub range: Range<usize>,
+    /// Its states, from `Setting::run`.
+    pub states: &'a [f64],
+    /// What was added to the inputs.
+    pub shift: &'a [f64],
+}
+
+impl Walk<'_> {
+    /// State at the beginning of a step of the record.
+    pub(crate) fn state(&self, step: usize) -> &[f64] {
+        let n = self.motion.n_states;
+        let place = (step - self.range.start * self.setting.substeps) * n;
+        // Lanes beyond the last step repeat the last state; nothing is taken from them.
+        let place = place.min(self.states.len().saturating_sub(n));
+        &self.states[place..place + n]
+    }
+}
+
+/// Where the derivative of an input by its delay is taken.
+#[derive(Clone, Copy)]
+pub(crate) enum Rate {
+    Step(usize, usize),
+    Sample(usize),
+}
+
+impl Rate {
+    /// That derivative.
+    pub(crate) fn of(self, walk: &Walk<'_>, input: usize) -> f64 {
+        let held = &walk.setting.held[input];
+        match self {
+            Self::Step(step, place) => held.steps[step].at(place).1,
+            Self::Sample(sample) => held.samples[sample].1,
+        }
+    }
+}
