@@ -1,6 +1,6 @@
 """Frequency sweeps: the exponential one of Tischler & Remple, and ArduPilot's chirp as flown.
 
-ArduPilot's waveform is computed by `crates/core/src/chirp.rs`.
+ArduPilot's waveform is computed by `ardupilot_chirp.rs`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The equations of a state-space model as C functions (native: `tape_listing.rs`)."""
+"""The equations of a state-space model as C functions (native: `equation_listing.rs`)."""
 
 from __future__ import annotations
 

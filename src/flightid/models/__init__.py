@@ -1,6 +1,6 @@
 """Models: a structure as data, with named parameters (native: `expression.rs`, `transfer.rs`).
 
-State space: `model_tape.rs`, `state_space_fit.rs`.
+State space: `model_tape.rs`, `state_space_response.rs`.
 """
 
 from flightid.models.description import Model, SavedModel

@@ -1,4 +1,4 @@
-"""Formulas in model files: their grammar's names (native: `expression.rs`, `tape.rs`)."""
+"""Formulas in model files: names of their grammar (native: `expression.rs`, `expression_tape.rs`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""State-space models as equations with units (native: `model_tape.rs`, `state_space_fit.rs`).
+"""State-space models as equations with units (native: `model_tape.rs`, `state_space_response.rs`).
 
 M ẋ = F x + G u(t − τ), y = H₁ ẋ + H₀ x + D u(t − τ). The equations may have factors on the left
 and need not be linear: the matrices are then those of the linearisation at the trim point.
