@@ -1,4 +1,4 @@
-"""Formulas in model files: names of their grammar (native: `expression.rs`, `expression_tape.rs`)."""
+"""Formulas in model files: their names (native: `expression.rs`, `expression_tape.rs`)."""
 
 from __future__ import annotations
 
