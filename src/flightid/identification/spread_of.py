@@ -101,6 +101,7 @@ def _of_polynomial(model: PolynomialModel) -> Spread[PolynomialModel]:
             covariance=model.covariance,
             units=model.units,
             name=model.name,
+            operating_point=model.operating_point,
         )
 
     reason = "" if model.covariance is not None else NO_COVARIANCE

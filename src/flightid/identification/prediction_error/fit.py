@@ -232,6 +232,7 @@ def _assemble(
         covariance=found.covariance,
         units=data.units,
         name=f"{structure.kind} model of {structure.output}",
+        operating_point=data.operating_point,
     )
     minima = tuple(
         replace(m, objective=squares) if m.objective == 0.0 and found.iterations == 0 else m

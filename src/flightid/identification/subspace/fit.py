@@ -83,6 +83,7 @@ def _assemble(
         *_scaled(found.matrices, size),
         noise_covariance=joint @ joint.T * (len(size) / found.degrees),
         units=data.channels.units,
+        operating_point=data.channels.operating_point,
         name=f"innovations model of {', '.join(structure.outputs)}",
     )
     covariance = _in_units(structure, found, size)

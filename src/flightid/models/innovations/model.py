@@ -45,6 +45,9 @@ class InnovationsModel:
     units : mapping of str to str
         By channel; a channel left out is dimensionless.
     name : str
+    operating_point : mapping of str to float
+        Value of each channel about which the model holds, in its unit: where the training records
+        were. A channel left out counts from zero.
 
     Raises
     ------
@@ -71,6 +74,7 @@ class InnovationsModel:
     noise_covariance: Array | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     name: str = "innovations model"
+    operating_point: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", tuple(self.outputs))
@@ -279,6 +283,7 @@ class InnovationsModel:
             **{x: m.tolist() for x, m in zip("abcdk", self.matrices, strict=True)},
             "noise_covariance": None if r is None else np.asarray(r).tolist(),
             "units": dict(self.units),
+            "operating_point": dict(self.operating_point),
         }
 
     @classmethod

@@ -13,6 +13,18 @@ MAXIMUM_ENTRIES = 1_000
 PARAMETER_KEYS = {"value", "unit", "min", "max", "fixed", "tie", "note", "status"}
 
 
+def read_operating_point(content: Mapping[str, object]) -> dict[str, float]:
+    """Value of each channel about which a sampled model holds; empty where nothing is said.
+
+    Raises
+    ------
+    ModelError
+        It is no table of numbers.
+    """
+    table = read_table(content, "operating_point", required=False)
+    return {name: read_number(value, f"operating_point.{name}") for name, value in table.items()}
+
+
 def require_keys(item: Mapping[str, object], known: set[str], subject: str) -> None:
     """Refuse a table with keys that nobody reads.
 

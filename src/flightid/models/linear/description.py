@@ -14,6 +14,7 @@ from flightid.models.innovations.model import InnovationsModel
 from flightid.models.language.reading import (
     MAXIMUM_ENTRIES,
     read_number,
+    read_operating_point,
     read_table,
     read_text,
     read_texts,
@@ -25,7 +26,7 @@ SCHEMA = "flightid.linear_system/1"
 _KEYS = {"schema", "kind", "inputs", "outputs", "states", "sample_time_s", "delays_s", "units"}
 _KEYS |= {"a", "b", "c", "d"}
 _INNOVATIONS_KEYS = {"schema", "kind", "name", "outputs", "inputs", "sample_time_s", "units"}
-_INNOVATIONS_KEYS |= {"a", "b", "c", "d", "k", "noise_covariance"}
+_INNOVATIONS_KEYS |= {"a", "b", "c", "d", "k", "noise_covariance", "operating_point"}
 
 
 def system_to_table(system: LinearSystem) -> dict[str, object]:
@@ -119,6 +120,7 @@ def innovations_from_table(content: Mapping[str, object]) -> InnovationsModel:
         **made,
         units=read_texts(read_table(content, "units", required=False), "units"),
         name=read_text(content.get("name", "innovations model"), "name"),
+        operating_point=read_operating_point(content),
     )
 
 

@@ -52,6 +52,14 @@ class PolynomialData:
         ends = np.cumsum([0, *self.lengths])
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
+    @property
+    def operating_point(self) -> dict[str, float]:
+        """What was taken off each channel, averaged over all samples."""
+        weights = np.array(self.lengths) / sum(self.lengths)
+        return {
+            name: float(weights @ [record[name] for record in self.offsets]) for name in self.units
+        }
+
     def require_change(self) -> None:
         """Refuse channels that are constant over all records.
 

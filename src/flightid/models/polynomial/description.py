@@ -11,6 +11,7 @@ from flightid.errors import ModelError
 from flightid.models.language.reading import (
     MAXIMUM_ENTRIES,
     read_number,
+    read_operating_point,
     read_table,
     read_text,
     read_texts,
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 
 SCHEMA = "flightid.polynomial_model/1"
 _KEYS = {"schema", "kind", "name", "output", "inputs", "sample_time_s", "a", "c", "d", "units"}
-_KEYS |= {"noise_variance", "covariance"}
+_KEYS |= {"noise_variance", "covariance", "operating_point"}
 _INPUT_KEYS = {"b", "f", "nk"}
 
 
@@ -46,6 +47,7 @@ def model_to_table(model: PolynomialModel) -> dict[str, object]:
             for i, name in enumerate(model.inputs)
         },
         "units": dict(model.units),
+        "operating_point": {name: float(value) for name, value in model.operating_point.items()},
     }
     if model.noise_variance is not None:
         table["noise_variance"] = float(model.noise_variance)
@@ -80,6 +82,7 @@ def model_from_table(content: Mapping[str, object]) -> dict[str, Any]:
         "nk": tuple(_delay(item.get("nk", 1), name) for name, item in inputs.items()),
         "units": read_texts(read_table(content, "units", required=False), "units"),
         "name": read_text(content.get("name", "polynomial model"), "name"),
+        "operating_point": read_operating_point(content),
     }
     for letter in "acd":
         made[letter] = _numbers(content.get(letter, [1.0]), letter)

@@ -49,6 +49,9 @@ class PolynomialModel(StructureMakers):
     units : mapping of str to str
         By channel; a channel left out is dimensionless.
     name : str
+    operating_point : mapping of str to float
+        Value of each channel about which the model holds, in its unit: where the training records
+        were. A channel left out counts from zero.
 
     Raises
     ------
@@ -78,6 +81,7 @@ class PolynomialModel(StructureMakers):
     covariance: Array | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     name: str = "polynomial model"
+    operating_point: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         inputs = tuple(self.inputs)
@@ -117,6 +121,7 @@ class PolynomialModel(StructureMakers):
         covariance: Array | None = None,
         units: Mapping[str, str] | None = None,
         name: str = "polynomial model",
+        operating_point: Mapping[str, float] | None = None,
     ) -> Self:
         """Model from the coefficients of a structure, in the order of its `names`."""
         values = np.asarray(theta, dtype=np.float64)
@@ -138,6 +143,7 @@ class PolynomialModel(StructureMakers):
             covariance,
             units or {},
             name,
+            operating_point or {},
         )
 
     @property
