@@ -8,7 +8,9 @@ STAMP  := $(VENV)/.installed
 JOBS   ?= auto
 FUZZ_RUNS ?= 1000000
 
-.PHONY: demo test test-slow fuzz bench lint hooks format stubs develop wheel constraints clean help
+PYTEST = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+
+.PHONY: demo test test-slow test-nightly fuzz bench lint hooks format stubs develop wheel constraints clean help
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/ —/'
@@ -52,10 +54,13 @@ stubs: develop  ## regenerate src/flightid/_native.pyi
 
 test: wheel lint  ## everything that must pass before a merge
 	cargo test --workspace --quiet
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --doctest-modules tests --pyargs flightid
+	$(PYTEST) --doctest-modules tests --pyargs flightid
+
+test-nightly: wheel  ## every example whole and longer draws, minutes; then what test-slow does
+	$(PYTEST) -m "nightly or slow"
 
 test-slow: wheel  ## Monte Carlo calibration of every printed interval, and the full studies
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) -m slow
+	$(PYTEST) -m slow
 
 bench: wheel  ## speed against peers, same data, one run
 	$(BIN)/python -m benchmarks

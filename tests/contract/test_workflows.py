@@ -85,9 +85,10 @@ def test_the_matrix_has_every_system_and_python_that_we_promise() -> None:
 
 
 def test_windows_runs_the_steps_of_make_test() -> None:
-    lines = (ROOT / "Makefile").read_text(encoding="utf-8").splitlines()
-    pytest_line = next(line for line in lines if "pytest -n $(JOBS) --doctest-modules" in line)
-    wanted = pytest_line.split("$(BIN)/")[1].replace("$(JOBS)", "auto")
+    text = (ROOT / "Makefile").read_text(encoding="utf-8")
+    pytest_line = next(line for line in text.splitlines() if "$(PYTEST) --doctest" in line)
+    (meaning,) = re.findall(r"^PYTEST = .*\$\(BIN\)/(.*)$", text, re.MULTILINE)
+    wanted = pytest_line.strip().replace("$(PYTEST)", meaning).replace("$(JOBS)", "auto")
     assert wanted in _commands(dict(JOBS)["test.windows"])
 
 

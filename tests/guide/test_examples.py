@@ -1,4 +1,8 @@
-"""Every example runs as its text says, in an empty folder, and says what it promises."""
+"""Every example runs as its text says, in an empty folder, and says what it promises.
+
+Those that take more than a few seconds are `nightly`; `test_example_scripts.py` loads their scripts
+and checks what they call in every run.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +31,9 @@ def _script(path: Path, *arguments: str, folder: Path) -> subprocess.CompletedPr
     return _run(sys.executable, str(path), *arguments, folder=folder)
 
 
-@pytest.mark.parametrize("name", ["study.toml", "advised.toml"])
+@pytest.mark.parametrize(
+    "name", ["study.toml", pytest.param("advised.toml", marks=pytest.mark.nightly)]
+)
 def test_the_rig_studies_find_the_truth(name: str, tmp_path: Path) -> None:
     study = EXAMPLES / "quadrotor_rig" / name
     run = _run(FLIGHTID, "--quiet", "run", str(study), "--output", "out", folder=tmp_path)
@@ -58,6 +64,7 @@ def test_the_instrument_is_less_biased_than_the_direct_estimate(tmp_path: Path) 
     assert sum(instrument) < 0.4 * sum(direct)
 
 
+@pytest.mark.nightly
 def test_the_unstable_helicopter_is_found_and_beats_its_rival(tmp_path: Path) -> None:
     run = _script(EXAMPLES / "ah64" / "identify.py", "--short", folder=tmp_path)
     assert run.returncode == 0, run.stderr[-3000:]
@@ -107,6 +114,7 @@ def test_the_dryer_script_checks_a_record_of_the_same_format(tmp_path: Path) -> 
     assert _script(EXAMPLES / "dryer" / "analyse.py", folder=tmp_path).returncode == 1
 
 
+@pytest.mark.nightly
 def test_the_r50_is_found_from_its_flights(tmp_path: Path) -> None:
     run = _script(EXAMPLES / "r50" / "study.py", "short", "0", "out", folder=tmp_path)
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
@@ -120,6 +128,7 @@ def test_the_r50_is_found_from_its_flights(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
 
 
+@pytest.mark.nightly
 def test_tuned_gains_fly_with_the_margins_that_were_promised(tmp_path: Path) -> None:
     script = EXAMPLES / "quadrotor_tuning" / "chain.py"
     run = _script(script, "short", "4", "out", folder=tmp_path)
@@ -132,6 +141,7 @@ def test_tuned_gains_fly_with_the_margins_that_were_promised(tmp_path: Path) -> 
     assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
 
 
+@pytest.mark.nightly
 def test_the_r50_is_augmented_with_margins(tmp_path: Path) -> None:
     run = _script(EXAMPLES / "r50" / "augmentation.py", folder=tmp_path)
     assert run.returncode == 0, run.stderr[-3000:]
@@ -149,6 +159,7 @@ def test_the_r50_is_augmented_with_margins(tmp_path: Path) -> None:
         assert on > 4.0 * off, response
 
 
+@pytest.mark.nightly
 def test_qualities_of_the_r50_are_read_alike_from_model_and_measurement(tmp_path: Path) -> None:
     run = _script(EXAMPLES / "r50" / "qualities.py", "hover", "0", "out", folder=tmp_path)
     # A red level is a verdict on the vehicle, no failure.
@@ -164,6 +175,7 @@ def test_qualities_of_the_r50_are_read_alike_from_model_and_measurement(tmp_path
     assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
 
 
+@pytest.mark.nightly
 def test_qualities_of_the_unstable_helicopter_are_those_of_the_flown_one(tmp_path: Path) -> None:
     run = _script(EXAMPLES / "ah64" / "qualities.py", folder=tmp_path)
     assert run.returncode == 0, run.stderr[-3000:]
@@ -176,6 +188,7 @@ def test_qualities_of_the_unstable_helicopter_are_those_of_the_flown_one(tmp_pat
     assert run.stdout.count("longitudinal phugoid-like: worse than level 1") == 2
 
 
+@pytest.mark.nightly
 def test_the_rig_grey_boxes_are_found_with_what_the_study_left_out(tmp_path: Path) -> None:
     study = EXAMPLES / "quadrotor_grey_box" / "study.py"
     run = _script(study, "short", "0", "out", folder=tmp_path)
@@ -195,6 +208,7 @@ def test_the_rig_grey_boxes_are_found_with_what_the_study_left_out(tmp_path: Pat
     assert (tmp_path / "out" / "rig.BIN").read_bytes()[:2] == b"\xa3\x95"
 
 
+@pytest.mark.nightly
 def test_gains_of_the_rig_are_held_with_all_loops_closed(tmp_path: Path) -> None:
     script = EXAMPLES / "quadrotor_grey_box" / "gains.py"
     run = _script(script, "short", "0", "out", folder=tmp_path)
@@ -215,6 +229,7 @@ def test_gains_of_the_rig_are_held_with_all_loops_closed(tmp_path: Path) -> None
     assert len(re.findall(r"21 of 21 fresh plants meet every requirement", said)) == 3
 
 
+@pytest.mark.nightly
 def test_tuned_gains_fly_as_promised(tmp_path: Path) -> None:
     script = EXAMPLES / "quadrotor_tuning" / "chain.py"
     run = _script(script, "short", "7", "out", folder=tmp_path)
@@ -257,6 +272,7 @@ def test_the_linear_twin_rotor_study_finds_the_published_modes(tmp_path: Path) -
     assert run.stdout.count("negative real pole has no real continuous counterpart") >= 3
 
 
+@pytest.mark.nightly
 def test_noise_trains_a_narx_model_of_the_rig_better_than_two_levels(tmp_path: Path) -> None:
     folder = EXAMPLES / "twin_rotor_rbf"
     assert _script(folder / "fly.py", "records", folder=tmp_path).returncode == 0
