@@ -14,7 +14,7 @@ from scipy.stats import binom
 import flightid as fid
 from flightid import excitation as ex
 from flightid.errors import DataError, ModelError, OptionError, ShapeError
-from flightid.identification import bias_rounds
+from flightid.identification.frequency_domain import bias_rounds
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.responses.arithmetic import add_delay
 from flightid.responses.store import read_response, write_response

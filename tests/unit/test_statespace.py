@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import flightid as fid
 from flightid.errors import DataError, FitError, ModelError, SingularError, UnknownNameError
-from flightid.models import symbolic
+from flightid.models.language import symbolic
 from flightid.models.state_space.model import StateSpaceModel
 from tests.closeness import assert_close
 
