@@ -189,7 +189,7 @@ def _native(record: fid.Record, starts: int) -> Callable[[], Array]:
     from flightid.identification.records.options import RecordOptions  # noqa: PLC0415
     from flightid.identification.records.setup import prepare_records  # noqa: PLC0415
 
-    options = RecordOptions(starts=starts, initial_state="trim", free_bias=False)
+    options = RecordOptions(starts=starts, initial_state="trim", output_bias=False)
     prepared = prepare_records(two_rates(), record, options)
     return lambda: search_records(prepared, options)[0].x
 
@@ -210,7 +210,7 @@ def run() -> Table:
             [
                 p.value
                 for p in fid.identify(
-                    verb, record, initial_state="trim", free_bias=False
+                    verb, record, initial_state="trim", output_bias=False
                 ).parameters.values()
             ]
         ),

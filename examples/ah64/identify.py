@@ -97,7 +97,7 @@ def study(seed: int, *, short: bool = False) -> Results:
         [fit, linearised_full_envelope().with_responses(*coherent.names)],
         fly_manoeuvres(seed),
         names=["identified", "full-envelope"],
-        initial="fit",
+        initial_state="estimate",
         outputs=OUTPUTS,
         response=response,
     )

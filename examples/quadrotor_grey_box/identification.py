@@ -100,4 +100,4 @@ def mse(fit: fid.Fit, place: int, rate: str) -> float:
 
 def predict(fit: fid.Fit, records: Sequence[fid.Record]) -> fid.Verification:
     """Predict records that the fit has not seen, from their inputs alone."""
-    return fid.verify(fit, list(records), free_reference=False, hold=HOLD)
+    return fid.verify(fit, list(records), output_bias=False, hold=HOLD)

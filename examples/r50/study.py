@@ -38,7 +38,7 @@ def section(condition: str, found: identification.Identified, *, full: bool, see
     records = [
         flight.segment(0.0, 6.0) for flight in flights.plan(condition, full=full).doublets(seed)
     ]
-    verification = fid.verify(found.fit, records, initial="fit")
+    verification = fid.verify(found.fit, records, initial_state="estimate")
     shown = [name for name in SHOWN if name in found.fit.costs]
     return Section(
         condition.capitalize(),

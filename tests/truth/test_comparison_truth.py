@@ -54,10 +54,10 @@ def test_an_unstable_model_runs_freely_through_a_record_of_any_length(
     result = fid.verify(
         _unstable(),
         _held(duration_s),
-        initial="fit",
+        initial_state="estimate",
         hold="zero",
-        free_bias=shifts,
-        free_reference=shifts,
+        state_bias=shifts,
+        output_bias=shifts,
     )
     for error in result.rms_error.values():
         assert_close(error, 0.0, atol=1e-12, why="the model is the truth")
@@ -70,7 +70,9 @@ def test_an_unstable_model_runs_freely_through_a_record_of_any_length(
 
 
 def test_noise_is_all_that_is_left_on_a_long_unstable_record() -> None:
-    result = fid.verify(_unstable(), _held(300.0, noise=0.01), initial="fit", hold="zero")
+    result = fid.verify(
+        _unstable(), _held(300.0, noise=0.01), initial_state="estimate", hold="zero"
+    )
     for error in result.rms_error.values():
         assert_close(error, 0.01, rtol=0.03, why="15 000 samples of noise")
 
@@ -85,10 +87,10 @@ def test_backward_runs_keep_delays_and_holds(hold: str) -> None:
     result = fid.verify(
         model,
         seen,
-        initial="fit",
+        initial_state="estimate",
         hold=hold,  # type: ignore[arg-type]
-        free_bias=False,
-        free_reference=False,
+        state_bias=False,
+        output_bias=False,
     )
     assert result.predictions[0].shifts.e_folds > 5.0
     for name, error in result.rms_error.items():
@@ -101,7 +103,7 @@ def test_a_model_of_growing_modes_alone() -> None:
     # Of all solutions the one that does not grow: (0.9 + s)^-1 of the input seen backward.
     bounded = -(0.9 * np.sin(time_s) + np.cos(time_s)) / (0.9**2 + 1)
     seen = fid.Record.from_arrays(time_s, inputs={"u": np.sin(time_s)}, outputs={"y": bounded})
-    result = fid.verify(model, seen, initial="fit", free_bias=False, free_reference=False)
+    result = fid.verify(model, seen, initial_state="estimate", state_bias=False, output_bias=False)
     assert_close(result.rms_error["y"], 0.0, atol=2e-5, why="straight lines of a sine")
 
 

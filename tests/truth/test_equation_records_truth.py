@@ -70,7 +70,7 @@ def test_quadratic_aircraft_is_recovered_from_records_that_start_elsewhere():
     model = longitudinal()
     starts = ({"alpha": 0.05}, {"alpha": -0.02, "q": 0.1})
     records = [flown(model, stepped(), 1e-9, k, initial_state=s) for k, s in enumerate(starts)]
-    fit = fid.identify(moved(model, 1.3), records, free_bias=False)
+    fit = fid.identify(moved(model, 1.3), records, output_bias=False)
     assert largest_error(fit, model) < 1e-6
     for record, start in zip(fit.records, starts, strict=True):
         for state in model.states:
@@ -96,7 +96,7 @@ def test_quadrotor_of_six_degrees_of_freedom_is_recovered():
     units = {name: model.units[name] for name in wave}
     record = fid.Record.from_arrays(t, inputs=inputs, units=units)
     fit = fid.identify(
-        moved(model, 1.1), flown(model, record, 1e-9, 0), initial_state="trim", free_bias=False
+        moved(model, 1.1), flown(model, record, 1e-9, 0), initial_state="trim", output_bias=False
     )
     assert len(fit.names) == 12
     assert largest_error(fit, model) < 1e-6
@@ -120,7 +120,7 @@ def test_unstable_short_period_is_recovered_from_a_long_record():
     model, record = unstable_flight(1, noise=1e-7, seconds=120.0)
     growth = 120.0 * model.eigenvalues().real.max()
     assert growth > 50  # a free run forward would amplify rounding by more than e^50
-    fit = fid.identify(moved(model, 1.15), record, free_bias=False)
+    fit = fid.identify(moved(model, 1.15), record, output_bias=False)
     # The exact discretisation made the record; steps of Runge and Kutta leave their own error.
     assert largest_error(fit, model) < 1e-5
     assert [f for f in fit.findings if f.code == "unstable-model"]
@@ -133,7 +133,7 @@ def covered(make, n_flights):
     hits = []
     for seed in range(n_flights):
         model, record = make(seed)
-        fit = fid.identify(moved(model, 1.05), record, free_bias=False)
+        fit = fid.identify(moved(model, 1.05), record, output_bias=False)
         for parameter in model.parameters.free:
             low, high = fit.parameters[parameter.name].interval95
             hits.append(low <= parameter.value <= high)

@@ -66,7 +66,7 @@ def test_sensitivities_match_central_differences(hold: str, tau: float) -> None:
     model = _library("short_period").with_fixed(Malphadot=-0.9).with_values({"tau": tau or 0.001})
     if not tau:
         model = model.with_fixed(tau=0.0)
-    options = RecordOptions(hold=hold, free_reference=True)
+    options = RecordOptions(hold=hold, input_bias=True)
     prepared = prepare_records(model, _flown(model, 200, 0.05), options)
     own = prepared.own[0].filled(np.array([0.01, -0.02, 0.003, 0.1, 0.2, 0.3]))
     free = model.parameters.free_indices

@@ -19,7 +19,7 @@ CASES = {
     "oe": (OUTPUT_ERROR, P.oe("y", "u", nb=2, nf=2)),
     "bj": (BOX, P.bj("y", "u", nb=2, nc=1, nd=1, nf=2)),
     "iv4": (BOX, P.arx("y", "u", na=2, nb=2, method="iv4")),
-    "armax backcast": (ARMAX, P.armax("y", "u", na=2, nb=2, nc=2, initial="backcast")),
+    "armax backcast": (ARMAX, P.armax("y", "u", na=2, nb=2, nc=2, backcast=True)),
 }
 
 
@@ -32,7 +32,7 @@ def coverage(case: str, runs: int, n: int = 600) -> dict[str, float]:
     theta = np.array([-1.5, 0.7, 1.0, 0.5]) if plant else truth.theta
     inside: dict[str, list[bool]] = {"coefficients": [], "frequency": [], "damping": [], "gain": []}
     for seed in range(runs):
-        warm_up = 0 if structure.initial == "backcast" else 300
+        warm_up = 0 if structure.backcast else 300
         record = flown(truth, seed, n=n, noise=0.5, warm_up=warm_up)
         fit = fid.identify(structure, record)
         for parameter, wanted in zip(fit.parameters.values(), theta, strict=True):

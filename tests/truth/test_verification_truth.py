@@ -25,7 +25,7 @@ def test_the_truth_predicts_itself_with_every_shift_recovered() -> None:
     seen = _flown(LAG, initial_state=[0.7])
     answer = (0.4 / 2.0) * (1 - np.exp(-2.0 * TIME_S))
     record = seen.replace({"p": seen["p"] + answer + 0.25})
-    result = fid.verify(LAG, record, initial="fit")
+    result = fid.verify(LAG, record, initial_state="estimate")
     shifts = result.predictions[0].shifts
     assert_close(result.rms_error["p"], 0.0, atol=1e-12, why="the model is the truth")
     # A bias b, an initial state and a reference shift act through two shapes only: a constant and
@@ -52,7 +52,7 @@ def test_bias_and_reference_alone_are_unique() -> None:
 def test_without_free_shifts_the_offset_is_an_error() -> None:
     seen = _flown(LAG)
     record = seen.replace({"p": seen["p"] + 0.25})
-    result = fid.verify(LAG, record, free_bias=False, free_reference=False)
+    result = fid.verify(LAG, record, state_bias=False, output_bias=False)
     assert_close(result.rms_error["p"], 0.25, rtol=1e-9, why="a constant error")
     assert_close(result.mse["p"], 0.0625, rtol=1e-9, why="its square")
     assert_close(result.vaf["p"], 100.0, rtol=1e-9, why="blind to a constant")
@@ -69,7 +69,7 @@ def test_declared_trim_is_taken_off_inputs_and_outputs() -> None:
         units={"p": "rad/s"},
         trim={"u": 10.0, "p": 4.0},
     )
-    result = fid.verify(LAG, record, free_bias=False, free_reference=False)
+    result = fid.verify(LAG, record, state_bias=False, output_bias=False)
     assert_close(result.rms_error["p"], 0.0, atol=1e-12, why="trim is declared")
     assert_close(result.predicted["p"], record["p"], atol=1e-11, why="in the record's own values")
 
@@ -90,8 +90,10 @@ def test_an_unstable_model_needs_its_initial_state() -> None:
     )
     noise = np.random.default_rng(1).standard_normal((2, TIME_S.size)) * 1e-3
     seen = truth.replace({"q": truth["q"] + noise[0], "theta": truth["theta"] + noise[1]})
-    at_trim = fid.verify(growing, seen, free_bias=False, free_reference=False)
-    fitted = fid.verify(growing, seen, initial="fit", free_bias=False, free_reference=False)
+    at_trim = fid.verify(growing, seen, state_bias=False, output_bias=False)
+    fitted = fid.verify(
+        growing, seen, initial_state="estimate", state_bias=False, output_bias=False
+    )
     assert at_trim.rms_error["q"] > 1.0
     assert_close(fitted.rms_error["q"], 1e-3, rtol=0.15, why="only the noise is left")
     assert_close(
@@ -107,8 +109,8 @@ def test_several_records_are_shifted_apart_and_judged_together() -> None:
     seen = _flown(LAG)
     records = [seen.replace({"p": seen["p"] + shift}, name=f"r{shift}") for shift in (1.0, -2.0)]
     slow = LinearSystem([[-1.0]], [[1.5]], [[1.0]], [[0.0]], ("u",), ("p",))
-    result = fid.verify(slow, records, free_bias=False)
-    one = fid.verify(slow, records[:1], free_bias=False)
+    result = fid.verify(slow, records, state_bias=False)
+    one = fid.verify(slow, records[:1], state_bias=False)
     shifts = [each.shifts.reference[0] for each in result.predictions]
     assert_close(shifts[0] - shifts[1], 3.0, rtol=1e-9, why="each record has its own")
     assert_close(result.theil["p"], one.theil["p"], rtol=1e-9, why="the same record twice")
@@ -118,7 +120,7 @@ def test_several_records_are_shifted_apart_and_judged_together() -> None:
 def test_hold_is_a_choice_that_shows() -> None:
     record = fid.Record.from_arrays(TIME_S, inputs={"u": np.sin(20 * TIME_S)})
     stepped = fid.simulate(LAG, record, hold="zero", units={"p": "rad/s"})
-    options = {"free_bias": False, "free_reference": False}
+    options = {"state_bias": False, "output_bias": False}
     right = fid.verify(LAG, stepped, hold="zero", **options)  # type: ignore[arg-type]
     wrong = fid.verify(LAG, stepped, **options)  # type: ignore[arg-type]
     assert_close(right.rms_error["p"], 0.0, atol=1e-12, why="the same hold")
@@ -132,7 +134,7 @@ def test_j_rms_counts_a_degree_as_a_foot_per_second() -> None:
     record = fid.Record.from_arrays(TIME_S, inputs={"u": STEP})
     seen = fid.simulate(pair, record, units={"p": "deg/s", "w": "ft/s"})
     shifted = seen.replace({"p": seen["p"] + 3.0, "w": seen["w"] - 4.0})
-    options = {"free_bias": False, "free_reference": False}
+    options = {"state_bias": False, "output_bias": False}
     result = fid.verify(pair, shifted, **options)  # type: ignore[arg-type]
     assert_close(result.j_rms, np.sqrt((9 + 16) / 2), rtol=1e-9, why="by definition")
     in_radians = fid.verify(pair, shifted.to_units(p="rad/s", w="m/s"), **options)  # type: ignore[arg-type]

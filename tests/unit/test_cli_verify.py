@@ -38,7 +38,15 @@ def test_values_make_the_model_and_the_code_is_the_verdict(
 
 
 def test_options_reach_the_verb(flown: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--initial", "fit", "--no-free-bias", "--hold", "zero", "--value", "Lp=-4"]
+    options = [
+        "--initial-state",
+        "estimate",
+        "--no-state-bias",
+        "--hold",
+        "zero",
+        "--value",
+        "Lp=-4",
+    ]
     assert run(["verify", "rate_first_order", str(flown), *options]) == 0
     shown = capsys.readouterr().out
     assert "steps between samples" in shown

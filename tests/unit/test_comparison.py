@@ -77,7 +77,7 @@ def test_equal_models_cannot_be_told_apart() -> None:
     assert result.contrast("p").p_value == 1.0
     assert result.contrast("p").better is None
     assert "cannot tell" in str(result.summary())
-    exact = fid.verify([_lag(2.0), _lag(2.0)], _flown(), free_bias=False, free_reference=False)
+    exact = fid.verify([_lag(2.0), _lag(2.0)], _flown(), state_bias=False, output_bias=False)
     assert exact.contrast("p").change_percent == 0.0
 
 

@@ -75,7 +75,7 @@ def test_a_narx_model_runs_beside_the_linear_model_of_its_lags() -> None:
     found = cross_validate(fit, fly(1, curve=0.8))
     one, linear = found.of("run"), found.of("run", model="linear, same lags")
     assert one.rms < 0.7 * linear.rms
-    assert one.initial == "2 measured samples"
+    assert one.initial_state == "2 measured samples"
     assert one.start == 2
     left = one.residual_record()
     assert left.n_samples == 398

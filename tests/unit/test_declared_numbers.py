@@ -52,7 +52,11 @@ def test_a_fit_follows_the_model() -> None:
 
 def test_options_overrule_the_model() -> None:
     fit = fid.identify(
-        _model(), _record(), hold="zero", initial_state={"p": 0.3, "b": "free"}, free_bias=["b"]
+        _model(),
+        _record(),
+        hold="zero",
+        initial_state={"p": 0.3, "b": "estimate"},
+        output_bias=["b"],
     )
     (record,) = fit.records
     assert record.initial_state["p"].status == "fixed"

@@ -47,7 +47,7 @@ def _problem(model: fid.StateSpaceModel) -> tuple[InnovationsProblem, np.ndarray
     )
     scales = np.array([0.1, 0.2]), np.array([0.01, 0.02, 0.1])
     problem = InnovationsProblem(
-        model, data, (0, 1), *scales, free_bias=True, free_reference=True, hold="first"
+        model, data, (0, 1), *scales, output_bias=True, input_bias=True, hold="first"
     )
     start = np.array([*values(model).values(), -1.0, 0.5, 0.2, -0.3])
     start[5] = 0.013

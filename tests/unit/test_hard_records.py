@@ -16,7 +16,7 @@ def test_a_nonlinear_flight_without_any_noise_has_intervals() -> None:
     model = longitudinal()
     record = flown(model, stepped(), 0.0, 0)
     start = model.with_values({"Ma": -4.4, "Maa": -13.0, "Zaa": 1.6})
-    fit = fid.identify(start, record, free_bias=False)
+    fit = fid.identify(start, record, output_bias=False)
     for parameter in model.parameters.free:
         found = fit.parameters[parameter.name]
         assert_close(found.value, parameter.value, rtol=1e-9, why="no noise")
@@ -28,7 +28,7 @@ def test_an_unstable_vehicle_is_found_from_a_stable_start() -> None:
     model, record = unstable_flight(1)
     start = model.with_values({"Malpha": -4.0, "Mq": -2.0})
     assert start.eigenvalues().real.max() < -1.0
-    fit, near = (fid.identify(each, record, free_bias=False) for each in (start, model))
+    fit, near = (fid.identify(each, record, output_bias=False) for each in (start, model))
     for name in fit.names:
         one, other = fit.parameters[name].value, near.parameters[name].value
         assert_close(one, other, rtol=1e-4, why="the same minimum")

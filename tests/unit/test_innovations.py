@@ -134,8 +134,8 @@ def test_prediction_horizons_meet_their_limits(noisy):
     record = noisy.records[0]
     one = noisy.predict(record, 1)
     assert_close(one.residual, noisy.errors[0], atol=1e-7, why="same predictor")
-    far = noisy.model.predict(record, 400, initial="zero", offsets="none")
-    free = noisy.model.predict(record, initial="zero", offsets="none")
+    far = noisy.model.predict(record, 400, initial_state="zero", offsets="none")
+    free = noisy.model.predict(record, initial_state="zero", offsets="none")
     assert_close(far.predicted[:, :300], free.predicted[:, :300], atol=1e-6, why="noise unseen")
     rms = [noisy.predict(record, k).error_rms["y"] for k in (1, 3, 10)]
     assert rms == sorted(rms)
@@ -188,7 +188,7 @@ def test_views_are_complete(noisy):
         ({"order": 0}, "order is outside its range"),
         ({"method": "era"}, "unknown method"),
         ({"offsets": "median"}, "unknown offsets"),
-        ({"initial": "rest"}, "unknown initial"),
+        ({"initial_state": "rest"}, "unknown initial_state"),
         ({"horizon": 4, "order": 6}, "the horizon is too short"),
         ({"maximum_iterations": 0}, "maximum_iterations is outside"),
     ],
@@ -244,13 +244,13 @@ def test_predictions_refuse_what_they_do_not_know():
     with pytest.raises(OptionError, match="unknown horizon"):
         SINGLE.predict(record, 0)
     with pytest.raises(OptionError, match="unknown initial state"):
-        SINGLE.predict(record, initial="backcast")
+        SINGLE.predict(record, initial_state="backcast")
     with pytest.raises(DataError, match="another sample time"):
         M(("y",), ("u",), 0.2, [[0.5]], [[1.0]], [[1.0]]).predict(record)
 
 
 def test_a_run_that_leaves_the_numbers_is_held():
     record = flown(SINGLE, 1, n=400)
-    run = M(("y",), ("u",), 0.1, [[3.0]], [[1.0]], [[1.0]]).predict(record, initial="zero")
+    run = M(("y",), ("u",), 0.1, [[3.0]], [[1.0]], [[1.0]]).predict(record, initial_state="zero")
     assert run.diverged
     assert np.all(np.isfinite(run.predicted))

@@ -66,7 +66,7 @@ def test_each_record_has_its_own_initial_state_bias_and_shift() -> None:
         _flown(phase, initial_state=start, input_bias=shift, output_bias=bias)
         for phase, start, shift, bias in zip((0.0, 1.0), starts, shifts, biases, strict=True)
     ]
-    fit = fid.identify(_model(), flown, free_bias=["alpha", "q"], free_reference=True)
+    fit = fid.identify(_model(), flown, output_bias=["alpha", "q"], input_bias=True)
     assert max(_errors(fit)) < 1e-8
     for item, start, shift, bias in zip(fit.records, starts, shifts, biases, strict=True):
         found = [item.initial_state[name].value for name in ("alpha", "q")]
@@ -211,7 +211,7 @@ REFUSED = [
     ({"initial_state": "rest"}, OptionError, "initial_state is not known"),
     ({"initial_state": {"q": "loose"}}, OptionError, "initial_state of q is not known"),
     ({"initial_state": {"u": 1.0}}, UnknownNameError, "names an unknown state"),
-    ({"free_bias": ["beta"]}, UnknownNameError, "free_bias names an unknown channel"),
+    ({"output_bias": ["beta"]}, UnknownNameError, "output_bias names an unknown channel"),
     ({"maximum_iterations": 0}, OptionError, "maximum_iterations is too small"),
     ({"loss_limit": 0.0}, OptionError, "loss_limit has no meaning"),
     ({"method": "guess"}, OptionError, "method is not known"),
@@ -256,7 +256,7 @@ def test_parameters_that_the_records_cannot_tell_apart_are_named() -> None:
 
 
 def test_a_record_may_have_no_numbers_of_its_own() -> None:
-    fit = fid.identify(_model(), _noisy(_flown(), 7), initial_state="trim", free_bias=False)
+    fit = fid.identify(_model(), _noisy(_flown(), 7), initial_state="trim", output_bias=False)
     item = fit.records[0]
     assert {p.status for p in (*item.initial_state.values(), *item.bias.values())} == {"fixed"}
     assert max(_errors(fit)) < 0.1
@@ -269,7 +269,7 @@ def test_residual_tests_and_verification_take_the_fit() -> None:
     assert tests.outputs == ("alpha", "q", "nz")
     with pytest.raises(OptionError, match="is a free run"):
         fid.residual_tests(fit, horizon="one step ahead")
-    assert fid.verify(fit, _noisy(_flown(1.0), 9), initial="fit").theil["q"] < 0.1
+    assert fid.verify(fit, _noisy(_flown(1.0), 9), initial_state="estimate").theil["q"] < 0.1
     omega = np.geomspace(1.0, 20.0, 30)
     model = fid.load_model("rate_first_order")
     response = fid.FrequencyResponse.from_values(

@@ -22,7 +22,7 @@ def _codes(fit):
 @pytest.mark.parametrize("initial", ["estimate", "zero"])
 def test_arx_recovers_a_noise_free_system_to_machine_precision(initial):
     record = flown(ARMAX, 0, warm_up=0 if initial == "zero" else 300)
-    asked = P.arx("y", "u", na=2, nb=2, offsets="none", initial=initial)
+    asked = P.arx("y", "u", na=2, nb=2, offsets="none", initial_state=initial)
     fit = fid.identify(asked, record)
     assert_close(fit.model.theta, [-1.5, 0.7, 1.0, 0.5], atol=1e-13, why="rounding")
 
@@ -54,10 +54,11 @@ def test_two_inputs_with_their_own_denominators_and_delays_are_recovered():
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("initial", ["estimate", "zero", "backcast"])
-def test_box_jenkins_with_noise_lies_within_its_errors(initial):
-    asked = P.bj("y", ["u", "v"], nb=[2, 3], nf=[2, 1], nk=[1, 3], nc=1, nd=1, initial=initial)
-    warm_up = 0 if initial == "zero" else 300
+@pytest.mark.parametrize("past", ["estimate", "zero", "backcast"])
+def test_box_jenkins_with_noise_lies_within_its_errors(past):
+    start = {"backcast": True} if past == "backcast" else {"initial_state": past}
+    asked = P.bj("y", ["u", "v"], nb=[2, 3], nf=[2, 1], nk=[1, 3], nc=1, nd=1, **start)
+    warm_up = 0 if past == "zero" else 300
     records = [flown(TWO_INPUTS, s, n=1500, noise=0.2, warm_up=warm_up) for s in (4, 5)]
     fit = fid.identify(asked, records)
     truth = TWO_INPUTS.theta
@@ -69,11 +70,11 @@ def test_box_jenkins_with_noise_lies_within_its_errors(initial):
 
 def test_the_minimum_has_no_gradient_and_the_errors_belong_to_it():
     record = flown(ARMAX, 6, n=500, noise=0.5)
-    fit = fid.identify(P.armax("y", "u", na=2, nb=2, nc=2, initial="zero"), record)
+    fit = fid.identify(P.armax("y", "u", na=2, nb=2, nc=2, initial_state="zero"), record)
 
     def loss(theta):
         model = P.from_theta(fit.structure, theta, 0.1)
-        return np.sum(model.predict(record, 1, initial="zero").residual ** 2)
+        return np.sum(model.predict(record, 1, initial_state="zero").residual ** 2)
 
     here = loss(fit.model.theta)
     assert_close(here, fit.criteria.loss * 500, rtol=1e-12, why="the same errors")
@@ -136,7 +137,7 @@ def test_a_pole_that_a_zero_cancels_is_named():
 def test_noise_zeros_at_the_circle_are_named_and_kept_inside():
     truth = P("y", ("u",), 0.1, a=[1, -0.5], b=[[1.0]], c=[1, -1.0])
     fit = fid.identify(
-        P.armax("y", "u", na=1, nb=1, nc=1, initial="zero"),
+        P.armax("y", "u", na=1, nb=1, nc=1, initial_state="zero"),
         flown(truth, 12, n=300, noise=0.5, warm_up=0),
     )
     assert abs(fit.model.c[1]) < 1.0
@@ -156,7 +157,7 @@ def test_an_unstable_plant_is_legal_and_can_be_held_stable():
     assert held.model.a[1] > -1.0
     assert "stability-enforced" in _codes(held)
     with pytest.raises(FitError, match="cannot be run backwards"):
-        fid.identify(P.arx("y", "u", na=1, nb=1, offsets="none", initial="backcast"), record)
+        fid.identify(P.arx("y", "u", na=1, nb=1, offsets="none", backcast=True), record)
 
 
 def test_roots_gains_and_modes_carry_intervals():
@@ -272,7 +273,11 @@ def test_instruments_that_fail_say_so():
         (lambda: P.oe("y", "u", nb=0, nf=2), "denominator alone"),
         (lambda: P.armax("y", "u", na=1, nb=1, nc=1, method="iv4"), "belong to ARX"),
         (lambda: P.arx("y", "u", na=1, nb=1, kernel="tc", method="iv4"), "stands alone"),
-        (lambda: P.arx("y", "u", na=1, nb=1, initial="guess"), "unknown initial"),
+        (lambda: P.arx("y", "u", na=1, nb=1, initial_state="guess"), "unknown initial"),
+        (
+            lambda: P.arx("y", "u", na=1, nb=1, initial_state="zero", backcast=True),
+            "backcast estimates the initial state",
+        ),
         (lambda: P.arx("y", "u", na=1, nb=1, starts=0), "starts is too small"),
     ],
 )

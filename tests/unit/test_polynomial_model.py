@@ -71,7 +71,7 @@ def test_responses_agree_with_scipy_and_control():
 def test_the_state_space_form_predicts_like_the_polynomials():
     record = flown(TWO_INPUTS, 0, noise=0.3)
     a, b, c, d, k = TWO_INPUTS.state_space()
-    run = TWO_INPUTS.predict(record, 1, initial="zero", offsets="none")
+    run = TWO_INPUTS.predict(record, 1, initial_state="zero", offsets="none")
     x, ahead = np.zeros(a.shape[0]), []
     for t in range(record.n_samples):
         u = np.array([record["u"][t], record["v"][t]])
@@ -88,18 +88,18 @@ def test_one_step_of_a_first_order_model_by_hand():
     record = fid.Record.from_arrays(
         [0.0, 1.0, 2.0], inputs={"u": [1.0, 0.0, 1.0]}, outputs={"y": [1.0, 3.0, 2.0]}
     )
-    run = model.predict(record, 1, initial="zero", offsets="none")
+    run = model.predict(record, 1, initial_state="zero", offsets="none")
     # e0 = 1; y1 = 0.5 y0 + 2 u0 + 0.5 e0 = 3, e1 = 0; y2 = 0.5 y1 + 2 u1 + 0.5 e1 = 1.5, e2 = 0.5.
     assert_close(run.predicted, np.array([0.0, 3.0, 1.5]), atol=1e-14, why="by hand")
-    two = model.predict(record, 2, initial="zero", offsets="none")
+    two = model.predict(record, 2, initial_state="zero", offsets="none")
     # Two ahead h1 = 1.0 times e(t-1) is not yet known either.
     assert_close(two.predicted, np.array([0.0, 2.0, 1.5]), atol=1e-14, why="by hand")
 
 
 def test_long_horizons_tend_to_the_free_run():
     record = flown(ARMAX, 1, noise=0.5)
-    far = ARMAX.predict(record, 200, initial="zero", offsets="none").predicted
-    free = ARMAX.predict(record, "free_run", initial="zero", offsets="none").predicted
+    far = ARMAX.predict(record, 200, initial_state="zero", offsets="none").predicted
+    free = ARMAX.predict(record, "free_run", initial_state="zero", offsets="none").predicted
     assert_close(far[250:], free[250:], atol=1e-9, why="0.84 to the 200th of the noise is left")
 
 
@@ -109,7 +109,7 @@ def test_the_free_run_finds_the_state_the_record_starts_in():
     assert run.error_rms > 1.0  # The offset is not part of the model …
     about = record.replace({"y": record["y"] - 4.0})
     assert ARMAX.predict(about, "free_run", offsets="none").error_rms < 1e-9
-    assert ARMAX.predict(about, "free_run", initial="zero", offsets="none").error_rms > 1e-3
+    assert ARMAX.predict(about, "free_run", initial_state="zero", offsets="none").error_rms > 1e-3
 
 
 def test_offsets_come_from_the_trim_where_that_is_asked():
@@ -131,7 +131,7 @@ def test_an_unstable_free_run_is_held_and_flagged():
     record = fid.Record.from_arrays(
         np.arange(200) / 10, inputs={"u": np.ones(200)}, outputs={"y": np.zeros(200)}
     )
-    run = model.predict(record, initial="zero", offsets="none")
+    run = model.predict(record, initial_state="zero", offsets="none")
     assert run.diverged
     assert np.all(np.isfinite(run.predicted))
     assert "diverged" in repr(run)
@@ -195,7 +195,7 @@ def test_records_that_do_not_belong_to_the_model():
     with pytest.raises(OptionError, match="unknown horizon"):
         ARMAX.predict(record, 0)
     with pytest.raises(OptionError, match="unknown initial state"):
-        ARMAX.predict(record, initial="backcast")
+        ARMAX.predict(record, initial_state="backcast")
     with pytest.raises(UnknownNameError, match="theta"):
         fid.PolynomialModel("theta", ("u",), 0.1, b=[[1.0]]).predict(record)
     with pytest.raises(DataError, match="another sample time"):

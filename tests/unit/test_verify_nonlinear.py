@@ -14,7 +14,7 @@ from tests.truth.test_equation_records_truth import flown, longitudinal, stepped
 def test_the_equations_are_integrated_not_their_linearisation() -> None:
     model = longitudinal()
     record = flown(model, stepped(), 0.0, 0)
-    result = fid.verify(model, record, free_bias=False, free_reference=False)
+    result = fid.verify(model, record, state_bias=False, output_bias=False)
     assert max(result.theil.values()) < 1e-12
     predicted = result.predictions[0].predicted
     assert_close(predicted["az"], record["az"], rtol=1e-10, atol=1e-10, why="the same run")
@@ -26,7 +26,7 @@ def test_initial_state_and_shifts_are_found() -> None:
     start = {"alpha": 0.05, "q": -0.1}
     clean = flown(model, stepped(), 0.0, 0, initial_state=start)
     moved = clean.replace({"elevator": clean["elevator"] - 0.01, "az": clean["az"] + 2.0})
-    result = fid.verify(model, moved, initial="fit", outputs=["q", "az"])
+    result = fid.verify(model, moved, initial_state="estimate", outputs=["q", "az"])
     shifts = result.predictions[0].shifts
     assert shifts.rank == shifts.n_free == 5
     assert shifts.input_shift is not None
@@ -35,7 +35,7 @@ def test_initial_state_and_shifts_are_found() -> None:
     assert_close(shifts.initial_state, [0.05, -0.1], rtol=1e-6, why="no noise")
     assert max(result.theil.values()) < 1e-7
     # A linearised run cannot do that well.
-    trimmed = fid.verify(model, moved, outputs=["q", "az"], free_bias=False)
+    trimmed = fid.verify(model, moved, outputs=["q", "az"], state_bias=False)
     assert max(trimmed.theil.values()) > 0.01
 
 
@@ -49,7 +49,7 @@ def test_both_holds_are_run() -> None:
     model = longitudinal()
     record = flown(model, stepped(), 0.0, 0, hold="zero")
     right, wrong = (
-        fid.verify(model, record, free_bias=False, hold=hold).theil["q"]
+        fid.verify(model, record, state_bias=False, hold=hold).theil["q"]
         for hold in ("zero", "first")
     )
     assert right < 1e-12

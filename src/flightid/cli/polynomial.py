@@ -41,11 +41,12 @@ HIGHEST = {"na": 4, "nb": 4, "nc": 3, "nd": 2, "nf": 4}
     help="File of records that the fit does not see.",
 )
 @click.option(
-    "--initial",
-    type=click.Choice(["estimate", "zero", "backcast"]),
+    "--initial-state",
+    type=click.Choice(["estimate", "zero"]),
     default="estimate",
     show_default=True,
 )
+@click.option("--backcast", is_flag=True, help="Estimate the past of each record backwards.")
 @json_option
 def command(
     file: Path,
@@ -60,7 +61,8 @@ def command(
     nk: int,
     scan: bool,
     validate: Path | None,
-    initial: str,
+    initial_state: str,
+    backcast: bool,
     as_json: bool,
 ) -> None:
     """Fit a polynomial model to the records of FILE, or scan its orders.
@@ -90,7 +92,8 @@ def command(
             nd=ranges["nd"],
             nf=ranges["nf"],
             nk=range(1, nk + 1),
-            initial=initial,
+            initial_state=initial_state,
+            backcast=backcast,
         )
         emit(found, as_json=as_json)
         leave_by_verdict(found.findings)
@@ -107,7 +110,8 @@ def command(
         nd=orders.get("nd", 0),
         nf=orders.get("nf", 0),
         nk=nk,
-        initial=initial,
+        initial_state=initial_state,
+        backcast=backcast,
     )
     fit = flightid.identify(structure, records)
     note(repr(fit))

@@ -31,10 +31,12 @@ if TYPE_CHECKING:
     help="Rival model to verify side by side; may be repeated.",
 )
 @click.option("--output", "outputs", multiple=True, help="Output to compare; default: all.")
-@click.option("--initial", type=click.Choice(["trim", "fit"]), default="trim", show_default=True)
+@click.option(
+    "--initial-state", type=click.Choice(["trim", "estimate"]), default="trim", show_default=True
+)
 @click.option("--hold", type=click.Choice(["first", "zero"]), default="first", show_default=True)
-@click.option("--free-bias/--no-free-bias", default=True, help="Solve for state biases.")
-@click.option("--free-reference/--no-free-reference", default=True, help="Solve for offsets.")
+@click.option("--state-bias/--no-state-bias", default=True, help="Solve for state biases.")
+@click.option("--output-bias/--no-output-bias", default=True, help="Solve for shifts of outputs.")
 @click.option(
     "--residuals",
     "with_residuals",
@@ -54,10 +56,10 @@ def command(
     values: tuple[str, ...],
     rivals: tuple[str, ...],
     outputs: tuple[str, ...],
-    initial: str,
+    initial_state: str,
     hold: str,
-    free_bias: bool,
-    free_reference: bool,
+    state_bias: bool,
+    output_bias: bool,
     with_residuals: bool,
     html: Path | None,
     as_json: bool,
@@ -84,9 +86,9 @@ def command(
     result: Verification | Comparison = verify(
         models if rivals else chosen,
         flown,
-        free_bias=free_bias,
-        free_reference=free_reference,
-        initial="fit" if initial == "fit" else "trim",
+        state_bias=state_bias,
+        output_bias=output_bias,
+        initial_state="estimate" if initial_state == "estimate" else "trim",
         outputs=compared,
         hold="zero" if hold == "zero" else "first",
     )

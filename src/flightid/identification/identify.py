@@ -192,8 +192,8 @@ def identify(
     starts: int = ...,
     seed: int = ...,
     initial_state: InitialState = ...,
-    free_bias: Freedom = ...,
-    free_reference: Freedom = ...,
+    output_bias: Freedom = ...,
+    input_bias: Freedom = ...,
     noise_covariance: str = ...,
     loss: str = ...,
     loss_limit: float = ...,
@@ -219,8 +219,8 @@ def identify(
     minimum_coherence: float | None = ...,
     correct_bias: bool = ...,
     initial_state: InitialState = ...,
-    free_bias: Freedom = ...,
-    free_reference: Freedom = ...,
+    output_bias: Freedom = ...,
+    input_bias: Freedom = ...,
     noise_covariance: str = ...,
     loss: str = ...,
     loss_limit: float = ...,
@@ -296,10 +296,10 @@ def identify(
     correct_bias : bool
         Responses: take out, in rounds of fit and correction, what windows or local polynomials add
         by leakage and finite resolution. Where that is impossible a finding says so.
-    initial_state : "free", "trim" or mapping
+    initial_state : "estimate", "trim" or mapping
         Records: state at the first sample of each, estimated or at the model's trim; or by state a
-        number or "free", the others at trim.
-    free_bias, free_reference : bool or sequence of str
+        number or "estimate", the others at trim.
+    output_bias, input_bias : bool or sequence of str
         Records: constants added to outputs (default: all) and to inputs (default: none) of each
         record, estimated; True for all channels, or names.
     noise_covariance : {"diagonal", "full"}

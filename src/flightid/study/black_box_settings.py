@@ -9,7 +9,7 @@ from typing import Any
 from flightid.models import NarxModel
 from flightid.models.narx.model import CANDIDATES, STOPS
 from flightid.models.narx.terms import KERNELS, WIDTH_FACTORS
-from flightid.models.polynomial.structure import INITIAL, OFFSETS
+from flightid.models.polynomial.structure import INITIAL_STATES, OFFSETS
 from flightid.study.reading import TableReader
 
 ORDERS = {
@@ -135,7 +135,8 @@ def _orders(reader: TableReader, names: tuple[str, ...]) -> dict[str, tuple[int,
 
 def _polynomial_options(reader: TableReader) -> dict[str, Any]:
     return {
-        "initial": reader.choice("initial", INITIAL, INITIAL[0]),
+        "initial_state": reader.choice("initial_state", INITIAL_STATES, INITIAL_STATES[0]),
+        "backcast": reader.flag("backcast", False),
         "offsets": reader.choice("offsets", OFFSETS, OFFSETS[0]),
         "enforce_stability": reader.flag("enforce_stability", False),
     }

@@ -155,7 +155,7 @@ class Settings:
         the records.
     starts, seed : int
         Starts of each fit, and the seed they are drawn with.
-    initial : {"trim", "fit"}
+    initial_state : {"trim", "estimate"}
         Whether a prediction starts at rest or from a state that is solved for.
     reduce : ReduceSettings or None
         How structures are reduced after their fit; None: not at all.
@@ -182,7 +182,7 @@ class Settings:
     method: str
     starts: int
     seed: int
-    initial: Literal["trim", "fit"]
+    initial_state: Literal["trim", "estimate"]
     reduce: ReduceSettings | None = None
     tune: TuneSettings | None = None
     qualities: QualitiesSettings | None = None
@@ -238,7 +238,9 @@ def read_settings(path: Path) -> Settings:
     starts, seed = fit.integer("starts", 1, minimum=1), fit.integer("seed", 0)
     fit.finish()
     check = root.table("verify")
-    initial = cast(Literal["trim", "fit"], check.choice("initial", ("trim", "fit"), "trim"))
+    initial_state = cast(
+        Literal["trim", "estimate"], check.choice("initial_state", ("trim", "estimate"), "trim")
+    )
     check.finish()
     on_records = method != FITS[0]
     reducing = root.maybe(lambda key: read_reduce(root.table(key)), "reduce")
@@ -277,7 +279,7 @@ def read_settings(path: Path) -> Settings:
         method,
         starts,
         seed,
-        initial,
+        initial_state,
         reducing,
         tuning,
         qualities,

@@ -291,15 +291,19 @@ def check(
     task: Task, fitted: Fit, records: Mapping[str, Record], settings: Settings
 ) -> dict[str, Verification | Comparison]:
     """Predict each segment that the fit has not seen, beside the rivals where there are any."""
-    outputs, initial = task.model.outputs, settings.initial
+    outputs, initial_state = task.model.outputs, settings.initial_state
     checked: dict[str, Verification | Comparison] = {}
     for name in task.settings.verify:
         record = records[name]
         if task.rivals:
             models = {task.settings.name: fitted, **task.rivals}
             checked[name] = verify(
-                [*models.values()], record, names=[*models], initial=initial, outputs=outputs
+                [*models.values()],
+                record,
+                names=[*models],
+                initial_state=initial_state,
+                outputs=outputs,
             )
         else:
-            checked[name] = verify(fitted, record, initial=initial, outputs=outputs)
+            checked[name] = verify(fitted, record, initial_state=initial_state, outputs=outputs)
     return checked

@@ -113,8 +113,8 @@ def _problem(
         (),
         np.zeros(0),
         np.ones(p),
-        options.free_bias,
-        options.free_reference,
+        options.output_bias,
+        options.input_bias,
         options.hold,
     )
     start, _ = limits_of(model, options.maximum_iterations)
@@ -254,8 +254,8 @@ def _fitted_records(
             dict(zip(model.outputs, predicted, strict=True)), step=step
         )
         constants = list(map(float, each.constants))
-        bias = constants[n : n + p] if problem.free_bias else []
-        shift = constants[len(constants) - m :] if problem.free_reference else []
+        bias = constants[n : n + p] if problem.output_bias else []
+        shift = constants[len(constants) - m :] if problem.input_bias else []
         found.append(
             FittedRecord(
                 record,

@@ -85,7 +85,7 @@ class InnovationsProblem:
         States with process noise.
     process_scale : ndarray, shape (n_noisy,)
     output_scale : ndarray, shape (n_outputs,)
-    free_bias, free_reference : bool
+    output_bias, input_bias : bool
         Whether each record has unknown output biases and input shifts.
     hold : str
     """
@@ -95,8 +95,8 @@ class InnovationsProblem:
     noisy: tuple[int, ...]
     process_scale: Array
     output_scale: Array
-    free_bias: bool
-    free_reference: bool
+    output_bias: bool
+    input_bias: bool
     hold: str
 
     @property
@@ -205,9 +205,9 @@ class InnovationsProblem:
         flat = (seen @ whitener.T).reshape(len(runs), -1)
         nuisance = Nuisance.best(-flat[1:].T, flat[0])
         state = np.tensordot(np.concatenate([[1.0], nuisance.values]), states, axes=1)
-        if self.free_bias:
+        if self.output_bias:
             outputs = outputs - nuisance.values[n : n + p]
-        if self.free_reference:
+        if self.input_bias:
             inputs = inputs + nuisance.values[len(nuisance.values) - m :]
         innovations = _seen(found, outputs, inputs) - state @ found.c.T
         moved = [
@@ -225,9 +225,9 @@ class InnovationsProblem:
         """Start, outputs and inputs of one run for each constant of a record."""
         no_output, no_input = np.zeros((1, p)), np.zeros((1, m))
         runs = [(start, no_output, no_input) for start in np.eye(n)]
-        if self.free_bias:
+        if self.output_bias:
             runs += [(np.zeros(n), -bias[None], no_input) for bias in np.eye(p)]
-        if self.free_reference:
+        if self.input_bias:
             runs += [(np.zeros(n), no_output, shift[None]) for shift in np.eye(m)]
         return runs
 

@@ -38,7 +38,7 @@ def backcast(model: PolynomialModel, data: PolynomialData) -> list[list[float]]:
             "a noise model that grows cannot be run backwards",
             found=f"a pole of size {size:.6g}",
             needed="below 1",
-            action="take initial='estimate'",
+            action="take backcast=False",
         )
     reach = above.size + below.size
     if size > 0.0:

@@ -79,19 +79,19 @@ def _require_samples(structure: PolynomialStructure, data: PolynomialData) -> No
 
 
 def _search(structure: PolynomialStructure, data: PolynomialData) -> _Found:
-    if structure.is_regression and structure.initial != "backcast":
+    if structure.is_regression and not structure.backcast:
         found = _regression(structure, data)
         unstable = np.max(np.abs(np.roots([1.0, *found.theta[: structure.na]])), initial=0.0) >= 1.0
         if not (structure.enforce_stability and unstable):
             return found
-    if structure.initial == "backcast":
+    if structure.backcast:
         return _backcast_rounds(structure, data)
     return _iterate(structure, data, polynomial_starts(structure, data), [])
 
 
 def _regression(structure: PolynomialStructure, data: PolynomialData) -> _Found:
     """ARX: linear in the coefficients, so no iteration."""
-    skip = 0 if structure.initial == "zero" else structure.longest_lag
+    skip = 0 if structure.initial_state == "zero" else structure.longest_lag
     made = regress(
         data.output, data.inputs, data.lengths, structure.na, structure.nb, structure.nk, skip
     )
@@ -140,7 +140,7 @@ def _iterate(
         list(data.lengths),
         structure.native,
         starts,
-        BEFORE[structure.initial],
+        BEFORE[structure.past],
         memory,
         skip,
         structure.enforce_stability,
@@ -156,7 +156,7 @@ def _iterate(
     ends.sort(key=lambda end: end[1])
     theta, squares, flat, iterations, _ = ends[0]
     unknown = 0
-    if structure.initial == "estimate":
+    if structure.past == "estimate":
         of_inputs, of_noise = _native.polynomial_memory(structure.native)
         unknown = len(data.lengths) * (sum(of_inputs) + of_noise)
     if structure.is_regression:
@@ -217,7 +217,7 @@ def _assemble(
         list(data.lengths),
         structure.native,
         found.theta,
-        BEFORE[structure.initial],
+        BEFORE[structure.past],
         found.memory,
     )
     counted = tuple(errors[span][found.skip :] for span in data.spans)
@@ -302,7 +302,7 @@ def _scores(
         "estimate": "an estimated state",
         "zero": "rest",
         "backcast": "a backcast past",
-    }[structure.initial]
+    }[structure.past]
 
     def score(words: str, errors: Array) -> FitScore:
         norm = float(np.sqrt(errors @ errors))
@@ -328,7 +328,8 @@ def _provenance(
         "records": [record.name for record in records],
         "offsets": [dict(row) for row in data.offsets],
         "options": {
-            "initial": structure.initial,
+            "initial_state": structure.initial_state,
+            "backcast": structure.backcast,
             "offsets": structure.offsets,
             "enforce_stability": structure.enforce_stability,
             "kernel": structure.kernel,

@@ -104,10 +104,12 @@ class PolynomialFit:
         return tuple(root for root in self.roots if root.kind == POLE and root.natural_frequency)
 
     def predict(
-        self, record: Record, horizon: int | str = "free_run", *, initial: str = "estimate"
+        self, record: Record, horizon: int | str = "free_run", *, initial_state: str = "estimate"
     ) -> PolynomialPrediction:
         """Predict a record, by default in free run; see `PolynomialModel.predict`."""
-        return self.model.predict(record, horizon, initial=initial, offsets=self.structure.offsets)
+        return self.model.predict(
+            record, horizon, initial_state=initial_state, offsets=self.structure.offsets
+        )
 
     def summary(self) -> Table:
         """Table of the coefficients, with roots, gains, criteria and findings below."""
@@ -126,7 +128,7 @@ class PolynomialFit:
             self.model.difference_equation(),
             *(f"fit {s.fit_percent:.2f} % ({s.predictor}), rms {s.rms:.4g}" for s in self.scores),
             str(self.criteria),
-            f"initial state: {self.structure.initial}; offsets taken off: "
+            f"initial state: {self.structure.past}; offsets taken off: "
             f"{self.structure.offsets}; ended by {self.termination} after {self.iterations} steps",
             *map(str, self.findings),
         )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.identification.records.options import FREE, RecordOptions
+from flightid.identification.records.options import ESTIMATE, RecordOptions
 from flightid.models import Model, RecordValue, StateSpaceModel
 
 Array = NDArray[np.float64]
@@ -35,9 +35,9 @@ def declared_numbers(
     dict of str to RecordValue
     """
     left_to_model = {
-        "initial": isinstance(options.initial_state, str) and options.initial_state == FREE,
-        "bias": options.free_bias is True,
-        "reference": options.free_reference is False,
+        "initial": isinstance(options.initial_state, str) and options.initial_state == ESTIMATE,
+        "bias": options.output_bias is True,
+        "reference": options.input_bias is False,
     }
     if not isinstance(model, StateSpaceModel) or not left_to_model[kind]:
         return {}

@@ -13,7 +13,7 @@ from flightid.errors import OptionError, UnknownNameError
 InitialState = str | Mapping[str, float | str]
 Freedom = bool | Sequence[str]
 
-FREE, TRIM = "free", "trim"
+ESTIMATE, TRIM = "estimate", "trim"
 HOLDS = ("first", "zero")
 COVARIANCES = ("diagonal", "full")
 LOSSES = ("gaussian", "huber")
@@ -26,9 +26,9 @@ class RecordOptions:
 
     starts: int = 1
     seed: int = 0
-    initial_state: InitialState = FREE
-    free_bias: Freedom = True
-    free_reference: Freedom = False
+    initial_state: InitialState = ESTIMATE
+    output_bias: Freedom = True
+    input_bias: Freedom = False
     noise_covariance: str = "diagonal"
     loss: str = "gaussian"
     loss_limit: float = 1.345
@@ -48,11 +48,11 @@ class RecordOptions:
                 raise OptionError(
                     f"{name} is not known", found=repr(found), needed=" or ".join(known)
                 )
-        if isinstance(self.initial_state, str) and self.initial_state not in (FREE, TRIM):
+        if isinstance(self.initial_state, str) and self.initial_state not in (ESTIMATE, TRIM):
             raise OptionError(
                 "initial_state is not known",
                 found=repr(self.initial_state),
-                needed="'free', 'trim', or a mapping of states to numbers or 'free'",
+                needed="'estimate', 'trim', or a mapping of states to numbers or 'estimate'",
             )
         if self.maximum_iterations < 1:
             raise OptionError(
@@ -117,11 +117,11 @@ def initial_values(
     UnknownNameError
         A state that is not there.
     OptionError
-        Neither a number nor ``"free"``.
+        Neither a number nor ``"estimate"``.
     """
     values = list(map(float, trim))
     if isinstance(option, str):
-        return values, list(range(len(states))) if option == FREE else []
+        return values, list(range(len(states))) if option == ESTIMATE else []
     free = []
     for name, given in option.items():
         if name not in states:
@@ -129,7 +129,7 @@ def initial_values(
                 "initial_state names an unknown state", found=repr(name), needed=", ".join(states)
             )
         place = list(states).index(name)
-        if given == FREE:
+        if given == ESTIMATE:
             free.append(place)
         elif isinstance(given, int | float):
             values[place] = float(given)
@@ -137,6 +137,6 @@ def initial_values(
             raise OptionError(
                 f"initial_state of {name} is not known",
                 found=repr(given),
-                needed="a number or 'free'",
+                needed="a number or 'estimate'",
             )
     return values, sorted(free)

@@ -190,13 +190,13 @@ def prepare_records(
                     "reference",
                     model.inputs,
                     np.zeros(len(model.inputs)),
-                    chosen(options.free_reference, model.inputs, "free_reference"),
+                    chosen(options.input_bias, model.inputs, "input_bias"),
                 ),
                 (
                     "bias",
                     model.outputs,
                     np.zeros(len(model.outputs)),
-                    chosen(options.free_bias, model.outputs, "free_bias"),
+                    chosen(options.output_bias, model.outputs, "output_bias"),
                 ),
             )
         )

@@ -56,7 +56,7 @@ def fit_equation_error(
     """Fit by least squares on state derivatives; see `flightid.identify`."""
 
     def operator(motion: MeasuredMotion) -> Operator:
-        return LocalMeans(motion, options.half_width, options.free_bias)
+        return LocalMeans(motion, options.half_width, options.output_bias)
 
     problem, start, limits = _problem(model, data, options, operator)
     count = len(problem.motions)
@@ -67,7 +67,7 @@ def fit_equation_error(
         for rows, weight in zip(settled.rows, settled.weights, strict=True)
     ]
     require_seen(inner, stack([slopes for _, slopes in weighed]))
-    constants = [_constants(each[0].shape, options.free_bias) for each in weighed]
+    constants = [_constants(each[0].shape, options.output_bias) for each in weighed]
     covariance, freedom, inflation = coloured_covariance(weighed, constants)
     jacobian = stack([slopes for _, slopes in weighed])
     known = Knowledge(jacobian, covariance, freedom, "coloured residuals", inflation)
@@ -176,9 +176,9 @@ def _finish(
     return replace(fit, findings=(*fit.findings, *judge_attenuation(bias, fit.parameters)))
 
 
-def _constants(shape: tuple[int, ...], free_bias: bool) -> Array:
+def _constants(shape: tuple[int, ...], output_bias: bool) -> Array:
     """Orthonormal directions of the equations' constants, (n_equations · n_rows, n_constants)."""
     n_equations, n_rows = shape
-    if not free_bias:
+    if not output_bias:
         return np.zeros((n_equations * n_rows, 0))
     return np.kron(np.eye(n_equations), np.full((n_rows, 1), 1.0 / np.sqrt(n_rows)))

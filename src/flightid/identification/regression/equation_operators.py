@@ -48,13 +48,13 @@ class LocalMeans:
     motion : MeasuredMotion
     half_width : int
         Neighbours on each side.
-    free_bias : bool
+    output_bias : bool
         Whether each equation has an unknown constant in this record.
     """
 
     motion: MeasuredMotion
     half_width: int
-    free_bias: bool = True
+    output_bias: bool = True
 
     def __post_init__(self) -> None:
         require_length(self.motion, 4 * (self.half_width + 2))
@@ -72,7 +72,7 @@ class LocalMeans:
     def nuisance(self, *, is_state: bool) -> Array | None:  # noqa: ARG002
         """A constant, where biases are free."""
         count = self.motion.n_samples - 2 * self.half_width - 2
-        return np.ones(count) if self.free_bias else None
+        return np.ones(count) if self.output_bias else None
 
     def in_time(self, rows: Array) -> Array:
         """The rows themselves."""

@@ -36,7 +36,7 @@ class EquationErrorOptions(RegressionOptions):
     """Options of equation error in the time domain."""
 
     half_width: int = 2
-    free_bias: bool = True
+    output_bias: bool = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -66,7 +66,7 @@ class FilterErrorOptions(RegressionOptions):
     """Options of filter error."""
 
     process_noise: tuple[str, ...] | list[str] | None = None
-    free_bias: bool = True
-    free_reference: bool = False
+    output_bias: bool = True
+    input_bias: bool = False
     starts: int = 1
     seed: int = 0

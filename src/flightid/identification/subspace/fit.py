@@ -41,7 +41,7 @@ def fit_subspace(structure: SubspaceStructure, data: Record | Sequence[Record]) 
             gathered,
             _scaled(start, 1.0 / size),
             direct=structure.direct,
-            initial=structure.initial,
+            initial_state=structure.initial_state,
             maximum_iterations=structure.maximum_iterations,
         )
     else:
@@ -58,7 +58,7 @@ def _scaled(matrices: Matrices, size: Array) -> Matrices:
 def _unrefined(structure: SubspaceStructure, data: SubspaceData, start: Matrices) -> Refined:
     model = InnovationsModel(structure.outputs, structure.inputs, 1.0, *start)
     errors = tuple(
-        one_step_errors(model, y, u, structure.initial)
+        one_step_errors(model, y, u, structure.initial_state)
         for y, u in zip(data.outputs, data.inputs, strict=True)
     )
     samples = sum(e.size for e in errors)
@@ -129,7 +129,7 @@ def _scores(
     runs = [model.predict(record, "free_run", offsets=structure.offsets) for record in records]
     free = np.hstack([run.residual for run in runs])
     step = np.hstack(list(errors))
-    started = "rest" if structure.initial == "zero" else "an estimated state"
+    started = "rest" if structure.initial_state == "zero" else "an estimated state"
     found = {}
     for place, name in enumerate(structure.outputs):
         about = np.concatenate([record[name] - record[name].mean() for record in records])

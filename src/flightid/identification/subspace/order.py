@@ -156,7 +156,7 @@ def _prediction_criteria(
     size = data.scales[:, None]
     errors = np.hstack(
         [
-            one_step_errors(model, y * size, u, structure.initial)
+            one_step_errors(model, y * size, u, structure.initial_state)
             for y, u in zip(data.outputs, data.inputs, strict=True)
         ]
     )

@@ -163,7 +163,7 @@ def refine(
     start: Matrices,
     *,
     direct: bool,
-    initial: str,
+    initial_state: str,
     maximum_iterations: int,
 ) -> Refined:
     """Smallest log determinant of the innovations' covariance, from a subspace estimate.
@@ -177,7 +177,7 @@ def refine(
     n = start[0].shape[0]
     shapes = [each.shape for each in start]
     free = tuple(shapes) if direct else (*shapes[:3], shapes[4])
-    predictor = Predictor(data, free, direct, initial == "estimate")
+    predictor = Predictor(data, free, direct, initial_state == "estimate")
     matrices = _balanced(predictor, start)
     iterations, termination, last = 0, "rounds", np.inf
     errors = predictor.fitted_errors(matrices, np.eye(data.n_outputs))
@@ -197,7 +197,7 @@ def refine(
                 termination = ended
                 break
     samples = sum(e.shape[1] for e in errors)
-    own = n * len(errors) if initial == "estimate" else 0
+    own = n * len(errors) if initial_state == "estimate" else 0
     degrees = max(samples * data.n_outputs - _count(free, n) - own, 1)
     covariance = _covariance(predictor, matrices, errors, degrees)
     return Refined(matrices, errors, covariance, degrees, iterations, termination)

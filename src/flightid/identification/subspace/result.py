@@ -91,10 +91,12 @@ class InnovationsFit:
         return tuple(root for root in self.roots if root.kind == POLE and root.natural_frequency)
 
     def predict(
-        self, record: Record, horizon: int | str = "free_run", *, initial: str = "estimate"
+        self, record: Record, horizon: int | str = "free_run", *, initial_state: str = "estimate"
     ) -> InnovationsPrediction:
         """Predict a record, by default in free run; see `InnovationsModel.predict`."""
-        return self.model.predict(record, horizon, initial=initial, offsets=self.structure.offsets)
+        return self.model.predict(
+            record, horizon, initial_state=initial_state, offsets=self.structure.offsets
+        )
 
     def summary(self) -> Table:
         """Table of poles and gains with intervals, and scores, criteria and findings below."""
@@ -116,7 +118,7 @@ class InnovationsFit:
             repr(self.order),
             *(f"fit {s.fit_percent:.2f} % ({s.predictor}), rms {s.rms:.4g}" for s in scores),
             str(self.criteria),
-            f"initial state: {self.structure.initial}; offsets taken off: "
+            f"initial state: {self.structure.initial_state}; offsets taken off: "
             f"{self.structure.offsets}; ended by {self.termination} after {self.iterations} steps",
             *map(str, self.findings),
         )

@@ -207,7 +207,7 @@ class InnovationsModel:
         record: Record,
         horizon: int | str = "free_run",
         *,
-        initial: str = "estimate",
+        initial_state: str = "estimate",
         offsets: str = "mean",
     ) -> InnovationsPrediction:
         """Predict the outputs of a record k steps ahead (1, 2, …) or in ``"free_run"``.
@@ -217,7 +217,7 @@ class InnovationsModel:
         record : Record
             With the model's channels, units and sample time.
         horizon : int or "free_run"
-        initial : {"estimate", "zero"}
+        initial_state : {"estimate", "zero"}
             State at the first sample: the one that makes this prediction's errors smallest (k
             ahead: those one step ahead), or rest.
         offsets : {"mean", "trim", "none"}
@@ -242,11 +242,11 @@ class InnovationsModel:
         ---------
         Ljung, *System Identification*, 2nd ed., eqs. 4.86 and 3.31.
         """
-        return predict(self, record, horizon, initial=initial, offsets=offsets)
+        return predict(self, record, horizon, initial_state=initial_state, offsets=offsets)
 
     def simulate(self, record: Record) -> Array:
         """Free run from rest on the inputs as they are, shape (p, n_samples), outputs' units."""
-        return self.predict(record, "free_run", initial="zero", offsets="none").predicted
+        return self.predict(record, "free_run", initial_state="zero", offsets="none").predicted
 
     def summary(self) -> Table:
         """Table of poles, and of the zeros of each response."""

@@ -34,7 +34,7 @@ class InnovationsPrediction:
         In the outputs' units, the operating point included.
     horizon : int or str
         Samples ahead, or ``"free_run"``.
-    initial : str
+    initial_state : str
         ``"estimate"`` or ``"zero"``.
     diverged : bool
         Whether the run left the range of numbers and was held.
@@ -50,7 +50,7 @@ class InnovationsPrediction:
     measured: Array
     predicted: Array
     horizon: int | str
-    initial: str
+    initial_state: str
     diverged: bool = False
 
     @property
@@ -77,7 +77,7 @@ class InnovationsPrediction:
     def words(self) -> str:
         """Horizon and initial state in words."""
         ahead = "free run" if self.horizon == "free_run" else f"{self.horizon} ahead"
-        return f"{ahead} from {'rest' if self.initial == 'zero' else 'an estimated state'}"
+        return f"{ahead} from {'rest' if self.initial_state == 'zero' else 'an estimated state'}"
 
     def __repr__(self) -> str:
         """Horizon, initial state, size and errors on one line."""
@@ -88,13 +88,13 @@ class InnovationsPrediction:
 
 
 def predict(
-    model: InnovationsModel, record: Record, horizon: int | str, *, initial: str, offsets: str
+    model: InnovationsModel, record: Record, horizon: int | str, *, initial_state: str, offsets: str
 ) -> InnovationsPrediction:
     """Predict one record; `InnovationsModel.predict` says how."""
     if horizon != "free_run" and not (isinstance(horizon, int) and horizon > 0):
         raise OptionError("unknown horizon", found=horizon, needed="1, 2, … or 'free_run'")
     for what, value, allowed in (
-        ("initial state", initial, ("estimate", "zero")),
+        ("initial state", initial_state, ("estimate", "zero")),
         ("offsets", offsets, OFFSETS),
     ):
         if value not in allowed:
@@ -107,9 +107,9 @@ def predict(
     u = data.inputs[p - 1 :]
     with np.errstate(over="ignore", invalid="ignore"):
         if horizon == "free_run":
-            run = free_run(model, y, u, initial=initial)
+            run = free_run(model, y, u, initial_state=initial_state)
         else:
-            run = _ahead(model, y, u, int(horizon), initial)
+            run = _ahead(model, y, u, int(horizon), initial_state)
     usable = np.all(np.abs(run) < LARGEST, axis=0)
     diverged = not bool(np.all(usable))
     if diverged:
@@ -117,15 +117,15 @@ def predict(
         run[:, last:] = run[:, last - 1 : last]
     offset = np.array([data.offsets[0][name] for name in model.outputs])[:, None]
     return InnovationsPrediction(
-        model.outputs, y + offset, run + offset, horizon, initial, diverged
+        model.outputs, y + offset, run + offset, horizon, initial_state, diverged
     )
 
 
-def free_run(model: InnovationsModel, y: Array, u: Array, *, initial: str) -> Array:
+def free_run(model: InnovationsModel, y: Array, u: Array, *, initial_state: str) -> Array:
     """Response to the inputs, shape (p, n_samples), from rest or from the state that fits best."""
     a, b, c, d, _ = model.matrices
     run = c @ run_recursion(a, b @ u) + d @ u
-    if initial == "zero" or not np.all(np.isfinite(run)):
+    if initial_state == "zero" or not np.all(np.isfinite(run)):
         return run
     motion = free_motion(a, c, y.shape[1])
     if not np.all(np.isfinite(motion)):
@@ -133,12 +133,12 @@ def free_run(model: InnovationsModel, y: Array, u: Array, *, initial: str) -> Ar
     return run + _best(motion, y - run)
 
 
-def one_step_errors(model: InnovationsModel, y: Array, u: Array, initial: str) -> Array:
+def one_step_errors(model: InnovationsModel, y: Array, u: Array, initial_state: str) -> Array:
     """Prediction errors one step ahead, shape (p, n_samples)."""
     a, b, c, d, k = model.matrices
     state = run_recursion(a - k @ c, (b - k @ d) @ u + k @ y)
     errors = y - c @ state - d @ u
-    if initial == "zero":
+    if initial_state == "zero":
         return np.asarray(errors)
     # The state is as uncertain as the outputs: each counts by its innovations.
     r = model.noise_covariance
@@ -159,9 +159,9 @@ def _best(motion: Array, errors: Array) -> Array:
     return np.asarray((columns @ weights).reshape(errors.shape))
 
 
-def _ahead(model: InnovationsModel, y: Array, u: Array, horizon: int, initial: str) -> Array:
+def _ahead(model: InnovationsModel, y: Array, u: Array, horizon: int, initial_state: str) -> Array:
     """y(t) minus the part of the noise that is younger than the horizon."""
-    errors = one_step_errors(model, y, u, initial)
+    errors = one_step_errors(model, y, u, initial_state)
     a, _, c, _, k = model.matrices
     young, gain = errors.copy(), k
     for lag in range(1, min(horizon, y.shape[1])):

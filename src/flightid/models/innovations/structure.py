@@ -9,7 +9,7 @@ from flightid.errors import OptionError
 from flightid.models.polynomial.structure import OFFSETS
 
 METHODS = ("moesp", "n4sid", "cva", "pbsid")
-INITIAL = ("estimate", "zero")
+INITIAL_STATES = ("estimate", "zero")
 LARGEST_ORDER = 50
 LARGEST_HORIZON = 500
 
@@ -21,7 +21,7 @@ class SubspaceOptions(TypedDict, total=False):
     horizon: int | None
     direct: bool
     refine: bool
-    initial: str
+    initial_state: str
     offsets: str
     maximum_order: int
     maximum_iterations: int
@@ -47,7 +47,7 @@ class SubspaceStructure:
         Whether inputs act without delay (D).
     refine : bool
         Whether the subspace estimate is the start of a prediction-error fit, which gives intervals.
-    initial : str
+    initial_state : str
         State at the first sample of each record: ``"estimate"`` or ``"zero"``.
     offsets : str
         What is taken off each channel of each record: its ``"mean"``, its declared ``"trim"`` or
@@ -75,7 +75,7 @@ class SubspaceStructure:
     horizon: int | None = None
     direct: bool = False
     refine: bool = True
-    initial: str = "estimate"
+    initial_state: str = "estimate"
     offsets: str = "mean"
     maximum_order: int = 10
     maximum_iterations: int = 100
@@ -86,7 +86,7 @@ class SubspaceStructure:
             raise OptionError("a channel is named twice", found=", ".join(channels))
         if not self.outputs or not self.inputs:
             raise OptionError("the model has no outputs or no inputs", found=", ".join(channels))
-        choices = {"method": METHODS, "initial": INITIAL, "offsets": OFFSETS}
+        choices = {"method": METHODS, "initial_state": INITIAL_STATES, "offsets": OFFSETS}
         for name, allowed in choices.items():
             if getattr(self, name) not in allowed:
                 needed = ", ".join(allowed)

@@ -39,7 +39,7 @@ class StructureMakers:
         na, nb, nc, nd, nf, nk : int, or for nb, nf, nk a sequence with one for each input
             Orders; nb counts coefficients, nk samples of delay.
         **options
-            ``initial``, ``offsets``, ``starts``, …
+            ``initial_state``, ``offsets``, ``starts``, …
 
         Returns
         -------

@@ -249,7 +249,7 @@ class PolynomialModel(StructureMakers):
         record: Record,
         horizon: int | str = "free_run",
         *,
-        initial: str = "estimate",
+        initial_state: str = "estimate",
         offsets: str = "mean",
     ) -> PolynomialPrediction:
         """Predict the output of a record k steps ahead (1, 2, …) or in ``"free_run"``.
@@ -259,7 +259,7 @@ class PolynomialModel(StructureMakers):
         record : Record
             With the model's channels, units and sample time.
         horizon : int or "free_run"
-        initial : {"estimate", "zero"}
+        initial_state : {"estimate", "zero"}
             Before the record: the values that make this prediction's errors smallest (a prediction
             k ahead: those one step ahead), or rest.
         offsets : {"mean", "trim", "none"}
@@ -284,11 +284,11 @@ class PolynomialModel(StructureMakers):
         ---------
         Ljung, *System Identification*, 2nd ed., eqs. 3.20 and 3.31.
         """
-        return predict(self, record, horizon, initial=initial, offsets=offsets)
+        return predict(self, record, horizon, initial_state=initial_state, offsets=offsets)
 
     def simulate(self, record: Record) -> Array:
         """Free run from rest on the inputs as they are, shape (n_samples,), output's unit."""
-        return self.predict(record, "free_run", initial="zero", offsets="none").predicted
+        return self.predict(record, "free_run", initial_state="zero", offsets="none").predicted
 
     def difference_equation(self) -> str:
         """The model as an equation in samples, for ARX and ARMAX; else in polynomials."""

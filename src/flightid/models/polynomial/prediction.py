@@ -35,7 +35,7 @@ class PolynomialPrediction:
         In the output's unit, the operating point included.
     horizon : int or str
         Samples ahead, or ``"free_run"``.
-    initial : str
+    initial_state : str
         ``"estimate"`` or ``"zero"``.
     diverged : bool
         Whether the run left the range of numbers and was held.
@@ -50,7 +50,7 @@ class PolynomialPrediction:
     measured: Array
     predicted: Array
     horizon: int | str
-    initial: str
+    initial_state: str
     diverged: bool = False
 
     @property
@@ -67,7 +67,7 @@ class PolynomialPrediction:
     def words(self) -> str:
         """Horizon and initial state in words."""
         ahead = "free run" if self.horizon == "free_run" else f"{self.horizon} ahead"
-        return f"{ahead} from {'rest' if self.initial == 'zero' else 'an estimated state'}"
+        return f"{ahead} from {'rest' if self.initial_state == 'zero' else 'an estimated state'}"
 
     def __repr__(self) -> str:
         """Horizon, initial state, size and error on one line."""
@@ -79,13 +79,13 @@ class PolynomialPrediction:
 
 
 def predict(
-    model: PolynomialModel, record: Record, horizon: int | str, *, initial: str, offsets: str
+    model: PolynomialModel, record: Record, horizon: int | str, *, initial_state: str, offsets: str
 ) -> PolynomialPrediction:
     """Predict one record; `PolynomialModel.predict` says how."""
     if horizon != "free_run" and not (isinstance(horizon, int) and horizon > 0):
         raise OptionError("unknown horizon", found=horizon, needed="1, 2, … or 'free_run'")
     for what, value, allowed in (
-        ("initial state", initial, ("estimate", "zero")),
+        ("initial state", initial_state, ("estimate", "zero")),
         ("offsets", offsets, OFFSETS),
     ):
         if value not in allowed:
@@ -93,9 +93,9 @@ def predict(
     data = gather_channels([record], model.output, model.inputs, offsets)
     require_same(model, data.units, data.sample_time_s)
     if horizon == "free_run":
-        deviation = free_run(model, data.output, data.inputs, initial=initial)
+        deviation = free_run(model, data.output, data.inputs, initial_state=initial_state)
     else:
-        deviation = _ahead(model, data.output, data.inputs, int(horizon), initial)
+        deviation = _ahead(model, data.output, data.inputs, int(horizon), initial_state)
     usable = np.abs(deviation) < LARGEST
     diverged = not bool(np.all(usable))
     if diverged:
@@ -103,7 +103,7 @@ def predict(
         deviation[last:] = deviation[last - 1]
     offset = data.offsets[0][model.output]
     return PolynomialPrediction(
-        record[model.output], deviation + offset, horizon, initial, diverged
+        record[model.output], deviation + offset, horizon, initial_state, diverged
     )
 
 
@@ -128,7 +128,9 @@ def require_same(
             )
 
 
-def one_step_errors(model: PolynomialModel, output: Array, inputs: Array, initial: str) -> Array:
+def one_step_errors(
+    model: PolynomialModel, output: Array, inputs: Array, initial_state: str
+) -> Array:
     """Prediction errors one step ahead, shape (n_samples,), of deviations from trim."""
     return _native.polynomial_errors(
         output,
@@ -136,16 +138,16 @@ def one_step_errors(model: PolynomialModel, output: Array, inputs: Array, initia
         [output.size],
         model.structure.native,
         model.theta,
-        "unknown" if initial == "estimate" else "rest",
+        "unknown" if initial_state == "estimate" else "rest",
         [],
     )
 
 
 def _ahead(
-    model: PolynomialModel, output: Array, inputs: Array, horizon: int, initial: str
+    model: PolynomialModel, output: Array, inputs: Array, horizon: int, initial_state: str
 ) -> Array:
     """y(t) minus the part of the noise that is younger than the horizon."""
-    errors = one_step_errors(model, output, inputs, initial)
+    errors = one_step_errors(model, output, inputs, initial_state)
     above, below = model.noise_transfer
     impulse = np.zeros(horizon)
     impulse[0] = 1.0
@@ -153,13 +155,13 @@ def _ahead(
     return np.asarray(output - lfilter(young, [1.0], errors))
 
 
-def free_run(model: PolynomialModel, output: Array, inputs: Array, *, initial: str) -> Array:
+def free_run(model: PolynomialModel, output: Array, inputs: Array, *, initial_state: str) -> Array:
     """Response to the inputs alone, and with ``"estimate"`` the free motion that fits best."""
     run = np.zeros(output.size)
     with np.errstate(over="ignore", invalid="ignore"):
         for name, row in zip(model.inputs, inputs, strict=True):
             run += lfilter(*model.transfer(name), row)
-        if initial == "zero":
+        if initial_state == "zero":
             return run
         below = np.asarray(model.a)
         for row in model.f:

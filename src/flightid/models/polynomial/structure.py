@@ -8,7 +8,7 @@ from typing import TypedDict
 
 from flightid.errors import OptionError
 
-INITIAL = ("estimate", "zero", "backcast")
+INITIAL_STATES = ("estimate", "zero")
 METHODS = ("prediction_error", "iv4")
 OFFSETS = ("mean", "trim", "none")
 KERNELS = ("tc", "dc")
@@ -21,7 +21,8 @@ NativeOrders = tuple[int, list[int], int, int, list[int], list[int]]
 class PolynomialOptions(TypedDict, total=False):
     """Options of `PolynomialStructure` by name."""
 
-    initial: str
+    initial_state: str
+    backcast: bool
     method: str
     offsets: str
     enforce_stability: bool
@@ -46,9 +47,12 @@ class PolynomialStructure:
     nb, nf, nk : tuple of int
         For each input the number of coefficients of B, the degree of F and the delay in samples
         (0: a direct path).
-    initial : str
+    initial_state : str
         Before each record: ``"estimate"`` fits the values that stand for it, ``"zero"`` takes
-        rest, ``"backcast"`` runs the noise model backwards over the record (inputs at rest).
+        rest.
+    backcast : bool
+        Estimate what was before each record by running the noise model backwards over it, inputs
+        at rest, in place of values that are fitted.
     method : str
         ``"prediction_error"`` or, for ARX, ``"iv4"``: optimal instruments, consistent with noise
         of any colour.
@@ -84,7 +88,8 @@ class PolynomialStructure:
     nd: int
     nf: tuple[int, ...]
     nk: tuple[int, ...]
-    initial: str = "estimate"
+    initial_state: str = "estimate"
+    backcast: bool = False
     method: str = "prediction_error"
     offsets: str = "mean"
     enforce_stability: bool = False
@@ -96,7 +101,7 @@ class PolynomialStructure:
     def __post_init__(self) -> None:
         self._check_orders()
         choices = {
-            "initial": INITIAL,
+            "initial_state": INITIAL_STATES,
             "method": METHODS,
             "offsets": OFFSETS,
             "kernel": (*KERNELS, None),
@@ -105,6 +110,12 @@ class PolynomialStructure:
             if getattr(self, name) not in allowed:
                 needed = ", ".join(map(str, allowed))
                 raise OptionError(f"unknown {name}", found=getattr(self, name), needed=needed)
+        if self.backcast and self.initial_state != "estimate":
+            raise OptionError(
+                "backcast estimates the initial state",
+                found=f"initial_state {self.initial_state!r}",
+                needed="initial_state 'estimate', or no backcast",
+            )
         if (self.kernel or self.method == "iv4") and not self.is_regression:
             raise OptionError(
                 "instruments and kernels belong to ARX models",
@@ -120,6 +131,11 @@ class PolynomialStructure:
         for name in ("starts", "maximum_iterations"):
             if getattr(self, name) < 1:
                 raise OptionError(f"{name} is too small", found=getattr(self, name), needed=1)
+
+    @property
+    def past(self) -> str:
+        """What stands for the time before a record: "estimate", "zero" or "backcast"."""
+        return "backcast" if self.backcast else self.initial_state
 
     def _check_orders(self) -> None:
         channels = [self.output, *self.inputs]

@@ -51,7 +51,7 @@ class CrossRun:
     output : str
     model : str
         ``"model"``, or ``"linear, same lags"``.
-    horizon, initial : str
+    horizon, initial_state : str
         How far ahead, and from what state, in words.
     predicted : ndarray, shape (n_samples,)
         In the output's unit.
@@ -72,7 +72,7 @@ class CrossRun:
     output: str
     model: str
     horizon: str
-    initial: str
+    initial_state: str
     predicted: NDArray[np.float64]
     start: int
     held: bool
@@ -171,7 +171,7 @@ class CrossValidation:
                 run.record.name,
                 run.model,
                 run.horizon,
-                run.initial,
+                run.initial_state,
                 run.fit_percent,
                 run.theil,
                 run.mse,
@@ -196,7 +196,7 @@ class CrossValidation:
                     "record": run.record.name,
                     "model": run.model,
                     "horizon": run.horizon,
-                    "initial": run.initial,
+                    "initial_state": run.initial_state,
                     "fit_percent": run.fit_percent,
                     "theil": run.theil,
                     "mse": run.mse,

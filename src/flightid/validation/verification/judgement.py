@@ -50,7 +50,7 @@ def _guide_factor(unit: str) -> float | None:
 def judge(
     predictions: tuple[Prediction, ...],
     compared: tuple[str, ...],
-    initial: str,
+    initial_state: str,
     freedom: Freedom,
     hold: str,
     mismatch: Mismatch | None,
@@ -94,9 +94,9 @@ def judge(
         predictions=predictions,
         overall_theil=overall,
         j_rms=j_rms,
-        initial=initial,
-        free_bias=freedom.bias,
-        free_reference=freedom.reference,
+        initial_state=initial_state,
+        state_bias=freedom.bias,
+        output_bias=freedom.reference,
         hold=hold,
         mismatch=mismatch,
         findings=(
@@ -157,7 +157,7 @@ def _findings(
             Finding(
                 "verification-nonlinear",
                 Light.GREEN,
-                "the model is not linear: its equations were integrated, and a free bias is a "
+                "the model is not linear: its equations were integrated, and a state bias is a "
                 "constant shift of each input",
             )
         )

@@ -68,9 +68,9 @@ class Verification:
     j_rms : float or None
         Weighted error over all outputs in degrees, deg/s, ft/s and ft/s²; None where an output is
         of another kind.
-    initial : {"trim", "fit"}
+    initial_state : {"trim", "estimate"}
         Whether the initial state was at rest or solved for.
-    free_bias, free_reference : bool
+    state_bias, output_bias : bool
         Which shifts were solved for.
     hold : {"first", "zero"}
         What inputs do between samples.
@@ -100,9 +100,9 @@ class Verification:
     r_squared: Mapping[str, float]
     overall_theil: float
     j_rms: float | None
-    initial: str
-    free_bias: bool
-    free_reference: bool
+    initial_state: str
+    state_bias: bool
+    output_bias: bool
     hold: str
     mismatch: Mismatch | None = None
     findings: tuple[Finding, ...] = ()
@@ -122,13 +122,13 @@ class Verification:
         """What was predicted from what, in one sentence."""
         start = {
             "trim": "from rest at trim",
-            "fit": "from an initial state solved for in each record",
-        }[self.initial]
+            "estimate": "from an initial state solved for in each record",
+        }[self.initial_state]
         solved = [
             name
             for name, is_free in (
-                ("state biases", self.free_bias),
-                ("reference shifts", self.free_reference),
+                ("state biases", self.state_bias),
+                ("reference shifts", self.output_bias),
             )
             if is_free
         ]
@@ -177,9 +177,9 @@ class Verification:
         return {
             "schema": "flightid.verification/1",
             "horizon": self.horizon,
-            "initial": self.initial,
-            "free_bias": self.free_bias,
-            "free_reference": self.free_reference,
+            "initial_state": self.initial_state,
+            "state_bias": self.state_bias,
+            "output_bias": self.output_bias,
             "hold": self.hold,
             "overall_theil": self.overall_theil,
             "j_rms": self.j_rms,

@@ -23,18 +23,18 @@ from flightid.validation.verification.nonlinear_run import predict_equations
 from flightid.validation.verification.result import Prediction, Verification
 from flightid.validation.verification.shifts import Freedom, Shifts, predict
 
-Initial = Literal["trim", "fit"]
+Initial = Literal["trim", "estimate"]
 
 
 @overload
 def verify(  # type: ignore[overload-overlap]  # a list is an object too
-    model: list[object] | tuple[object, ...],
+    source: list[object] | tuple[object, ...],
     records: Record | Sequence[Record],
     *,
     names: Sequence[str] | None = ...,
-    free_bias: bool = ...,
-    free_reference: bool = ...,
-    initial: Initial = ...,
+    state_bias: bool = ...,
+    output_bias: bool = ...,
+    initial_state: Initial = ...,
     outputs: Sequence[str] | None = ...,
     hold: Hold = ...,
     response: FrequencyResponse | None = ...,
@@ -43,13 +43,13 @@ def verify(  # type: ignore[overload-overlap]  # a list is an object too
 
 @overload
 def verify(
-    model: object,
+    source: object,
     records: Record | Sequence[Record],
     *,
     names: None = ...,
-    free_bias: bool = ...,
-    free_reference: bool = ...,
-    initial: Initial = ...,
+    state_bias: bool = ...,
+    output_bias: bool = ...,
+    initial_state: Initial = ...,
     outputs: Sequence[str] | None = ...,
     hold: Hold = ...,
     response: FrequencyResponse | None = ...,
@@ -57,13 +57,13 @@ def verify(
 
 
 def verify(
-    model: object,
+    source: object,
     records: Record | Sequence[Record],
     *,
     names: Sequence[str] | None = None,
-    free_bias: bool = True,
-    free_reference: bool = True,
-    initial: Initial = "trim",
+    state_bias: bool = True,
+    output_bias: bool = True,
+    initial_state: Initial = "trim",
     outputs: Sequence[str] | None = None,
     hold: Hold = "first",
     response: FrequencyResponse | None = None,
@@ -71,11 +71,11 @@ def verify(
     """Drive a model, or several side by side, with records' inputs and compare the outputs.
 
     ``dx/dt = A x + B (u - u_ref) + b``, ``y = C x + D (u - u_ref) + y_ref``: a free run over the
-    whole record. Nothing of the model changes; state biases b, reference shifts y_ref and, with
-    ``initial="fit"``, the initial state are solved for by weighted least squares in each record,
-    since they belong to the record. u_ref is the record's declared trim, or zero. The equations of
-    a nonlinear model are integrated instead, on the channels as they are; its free bias is a
-    constant shift of each input.
+    whole record. Nothing of the model changes; state biases b, output biases y_ref and, with
+    ``initial_state="estimate"``, the initial state are solved for by weighted least squares in each
+    record, since they belong to the record. u_ref is the record's declared trim, or zero. The
+    equations of a nonlinear model are integrated instead, on the channels as they are; its state
+    bias is a constant shift of each input.
 
     Assumes: records that were not used in the fit, and start in trim unless the initial state is
     fitted; a nonlinear model that does not explode within a record. Biased when the record is short
@@ -86,16 +86,16 @@ def verify(
 
     Parameters
     ----------
-    model : Fit or model, or list or tuple of them
+    source : Fit or model, or list or tuple of them
         A fit, or anything with inputs, outputs and state_space(). Of several the first is on
         trial and the others are its rivals.
     records : Record or sequence of Record
         What to predict; they hold the models' inputs and outputs by name and unit.
     names : sequence of str, optional
         Names of several models; default: their own.
-    free_bias, free_reference : bool
-        Solve for state biases and reference shifts.
-    initial : {"trim", "fit"}
+    state_bias, output_bias : bool
+        Solve for state biases b and output biases y_ref.
+    initial_state : {"trim", "estimate"}
         Start at rest, or from a state that is solved for.
     outputs : sequence of str, optional
         Outputs to compare; default: those of the models that every record holds.
@@ -142,22 +142,24 @@ def verify(
     flown = (records,) if isinstance(records, Record) else tuple(records)
     if not flown:
         raise OptionError("there is nothing to verify on", needed="one record or more")
-    if initial not in ("trim", "fit"):
-        raise OptionError("initial is not known", found=initial, needed="'trim' or 'fit'")
+    if initial_state not in ("trim", "estimate"):
+        raise OptionError(
+            "initial_state is not known", found=initial_state, needed="'trim' or 'estimate'"
+        )
     if hold not in ("first", "zero"):
         raise OptionError("hold is not known", found=hold, needed="'first' or 'zero'")
-    several = model if isinstance(model, list | tuple) else [model]
+    several = source if isinstance(source, list | tuple) else [source]
     models = [_linear_model(each) for each in several]
     chosen = _compared(models, flown, outputs)
-    freedom = Freedom(free_bias, free_reference, initial == "fit")
+    freedom = Freedom(state_bias, output_bias, initial_state == "estimate")
     results = []
     for each in models:
         for record in flown:
             _require_units(each, record, chosen)
         predictions = tuple(_predict(each, record, chosen, freedom, hold) for record in flown)
         seen = None if response is None else mismatch(each, response)
-        results.append(judge(predictions, chosen, initial, freedom, hold, seen))
-    if not isinstance(model, list | tuple):
+        results.append(judge(predictions, chosen, initial_state, freedom, hold, seen))
+    if not isinstance(source, list | tuple):
         return results[0]
     return compared(dict(zip(_names(models, names), results, strict=True)))
 
