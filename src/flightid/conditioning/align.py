@@ -12,7 +12,7 @@ from scipy import signal
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
-from flightid.record import Record, Step
+from flightid.record import InputShape, Record, Step
 from flightid.record.interpolation import windowed_sinc
 from flightid.table import Column, Table
 from flightid.units import require_match
@@ -392,7 +392,9 @@ def align(record: Record, skews_s: Mapping[str, float]) -> Record:
     samples = {name: record[name][kept] for name in record.channels}
     for name, lag in lags.items():
         samples[name] = shifted(record[name], lag)[kept]
-    step_done = Step(
-        "conditioning.align", {f"{name}_skew_s": float(skew) for name, skew in skews_s.items()}
-    )
-    return record.replace(samples, time_s=record.time_s[kept], step=step_done)
+    options = {f"{name}_skew_s": float(skew) for name, skew in skews_s.items()}
+    step_done = Step("conditioning.align", options)
+    broken = any(not float(lags.get(name, 0.0)).is_integer() for name in record.inputs)
+    # Steps and lines that are moved by part of a sample no longer end at the samples.
+    shape = InputShape(None, record.period_s) if broken and record.hold != "band_limited" else None
+    return record.replace(samples, time_s=record.time_s[kept], step=step_done, input_shape=shape)

@@ -13,7 +13,7 @@ from scipy import signal
 
 from flightid.conditioning.detrend import chosen_channels
 from flightid.errors import DataError, OptionError
-from flightid.record import Record, Step
+from flightid.record import InputShape, Record, Step
 from flightid.table import Cell
 
 
@@ -151,7 +151,14 @@ def filter_record(
         "channels": "all" if channels is None else ", ".join(names),
         "delay_s": 0.0 if zero_phase else _delay_s(made, record, band, low, high),
     }
-    return record.replace(samples, step=Step("conditioning.filter_record", options))
+    # Inputs and outputs filtered alike keep the sampled relation that their hold made; an input
+    # filtered by itself no longer moves as it did.
+    alike = set(names) >= {*record.inputs, *record.outputs} or not set(names) & set(record.inputs)
+    return record.replace(
+        samples,
+        step=Step("conditioning.filter_record", options),
+        input_shape=record.input_shape if alike else InputShape(None, record.period_s),
+    )
 
 
 def _design(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from flightid.record import Interpolation, Record, Step, to_uniform
+from flightid.record import InputShape, Interpolation, Record, Step, to_uniform
 
 
 def resample(
@@ -27,7 +27,8 @@ def resample(
     Returns
     -------
     Record
-        Copy; starts at the same instant.
+        Copy; starts at the same instant. Its hold is "band_limited" where inputs were low-passed
+        to a coarser base, and unknown where steps or lines were broken up.
 
     Raises
     ------
@@ -55,4 +56,28 @@ def resample(
         interpolation=interpolation,
     )
     step = Step("conditioning.resample", base.options)
-    return record.replace(base.only.samples, time_s=base.only.time_s, step=step)
+    time_s = base.only.time_s
+    return record.replace(
+        base.only.samples,
+        time_s=time_s,
+        step=step,
+        input_shape=_shape_after(record, sample_time_s, interpolation),
+    )
+
+
+def _shape_after(
+    record: Record,
+    sample_time_s: float,
+    interpolation: Interpolation | str | Mapping[str, Interpolation | str],
+) -> InputShape:
+    """Inputs that were low-passed to a coarser base are smooth on it, whatever they were."""
+    methods = {
+        interpolation.get(name, Interpolation.BAND_LIMITED)
+        if isinstance(interpolation, Mapping)
+        else interpolation
+        for name in record.inputs
+    }
+    known = record.input_shape.on_another_base(record.sample_time_s, sample_time_s)
+    if known.hold is None and methods == {"band-limited"} and sample_time_s > record.sample_time_s:
+        return InputShape("band_limited", known.period_s)
+    return known if methods <= {"band-limited"} else InputShape(None, known.period_s)

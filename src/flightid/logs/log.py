@@ -15,7 +15,7 @@ from flightid.logs.log_table import LogTable
 from flightid.logs.self_check import InjectionCheck, check_injection
 from flightid.logs.source import ByteRange, Event, Gap, LogSource, MessageInfo, ParameterChange
 from flightid.logs.to_record import make_record
-from flightid.record import Record
+from flightid.record import InputHold, InputShape, Record
 from flightid.record.timebase import GapPolicy
 from flightid.table import Column, Table
 
@@ -172,6 +172,8 @@ class Log:
         gaps: GapPolicy | str = GapPolicy.ERROR,
         max_gap_s: float | None = None,
         name: str | None = None,
+        hold: InputHold | None = None,
+        period_s: float | None = None,
     ) -> Record:
         """Make a record: mapped channels in SI units on one uniform time base.
 
@@ -196,6 +198,11 @@ class Log:
             What to do where a channel has no samples for long; see `to_uniform`.
         name : str, optional
             Name of the record; default: the file's.
+        hold : {"zero", "first", "band_limited"}, optional
+            What inputs do between the samples of the record; default: what the map says, where the
+            inputs are on their own stamps, else unknown.
+        period_s : float, optional
+            Time after which the inputs repeat, s.
 
         Returns
         -------
@@ -222,6 +229,7 @@ class Log:
             gaps,
             max_gap_s,
             name,
+            InputShape(hold, period_s),
         )
 
     def summary(self) -> Table:

@@ -22,7 +22,7 @@ from flightid.logs.channels.channel_map import (
 from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.logs.extraction import Extracted, extract, find
 from flightid.logs.self_check import InjectionCheck, check_injection, chirp_clock, paired_rows
-from flightid.record import Channel, Record, Step
+from flightid.record import Channel, InputShape, Record, Step
 from flightid.record.timebase import GapPolicy, to_uniform
 from flightid.table import Cell
 from flightid.units import convert
@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 EXCITATION = "excitation"
 EDGE_STEPS = 3.0
 """Steps of its own by which a channel may begin late or end early and still cover a span."""
+OWN_STAMPS = 1e-3
+"""Largest relative difference of a record's sample time from that of a channel that it copies."""
 SI = {"deg": "rad", "deg/s": "rad/s"}
 
 
@@ -47,6 +49,7 @@ def make_record(
     gaps: GapPolicy | str,
     max_gap_s: float | None,
     name: str | None,
+    declared: InputShape,
 ) -> Record:
     """See `Log.record`."""
     chosen = _chosen(log, channels, names).with_roles(roles or {})
@@ -96,7 +99,19 @@ def make_record(
     options |= {"left_out": ", ".join(left_out) or None}
     if check is not None:
         options |= {"sid_run": repr(run), "injection": str(check.findings[0])}
-    return record.replace(channels=labels, step=Step("Log.record", options))
+    shape = _input_shape(declared, chosen, found, base.sample_time_s)
+    return record.replace(channels=labels, step=Step("Log.record", options), input_shape=shape)
+
+
+def _input_shape(
+    declared: InputShape, chosen: ChannelMap, found: list[Extracted], step_s: float
+) -> InputShape:
+    """What is declared; else what the map knows, for inputs that are not resampled."""
+    if declared.hold is not None or chosen.hold is None:
+        return declared
+    inputs = [item for item in found if item.channel.role == Role.INPUT]
+    own = all(abs(item.interval_s / step_s - 1.0) < OWN_STAMPS for item in inputs)
+    return InputShape(chosen.hold if own else None, declared.period_s)
 
 
 def _chosen(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from flightid.record.channel import Channel
 from flightid.record.history import Step
+from flightid.record.hold import InputHold, InputShape
 from flightid.record.interpolation import Interpolation
 from flightid.record.record import Record
 from flightid.record.stamps import StampPolicy
@@ -24,6 +25,8 @@ _HOMES = {"read_records": "flightid.record.read", "write_records": "flightid.rec
 __all__ = [
     "Channel",
     "GapPolicy",
+    "InputHold",
+    "InputShape",
     "Interpolation",
     "Record",
     "StampPolicy",

@@ -36,7 +36,18 @@ def summary_table(record: Record) -> Table:
         )
         for key, channel in record.channels.items()
     )
-    return Table(repr(record), columns, rows, tuple(str(step) for step in record.history))
+    known = (f"{str(record.input_shape).capitalize()}.",) if record.inputs else ()
+    notes = (*known, *(str(step) for step in record.history))
+    return Table(repr(record), columns, rows, notes)
+
+
+def one_line(record: Record) -> str:
+    """Size, rate and channel names on one line."""
+    return (
+        f"Record({record.name!r}, {record.n_samples} samples, {record.sample_rate_hz:.6g} Hz, "
+        f"{record.duration_s:.6g} s, inputs [{', '.join(record.inputs)}], "
+        f"outputs [{', '.join(record.outputs)}])"
+    )
 
 
 def plain_values(record: Record) -> dict[str, object]:
@@ -55,6 +66,7 @@ def plain_values(record: Record) -> dict[str, object]:
             for key, channel in record.channels.items()
         },
         "trim": record.trim,
+        **record.input_shape.to_dict(),
         "history": [plain_step(step) for step in record.history],
     }
 

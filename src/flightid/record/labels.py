@@ -16,6 +16,7 @@ from flightid.errors import DataError, FileFormatError
 from flightid.record.channel import Channel
 from flightid.record.display import plain_step
 from flightid.record.history import Step
+from flightid.record.hold import InputShape
 from flightid.record.record import Record
 
 SCHEMA = "flightid.records/1"
@@ -40,6 +41,8 @@ class RecordLabels:
         Trim values.
     history : tuple of Step
         What was done.
+    input_shape : InputShape
+        How the inputs move between samples, and whether they repeat.
     """
 
     name: str
@@ -48,6 +51,7 @@ class RecordLabels:
     variables: tuple[str, ...]
     trim: Mapping[str, float]
     history: tuple[Step, ...]
+    input_shape: InputShape
 
     def record(self, time_s: NDArray[np.float64], samples: Mapping[str, Any]) -> Record:
         """The record, from its stamps and its samples by variable."""
@@ -68,7 +72,7 @@ class RecordLabels:
             history=self.history,
         )
         # Groups by role lose the order in which the channels stood.
-        return record.replace(channels=self.channels)
+        return record.replace(channels=self.channels, input_shape=self.input_shape)
 
 
 def labels_of(record: Record, *, plain_names: bool) -> RecordLabels:
@@ -80,8 +84,9 @@ def labels_of(record: Record, *, plain_names: bool) -> RecordLabels:
         for index, name in enumerate(names)
     )
     return RecordLabels(
-        record.name, record.n_samples, channels, variables, record.trim, record.history
-    )
+        record.name, record.n_samples, channels, variables, record.trim, record.history,
+        record.input_shape,
+    )  # fmt: skip
 
 
 def to_text(labels: Iterable[RecordLabels]) -> str:
@@ -110,6 +115,7 @@ def to_text(labels: Iterable[RecordLabels]) -> str:
                 ],
                 "trim": dict(item.trim),
                 "history": [plain_step(step) for step in item.history],
+                "input_shape": item.input_shape.to_dict(),
             }
             for item in labels
         ],
@@ -164,4 +170,6 @@ def _record_labels(item: dict[str, Any]) -> RecordLabels:
             Step(step["operation"], dict(step["options"]), step["version"])
             for step in item["history"]
         ),
+        # Files of earlier versions do not say.
+        InputShape(**item.get("input_shape", {})),
     )

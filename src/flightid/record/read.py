@@ -18,6 +18,7 @@ from flightid.record.formats import ColumnTable, FileFormat, csv, file_format, m
 from flightid.record.formats import parquet as parquet_format
 from flightid.record.formats.columns import is_unit
 from flightid.record.history import Step
+from flightid.record.hold import InputHold, InputShape
 from flightid.record.record import Record
 from flightid.record.stamps import GAP_FACTOR
 from flightid.record.store import RECORD_COLUMN, stored_records
@@ -49,6 +50,8 @@ def read_records(
     sample_time_s: float | None = None,
     resample_to_s: float | None = None,
     record: str | None = RECORD_COLUMN,
+    hold: InputHold | None = None,
+    period_s: float | None = None,
 ) -> list[Record]:
     r"""Read records from CSV, Parquet, MATLAB .mat (level 5 to 7.3) or netCDF.
 
@@ -76,6 +79,11 @@ def read_records(
         Sample time, s, of a new uniform grid; for stamps that are not uniform.
     record : str, optional
         Column that tells manoeuvres apart, used if it is there; None: there is none.
+    hold : {"zero", "first", "band_limited"}, optional
+        What the inputs of the records do between samples: steps, straight lines, smooth. Default:
+        what the file says, else unknown.
+    period_s : float, optional
+        Time after which the inputs repeat exactly, s.
 
     Returns
     -------
@@ -91,7 +99,7 @@ def read_records(
     UnitError
         A unit that is not known or contradicts the file.
     OptionError
-        Time stated twice, or not at all; a channel named twice.
+        Time stated twice, or not at all; a channel named twice; a hold against the file's.
     DataError
         Samples that are not finite, stamps that are not uniform.
 
@@ -116,7 +124,8 @@ def read_records(
     text = _labels(source, kind)
     if text is not None:
         stored = stored_records(source, text, is_parquet=kind is FileFormat.PARQUET)
-        return [_selected(item, roles, units or {}) for item in stored]
+        chosen = [_selected(item, roles, units or {}) for item in stored]
+        return [_declared(item, hold, period_s) for item in chosen]
     table = _table(source, kind)
     stamps = _stamps(table, time, units or {}, sample_time_s)
     wanted = _wanted(table, roles, units or {}, time, record, stamps.size)
@@ -142,7 +151,22 @@ def read_records(
             records.append(_record(grid, samples, wanted, label or source.stem, (*history, *more)))
     if len(records) > 1 and len({item.name for item in records}) == 1:
         records = [item.replace(name=f"{item.name}[{index}]") for index, item in enumerate(records)]
-    return records
+    return [_declared(item, hold, period_s) for item in records]
+
+
+def _declared(record: Record, hold: InputHold | None, period_s: float | None) -> Record:
+    """The record with what is declared of its inputs; a file must not say otherwise."""
+    known = record.input_shape
+    if hold is not None and known.hold not in (None, hold):
+        raise OptionError(
+            f"the declared hold contradicts the file of record {record.name!r}",
+            found=hold,
+            needed=known.hold,
+            action="leave it out, or replace what the file says with Record.with_hold",
+        )
+    if hold is None and period_s is None:
+        return record
+    return record.replace(input_shape=InputShape(hold or known.hold, period_s or known.period_s))
 
 
 def _labels(path: Path, kind: FileFormat) -> str | None:

@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.conventions import Role
-from flightid.errors import DataError, OptionError
 from flightid.record.channel import Channel
-from flightid.record.display import plain_values, summary_table
+from flightid.record.display import one_line, plain_values, summary_table
 from flightid.record.history import Step
-from flightid.record.stamps import UNIFORM_TOLERANCE
+from flightid.record.hold import InputHold, InputShape
+from flightid.record.unit_change import in_units
 from flightid.record.validation import (
     TIME,
+    channels_of,
+    inside_span,
     labelled_variable,
+    labelled_variables,
     require_finite,
     uniform_sample_time,
     unknown_channel,
 )
 from flightid.table import Cell, Table
-from flightid.units import DIMENSIONLESS, convert
 from flightid.version import VERSION
 
 
@@ -55,7 +56,9 @@ class Record:
     Record('record', 200 samples, 100 Hz, 2 s, inputs [tau], outputs [p])
     """
 
-    __slots__ = ("_channels", "_dataset", "_history", "_name", "_sample_time_s", "_trim")
+    __slots__ = (
+        "_channels", "_dataset", "_history", "_input_shape", "_name", "_sample_time_s", "_trim",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -64,17 +67,10 @@ class Record:
         name: str = "record",
         trim: Mapping[str, float] | None = None,
         history: Iterable[Step] = (),
+        input_shape: InputShape | None = None,
     ) -> None:
         self._sample_time_s = uniform_sample_time(np.asarray(dataset[TIME].values))
-        self._channels = {
-            str(key): Channel(
-                str(key),
-                str(variable.attrs.get("unit", DIMENSIONLESS)),
-                Role(variable.attrs.get("role", Role.OTHER)),
-                str(variable.attrs.get("note", "")),
-            )
-            for key, variable in dataset.data_vars.items()
-        }
+        self._channels = channels_of(dataset)
         for key in self._channels:
             require_finite(key, np.asarray(dataset[key].values))
         frozen = dataset.copy(deep=True)
@@ -84,6 +80,7 @@ class Record:
         self._name = name
         self._trim = dict(trim or {})
         self._history = tuple(history)
+        self._input_shape = input_shape or InputShape()
 
     @classmethod
     def from_arrays(
@@ -99,6 +96,8 @@ class Record:
         trim: Mapping[str, float] | None = None,
         name: str = "record",
         history: Iterable[Step] = (),
+        hold: InputHold | None = None,
+        period_s: float | None = None,
     ) -> Record:
         """Build a record from stamps and named arrays.
 
@@ -118,6 +117,8 @@ class Record:
             Name of the manoeuvre.
         history : iterable of Step
             What was done before.
+        hold, period_s : optional
+            What inputs do between samples and when they repeat; see `InputShape`.
 
         Returns
         -------
@@ -139,21 +140,10 @@ class Record:
             Role.EXCITATION: excitations or {},
             Role.OTHER: others or {},
         }
-        variables: dict[str, Any] = {}
-        for role, group in groups.items():
-            for key, samples in group.items():
-                if key in variables:
-                    raise OptionError(
-                        "a channel is named twice", found=key, needed="one role for each channel"
-                    )
-                unit = (units or {}).get(key, DIMENSIONLESS)
-                channel = Channel(key, unit, role, (notes or {}).get(key, ""))
-                variables[key] = labelled_variable(channel, samples, stamps)
-        for label in (*(units or {}), *(trim or {}), *(notes or {})):
-            if label not in variables:
-                raise unknown_channel(label, variables)
+        variables = labelled_variables(groups, stamps, units or {}, notes or {}, trim or {})
         dataset = xr.Dataset(variables, coords={TIME: stamps})
-        return cls(dataset, name=name, trim=trim, history=history)
+        shape = InputShape(hold, period_s)
+        return cls(dataset, name=name, trim=trim, history=history, input_shape=shape)
 
     @property
     def name(self) -> str:
@@ -204,6 +194,21 @@ class Record:
     def history(self) -> tuple[Step, ...]:
         """What was done to the data, oldest first."""
         return self._history
+
+    @property
+    def input_shape(self) -> InputShape:
+        """How the inputs move between samples, and whether they repeat."""
+        return self._input_shape
+
+    @property
+    def hold(self) -> InputHold | None:
+        """What inputs do between samples: "zero", "first", "band_limited"; None: not known."""
+        return self._input_shape.hold
+
+    @property
+    def period_s(self) -> float | None:
+        """Time after which the inputs repeat, s; None: not known, or they do not."""
+        return self._input_shape.period_s
 
     def names(self, role: Role) -> tuple[str, ...]:
         """Names of the channels of one role, in order."""
@@ -264,6 +269,7 @@ class Record:
         channels: Iterable[Channel] | None = None,
         name: str | None = None,
         trim: Mapping[str, float] | None = None,
+        input_shape: InputShape | None = None,
     ) -> Record:
         """Copy with some samples, stamps or labels exchanged, and one step appended to history.
 
@@ -280,6 +286,8 @@ class Record:
             that is left out is dropped.
         name, trim : optional
             New name or trim values.
+        input_shape : InputShape, optional
+            What is known of the inputs now; default: what was known, as far as new stamps leave it.
         """
         stamps = self.time_s if time_s is None else np.array(time_s, dtype=np.float64)
         kept = list(self._channels.values()) if channels is None else list(channels)
@@ -297,12 +305,20 @@ class Record:
         }
         done = () if step is None else (Step(step.operation, step.options, VERSION),)
         values = self._trim if trim is None else trim
-        return Record(
+        made = Record(
             xr.Dataset(variables, coords={TIME: stamps}),
             name=self._name if name is None else name,
             trim={key: value for key, value in values.items() if key in variables},
             history=(*self._history, *done),
         )
+        bases = self._sample_time_s, made.sample_time_s
+        made._input_shape = input_shape or self._input_shape.on_another_base(*bases)
+        return made
+
+    def with_hold(self, hold: InputHold | None, *, period_s: float | None = None) -> Record:
+        """Copy that knows how its inputs move between samples and when they repeat."""
+        step = Step("Record.with_hold", {"hold": hold, "period_s": period_s})
+        return self.replace(step=step, input_shape=InputShape(hold, period_s))
 
     def with_roles(self, **roles: Role | str) -> Record:
         """Copy in which the named channels have other roles."""
@@ -332,18 +348,11 @@ class Record:
         >>> record.to_units(p="rad/s")["p"]
         array([0.        , 3.14159265])
         """
-        samples: dict[str, NDArray[np.float64]] = {}
-        trim = self.trim
-        channels = self.channels
-        for key, unit in units.items():
+        for key in units:
             self._require(key)
-            samples[key] = convert(self[key], self.unit(key), unit)
-            if key in trim:
-                trim[key] = float(convert(trim[key], self.unit(key), unit))
-            old = channels[key]
-            channels[key] = Channel(key, unit, old.role, old.note)
+        samples, channels, trim = in_units(self, units)
         step = Step("Record.to_units", dict(units))
-        return self.replace(samples, channels=channels.values(), trim=trim, step=step)
+        return self.replace(samples, channels=channels, trim=trim, step=step)
 
     def select(self, names: Iterable[str]) -> Record:
         """Copy with only the named channels, in that order."""
@@ -362,14 +371,7 @@ class Record:
             Fewer than two samples lie in the span.
         """
         time_s = self.time_s
-        slack = self._sample_time_s * UNIFORM_TOLERANCE
-        inside = (time_s >= start_s - slack) & (time_s < stop_s - slack)
-        if np.count_nonzero(inside) < 2:
-            raise DataError(
-                "the segment holds fewer than two samples",
-                found=f"{start_s} s to {stop_s} s",
-                needed=f"a span inside {time_s[0]:.3f} s to {time_s[-1]:.3f} s",
-            )
+        inside = inside_span(time_s, start_s, stop_s, self._sample_time_s)
         samples = {key: self[key][inside] for key in self._channels}
         step = Step("Record.segment", {"start_s": start_s, "stop_s": stop_s})
         return self.replace(samples, time_s=time_s[inside], step=step, name=name)
@@ -384,11 +386,7 @@ class Record:
 
     def __repr__(self) -> str:
         """Size, rate and channel names on one line."""
-        return (
-            f"Record({self._name!r}, {self.n_samples} samples, {self.sample_rate_hz:.6g} Hz, "
-            f"{self.duration_s:.6g} s, inputs [{', '.join(self.inputs)}], "
-            f"outputs [{', '.join(self.outputs)}])"
-        )
+        return one_line(self)
 
     def _repr_html_(self) -> str:
         return self.summary()._repr_html_()

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
-from flightid.errors import DataError, ShapeError, UnknownNameError
+from flightid.conventions import Role
+from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
 from flightid.record.channel import Channel
 from flightid.record.stamps import UNIFORM_TOLERANCE
+from flightid.units import DIMENSIONLESS
 
 TIME = "time_s"
 """Name of the time dimension and coordinate of a record."""
@@ -34,6 +38,57 @@ def labelled_variable(
         )
     attributes = {"unit": channel.unit, "role": str(channel.role), "note": channel.note}
     return (TIME,), values, attributes
+
+
+def labelled_variables(
+    groups: Mapping[Role, Mapping[str, ArrayLike]],
+    time_s: NDArray[np.float64],
+    units: Mapping[str, str],
+    notes: Mapping[str, str],
+    trim: Mapping[str, float],
+) -> dict[str, Any]:
+    """Variables by channel name; refused where a channel has two roles or a label no channel."""
+    variables: dict[str, Any] = {}
+    for role, group in groups.items():
+        for key, samples in group.items():
+            if key in variables:
+                raise OptionError(
+                    "a channel is named twice", found=key, needed="one role for each channel"
+                )
+            channel = Channel(key, units.get(key, DIMENSIONLESS), role, notes.get(key, ""))
+            variables[key] = labelled_variable(channel, samples, time_s)
+    for label in (*units, *trim, *notes):
+        if label not in variables:
+            raise unknown_channel(label, variables)
+    return variables
+
+
+def channels_of(dataset: xr.Dataset) -> dict[str, Channel]:
+    """Channels by name, from the attributes of a dataset's variables."""
+    return {
+        str(key): Channel(
+            str(key),
+            str(variable.attrs.get("unit", DIMENSIONLESS)),
+            Role(variable.attrs.get("role", Role.OTHER)),
+            str(variable.attrs.get("note", "")),
+        )
+        for key, variable in dataset.data_vars.items()
+    }
+
+
+def inside_span(
+    time_s: NDArray[np.float64], start_s: float, stop_s: float, sample_time_s: float
+) -> NDArray[np.bool_]:
+    """Stamps with ``start_s <= time < stop_s``; refused where there are fewer than two."""
+    slack = sample_time_s * UNIFORM_TOLERANCE
+    inside = (time_s >= start_s - slack) & (time_s < stop_s - slack)
+    if np.count_nonzero(inside) < 2:
+        raise DataError(
+            "the segment holds fewer than two samples",
+            found=f"{start_s} s to {stop_s} s",
+            needed=f"a span inside {time_s[0]:.3f} s to {time_s[-1]:.3f} s",
+        )
+    return np.asarray(inside)
 
 
 def unknown_channel(name: str, channels: Iterable[str]) -> UnknownNameError:

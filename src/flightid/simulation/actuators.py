@@ -9,7 +9,7 @@ import numpy as np
 from flightid import _native
 from flightid.errors import OptionError, UnknownNameError
 from flightid.models.linear.realisation import Matrices
-from flightid.record import Record, Step
+from flightid.record import InputShape, Record, Step
 
 
 def actuator_positions(record: Record, actuators: Mapping[str, float]) -> Record:
@@ -56,11 +56,16 @@ def actuator_positions(record: Record, actuators: Mapping[str, float]) -> Record
             np.ascontiguousarray(record[name][None]),
             np.array([record[name][0]]),
             record.sample_time_s,
-            True,
+            record.hold != "zero",
         )
         moved[name] = found[0]
     listed = ", ".join(f"{name} {bandwidth:g}" for name, bandwidth in actuators.items())
-    return record.replace(moved, step=Step("actuator_positions", {"rad_s": listed}))
+    return record.replace(
+        moved,
+        step=Step("actuator_positions", {"rad_s": listed}),
+        # A lag leaves neither steps nor lines.
+        input_shape=InputShape(None, record.period_s),
+    )
 
 
 def with_actuators(

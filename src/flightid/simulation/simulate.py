@@ -14,7 +14,8 @@ from flightid.errors import DataError, ModelError, OptionError, ShapeError
 from flightid.models import LinearModel, LinearSystem, StateSpaceModel
 from flightid.models.linear.hold_equivalent import Hold
 from flightid.models.linear.recursion import run_recursion
-from flightid.record import Channel, Record, Step
+from flightid.record import Channel, InputHold, InputShape, Record, Step
+from flightid.record.chosen_hold import chosen_hold
 from flightid.simulation.noise import (
     NOISE_PARTS,
     Noise,
@@ -29,7 +30,7 @@ def simulate(
     model: LinearModel,
     data: Record,
     *,
-    hold: Hold = "first",
+    hold: Hold | None = None,
     initial_state: ArrayLike | Mapping[str, float] | None = None,
     substeps: int | None = None,
     input_bias: Mapping[str, float] | None = None,
@@ -58,8 +59,9 @@ def simulate(
         `StateSpaceModel`.
     data : Record
         Holds the inputs by name, in the model's units.
-    hold : {"first", "zero"}
-        What the inputs do between samples.
+    hold : {"first", "zero"}, optional
+        What the inputs do between samples. Default: what the record knows, else "first"; the
+        record that comes back knows what was used.
     initial_state : array_like, shape (n,), or mapping of str to float, optional
         State at the first sample. Left out: zero, for a nonlinear model its trim; a mapping by
         state of a `StateSpaceModel` changes some entries of that.
@@ -115,11 +117,10 @@ def simulate(
             found=type(model).__name__,
             needed="an object with inputs, outputs and state_space()",
         )
-    if hold not in ("zero", "first"):
-        raise OptionError("hold is not known", found=hold, needed="'zero' or 'first'")
+    between = chosen_hold(data, hold).hold
     names, outputs = tuple(model.inputs), tuple(model.outputs)
     driven = data.matrix(names) + _biases(input_bias, names)
-    first = hold == "first"
+    first = between == "first"
     if isinstance(model, StateSpaceModel) and not model.is_linear:
         computed = _run_nonlinear(model, driven, data, first, initial_state, substeps, noise)
     else:
@@ -136,7 +137,11 @@ def simulate(
         computed = computed + noise.on_sensors(outputs, data.n_samples)
     computed = computed + _biases(output_bias, outputs)
     made = dict(zip(outputs, computed, strict=True))
-    return _as_record(data, names, made, units, hold, noise)
+    made_record = _as_record(data, names, made, units, between, noise)
+    if isinstance(model, LinearSystem) and model.is_discrete:
+        # A sampled system reads its inputs at their samples alone.
+        return made_record.replace(input_shape=data.input_shape)
+    return made_record
 
 
 def _run_nonlinear(
@@ -237,7 +242,7 @@ def _as_record(
     inputs: tuple[str, ...],
     computed: Mapping[str, NDArray[np.float64]],
     units: Mapping[str, str] | None,
-    hold: Hold,
+    hold: InputHold,
     noise: Noise | None,
 ) -> Record:
     known = data.channels
@@ -246,4 +251,9 @@ def _as_record(
     for name in computed:
         given = (units or {}).get(name) or (known[name].unit if name in known else "1")
         channels.append(Channel(name, given, Role.OUTPUT, "simulated"))
-    return data.replace(computed, channels=channels, step=Step("simulate", options))
+    return data.replace(
+        computed,
+        channels=channels,
+        step=Step("simulate", options),
+        input_shape=InputShape(hold, data.period_s),
+    )

@@ -285,7 +285,7 @@ class Interconnection:
         data: Record,
         *,
         outputs: Sequence[str] | None = None,
-        hold: InputHold = "first",
+        hold: InputHold | None = None,
         step_s: float | None = None,
         initial_state: Mapping[str, ArrayLike] | None = None,
     ) -> Record:
@@ -299,8 +299,8 @@ class Interconnection:
             Holds the inputs by name, departures from trim; before its first sample all is at rest.
         outputs : sequence of str, optional
             Signals to keep; `outputs` when left out.
-        hold : {"first", "zero"}
-            What inputs do between samples.
+        hold : {"first", "zero"}, optional
+            What inputs do between samples; default: what the record knows, else "first".
         step_s : float, optional
             Largest step, s; the record's samples when left out, less where delays or holds need it.
         initial_state : mapping of str to array_like, optional

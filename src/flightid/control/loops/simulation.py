@@ -23,7 +23,8 @@ from flightid.conventions import Role
 from flightid.errors import OptionError, ShapeError, UnitError
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.state_space.integration_steps import steps_per_sample
-from flightid.record import Channel, Record, Step
+from flightid.record import Channel, InputHold, InputShape, Record, Step
+from flightid.record.chosen_hold import chosen_hold
 from flightid.simulation.nonlinear import run_equations
 from flightid.units import canonical
 
@@ -59,7 +60,7 @@ def simulate_connection(
     data: Record,
     outputs: Sequence[str],
     *,
-    hold: str,
+    hold: str | None,
     step_s: float | None,
     initial_state: Mapping[str, ArrayLike],
 ) -> Record:
@@ -77,8 +78,7 @@ def simulate_connection(
     SingularError
         An algebraic loop through a limit does not settle.
     """
-    if hold not in ("zero", "first"):
-        raise OptionError("hold is not known", found=hold, needed="'zero' or 'first'")
+    hold = chosen_hold(data, hold, inputs=wiring.inputs).hold
     _check_units(wiring, data)
     clock = _clock(wiring, data.sample_time_s, step_s)
     linear = [block for block in wiring.blocks if _in_core(block)]
@@ -329,7 +329,7 @@ def _record(
     data: Record,
     outputs: Sequence[str],
     found: Array,
-    hold: str,
+    hold: InputHold,
     clock: _Clock,
 ) -> Record:
     channels = [_channel(data, name) for name in wiring.inputs]
@@ -343,7 +343,8 @@ def _record(
             unit = _channel(data, name).unit if name in data.channels else "1"
         channels.append(Channel(name, unit, Role.OUTPUT, "simulated"))
     step = Step("simulate loops", {"hold": hold, "step_s": clock.step_s})
-    return data.replace(computed, channels=channels, step=step)
+    shape = InputShape(hold, data.period_s)
+    return data.replace(computed, channels=channels, step=step, input_shape=shape)
 
 
 def _channel(data: Record, name: str) -> Channel:

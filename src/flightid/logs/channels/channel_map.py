@@ -12,6 +12,7 @@ from typing import Any
 
 from flightid.conventions import Role
 from flightid.errors import DataError, FileFormatError, UnknownNameError
+from flightid.record.hold import HOLDS, InputHold, require_hold
 
 # Kind of log and vehicle -> map.
 DEFAULTS = {
@@ -110,6 +111,9 @@ class ChannelMap:
         Logs that it is meant for.
     channels : tuple of MappedChannel
         Channels in the order of the record.
+    hold : {"zero", "first", "band_limited"} or None
+        How inputs move between the stamps of the message they come from, where the firmware tells;
+        a record keeps it only on those very stamps.
 
     Example
     -------
@@ -123,6 +127,7 @@ class ChannelMap:
     kind: str
     vehicle: str
     channels: tuple[MappedChannel, ...]
+    hold: InputHold | None = None
 
     def __getitem__(self, name: str) -> MappedChannel:
         """Channel of a name.
@@ -223,7 +228,9 @@ def channel_map(name: str | Path) -> ChannelMap:
 
 def _parse(content: dict[str, Any]) -> ChannelMap:
     channels = tuple(_channel(name, item) for name, item in content["channels"].items())
-    return ChannelMap(content["title"], content["kind"], content["vehicle"], channels)
+    hold = content.get("hold")
+    known = None if hold is None else require_hold(hold, HOLDS)
+    return ChannelMap(content["title"], content["kind"], content["vehicle"], channels, known)
 
 
 def _channel(name: str, item: dict[str, Any]) -> MappedChannel:

@@ -1,0 +1,146 @@
+"""What samples show of inputs: levels that stand still (a staircase), and exact repetition."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.record.record import Record
+
+Array = NDArray[np.float64]
+FEWEST_JUMPS = 8
+"""Below it standing still may be the manoeuvre, not a hold."""
+LARGE_JUMP = 0.2
+"""Median jump over the range of an input that stands still between irregular jumps. Coarse
+quantisation of a smooth signal also stands still, but then moves by its smallest step."""
+STANDING = 0.5
+"""Least share of samples that repeat the one before, for irregular jumps."""
+FEWEST_PERIODS = 2
+ROUNDING = 1e-9
+"""Largest difference of two periods, over the range, that still counts as the same."""
+
+
+@dataclass(frozen=True)
+class Staircase:
+    """An input that stands still over several samples and then jumps.
+
+    Attributes
+    ----------
+    samples : int
+        Every jump falls on a multiple of this; 1 for irregular jumps.
+    n_jumps : int
+
+    Example
+    -------
+    >>> str(Staircase(4, 30))
+    'stands still and jumps every 4 samples or multiples of it (30 jumps)'
+    """
+
+    samples: int
+    n_jumps: int
+
+    def __str__(self) -> str:
+        """What was seen, in words."""
+        if self.samples > 1:
+            return (
+                f"stands still and jumps every {self.samples} samples or multiples of it "
+                f"({self.n_jumps} jumps)"
+            )
+        return f"stands still between {self.n_jumps} large jumps"
+
+
+def found_staircase(samples: Array) -> Staircase | None:
+    """Find an input that is held: changes on a coarser grid than its own, or few large jumps.
+
+    A smooth signal changes at every sample, a coarsely quantised one by its smallest step at
+    instants that share no grid; neither is taken for a staircase. One that steps at every sample
+    cannot be told from samples of a smooth signal, and is not found.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (n_samples,)
+
+    Returns
+    -------
+    Staircase or None
+
+    Example
+    -------
+    >>> held = np.repeat(np.random.default_rng(0).standard_normal(40), 5)
+    >>> found_staircase(held)
+    Staircase(samples=5, n_jumps=39)
+    >>> found_staircase(np.round(10 * np.sin(0.05 * np.arange(400)))) is None
+    True
+    """
+    jumps = np.flatnonzero(np.diff(samples)) + 1
+    if jumps.size < FEWEST_JUMPS:
+        return None
+    grid = int(np.gcd.reduce(np.diff(jumps)))
+    if grid > 1:
+        return Staircase(grid, int(jumps.size))
+    sizes = np.abs(np.diff(samples)[jumps - 1])
+    large = np.median(sizes) >= LARGE_JUMP * np.ptp(samples)
+    still = jumps.size <= (1.0 - STANDING) * samples.size
+    return Staircase(1, int(jumps.size)) if large and still else None
+
+
+def found_period(samples: Array) -> int | None:
+    """Find the least number of samples after which all rows repeat, to rounding.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (n_samples,) or (n_rows, n_samples)
+        Constant rows are passed over.
+
+    Returns
+    -------
+    int or None
+        None where fewer than two whole periods are there, or any sample differs.
+
+    Example
+    -------
+    >>> found_period(np.tile([0.0, 1.0, 1.0, 0.0, 1.0], 3))
+    5
+    >>> found_period(np.sin(np.arange(100) ** 1.5)) is None
+    True
+    """
+    rows = np.atleast_2d(np.asarray(samples, dtype=np.float64))
+    rows = rows[np.ptp(rows, axis=1) > 0.0]
+    n = rows.shape[1]
+    if not rows.size or n < 2 * FEWEST_PERIODS:
+        return None
+    longest = n // FEWEST_PERIODS
+    centred = (rows - rows.mean(axis=1, keepdims=True)) / np.ptp(rows, axis=1)[:, None]
+    for lag in _candidates(centred, longest):
+        if np.max(np.abs(centred[:, lag:] - centred[:, :-lag])) <= ROUNDING:
+            return int(lag)
+    return None
+
+
+def _candidates(rows: Array, longest: int) -> NDArray[np.intp]:
+    """Lags at which the sum of squared differences vanishes to the rounding of its sums."""
+    n = rows.shape[1]
+    size = 1 << (2 * n - 1).bit_length()
+    spectrum = np.fft.rfft(rows, size, axis=1)
+    products = np.fft.irfft(np.abs(spectrum) ** 2, size, axis=1).sum(axis=0)
+    squares = np.concatenate([[0.0], np.cumsum(np.sum(rows**2, axis=0))])
+    lags = np.arange(1, longest + 1)
+    away = squares[n - lags] + (squares[n] - squares[lags]) - 2.0 * products[lags]
+    return np.asarray(lags[away <= 1e-9 * squares[n]], dtype=np.intp)
+
+
+def period_of(record: Record) -> float | None:
+    """Time after which the inputs of a record repeat, s: what it knows, else what it shows.
+
+    Example
+    -------
+    >>> record = Record.from_arrays(np.arange(6) / 10, inputs={"u": [0, 1, 3, 0, 1, 3]})
+    >>> round(period_of(record), 9)
+    0.3
+    """
+    if record.period_s is not None or not record.inputs:
+        return record.period_s
+    lag = found_period(record.matrix(record.inputs))
+    return None if lag is None else lag * record.sample_time_s

@@ -1,0 +1,36 @@
+"""Channels of a record in other units, trim values included."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.record.channel import Channel
+from flightid.units import convert
+
+if TYPE_CHECKING:
+    from flightid.record.record import Record
+
+Converted = tuple[dict[str, NDArray[np.float64]], list[Channel], dict[str, float]]
+
+
+def in_units(record: Record, units: Mapping[str, str]) -> Converted:
+    """Samples of the named channels, all channels, and trim values, in other units.
+
+    Raises
+    ------
+    UnitError
+        A dimension differs.
+    """
+    samples: dict[str, NDArray[np.float64]] = {}
+    trim, channels = record.trim, record.channels
+    for key, unit in units.items():
+        old = channels[key]
+        samples[key] = convert(record[key], old.unit, unit)
+        if key in trim:
+            trim[key] = float(convert(trim[key], old.unit, unit))
+        channels[key] = Channel(key, unit, old.role, old.note)
+    return samples, list(channels.values()), trim
