@@ -6,7 +6,9 @@ belongs to. A stage is loaded when its first name is used, so that ``import flig
 compares them).
 """
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 from flightid.version import VERSION as __version__
@@ -364,3 +366,15 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted(__all__)
+
+
+class _Package(ModuleType):
+    """Keeps a verb where a room has its name: Python binds an imported room to the package."""
+
+    def __setattr__(self, name: str, value: object) -> None:
+        is_room = isinstance(value, ModuleType) and value.__name__ == f"{__name__}.{name}"
+        if not (is_room and name in _HOMES and _HOMES[name] != f"{__name__}.{name}"):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Package

@@ -48,6 +48,21 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         flightid.nonsense  # noqa: B018
 
 
+def test_a_room_does_not_hide_a_verb_of_its_name() -> None:
+    code = (
+        "import importlib, flightid\n"
+        "for home in sorted(set(flightid._HOMES.values())):\n"
+        "    importlib.import_module(home)\n"
+        "    importlib.import_module(home.rpartition('.')[0])\n"
+        "for name, home in flightid._HOMES.items():\n"
+        "    module = importlib.import_module(home)\n"
+        "    meant = module if home == f'flightid.{name}' else getattr(module, name)\n"
+        "    assert getattr(flightid, name) is meant, name\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+
+
 def test_help_does_not_load_what_it_does_not_need() -> None:
     code = (
         "import sys\n"
