@@ -5,7 +5,8 @@
 0.0
 """
 
-from flightid.validation.metrics import (
+from flightid.identification.prediction.result import Prediction, Shifts
+from flightid.simulation.metrics import (
     fit_percent,
     mse,
     r_squared,
@@ -32,8 +33,7 @@ from flightid.validation.verification.comparison import Comparison, Contrast
 from flightid.validation.verification.cross_validation import cross_validate
 from flightid.validation.verification.cross_validation_result import CrossRun, CrossValidation
 from flightid.validation.verification.muad import Envelopes, Mismatch, mismatch, muad_envelopes
-from flightid.validation.verification.result import Prediction, Verification
-from flightid.validation.verification.shifts import Shifts
+from flightid.validation.verification.result import Verification
 from flightid.validation.verification.verify import verify
 
 __all__ = [

@@ -109,7 +109,7 @@ def predict(
         if horizon == "free_run":
             run = free_run(model, y, u, initial_state=initial_state)
         else:
-            run = _ahead(model, y, u, int(horizon), initial_state)
+            run = ahead(model, y, u, int(horizon), initial_state)
     usable = np.all(np.abs(run) < LARGEST, axis=0)
     diverged = not bool(np.all(usable))
     if diverged:
@@ -121,10 +121,16 @@ def predict(
     )
 
 
+def forced_run(model: InnovationsModel, u: Array) -> Array:
+    """Response to the inputs alone, shape (p, n_samples), from rest."""
+    a, b, c, d, _ = model.matrices
+    return np.asarray(c @ run_recursion(a, b @ u) + d @ u)
+
+
 def free_run(model: InnovationsModel, y: Array, u: Array, *, initial_state: str) -> Array:
     """Response to the inputs, shape (p, n_samples), from rest or from the state that fits best."""
-    a, b, c, d, _ = model.matrices
-    run = c @ run_recursion(a, b @ u) + d @ u
+    a, _, c, _, _ = model.matrices
+    run = forced_run(model, u)
     if initial_state == "zero" or not np.all(np.isfinite(run)):
         return run
     motion = free_motion(a, c, y.shape[1])
@@ -159,7 +165,9 @@ def _best(motion: Array, errors: Array) -> Array:
     return np.asarray((columns @ weights).reshape(errors.shape))
 
 
-def _ahead(model: InnovationsModel, y: Array, u: Array, horizon: int, initial_state: str) -> Array:
+def ahead(
+    model: InnovationsModel, y: Array, u: Array, horizon: int, initial_state: str = "estimate"
+) -> Array:
     """y(t) minus the part of the noise that is younger than the horizon."""
     errors = one_step_errors(model, y, u, initial_state)
     a, _, c, _, k = model.matrices

@@ -95,7 +95,7 @@ def predict(
     if horizon == "free_run":
         deviation = free_run(model, data.output, data.inputs, initial_state=initial_state)
     else:
-        deviation = _ahead(model, data.output, data.inputs, int(horizon), initial_state)
+        deviation = ahead(model, data.output, data.inputs, int(horizon), initial_state)
     usable = np.abs(deviation) < LARGEST
     diverged = not bool(np.all(usable))
     if diverged:
@@ -143,8 +143,12 @@ def one_step_errors(
     )
 
 
-def _ahead(
-    model: PolynomialModel, output: Array, inputs: Array, horizon: int, initial_state: str
+def ahead(
+    model: PolynomialModel,
+    output: Array,
+    inputs: Array,
+    horizon: int,
+    initial_state: str = "estimate",
 ) -> Array:
     """y(t) minus the part of the noise that is younger than the horizon."""
     errors = one_step_errors(model, output, inputs, initial_state)
@@ -155,24 +159,33 @@ def _ahead(
     return np.asarray(output - lfilter(young, [1.0], errors))
 
 
-def free_run(model: PolynomialModel, output: Array, inputs: Array, *, initial_state: str) -> Array:
-    """Response to the inputs alone, and with ``"estimate"`` the free motion that fits best."""
-    run = np.zeros(output.size)
+def forced_run(model: PolynomialModel, inputs: Array) -> Array:
+    """Response to the inputs alone, shape (n_samples,), from rest."""
+    run = np.zeros(inputs.shape[1])
     with np.errstate(over="ignore", invalid="ignore"):
         for name, row in zip(model.inputs, inputs, strict=True):
             run += lfilter(*model.transfer(name), row)
-        if initial_state == "zero":
-            return run
-        below = np.asarray(model.a)
-        for row in model.f:
-            below = np.convolve(below, np.asarray(row))
-        count = below.size - 1
-        if count == 0 or not np.all(np.isfinite(run)):
-            return run
-        impulse = np.zeros((count, output.size))
-        np.fill_diagonal(impulse, 1.0)
-        motion = lfilter([1.0], below, impulse)
-    if not np.all(np.isfinite(motion)):
+    return run
+
+
+def free_motion(model: PolynomialModel, n_samples: int) -> Array:
+    """What each sample before the record makes of the output, shape (count, n_samples)."""
+    below = np.asarray(model.a)
+    for row in model.f:
+        below = np.convolve(below, np.asarray(row))
+    impulse = np.zeros((below.size - 1, n_samples))
+    np.fill_diagonal(impulse, 1.0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(lfilter([1.0], below, impulse))
+
+
+def free_run(model: PolynomialModel, output: Array, inputs: Array, *, initial_state: str) -> Array:
+    """Response to the inputs alone, and with ``"estimate"`` the free motion that fits best."""
+    run = forced_run(model, inputs)
+    if initial_state == "zero":
+        return run
+    motion = free_motion(model, output.size)
+    if not len(motion) or not (np.all(np.isfinite(run)) and np.all(np.isfinite(motion))):
         return run
     weights = np.linalg.lstsq(motion.T, output - run, rcond=None)[0]
     return np.asarray(run + weights @ motion)

@@ -16,8 +16,8 @@ from flightid.identification.narx.result import NarxFit
 from flightid.models.narx.model import NarxEquation, NarxModel
 from flightid.progress import track
 from flightid.record import Record
+from flightid.simulation.metrics import fit_percent, rms_error
 from flightid.table import Cell, Column, Table
-from flightid.validation.metrics import fit_percent, rms_error
 
 
 @dataclass(frozen=True)

@@ -165,18 +165,24 @@ def _of_verification(
     outputs: Iterable[str] | None,
     horizon: Horizon | None,
 ) -> ResidualData:
-    if horizon is Horizon.ONE_STEP:
+    made_with = Horizon.ONE_STEP if verification.horizon == 1 else Horizon.FREE_RUN
+    if horizon not in (None, made_with):
         raise OptionError(
-            "a verification is a free run", found=str(horizon), needed=str(Horizon.FREE_RUN)
+            "this verification has another predictor", found=str(horizon), needed=str(made_with)
         )
     names = tuple(verification.outputs if outputs is None else outputs)
     driven = tuple(verification.predicted.inputs if inputs is None else inputs)
-    measured = tuple(item.measured for item in verification.predictions)
-    _require_one_sample_time(measured)
-    made = {name: tuple(item.residual(name) for item in verification.predictions) for name in names}
-    predictor = f"{verification.horizon} {_FREE_RUN}"
-    sizes = _sizes(measured, names)
-    return _checked(made, _columns(measured, driven), sizes, Horizon.FREE_RUN, predictor)
+    scored = tuple(item.residual_record() for item in verification.predictions)
+    _require_one_sample_time(scored)
+    words = _ONE_STEP if made_with is Horizon.ONE_STEP else _FREE_RUN
+    sizes = _sizes([item.measured for item in verification.predictions], names)
+    return _checked(
+        _columns(scored, names),
+        _columns(scored, driven),
+        sizes,
+        made_with,
+        f"{verification.protocol} {words}",
+    )
 
 
 def _of_fits(

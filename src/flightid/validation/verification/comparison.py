@@ -151,7 +151,7 @@ class Comparison:
             for name, result in self.verifications.items()
             if result.j_rms is not None
         ]
-        notes = [self.first.horizon, *notes, *map(str, self.findings)]
+        notes = [self.first.protocol, *notes, *map(str, self.findings)]
         return Table(repr(self), tuple(columns), tuple(rows), tuple(notes))
 
     def to_dict(self) -> dict[str, object]:
@@ -247,7 +247,7 @@ def _contrast(
 
 
 def _squares(result: Verification, output: str) -> NDArray[np.float64]:
-    return np.concatenate([each.residual(output) ** 2 for each in result.predictions])
+    return np.concatenate([each.residual(output)[each.start :] ** 2 for each in result.predictions])
 
 
 def swap_p_value(differences: NDArray[np.float64]) -> float:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from flightid.findings import Finding
 from flightid.record import Record
+from flightid.simulation.metrics import fit_percent, mse, theil
 from flightid.table import Column, Table
-from flightid.validation.metrics import fit_percent, mse, theil
 
 MODEL, LINEAR = "model", "linear, same lags"
 

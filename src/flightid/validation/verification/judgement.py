@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.record import Record
-from flightid.units import conversion_factor, same_dimension
-from flightid.validation import metrics
+from flightid.identification.prediction.request import FREE_RUN, Request
+from flightid.identification.prediction.result import Prediction
+from flightid.identification.prediction.weights import guide_factor, guide_weights
+from flightid.simulation import metrics
 from flightid.validation.verification.muad import Mismatch
-from flightid.validation.verification.result import Prediction, Verification
-from flightid.validation.verification.shifts import Freedom
+from flightid.validation.verification.result import Verification
 
-ANGULAR = {"rad": "deg", "deg": "deg", "rad/s": "deg/s", "deg/s": "deg/s"}
-LINEAR = ("ft/s", "ft/s^2")
-"""One deg, deg/s, ft/s and ft/s² count the same in J_rms (Tischler & Remple, section 14.4)."""
 THEIL_GUIDE = (0.25, 0.30)
 J_RMS_GUIDE = (1.0, 2.0)
 
@@ -24,35 +20,10 @@ GROWTH_E_FOLDS = 4.6
 """Growth by a factor of 100 over a record: less leaves its beginning in command of its end."""
 
 
-def guide_weights(record: Record, compared: tuple[str, ...]) -> NDArray[np.float64]:
-    """Guide weights; by the deviation of the channel where it is of another kind."""
-    found = []
-    for name in compared:
-        factor = _guide_factor(record.unit(name))
-        if factor is None:
-            spread = float(np.std(record[name]))
-            factor = 1.0 / spread if spread > 0 else 1.0
-        found.append(factor**2)
-    return np.array(found)
-
-
-def _guide_factor(unit: str) -> float | None:
-    """What one of `unit` counts in J_rms; None where the guide does not name its kind."""
-    # Angles have no dimension, so they go by name: a percentage is not an angle.
-    if unit in ANGULAR:
-        return conversion_factor(unit, ANGULAR[unit])
-    for guide in LINEAR:
-        if same_dimension(unit, guide):
-            return conversion_factor(unit, guide)
-    return None
-
-
 def judge(
     predictions: tuple[Prediction, ...],
     compared: tuple[str, ...],
-    initial_state: str,
-    freedom: Freedom,
-    hold: str,
+    request: Request,
     mismatch: Mismatch | None,
 ) -> Verification:
     """Numbers by output over all records together, and verdicts against the guides."""
@@ -61,14 +32,8 @@ def judge(
     }
     power = []
     for name in compared:
-        # About the mean of each measured record: how a constant is shared between trim, bias and
-        # reference shift must not change a number, and an offset must not flatter it.
-        y, y_hat = (
-            np.concatenate(
-                [getattr(each, side)[name] - np.mean(each.measured[name]) for each in predictions]
-            )
-            for side in ("measured", "predicted")
-        )
+        pairs = [each.scored(name) for each in predictions]
+        y, y_hat = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
         numbers["theil"][name] = float(metrics.theil(y, y_hat))
         numbers["rms_error"][name] = float(metrics.rms_error(y, y_hat))
         numbers["mse"][name] = float(metrics.mse(y, y_hat))
@@ -77,7 +42,7 @@ def judge(
         numbers["r_squared"][name] = float(metrics.r_squared(y, y_hat))
         power.append([np.mean(np.square(signal)) for signal in (y - y_hat, y, y_hat)])
     first = predictions[0].measured
-    factors = [_guide_factor(first.unit(name)) for name in compared]
+    factors = [guide_factor(first.unit(name)) for name in compared]
     j_rms = None
     if all(factor is not None for factor in factors):
         errors = [
@@ -89,18 +54,20 @@ def judge(
     # One number for all outputs, each counted in the guide's units: the verdict of the reference.
     error, seen, said = np.sqrt(guide_weights(first, compared) @ np.array(power))
     overall = float(error / (seen + said))
+    verdicts = _findings(overall, numbers["theil"], j_rms, predictions)
     return Verification(
         outputs=compared,
         predictions=predictions,
         overall_theil=overall,
         j_rms=j_rms,
-        initial_state=initial_state,
-        state_bias=freedom.bias,
-        output_bias=freedom.reference,
-        hold=hold,
+        horizon=request.horizon,
+        initial_state=predictions[0].initial_state,
+        state_bias=request.state_bias,
+        output_bias=request.output_bias,
+        hold=request.hold,
         mismatch=mismatch,
         findings=(
-            *_findings(overall, numbers["theil"], j_rms, predictions),
+            *(verdicts if request.horizon == FREE_RUN else ()),
             *(() if mismatch is None else mismatch.findings),
         ),
         **numbers,
@@ -152,7 +119,7 @@ def _findings(
                 "" if light is Light.GREEN else "verify with smaller inputs, or mend the model",
             )
         )
-    if any(each.shifts.input_shift is not None for each in predictions):
+    if any(each.shifts.input_bias is not None for each in predictions):
         found.append(
             Finding(
                 "verification-nonlinear",
@@ -161,6 +128,17 @@ def _findings(
                 "constant shift of each input",
             )
         )
+    held = [each for each in predictions if each.diverged_at is not None]
+    found += [
+        Finding(
+            "free-run-unstable",
+            Light.RED,
+            f"{each.measured.name}: the free run left its range at sample {each.diverged_at} and "
+            "was held",
+            "use fewer terms or a stable model, or train on records that cover the manoeuvre",
+        )
+        for each in held
+    ]
     short = [each for each in predictions if each.shifts.rank < each.shifts.n_free]
     if short:
         found.append(

@@ -5,48 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flightid.findings import Finding
+from flightid.identification.prediction.result import Prediction
 from flightid.record import Record
 from flightid.table import Cell, Column, Table
 from flightid.validation.verification.muad import Mismatch
-from flightid.validation.verification.shifts import Shifts
-
-
-@dataclass(frozen=True, eq=False)
-class Prediction:
-    """One record and the model's free run through it.
-
-    Attributes
-    ----------
-    measured : Record
-        What was verified on.
-    predicted : Record
-        Inputs, and outputs of the model with all shifts, in the record's units.
-    shifts : Shifts
-        Bias, reference shift and initial state that were solved for.
-
-    Example
-    -------
-    >>> import numpy as np
-    >>> import flightid as fid
-    >>> time_s = np.arange(300) * 0.02
-    >>> lag = fid.LinearSystem([[-2.0]], [[2.0]], [[1.0]], [[0.0]], ("u",), ("y",))
-    >>> flown = fid.Record.from_arrays(time_s, inputs={"u": np.sin(time_s)})
-    >>> seen = fid.simulate(lag, flown)
-    >>> fid.verify(lag, seen).predictions[0].residual("y").shape
-    (300,)
-    """
-
-    measured: Record
-    predicted: Record
-    shifts: Shifts
-
-    def residual(self, name: str) -> NDArray[np.float64]:
-        """Measured minus predicted, in the channel's unit, shape (n_samples,)."""
-        return np.asarray(self.measured[name] - self.predicted[name])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -68,10 +31,12 @@ class Verification:
     j_rms : float or None
         Weighted error over all outputs in degrees, deg/s, ft/s and ft/s²; None where an output is
         of another kind.
-    initial_state : {"trim", "estimate"}
-        Whether the initial state was at rest or solved for.
+    horizon : int or "free_run"
+        Samples ahead.
+    initial_state : str
+        Where the runs started, in words.
     state_bias, output_bias : bool
-        Which shifts were solved for.
+        Which constants were solved for.
     hold : {"first", "zero"}
         What inputs do between samples.
     mismatch : Mismatch or None
@@ -100,6 +65,7 @@ class Verification:
     r_squared: Mapping[str, float]
     overall_theil: float
     j_rms: float | None
+    horizon: int | str
     initial_state: str
     state_bias: bool
     output_bias: bool
@@ -118,25 +84,28 @@ class Verification:
         return self.predictions[0].predicted
 
     @property
-    def horizon(self) -> str:
+    def protocol(self) -> str:
         """What was predicted from what, in one sentence."""
-        start = {
-            "trim": "from rest at trim",
-            "estimate": "from an initial state solved for in each record",
-        }[self.initial_state]
         solved = [
             name
             for name, is_free in (
                 ("state biases", self.state_bias),
-                ("reference shifts", self.output_bias),
+                ("output biases", self.output_bias),
             )
             if is_free
         ]
         shifts = f"; {' and '.join(solved)} solved for in each record" if solved else ""
+        if self.horizon != "free_run":
+            ahead = "1 sample" if self.horizon == 1 else f"{self.horizon} samples"
+            return f"Prediction {ahead} ahead from the measured past."
+        left = max(each.start for each in self.predictions)
+        over = (
+            "after the first stretch, which no score counts," if left else "over the whole record"
+        )
         between = {"first": "straight lines", "zero": "steps"}[self.hold]
         return (
-            f"Free run over the whole record on measured inputs alone ({between} between samples),"
-            f" {start}{shifts}."
+            f"Free run {over} on measured inputs alone ({between} between samples), from "
+            f"{self.initial_state}{shifts}."
         )
 
     def summary(self) -> Table:
@@ -165,7 +134,7 @@ class Verification:
             )
             for name in self.outputs
         ]
-        notes = [self.horizon]
+        notes = [self.protocol]
         if self.j_rms is not None:
             notes.append(f"Weighted error J_rms {self.j_rms:.3g} (deg, deg/s, ft/s, ft/s²).")
         if len(self.outputs) > 1:
@@ -176,6 +145,7 @@ class Verification:
         """Plain values, without the time histories."""
         return {
             "schema": "flightid.verification/1",
+            "protocol": self.protocol,
             "horizon": self.horizon,
             "initial_state": self.initial_state,
             "state_bias": self.state_bias,
@@ -199,9 +169,11 @@ class Verification:
                 {
                     "name": prediction.measured.name,
                     "duration_s": prediction.measured.duration_s,
-                    "bias": prediction.shifts.bias.tolist(),
-                    "reference": dict(
-                        zip(self.outputs, prediction.shifts.reference.tolist(), strict=True)
+                    "start": prediction.start,
+                    "diverged_at": prediction.diverged_at,
+                    "state_bias": prediction.shifts.state_bias.tolist(),
+                    "output_bias": dict(
+                        zip(self.outputs, prediction.shifts.output_bias.tolist(), strict=False)
                     ),
                     "initial_state": prediction.shifts.initial_state.tolist(),
                 }

@@ -1,29 +1,31 @@
-"""The verb `verify`: drive a model with recorded inputs and compare, shifts aside."""
+"""The verb `verify`: predict records that a model has not seen, and judge how well."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, overload
+from typing import Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flightid.errors import ModelError, OptionError, UnitError, UnknownNameError
-from flightid.models import StateSpaceModel
+from flightid.errors import DataError, OptionError
+from flightid.identification.prediction.continuous import predict_continuous
+from flightid.identification.prediction.predict import (
+    output_names,
+    outputs_held,
+    predictor_of,
+    require_units,
+)
+from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
+from flightid.identification.prediction.result import Prediction
 from flightid.models.linear.hold_equivalent import Hold
-from flightid.models.linear.linear_system import LinearModel
-from flightid.record import Channel, Record, Step
+from flightid.record import Record
 from flightid.responses import FrequencyResponse
-from flightid.units import canonical
+from flightid.validation.verification.baseline import baseline_findings
 from flightid.validation.verification.comparison import Comparison, compared
-from flightid.validation.verification.judgement import guide_weights, judge
+from flightid.validation.verification.judgement import judge
 from flightid.validation.verification.muad import mismatch
-from flightid.validation.verification.nonlinear_run import predict_equations
-from flightid.validation.verification.result import Prediction, Verification
-from flightid.validation.verification.shifts import Freedom, Shifts, predict
-
-Initial = Literal["trim", "estimate"]
+from flightid.validation.verification.result import Verification
 
 
 @overload
@@ -32,9 +34,11 @@ def verify(  # type: ignore[overload-overlap]  # a list is an object too
     records: Record | Sequence[Record],
     *,
     names: Sequence[str] | None = ...,
-    state_bias: bool = ...,
-    output_bias: bool = ...,
-    initial_state: Initial = ...,
+    horizon: int | str = ...,
+    initial_state: InitialState | None = ...,
+    settle_s: float | None = ...,
+    state_bias: bool | None = ...,
+    output_bias: bool | None = ...,
     outputs: Sequence[str] | None = ...,
     hold: Hold = ...,
     response: FrequencyResponse | None = ...,
@@ -47,9 +51,11 @@ def verify(
     records: Record | Sequence[Record],
     *,
     names: None = ...,
-    state_bias: bool = ...,
-    output_bias: bool = ...,
-    initial_state: Initial = ...,
+    horizon: int | str = ...,
+    initial_state: InitialState | None = ...,
+    settle_s: float | None = ...,
+    state_bias: bool | None = ...,
+    output_bias: bool | None = ...,
     outputs: Sequence[str] | None = ...,
     hold: Hold = ...,
     response: FrequencyResponse | None = ...,
@@ -61,21 +67,25 @@ def verify(
     records: Record | Sequence[Record],
     *,
     names: Sequence[str] | None = None,
-    state_bias: bool = True,
-    output_bias: bool = True,
-    initial_state: Initial = "trim",
+    horizon: int | str = FREE_RUN,
+    initial_state: InitialState | None = None,
+    settle_s: float | None = None,
+    state_bias: bool | None = None,
+    output_bias: bool | None = None,
     outputs: Sequence[str] | None = None,
     hold: Hold = "first",
     response: FrequencyResponse | None = None,
 ) -> Verification | Comparison:
-    """Drive a model, or several side by side, with records' inputs and compare the outputs.
+    """Predict records with a model, or with several of any kinds side by side, and judge it.
 
-    ``dx/dt = A x + B (u - u_ref) + b``, ``y = C x + D (u - u_ref) + y_ref``: a free run over the
-    whole record. Nothing of the model changes; state biases b, output biases y_ref and, with
-    ``initial_state="estimate"``, the initial state are solved for by weighted least squares in each
-    record, since they belong to the record. u_ref is the record's declared trim, or zero. The
-    equations of a nonlinear model are integrated instead, on the channels as they are; its state
-    bias is a constant shift of each input.
+    Models in continuous time, ``dx/dt = A x + B (u - u_ref) + b``, ``y = C x + D (u - u_ref) +
+    y_ref``: a free run over the whole record. Nothing of the model changes; state biases b, output
+    biases y_ref and, with ``initial_state="estimate"``, the initial state are solved for by
+    weighted least squares in each record, since they belong to the record. u_ref is the record's
+    declared trim, or zero. The equations of a nonlinear model are integrated instead, on the
+    channels as they are; its state bias is a constant shift of each input. Sampled models (ARX …
+    Box–Jenkins, innovations forms, NARX) run about the operating point of their training records,
+    from a state that a first stretch tells, which no score counts; no bias is taken off.
 
     Assumes: records that were not used in the fit, and start in trim unless the initial state is
     fitted; a nonlinear model that does not explode within a record. Biased when the record is short
@@ -87,16 +97,20 @@ def verify(
     Parameters
     ----------
     source : Fit or model, or list or tuple of them
-        A fit, or anything with inputs, outputs and state_space(). Of several the first is on
-        trial and the others are its rivals.
+        Of any kind. Of several the first is on trial and the others are its rivals; samples that
+        tell the start of one of them are scored for none.
     records : Record or sequence of Record
         What to predict; they hold the models' inputs and outputs by name and unit.
     names : sequence of str, optional
         Names of several models; default: their own.
-    state_bias, output_bias : bool
-        Solve for state biases b and output biases y_ref.
-    initial_state : {"trim", "estimate"}
-        Start at rest, or from a state that is solved for.
+    horizon : int or "free_run"
+        Samples ahead, for models that predict from the measured past; see `flightid.predict`.
+    initial_state : {"trim", "zero", "measured", "estimate"} or mapping, optional
+        Where runs start; default by the kind of model, see `flightid.predict`.
+    settle_s : float, optional
+        First stretch, s, on which start and biases are solved for and which no score counts.
+    state_bias, output_bias : bool, optional
+        Solve for state biases b and output biases y_ref; default: for models in continuous time.
     outputs : sequence of str, optional
         Outputs to compare; default: those of the models that every record holds.
     hold : {"first", "zero"}
@@ -114,7 +128,7 @@ def verify(
     ModelError
         The model cannot be simulated.
     OptionError
-        No record, or an option that is not known.
+        No record, or an option that is not known or that the kind of model does not have.
     UnknownNameError
         A record lacks an input, or none of the outputs.
     UnitError
@@ -124,7 +138,8 @@ def verify(
 
     Reference
     ---------
-    Tischler & Remple, Aircraft and Rotorcraft System Identification, 2nd ed., chapter 14.
+    Tischler & Remple, Aircraft and Rotorcraft System Identification, 2nd ed., chapter 14; Ljung,
+    System Identification, 2nd ed., section 16.5.
 
     Example
     -------
@@ -142,33 +157,55 @@ def verify(
     flown = (records,) if isinstance(records, Record) else tuple(records)
     if not flown:
         raise OptionError("there is nothing to verify on", needed="one record or more")
-    if initial_state not in ("trim", "estimate"):
-        raise OptionError(
-            "initial_state is not known", found=initial_state, needed="'trim' or 'estimate'"
-        )
-    if hold not in ("first", "zero"):
-        raise OptionError("hold is not known", found=hold, needed="'first' or 'zero'")
     several = source if isinstance(source, list | tuple) else [source]
-    models = [_linear_model(each) for each in several]
-    chosen = _compared(models, flown, outputs)
-    freedom = Freedom(state_bias, output_bias, initial_state == "estimate")
-    results = []
-    for each in models:
+    models = [predictor_of(each) for each in several]
+    chosen = _compared([model for model, _ in models], flown, outputs)
+    _require_change(flown, chosen)
+    requests = [
+        Request(
+            horizon,
+            initial_state,
+            settle_s,
+            # Models in continuous time hold about the record's own trim, which no training told.
+            way is predict_continuous if state_bias is None else state_bias,
+            way is predict_continuous if output_bias is None else output_bias,
+            hold,
+        )
+        for _, way in models
+    ]
+    runs = []
+    for (model, way), request in zip(models, requests, strict=True):
         for record in flown:
-            _require_units(each, record, chosen)
-        predictions = tuple(_predict(each, record, chosen, freedom, hold) for record in flown)
-        seen = None if response is None else mismatch(each, response)
-        results.append(judge(predictions, chosen, initial_state, freedom, hold, seen))
+            require_units(model, record, chosen)
+        runs.append([way(model, record, chosen, request) for record in flown])
+    results = []
+    for each, (model, _), request, made in zip(
+        several, models, requests, _scored_alike(runs), strict=True
+    ):
+        seen = None if response is None else mismatch(model, response)
+        judged = judge(tuple(made), chosen, request, seen)
+        beside = baseline_findings(each, made, request)
+        results.append(replace(judged, findings=(*judged.findings, *beside)))
     if not isinstance(source, list | tuple):
         return results[0]
-    return compared(dict(zip(_names(models, names), results, strict=True)))
+    return compared(dict(zip(_names(several, names), results, strict=True)))
 
 
-def _names(models: Sequence[object], given: Sequence[str] | None) -> list[str]:
+def _scored_alike(runs: list[list[Prediction]]) -> list[list[Prediction]]:
+    """The same samples of a record count for every model."""
+    starts = [max(made[place].start for made in runs) for place in range(len(runs[0]))]
+    return [
+        [replace(one, start=start) for one, start in zip(made, starts, strict=True)]
+        for made in runs
+    ]
+
+
+def _names(models: Sequence[Any], given: Sequence[str] | None) -> list[str]:
     if len(models) < 2:
         raise OptionError("there is nothing to compare", found=len(models), needed="two models")
     if given is None:
-        own = [str(getattr(each, "name", type(each).__name__)) for each in models]
+        inner = [getattr(model, "model", model) for model in models]
+        own = [str(getattr(each, "name", type(each).__name__)) for each in inner]
         return [
             name if own.count(name) == 1 else f"{name} ({place})"
             for place, name in enumerate(own, start=1)
@@ -182,104 +219,27 @@ def _names(models: Sequence[object], given: Sequence[str] | None) -> list[str]:
     return list(given)
 
 
-def _linear_model(model: object) -> LinearModel:
-    """The model itself, or the one inside a fit."""
-    inner = getattr(model, "model", model)
-    if not isinstance(inner, LinearModel):
-        raise ModelError(
-            "the model cannot be simulated",
-            found=type(model).__name__,
-            needed="a fit, or an object with inputs, outputs and state_space()",
-        )
-    return inner
-
-
 def _compared(
-    models: Sequence[LinearModel], records: tuple[Record, ...], outputs: Sequence[str] | None
+    models: Sequence[object], records: tuple[Record, ...], outputs: Sequence[str] | None
 ) -> tuple[str, ...]:
-    shared = [name for name in models[0].outputs if all(name in each.outputs for each in models)]
-    for name in outputs or ():
-        if name not in shared:
-            raise UnknownNameError(
-                "the model has no such output", found=name, needed=", ".join(shared)
-            )
-    wanted = tuple(shared if outputs is None else outputs)
-    held = tuple(name for name in wanted if all(name in record for record in records))
-    if not held or (outputs is not None and held != wanted):
-        raise UnknownNameError(
-            "a record lacks what the model predicts",
-            found=", ".join(records[0].channels),
-            needed=", ".join(wanted) or "outputs that all models have",
-        )
+    """Outputs that all models have and all records hold."""
+    shared = [
+        name
+        for name in output_names(models[0])
+        if all(name in output_names(each) for each in models)
+    ]
+    if outputs is None and len(models) > 1:
+        outputs = [name for name in shared if all(name in record for record in records)] or shared
+    for model in models:
+        held = outputs_held(model, records, outputs)
     return held
 
 
-def _require_units(model: LinearModel, record: Record, chosen: tuple[str, ...]) -> None:
-    units = getattr(model, "units", None) or {}
-    for name in (*model.inputs, *chosen):
-        expected = units.get(name)
-        if expected is not None and canonical(expected) != record.unit(name):
-            raise UnitError(
-                f"channel {name!r} has another unit in the record than in the model",
-                found=record.unit(name),
-                needed=canonical(expected),
-                action="convert the record with to_units",
-            )
-
-
-def _predict(
-    model: LinearModel,
-    record: Record,
-    chosen: tuple[str, ...],
-    freedom: Freedom,
-    hold: Hold,
-) -> Prediction:
-    rows = [list(model.outputs).index(name) for name in chosen]
-    if isinstance(model, StateSpaceModel) and not model.is_linear:
-        predicted, shifts = predict_equations(
-            model,
-            record.matrix(model.inputs),
-            record.matrix(chosen),
-            record.sample_time_s,
-            rows=rows,
-            freedom=freedom,
-            weights=guide_weights(record, chosen),
-            hold=hold,
-        )
-        return _prediction(record, model, chosen, predicted, shifts, hold)
-    a, b, c, d, delays_s = (np.ascontiguousarray(m, dtype=np.float64) for m in model.state_space())
-    trim = record.trim
-    measured = record.matrix(chosen)
-    offset = np.array([[trim.get(name, 0.0)] for name in chosen])
-    driven = record.matrix(model.inputs)
-    driven = driven - np.array([[trim.get(name, 0.0)] for name in model.inputs])
-    predicted, shifts = predict(
-        (a, b, np.ascontiguousarray(c[rows]), np.ascontiguousarray(d[rows]), delays_s),
-        driven,
-        measured - offset,
-        record.sample_time_s,
-        freedom=freedom,
-        weights=guide_weights(record, chosen),
-        hold=hold,
-    )
-    total = replace(shifts, reference=shifts.reference + offset[:, 0])
-    return _prediction(record, model, chosen, predicted + offset, total, hold)
-
-
-def _prediction(
-    record: Record,
-    model: LinearModel,
-    chosen: tuple[str, ...],
-    predicted: NDArray[np.float64],
-    shifts: Shifts,
-    hold: Hold,
-) -> Prediction:
-    known = record.channels
-    channels = [known[name] for name in model.inputs]
-    channels += [Channel(name, known[name].unit, known[name].role, "predicted") for name in chosen]
-    made = record.replace(
-        dict(zip(chosen, predicted, strict=True)),
-        channels=channels,
-        step=Step("verify", {"hold": hold}),
-    )
-    return Prediction(record, made, shifts)
+def _require_change(records: tuple[Record, ...], outputs: tuple[str, ...]) -> None:
+    for record in records:
+        for name in outputs:
+            if np.ptp(record[name]) == 0.0:
+                raise DataError(
+                    f"output {name!r} of record {record.name!r} does not change",
+                    action="choose another record, or leave the output out",
+                )

@@ -1,4 +1,4 @@
-"""Shifts of a verification record: biases, reference shifts and initial state by least squares.
+"""Free runs of linear models, with the biases and the initial state that fit the record best.
 
 ``dx/dt = A x + B (u - u_ref) + b``, ``y = C x + D (u - u_ref) + y_ref`` is linear in b, y_ref and
 the initial state, so each one's share of the output is a column and all are solved at once.
@@ -6,66 +6,50 @@ the initial state, so each one's share of the output is a column and all are sol
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.identification.prediction.free_run import Answer, FreeRun
+from flightid.identification.prediction.result import Shifts
 from flightid.models.linear.realisation import Matrices
-from flightid.validation.verification.free_run import Answer, FreeRun
 
 RANK_TOLERANCE = 1e-10
 """Singular values below this share of the largest count as zero (columns have unit length)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Shifts:
-    """What was solved for in one record.
+@dataclass(frozen=True)
+class Freedom:
+    """What is solved for in a record, and on how much of it.
 
     Attributes
     ----------
-    bias : ndarray, shape (n_states,)
-        Constant added to the state derivatives; zero where it was not free.
-    reference : ndarray, shape (n_outputs,)
-        Constant added to the outputs, in their units.
-    initial_state : ndarray, shape (n_states,)
-        State at the first sample.
-    n_free : int
-        Numbers that were free.
-    rank : int
-        How many of them the record tells apart; fewer than `n_free` means that their values are
-        one choice among many, while the prediction is not touched.
-    e_folds : float
-        How often the model's fastest growing mode grows by e over the record; 0 where none grows.
-    input_shift : ndarray, shape (n_inputs,), or None
-        Of a nonlinear model, whose equations were integrated: constant added to the inputs.
-
-    Example
-    -------
-    >>> Shifts(np.zeros(1), np.array([0.2]), np.zeros(1), 2, 2).reference
-    array([0.2])
+    state_bias, output_bias : bool
+    initial_state : bool or tuple of int
+        All states at the first sample, none, or these.
+    given : mapping of int to float
+        States at the first sample that are known; the others start at rest.
+    stretch : int or None
+        First samples that tell what is solved for; None takes the whole record.
     """
 
-    bias: NDArray[np.float64]
-    reference: NDArray[np.float64]
-    initial_state: NDArray[np.float64]
-    n_free: int
-    rank: int
-    e_folds: float = 0.0
-    input_shift: NDArray[np.float64] | None = None
+    state_bias: bool
+    output_bias: bool
+    initial_state: bool | tuple[int, ...]
+    given: Mapping[int, float] = field(default_factory=dict)
+    stretch: int | None = None
+
+    def free_states(self, n_states: int) -> tuple[int, ...]:
+        """Places of the states that are solved for."""
+        if isinstance(self.initial_state, tuple):
+            return self.initial_state
+        return tuple(range(n_states)) if self.initial_state else ()
 
 
-@dataclass(frozen=True)
-class Freedom:
-    """Which shifts are solved for."""
-
-    bias: bool
-    reference: bool
-    initial_state: bool
-
-
-def predict(
+def predict_linear(
     matrices: Matrices,
     driven: NDArray[np.float64],
     measured: NDArray[np.float64],
@@ -99,31 +83,37 @@ def predict(
     tuple of ndarray and Shifts
         Prediction, shape (n_outputs, n_samples), and the shifts.
     """
-    n_samples = driven.shape[1]
-    run = FreeRun(matrices, n_samples, sample_time_s, hold, freedom.initial_state)
-    plain = run.driven(driven)
+    n_samples, stretch = driven.shape[1], freedom.stretch
+    # Growing modes can be followed backwards only where the whole state is free and the whole
+    # record tells it.
+    backwards = freedom.initial_state is True and stretch is None
+    run = FreeRun(matrices, n_samples, sample_time_s, hold, backwards)
+    n_states = run.n_states
+    free = freedom.free_states(n_states)
+    states, biases = run.free() if freedom.state_bias or free or freedom.given else ([], [])
+    plain = _begun(run.driven(driven), states, freedom.given)
     n_outputs = len(plain.outputs)
-    states, biases = run.free() if freedom.bias or freedom.initial_state else ([], [])
     answers = [
-        *(biases if freedom.bias else ()),
-        *(states if freedom.initial_state else ()),
-        *(_reference_shifts(n_outputs, n_samples, run.n_states) if freedom.reference else ()),
+        *(biases if freedom.state_bias else ()),
+        *(states[place] for place in free),
+        *(_output_biases(n_outputs, n_samples, n_states) if freedom.output_bias else ()),
     ]
     if not answers:
-        none = np.zeros(run.n_states)
-        return plain.outputs, Shifts(none, np.zeros(n_outputs), none, 0, 0, run.e_folds)
+        none = np.zeros(n_states)
+        return plain.outputs, Shifts(none, np.zeros(n_outputs), plain.start, 0, 0, run.e_folds)
     design = np.stack([answer.outputs for answer in answers], axis=-1)
+    told = slice(None, stretch)
     scale = np.sqrt(weights)[:, None]
     solution, rank = _solve(
-        (scale[..., None] * design).reshape(-1, len(answers)),
-        (scale * (measured - plain.outputs)).reshape(-1),
+        (scale[..., None] * design[:, told]).reshape(-1, len(answers)),
+        (scale * (measured - plain.outputs)[:, told]).reshape(-1),
     )
     # The state at the first sample is that of all runs together.
     start = plain.start + np.stack([answer.start for answer in answers], axis=-1) @ solution
     shifts = Shifts(
-        solution[: run.n_states] if freedom.bias else np.zeros(run.n_states),
-        solution[-n_outputs:] if freedom.reference else np.zeros(n_outputs),
-        start if freedom.initial_state else np.zeros(run.n_states),
+        solution[:n_states] if freedom.state_bias else np.zeros(n_states),
+        solution[-n_outputs:] if freedom.output_bias else np.zeros(n_outputs),
+        start if free else plain.start,
         solution.size,
         rank,
         run.e_folds,
@@ -131,7 +121,16 @@ def predict(
     return plain.outputs + design @ solution, shifts
 
 
-def _reference_shifts(n_outputs: int, n_samples: int, n_states: int) -> list[Answer]:
+def _begun(plain: Answer, states: list[Answer], given: Mapping[int, float]) -> Answer:
+    """The driven run from known states."""
+    outputs, start = plain.outputs, plain.start
+    for place, value in given.items():
+        outputs = outputs + value * states[place].outputs
+        start = start + value * states[place].start
+    return Answer(outputs, start)
+
+
+def _output_biases(n_outputs: int, n_samples: int, n_states: int) -> list[Answer]:
     found = []
     for index in range(n_outputs):
         shift = np.zeros((n_outputs, n_samples))

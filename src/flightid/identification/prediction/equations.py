@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.identification.multistart import DenseEnd
+from flightid.identification.prediction.linear import RANK_TOLERANCE, Freedom
+from flightid.identification.prediction.result import Shifts
 from flightid.identification.records.setup import OwnNumbers
 from flightid.models import StateSpaceModel
 from flightid.models.state_space.integration_steps import steps_per_sample
-from flightid.validation.verification.shifts import RANK_TOLERANCE, Freedom, Shifts
 
 Array = NDArray[np.float64]
 MOST_STEPS = 50
@@ -63,13 +64,16 @@ class NonlinearRun:
         cuts: list[int] = []
         whole = (cuts, np.zeros((0, 0)), 0, np.zeros((0, 0)))
         steps = steps_per_sample(model, sample_time_s, None)
+        initial = np.array([float(model.trim.get(name, 0.0)) for name in model.states])
+        for place, value in freedom.given.items():
+            initial[place] = value
         start = OwnNumbers(
-            np.array([float(model.trim.get(name, 0.0)) for name in model.states]),
+            initial,
             np.zeros(m),
             np.zeros(p),
-            list(range(n)) if freedom.initial_state else [],
-            list(range(m)) if freedom.bias else [],
-            rows if freedom.reference else [],
+            list(freedom.free_states(n)),
+            list(range(m)) if freedom.state_bias else [],
+            rows if freedom.output_bias else [],
         )
         native = _native.EquationRecords(model.native, [steps], [whole])
         return cls(model, native, inputs, sample_time_s, hold == "first", rows, start)
@@ -132,17 +136,19 @@ def predict_equations(
         The run from trim diverges, or a formula has no value.
     """
     run = NonlinearRun.of(model, inputs, sample_time_s, rows, freedom, hold)
+    told = slice(None, freedom.stretch)
     scale = np.sqrt(weights)[:, None]
     best, rank = run.start, 0
     n_free = run.start.n_free
     if n_free:
-        start, size = _places(run.start), measured.size
+        start, size = _places(run.start), measured[:, told].size
 
         def residuals(x: Array) -> Array:
-            return np.asarray((scale * (run.outputs(run.start.filled(x))[0] - measured)).ravel())
+            error = run.outputs(run.start.filled(x))[0] - measured
+            return np.asarray((scale * error[:, told]).ravel())
 
         def jacobian(x: Array) -> Array:
-            slopes = scale[..., None] * run.outputs(run.start.filled(x))[1]
+            slopes = scale[..., None] * run.outputs(run.start.filled(x))[1][:, told]
             return np.ascontiguousarray(slopes.reshape(size, n_free))
 
         open_ = np.full(n_free, np.inf)
@@ -156,7 +162,7 @@ def predict_equations(
         best.initial,
         n_free,
         rank,
-        input_shift=best.shift,
+        input_bias=best.shift,
     )
     return predicted, shifts
 

@@ -1,0 +1,167 @@
+"""Free runs of models without a noise model: linear ones and equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from flightid.errors import OptionError, UnknownNameError
+from flightid.identification.prediction.equations import predict_equations
+from flightid.identification.prediction.linear import Freedom, predict_linear
+from flightid.identification.prediction.request import FREE_RUN, Request
+from flightid.identification.prediction.result import Prediction, Shifts
+from flightid.identification.prediction.weights import guide_weights
+from flightid.models import StateSpaceModel
+from flightid.models.linear.linear_system import LinearModel
+from flightid.record import Channel, Record, Step
+
+
+def predict_continuous(
+    model: LinearModel, record: Record, outputs: tuple[str, ...], request: Request
+) -> Prediction:
+    """Predict one record; `flightid.predict` says how.
+
+    Raises
+    ------
+    OptionError
+        Steps ahead are asked of a model without a noise model, or a state that has no name.
+    UnknownNameError
+        The model has no such state.
+    DataError
+        The run grows beyond all numbers.
+    """
+    if request.horizon != FREE_RUN:
+        raise OptionError(
+            "this model has no noise model, so it predicts the same from any past",
+            found=f"horizon={request.horizon!r}",
+            needed="horizon='free_run'",
+            action="identify an ARX … Box–Jenkins or innovations model to predict some steps ahead",
+        )
+    settle = request.settle_samples(record.n_samples, record.sample_time_s)
+    freedom = replace(_freedom(model, request), stretch=settle or _least(model, request))
+    if isinstance(model, StateSpaceModel) and not model.is_linear:
+        return _of_equations(model, record, outputs, request, freedom)
+    return _of_matrices(model, record, outputs, request, freedom)
+
+
+def _freedom(model: LinearModel, request: Request) -> Freedom:
+    start = request.initial_state
+    if not isinstance(start, Mapping):
+        solved = start in ("estimate", "measured")
+        return Freedom(request.state_bias, request.output_bias, solved)
+    names = _states(model)
+    for name, value in start.items():
+        if name not in names:
+            raise UnknownNameError(
+                "the model has no such state", found=name, needed=", ".join(names)
+            )
+        if isinstance(value, str) and value != "estimate":
+            raise OptionError(
+                f"unknown start of state {name!r}", found=repr(value), needed="a number, 'estimate'"
+            )
+    free = tuple(names.index(name) for name, value in start.items() if isinstance(value, str))
+    given = {
+        names.index(name): float(value)
+        for name, value in start.items()
+        if not isinstance(value, str)
+    }
+    return Freedom(request.state_bias, request.output_bias, free, given)
+
+
+def _states(model: LinearModel) -> list[str]:
+    names = list(getattr(model, "states", ()))
+    if not names:
+        raise OptionError(
+            "the states of this model have no names",
+            found=type(model).__name__,
+            needed="'trim', 'measured' or 'estimate'",
+        )
+    return names
+
+
+def _least(model: LinearModel, request: Request) -> int | None:
+    """Samples that tell a measured state: as many as it has numbers."""
+    if request.initial_state != "measured":
+        return None
+    order = len(model.states) if isinstance(model, StateSpaceModel) else len(model.state_space()[0])
+    return max(order, 1)
+
+
+def _of_equations(
+    model: StateSpaceModel,
+    record: Record,
+    outputs: tuple[str, ...],
+    request: Request,
+    freedom: Freedom,
+) -> Prediction:
+    predicted, shifts = predict_equations(
+        model,
+        record.matrix(model.inputs),
+        record.matrix(outputs),
+        record.sample_time_s,
+        rows=[list(model.outputs).index(name) for name in outputs],
+        freedom=freedom,
+        weights=guide_weights(record, outputs),
+        hold=request.hold,
+    )
+    return _prediction(record, model, outputs, predicted, shifts, request, freedom)
+
+
+def _of_matrices(
+    model: LinearModel,
+    record: Record,
+    outputs: tuple[str, ...],
+    request: Request,
+    freedom: Freedom,
+) -> Prediction:
+    rows = [list(model.outputs).index(name) for name in outputs]
+    a, b, c, d, delays_s = (np.ascontiguousarray(m, dtype=np.float64) for m in model.state_space())
+    trim = record.trim
+    offset = np.array([[trim.get(name, 0.0)] for name in outputs])
+    driven = record.matrix(model.inputs)
+    driven = driven - np.array([[trim.get(name, 0.0)] for name in model.inputs])
+    predicted, shifts = predict_linear(
+        (a, b, np.ascontiguousarray(c[rows]), np.ascontiguousarray(d[rows]), delays_s),
+        driven,
+        record.matrix(outputs) - offset,
+        record.sample_time_s,
+        freedom=freedom,
+        weights=guide_weights(record, outputs),
+        hold=request.hold,
+    )
+    total = replace(shifts, output_bias=shifts.output_bias + offset[:, 0])
+    return _prediction(record, model, outputs, predicted + offset, total, request, freedom)
+
+
+def _prediction(
+    record: Record,
+    model: LinearModel,
+    outputs: tuple[str, ...],
+    rows: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
+    shifts: Shifts,
+    request: Request,
+    freedom: Freedom,
+) -> Prediction:
+    known = record.channels
+    channels = [known[name] for name in model.inputs]
+    channels += [Channel(name, known[name].unit, known[name].role, "predicted") for name in outputs]
+    predicted = record.replace(
+        dict(zip(outputs, rows, strict=True)),
+        channels=channels,
+        step=Step("predict", {"hold": request.hold}),
+    )
+    start = freedom.stretch or 0
+    words = start_words(request, start, record.sample_time_s)
+    return Prediction(record, predicted, outputs, request.horizon, words, start, shifts)
+
+
+def start_words(request: Request, start: int, sample_time_s: float) -> str:
+    """Where a model without a noise model started."""
+    on = f"over the first {start * sample_time_s:.3g} s" if start else "over the whole record"
+    if isinstance(request.initial_state, Mapping):
+        return "a given state"
+    if request.initial_state in ("estimate", "measured"):
+        return f"a state solved for {on}"
+    return "trim" if request.initial_state in (None, "trim") else "rest"

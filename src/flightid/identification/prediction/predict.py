@@ -1,0 +1,227 @@
+"""The verb `predict`: any model driven by records' inputs, beside what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, overload
+
+from flightid.errors import ModelError, OptionError, UnitError, UnknownNameError
+from flightid.identification.prediction.continuous import predict_continuous
+from flightid.identification.prediction.narx import predict_narx
+from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
+from flightid.identification.prediction.result import Prediction
+from flightid.identification.prediction.sampled import predict_sampled
+from flightid.models import InnovationsModel, NarxEquation, PolynomialModel
+from flightid.models.linear.hold_equivalent import Hold
+from flightid.models.linear.linear_system import LinearModel
+from flightid.record import Record
+from flightid.units import canonical
+
+Predictor = Callable[[Any, Record, tuple[str, ...], Request], Prediction]
+# Kind of model -> how it predicts; the first that fits. A new kind adds its line.
+PREDICTORS: tuple[tuple[type[Any], Predictor], ...] = (
+    (NarxEquation, predict_narx),
+    (PolynomialModel, predict_sampled),
+    (InnovationsModel, predict_sampled),
+    (LinearModel, predict_continuous),
+)
+
+
+@overload
+def predict(
+    source: object,
+    records: Record,
+    horizon: int | str = ...,
+    *,
+    outputs: str | Sequence[str] | None = ...,
+    initial_state: InitialState | None = ...,
+    settle_s: float | None = ...,
+    state_bias: bool = ...,
+    output_bias: bool = ...,
+    hold: Hold = ...,
+) -> Prediction: ...
+
+
+@overload
+def predict(
+    source: object,
+    records: Sequence[Record],
+    horizon: int | str = ...,
+    *,
+    outputs: str | Sequence[str] | None = ...,
+    initial_state: InitialState | None = ...,
+    settle_s: float | None = ...,
+    state_bias: bool = ...,
+    output_bias: bool = ...,
+    hold: Hold = ...,
+) -> tuple[Prediction, ...]: ...
+
+
+def predict(
+    source: object,
+    records: Record | Sequence[Record],
+    horizon: int | str = FREE_RUN,
+    *,
+    outputs: str | Sequence[str] | None = None,
+    initial_state: InitialState | None = None,
+    settle_s: float | None = None,
+    state_bias: bool = False,
+    output_bias: bool = False,
+    hold: Hold = "first",
+) -> Prediction | tuple[Prediction, ...]:
+    """Predict the outputs of records from their inputs, with any fit or model.
+
+    Offsets and scaling come from the training records of the model, or from the trim that a record
+    declares; never from the mean of the record that is predicted.
+
+    Parameters
+    ----------
+    source : Fit or model
+        Of any kind.
+    records : Record or sequence of Record
+        With the model's inputs and outputs, in its units.
+    horizon : int or "free_run"
+        Samples ahead, from the measured past, for models with a noise model and NARX; or the whole
+        record from the inputs alone.
+    outputs : str or sequence of str, optional
+        Outputs to predict; default: those of the model that the record holds.
+    initial_state : str or mapping, optional
+        Where the run starts: ``"trim"`` (default of models in continuous time), ``"zero"`` (rest at
+        the point the model holds about), ``"measured"`` (solved for on as few samples as there are
+        states; default of NARX: the measured lags), ``"estimate"`` (solved for on the first
+        stretch; default of polynomial and innovations models), or by state a number or
+        ``"estimate"``, the others at trim.
+    settle_s : float, optional
+        First stretch, s, on which the start and the biases are solved for and which no score
+        counts. Default: a tenth of the record for polynomial and innovations models; for those in
+        continuous time the whole record is used, and all of it counts.
+    state_bias, output_bias : bool
+        Solve for a constant on each state derivative (of a nonlinear model: on each input), and on
+        each output.
+    hold : {"first", "zero"}
+        What the inputs of a model in continuous time do between samples.
+
+    Returns
+    -------
+    Prediction, or tuple of Prediction for a sequence of records
+
+    Raises
+    ------
+    ModelError
+        The source cannot predict.
+    OptionError
+        An option that is unknown, or that this kind of model does not have.
+    UnknownNameError
+        A channel is missing.
+    UnitError
+        A channel in another unit.
+    DataError
+        Another sample time than a sampled model's, or a run that grows beyond all numbers.
+
+    Assumes
+    -------
+    Records that took no part in the fit. Where the whole record tells the initial state, a slow
+    mode can be explained rather than predicted: give `settle_s`.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., eqs. 3.20, 3.31 and 4.86; Billings, *Nonlinear System
+    Identification*, Wiley 2013, section 5.5; biases: Tischler & Remple, *Aircraft and Rotorcraft
+    System Identification*, 2nd ed., section 14.3.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> import flightid as fid
+    >>> truth = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
+    >>> u = np.random.default_rng(0).standard_normal(300)
+    >>> record = fid.Record.from_arrays(np.arange(300) / 10, inputs={"u": u},
+    ...                                 outputs={"y": np.zeros(300)})
+    >>> record = record.replace({"y": truth.simulate(record)})
+    >>> fid.predict(truth, record, settle_s=2.0)
+    Prediction(free run from a state solved for over the first 2 s, 300 samples, fit y 100.0 %)
+    """
+    request = Request(horizon, initial_state, settle_s, state_bias, output_bias, hold)
+    model, way = predictor_of(source)
+    asked = (outputs,) if isinstance(outputs, str) else outputs
+    flown = (records,) if isinstance(records, Record) else tuple(records)
+    if not flown:
+        raise OptionError("there is nothing to predict", needed="one record or more")
+    chosen = outputs_held(model, flown, asked)
+    for record in flown:
+        require_units(model, record, chosen)
+    made = tuple(way(model, record, chosen, request) for record in flown)
+    return made[0] if isinstance(records, Record) else made
+
+
+def predictor_of(source: object) -> tuple[Any, Predictor]:
+    """The model of a source and how it predicts.
+
+    Raises
+    ------
+    ModelError
+        The source is no model and holds none.
+    """
+    for candidate in (getattr(source, "equation", None), getattr(source, "model", source)):
+        for kind, way in PREDICTORS:
+            if isinstance(candidate, kind):
+                return candidate, way
+    raise ModelError(
+        "the model cannot be simulated",
+        found=type(source).__name__,
+        needed="a fit or a model, or an object with inputs, outputs and state_space()",
+    )
+
+
+def output_names(model: object) -> tuple[str, ...]:
+    """Outputs of a model of any kind."""
+    inner: Any = getattr(model, "model", model)
+    several = getattr(inner, "outputs", None)
+    return (inner.output,) if several is None else tuple(several)
+
+
+def outputs_held(
+    model: object, records: tuple[Record, ...], outputs: Sequence[str] | None
+) -> tuple[str, ...]:
+    """Outputs of a model that all records hold, or those asked for.
+
+    Raises
+    ------
+    UnknownNameError
+        The model or a record lacks one.
+    """
+    known = output_names(model)
+    for name in outputs or ():
+        if name not in known:
+            raise UnknownNameError(
+                "the model has no such output", found=name, needed=", ".join(known)
+            )
+    wanted = known if outputs is None else tuple(outputs)
+    held = tuple(name for name in wanted if all(name in record for record in records))
+    if not held or (outputs is not None and held != wanted):
+        raise UnknownNameError(
+            "a record lacks what the model predicts",
+            found=", ".join(records[0].channels),
+            needed=", ".join(wanted) or "outputs that all models have",
+        )
+    return held
+
+
+def require_units(model: object, record: Record, outputs: tuple[str, ...]) -> None:
+    """Refuse a record whose channels have other units than the model's.
+
+    Raises
+    ------
+    UnitError
+        A unit of the model and one of the record differ.
+    """
+    units = getattr(model, "units", None) or {}
+    for name in (*getattr(model, "inputs", ()), *outputs):
+        expected = units.get(name)
+        if expected is not None and canonical(expected) != record.unit(name):
+            raise UnitError(
+                f"channel {name!r} has another unit in the record than in the model",
+                found=record.unit(name),
+                needed=canonical(expected),
+                action="convert the record with to_units",
+            )

@@ -1,0 +1,108 @@
+"""What a prediction is asked for, after its checks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from flightid.errors import OptionError
+from flightid.models.linear.hold_equivalent import Hold
+
+FREE_RUN = "free_run"
+STARTS = ("trim", "zero", "measured", "estimate")
+SHARE = 10
+"""A tenth of a record tells the state of a sampled model at its beginning."""
+LEAST_PER_STATE = 3
+"""Samples for each number of the initial state: fewer would follow the noise."""
+
+InitialState = str | Mapping[str, float | str]
+
+
+@dataclass(frozen=True)
+class Request:
+    """One way to predict.
+
+    Attributes
+    ----------
+    horizon : int or "free_run"
+        Samples ahead.
+    initial_state : str, mapping or None
+        ``"trim"``, ``"zero"``, ``"measured"``, ``"estimate"``, or numbers and ``"estimate"`` by
+        state; None leaves it to the kind of model.
+    settle_s : float or None
+        First stretch, s: what is solved for is solved on it alone, and no score counts it. None
+        leaves it to the kind of model.
+    state_bias, output_bias : bool
+        Constants on the state derivatives and on the outputs are solved for.
+    hold : {"first", "zero"}
+        What the inputs of a continuous model do between samples.
+
+    Example
+    -------
+    >>> Request(horizon=1).words
+    '1 sample ahead'
+    """
+
+    horizon: int | str = FREE_RUN
+    initial_state: InitialState | None = None
+    settle_s: float | None = None
+    state_bias: bool = False
+    output_bias: bool = False
+    hold: Hold = "first"
+
+    def __post_init__(self) -> None:
+        ahead = self.horizon
+        counted = isinstance(ahead, int) and not isinstance(ahead, bool) and ahead > 0
+        if ahead != FREE_RUN and not counted:
+            raise OptionError("unknown horizon", found=ahead, needed="1, 2, … or 'free_run'")
+        known = self.initial_state is None or isinstance(self.initial_state, Mapping)
+        if not known and self.initial_state not in STARTS:
+            raise OptionError(
+                "unknown initial state",
+                found=repr(self.initial_state),
+                needed=" or ".join(map(repr, STARTS)) + ", or numbers by state",
+            )
+        if self.hold not in ("first", "zero"):
+            raise OptionError("hold is not known", found=self.hold, needed="'first' or 'zero'")
+        if self.settle_s is not None and not (math.isfinite(self.settle_s) and self.settle_s >= 0):
+            raise OptionError(
+                "settle_s is no length of time", found=self.settle_s, needed="0 s or more"
+            )
+
+    @property
+    def words(self) -> str:
+        """The horizon in words."""
+        if self.horizon == FREE_RUN:
+            return "free run"
+        return f"{self.horizon} sample{'' if self.horizon == 1 else 's'} ahead"
+
+    def settle_samples(self, n_samples: int, sample_time_s: float) -> int | None:
+        """Samples of the first stretch; None where nobody gave it.
+
+        Raises
+        ------
+        OptionError
+            Nothing of the record would be left to score.
+        """
+        if self.settle_s is None:
+            return None
+        count = round(self.settle_s / sample_time_s)
+        if count >= n_samples:
+            raise OptionError(
+                "the stretch that settles the start leaves nothing of the record",
+                found=f"{self.settle_s:g} s of {n_samples * sample_time_s:g} s",
+                needed="a shorter settle_s, or a longer record",
+            )
+        return count
+
+
+def usual_stretch(n_samples: int, n_states: int) -> int:
+    """First samples on which the start of a sampled model is solved where nobody says how many.
+
+    Example
+    -------
+    >>> usual_stretch(1000, 4), usual_stretch(50, 4)
+    (100, 12)
+    """
+    return min(max(LEAST_PER_STATE * n_states, n_samples // SHARE), n_samples // 2)

@@ -1,0 +1,196 @@
+"""The prediction: a record, the model's answer to its inputs, and what was solved for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.record import Record
+from flightid.simulation import metrics
+from flightid.table import Cell, Column, Table
+
+SCHEMA = "flightid.prediction/1"
+
+
+@dataclass(frozen=True, eq=False)
+class Shifts:
+    """What was solved for in one record.
+
+    Attributes
+    ----------
+    state_bias : ndarray, shape (n_states,)
+        Constant added to the state derivatives; zero where it was not free.
+    output_bias : ndarray, shape (n_outputs,)
+        Constant added to the outputs, in their units.
+    initial_state : ndarray, shape (n_states,)
+        State at the first sample.
+    n_free : int
+        Numbers that were free.
+    rank : int
+        How many of them the record tells apart; fewer than `n_free` means that their values are
+        one choice among many, while the prediction is not touched.
+    e_folds : float
+        How often the model's fastest growing mode grows by e over the record; 0 where none grows.
+    input_bias : ndarray, shape (n_inputs,), or None
+        Of a nonlinear model, whose equations were integrated: constant added to the inputs.
+
+    Example
+    -------
+    >>> Shifts(np.zeros(1), np.array([0.2]), np.zeros(1), 2, 2).output_bias
+    array([0.2])
+    """
+
+    state_bias: NDArray[np.float64]
+    output_bias: NDArray[np.float64]
+    initial_state: NDArray[np.float64]
+    n_free: int
+    rank: int
+    e_folds: float = 0.0
+    input_bias: NDArray[np.float64] | None = None
+
+
+NOTHING = Shifts(np.zeros(0), np.zeros(0), np.zeros(0), 0, 0)
+"""Of a prediction that starts from measured samples alone."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Prediction:
+    """One record and what a model makes of its inputs.
+
+    Attributes
+    ----------
+    measured : Record
+        What was predicted.
+    predicted : Record
+        Inputs, and outputs of the model with all shifts, in the record's units.
+    outputs : tuple of str
+        Outputs predicted.
+    horizon : int or "free_run"
+        Samples ahead.
+    initial_state : str
+        Where the model started, in words.
+    start : int
+        First samples that no score counts: they told the start.
+    shifts : Shifts
+        Biases and initial state that were solved for.
+    diverged_at : int or None
+        First sample at which the run left its range and was held.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> import flightid as fid
+    >>> time_s = np.arange(300) * 0.02
+    >>> lag = fid.LinearSystem([[-2.0]], [[2.0]], [[1.0]], [[0.0]], ("u",), ("y",))
+    >>> flown = fid.Record.from_arrays(time_s, inputs={"u": np.sin(time_s)})
+    >>> fid.predict(lag, fid.simulate(lag, flown))
+    Prediction(free run from trim, 300 samples, fit y 100.0 %)
+    """
+
+    measured: Record
+    predicted: Record
+    outputs: tuple[str, ...]
+    horizon: int | str
+    initial_state: str
+    start: int = 0
+    shifts: Shifts = NOTHING
+    diverged_at: int | None = None
+
+    def residual(self, name: str) -> NDArray[np.float64]:
+        """Measured minus predicted, in the channel's unit, shape (n_samples,)."""
+        return np.asarray(self.measured[name] - self.predicted[name])
+
+    def scored(self, name: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Measured and predicted samples after the start, about the mean of the measured ones.
+
+        How a constant is shared between trim, bias and offset must not change a number, and an
+        offset must not flatter it.
+        """
+        measured, predicted = (side[name][self.start :] for side in (self.measured, self.predicted))
+        middle = np.mean(measured)
+        return measured - middle, predicted - middle
+
+    @property
+    def fit_percent(self) -> dict[str, float]:
+        """100 (1 - |y - ŷ| / |y - mean y|) by output."""
+        return {name: float(metrics.fit_percent(*self.scored(name))) for name in self.outputs}
+
+    @property
+    def theil(self) -> dict[str, float]:
+        """Theil's coefficient about the measured mean, by output."""
+        return {name: float(metrics.theil(*self.scored(name))) for name in self.outputs}
+
+    @property
+    def rms_error(self) -> dict[str, float]:
+        """Root mean square error by output, in its unit."""
+        return {name: float(metrics.rms_error(*self.scored(name))) for name in self.outputs}
+
+    @property
+    def words(self) -> str:
+        """Horizon and initial state in words."""
+        ahead = "free run" if self.horizon == "free_run" else f"{self.horizon} ahead"
+        return f"{ahead} from {self.initial_state}"
+
+    def residual_record(self) -> Record:
+        """Measured minus predicted after the start, beside the inputs."""
+        left = self.measured.replace({name: self.residual(name) for name in self.outputs})
+        time_s, half = self.measured.time_s, 0.5 * self.measured.sample_time_s
+        return left.segment(time_s[self.start] - half, time_s[-1] + half, name=self.measured.name)
+
+    def summary(self) -> Table:
+        """Table by output, after the start."""
+        columns = (
+            Column("output"),
+            Column("unit"),
+            Column("fit", "%", 4),
+            Column("Theil coefficient", digits=3),
+            Column("rms error", digits=3),
+        )
+        numbers = (self.fit_percent, self.theil, self.rms_error)
+        rows: list[tuple[Cell, ...]] = [
+            (name, self.measured.unit(name), *(each[name] for each in numbers))
+            for name in self.outputs
+        ]
+        notes = [f"{self.words}; the first {self.start} samples are not scored."]
+        if self.diverged_at is not None:
+            notes.append(f"The run left its range at sample {self.diverged_at} and was held.")
+        return Table(repr(self), columns, tuple(rows), tuple(notes))
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key, without the time histories."""
+        scores: Mapping[str, Mapping[str, float]] = {
+            "fit_percent": self.fit_percent,
+            "theil": self.theil,
+            "rms_error": self.rms_error,
+        }
+        bias = self.shifts.input_bias
+        return {
+            "schema": SCHEMA,
+            "record": self.measured.name,
+            "outputs": list(self.outputs),
+            "horizon": self.horizon,
+            "initial_state": self.initial_state,
+            "start": self.start,
+            "diverged_at": self.diverged_at,
+            **{key: dict(value) for key, value in scores.items()},
+            "shifts": {
+                "state_bias": self.shifts.state_bias.tolist(),
+                "output_bias": self.shifts.output_bias.tolist(),
+                "input_bias": None if bias is None else bias.tolist(),
+                "initial_state": self.shifts.initial_state.tolist(),
+                "n_free": self.shifts.n_free,
+                "rank": self.shifts.rank,
+            },
+        }
+
+    def __repr__(self) -> str:
+        """Horizon, start, size and fits on one line."""
+        fits = ", ".join(f"{name} {fit:.1f} %" for name, fit in self.fit_percent.items())
+        left = "" if self.diverged_at is None else f", held from sample {self.diverged_at}"
+        return f"Prediction({self.words}, {self.measured.n_samples} samples, fit {fits}{left})"
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()

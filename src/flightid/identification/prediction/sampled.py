@@ -1,0 +1,212 @@
+"""Predictions of sampled models with a noise model: polynomials and innovations forms.
+
+What the model holds about is its own operating point, that of its training records, or the trim a
+record declares: never the mean of the record that is predicted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError, OptionError
+from flightid.identification.prediction.request import FREE_RUN, Request, usual_stretch
+from flightid.identification.prediction.result import Prediction, Shifts
+from flightid.models import InnovationsModel, PolynomialModel
+from flightid.models.innovations import prediction as innovations
+from flightid.models.polynomial import prediction as polynomial
+from flightid.record import Channel, Record, Step
+
+Array = NDArray[np.float64]
+SampledModel = PolynomialModel | InnovationsModel
+LARGEST = 1e100
+"""A run beyond this is held at the last sample before it: its squares still are numbers."""
+RANK = 1e-10
+"""Directions of the initial state weaker than this share of the strongest are left at rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class Deviations:
+    """A record's channels about the point that the model holds about.
+
+    Attributes
+    ----------
+    outputs : ndarray, shape (p, n_samples)
+    inputs : ndarray, shape (m, n_samples)
+    point : ndarray, shape (p,)
+        What was taken off the outputs.
+    """
+
+    outputs: Array
+    inputs: Array
+    point: Array
+
+
+def predict_sampled(
+    model: SampledModel, record: Record, outputs: tuple[str, ...], request: Request
+) -> Prediction:
+    """Predict one record; `flightid.predict` says how.
+
+    Raises
+    ------
+    OptionError
+        Something is asked that this kind of model does not have.
+    DataError
+        Another sample time, or a record too short to tell the start.
+    UnitError
+        A channel in another unit.
+    """
+    _refuse(request)
+    names = _outputs(model)
+    polynomial.require_same(
+        model,
+        {name: record.unit(name) for name in (*names, *model.inputs)},
+        record.sample_time_s,
+    )
+    data = _deviations(model, record, names, from_trim=request.initial_state == "trim")
+    with np.errstate(over="ignore", invalid="ignore"):
+        if request.horizon == FREE_RUN:
+            run, start, shifts = _free_run(model, data, record, request)
+        else:
+            run, start, shifts = _ahead(model, data, int(request.horizon)), 0, None
+    diverged_at = _hold(run)
+    made = run + data.point[:, None]
+    rows = dict(zip(names, made, strict=True))
+    known = record.channels
+    channels = [known[name] for name in model.inputs]
+    channels += [Channel(name, known[name].unit, known[name].role, "predicted") for name in outputs]
+    predicted = record.replace(
+        {name: rows[name] for name in outputs}, channels=channels, step=Step("predict", {})
+    )
+    settled = {} if shifts is None else {"shifts": shifts}
+    return Prediction(
+        record,
+        predicted,
+        outputs,
+        request.horizon,
+        start_words(request, start, record.sample_time_s),
+        start,
+        diverged_at=diverged_at,
+        **settled,
+    )
+
+
+def start_words(request: Request, start: int, sample_time_s: float) -> str:
+    """Where a sampled model started."""
+    if request.horizon != FREE_RUN:
+        return "the measured past"
+    if request.initial_state in ("zero", "trim"):
+        return "rest" if request.initial_state == "zero" else "trim"
+    return f"a state solved for over the first {start * sample_time_s:.3g} s"
+
+
+def _refuse(request: Request) -> None:
+    if request.state_bias:
+        raise OptionError(
+            "a sampled model has no state biases", found="state_bias=True", needed="False"
+        )
+    if isinstance(request.initial_state, Mapping):
+        raise OptionError(
+            "the states of a sampled model have no names",
+            found=", ".join(map(str, request.initial_state)),
+            needed="'trim', 'zero', 'measured' or 'estimate'",
+        )
+    if request.horizon != FREE_RUN and request.output_bias:
+        raise OptionError(
+            "a prediction from the measured past takes no bias off",
+            found="output_bias=True",
+            needed="False, or a free run",
+        )
+
+
+def _outputs(model: SampledModel) -> tuple[str, ...]:
+    return (model.output,) if isinstance(model, PolynomialModel) else model.outputs
+
+
+def _deviations(
+    model: SampledModel, record: Record, names: tuple[str, ...], *, from_trim: bool
+) -> Deviations:
+    point = {**model.operating_point, **(record.trim if from_trim else {})}
+
+    def about(channels: tuple[str, ...]) -> Array:
+        rows = [record[name] - point.get(name, 0.0) for name in channels]
+        return np.array(rows, dtype=np.float64).reshape(len(channels), record.n_samples)
+
+    offsets = np.array([point.get(name, 0.0) for name in names])
+    return Deviations(about(names), about(model.inputs), offsets)
+
+
+def _free_run(
+    model: SampledModel, data: Deviations, record: Record, request: Request
+) -> tuple[Array, int, Shifts]:
+    """The answer to the inputs, with the free motion that its first stretch tells."""
+    forced = _forced(model, data.inputs)
+    p, n_samples = data.outputs.shape
+    settle = request.settle_samples(n_samples, record.sample_time_s)
+    motion = np.zeros((0, p, n_samples))
+    if request.initial_state not in ("zero", "trim"):
+        motion = _motion(model, n_samples)
+    columns = [*motion, *(_constants(p, n_samples) if request.output_bias else ())]
+    if not columns:
+        return forced, settle or 0, Shifts(np.zeros(0), np.zeros(p), np.zeros(0), 0, 0)
+    stretch = settle or _stretch(request, n_samples, p, len(columns))
+    if stretch * p < len(columns):
+        raise DataError(
+            "the first stretch is too short to tell the start",
+            found=f"{stretch} samples of {p} outputs",
+            needed=f"{len(columns)} numbers or more",
+            action="give a longer settle_s, or initial_state='zero'",
+        )
+    told = np.array(columns)[:, :, :stretch].reshape(len(columns), -1).T
+    error = (data.outputs - forced)[:, :stretch].ravel()
+    if not (np.all(np.isfinite(told)) and np.all(np.isfinite(error))):
+        return forced, stretch, Shifts(np.zeros(0), np.zeros(p), np.zeros(len(motion)), 0, 0)
+    weights, _, rank, _ = np.linalg.lstsq(told, error, rcond=RANK)
+    run = forced + np.tensordot(weights, np.array(columns), axes=1)
+    k = len(motion)
+    bias = weights[k:] if request.output_bias else np.zeros(p)
+    return run, stretch, Shifts(np.zeros(0), bias, weights[:k], len(columns), int(rank))
+
+
+def _stretch(request: Request, n_samples: int, p: int, n_columns: int) -> int:
+    if request.initial_state == "measured":
+        return min(-(-n_columns // p), n_samples - 1)
+    return usual_stretch(n_samples, n_columns)
+
+
+def _constants(p: int, n_samples: int) -> Array:
+    return np.asarray(np.eye(p)[:, :, None] * np.ones(n_samples))
+
+
+def _forced(model: SampledModel, inputs: Array) -> Array:
+    if isinstance(model, PolynomialModel):
+        return polynomial.forced_run(model, inputs)[None]
+    return innovations.forced_run(model, inputs)
+
+
+def _motion(model: SampledModel, n_samples: int) -> Array:
+    """What each number of the initial state makes of the outputs, shape (k, p, n_samples)."""
+    if isinstance(model, PolynomialModel):
+        return polynomial.free_motion(model, n_samples)[:, None]
+    a, _, c, _, _ = model.matrices
+    return innovations.free_motion(a, c, n_samples)
+
+
+def _ahead(model: SampledModel, data: Deviations, horizon: int) -> Array:
+    """y(t) minus the part of the noise that is younger than the horizon."""
+    if isinstance(model, PolynomialModel):
+        return polynomial.ahead(model, data.outputs[0], data.inputs, horizon)[None]
+    return innovations.ahead(model, data.outputs, data.inputs, horizon)
+
+
+def _hold(run: Array) -> int | None:
+    """Hold a run that leaves the range of numbers, in place; the sample at which it did."""
+    usable = np.all(np.abs(run) < LARGEST, axis=0)
+    if np.all(usable):
+        return None
+    first = int(np.argmin(usable))
+    run[:, first:] = run[:, first - 1 : first] if first else 0.0
+    return first

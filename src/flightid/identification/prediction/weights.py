@@ -1,0 +1,36 @@
+"""What the error of each output counts beside the others'."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.record import Record
+from flightid.units import conversion_factor, same_dimension
+
+ANGULAR = {"rad": "deg", "deg": "deg", "rad/s": "deg/s", "deg/s": "deg/s"}
+LINEAR = ("ft/s", "ft/s^2")
+"""One deg, deg/s, ft/s and ft/s² count the same in J_rms (Tischler & Remple, section 14.4)."""
+
+
+def guide_weights(record: Record, outputs: tuple[str, ...]) -> NDArray[np.float64]:
+    """Guide weights; by the deviation of the channel where it is of another kind."""
+    weights = []
+    for name in outputs:
+        factor = guide_factor(record.unit(name))
+        if factor is None:
+            spread = float(np.std(record[name]))
+            factor = 1.0 / spread if spread > 0 else 1.0
+        weights.append(factor**2)
+    return np.array(weights)
+
+
+def guide_factor(unit: str) -> float | None:
+    """What one of `unit` counts in J_rms; None where the guide does not name its kind."""
+    # Angles have no dimension, so they go by name: a percentage is not an angle.
+    if unit in ANGULAR:
+        return conversion_factor(unit, ANGULAR[unit])
+    for guide in LINEAR:
+        if same_dimension(unit, guide):
+            return conversion_factor(unit, guide)
+    return None
