@@ -78,6 +78,8 @@ if TYPE_CHECKING:
     from flightid.identification.advice.advice import advise
     from flightid.identification.advice.impulse_response import impulse_response
     from flightid.identification.identify import identify
+    from flightid.identification.prediction.predict import predict
+    from flightid.identification.prediction.result import Prediction
     from flightid.identification.reduction.reduce import reduce
     from flightid.identification.reduction.structures import compare_structures
     from flightid.inspection import Inspection, inspect_log
@@ -226,6 +228,8 @@ _HOMES = {
     "export": "flightid.export.to_file",
     "library_names": "flightid.models",
     "load_model": "flightid.models",
+    "Prediction": "flightid.identification.prediction.result",
+    "predict": "flightid.identification.prediction.predict",
     "read_log": "flightid.logs",
     "read_records": "flightid.record",
     "reduce": "flightid.identification.reduction.reduce",
@@ -281,6 +285,7 @@ __all__ = [
     "PidDesign",
     "PolynomialFit",
     "PolynomialModel",
+    "Prediction",
     "Record",
     "Reduction",
     "Replay",
@@ -328,6 +333,7 @@ __all__ = [
     "modes",
     "open_loop",
     "pilot_cutoff",
+    "predict",
     "px4_autotune_gains",
     "read_log",
     "read_parameters",

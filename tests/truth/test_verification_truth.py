@@ -31,8 +31,8 @@ def test_the_truth_predicts_itself_with_every_shift_recovered() -> None:
     # A bias b, an initial state and a reference shift act through two shapes only: a constant and
     # exp(-2 t). The free run is unique, the split is not.
     assert (shifts.n_free, shifts.rank) == (3, 2)
-    at_rest = shifts.reference[0] + shifts.bias[0] / 2.0
-    decay = shifts.initial_state[0] - shifts.bias[0] / 2.0
+    at_rest = shifts.output_bias[0] + shifts.state_bias[0] / 2.0
+    decay = shifts.initial_state[0] - shifts.state_bias[0] / 2.0
     assert_close(at_rest, 0.25 + 0.2, rtol=1e-9, why="the constant part is unique")
     assert_close(decay, 0.7 - 0.2, rtol=1e-9, why="the decaying part is unique")
     assert "verification-shifts-not-unique" in {finding.code for finding in result.findings}
@@ -44,8 +44,8 @@ def test_bias_and_reference_alone_are_unique() -> None:
     record = seen.replace({"p": seen["p"] + answer + 0.25})
     result = fid.verify(LAG, record)
     shifts = result.predictions[0].shifts
-    assert_close(shifts.bias, [0.4], rtol=1e-9, why="what was added to the state derivative")
-    assert_close(shifts.reference, [0.25], rtol=1e-9, why="what was added to the output")
+    assert_close(shifts.state_bias, [0.4], rtol=1e-9, why="what was added to the state derivative")
+    assert_close(shifts.output_bias, [0.25], rtol=1e-9, why="what was added to the output")
     assert np.all(shifts.initial_state == 0)
 
 
@@ -102,7 +102,7 @@ def test_an_unstable_model_needs_its_initial_state() -> None:
         atol=3e-4,
         why="noise of 1e-3 over 600 samples",
     )
-    assert "from an initial state solved for" in fitted.horizon
+    assert "from an initial state solved for" in fitted.protocol
 
 
 def test_several_records_are_shifted_apart_and_judged_together() -> None:
@@ -111,7 +111,7 @@ def test_several_records_are_shifted_apart_and_judged_together() -> None:
     slow = LinearSystem([[-1.0]], [[1.5]], [[1.0]], [[0.0]], ("u",), ("p",))
     result = fid.verify(slow, records, state_bias=False)
     one = fid.verify(slow, records[:1], state_bias=False)
-    shifts = [each.shifts.reference[0] for each in result.predictions]
+    shifts = [each.shifts.output_bias[0] for each in result.predictions]
     assert_close(shifts[0] - shifts[1], 3.0, rtol=1e-9, why="each record has its own")
     assert_close(result.theil["p"], one.theil["p"], rtol=1e-9, why="the same record twice")
     assert 0.02 < result.theil["p"] < 1.0

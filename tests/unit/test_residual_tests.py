@@ -183,7 +183,7 @@ def test_a_verification_says_its_predictor_and_counts_independence_only() -> Non
     verification = _verification()
     tests = fid.residual_tests(verification)
     assert tests.horizon == "free run"
-    assert verification.horizon in tests.predictor
+    assert verification.protocol in tests.predictor
     assert not tests.test("εε", "y").counts
     assert tests.test("uε", "y", "u").counts
     assert "shown, not counted" in str(tests.summary())
@@ -289,7 +289,12 @@ def test_results_are_plain_values_and_pictures() -> None:
         (OptionError, "below one sample", _pair(), {"horizon": STEP, "maximum_lag": 0}),
         (OptionError, "fitted_noise leaves no", _pair(), {"horizon": STEP, "fitted_noise": 25}),
         (OptionError, "fitted_input leaves no", _pair(), {"horizon": STEP, "fitted_input": 51}),
-        (OptionError, "a verification is a free run", (_verification(),), {"horizon": STEP}),
+        (
+            OptionError,
+            "verification has another",
+            (_verification(),),
+            {"horizon": STEP},
+        ),
         (OptionError, "inputs of records are channel", (_verification(), np.ones(3)), {}),
         (DataError, "too short for so many lags", _pair(0, 60), {"horizon": STEP}),
         (DataError, "leaves nothing to test", (np.ones(900),), {"horizon": "free run"}),

@@ -29,9 +29,9 @@ def test_initial_state_and_shifts_are_found() -> None:
     result = fid.verify(model, moved, initial_state="estimate", outputs=["q", "az"])
     shifts = result.predictions[0].shifts
     assert shifts.rank == shifts.n_free == 5
-    assert shifts.input_shift is not None
-    assert_close(shifts.input_shift, [0.01], rtol=1e-6, why="no noise")
-    assert_close(shifts.reference, [0.0, 2.0], atol=1e-6, why="no noise")
+    assert shifts.input_bias is not None
+    assert_close(shifts.input_bias, [0.01], rtol=1e-6, why="no noise")
+    assert_close(shifts.output_bias, [0.0, 2.0], atol=1e-6, why="no noise")
     assert_close(shifts.initial_state, [0.05, -0.1], rtol=1e-6, why="no noise")
     assert max(result.theil.values()) < 1e-7
     # A linearised run cannot do that well.

@@ -163,5 +163,5 @@ def start_words(request: Request, start: int, sample_time_s: float) -> str:
     if isinstance(request.initial_state, Mapping):
         return "a given state"
     if request.initial_state in ("estimate", "measured"):
-        return f"a state solved for {on}"
-    return "trim" if request.initial_state in (None, "trim") else "rest"
+        return f"an initial state solved for {on}"
+    return "rest at trim" if request.initial_state in (None, "trim") else "rest"

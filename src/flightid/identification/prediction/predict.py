@@ -11,7 +11,7 @@ from flightid.identification.prediction.narx import predict_narx
 from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.sampled import predict_sampled
-from flightid.models import InnovationsModel, NarxEquation, PolynomialModel
+from flightid.models import InnovationsModel, LinearSystem, NarxEquation, PolynomialModel
 from flightid.models.linear.hold_equivalent import Hold
 from flightid.models.linear.linear_system import LinearModel
 from flightid.record import Record
@@ -139,7 +139,8 @@ def predict(
     ...                                 outputs={"y": np.zeros(300)})
     >>> record = record.replace({"y": truth.simulate(record)})
     >>> fid.predict(truth, record, settle_s=2.0)
-    Prediction(free run from a state solved for over the first 2 s, 300 samples, fit y 100.0 %)
+    Prediction(free run from an initial state solved for over the first 2 s, 300 samples, fit y
+    100.0 %)
     """
     request = Request(horizon, initial_state, settle_s, state_bias, output_bias, hold)
     model, way = predictor_of(source)
@@ -163,6 +164,8 @@ def predictor_of(source: object) -> tuple[Any, Predictor]:
         The source is no model and holds none.
     """
     for candidate in (getattr(source, "equation", None), getattr(source, "model", source)):
+        if isinstance(candidate, LinearSystem) and candidate.is_discrete:
+            return _without_noise(candidate), predict_sampled
         for kind, way in PREDICTORS:
             if isinstance(candidate, kind):
                 return candidate, way
@@ -170,6 +173,15 @@ def predictor_of(source: object) -> tuple[Any, Predictor]:
         "the model cannot be simulated",
         found=type(source).__name__,
         needed="a fit or a model, or an object with inputs, outputs and state_space()",
+    )
+
+
+def _without_noise(system: LinearSystem) -> InnovationsModel:
+    """A sampled system as an innovations form without a noise model, its delays as states."""
+    whole = system.with_pade()
+    step_s = float(system.sample_time_s or 0.0)
+    return InnovationsModel(
+        system.outputs, system.inputs, step_s, *whole.state_space()[:4], units=system.units
     )
 
 

@@ -87,7 +87,7 @@ class Prediction:
     >>> lag = fid.LinearSystem([[-2.0]], [[2.0]], [[1.0]], [[0.0]], ("u",), ("y",))
     >>> flown = fid.Record.from_arrays(time_s, inputs={"u": np.sin(time_s)})
     >>> fid.predict(lag, fid.simulate(lag, flown))
-    Prediction(free run from trim, 300 samples, fit y 100.0 %)
+    Prediction(free run from rest at trim, 300 samples, fit y 100.0 %)
     """
 
     measured: Record

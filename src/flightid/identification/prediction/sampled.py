@@ -99,8 +99,8 @@ def start_words(request: Request, start: int, sample_time_s: float) -> str:
     if request.horizon != FREE_RUN:
         return "the measured past"
     if request.initial_state in ("zero", "trim"):
-        return "rest" if request.initial_state == "zero" else "trim"
-    return f"a state solved for over the first {start * sample_time_s:.3g} s"
+        return "rest" if request.initial_state == "zero" else "rest at trim"
+    return f"an initial state solved for over the first {start * sample_time_s:.3g} s"
 
 
 def _refuse(request: Request) -> None:
