@@ -2,7 +2,8 @@
 
 use crate::error::from_core;
 use crate::linear_simulation::{States, matrix};
-use flightid_core::linear::linear_simulation::{Discrete, Hold, StateSpace};
+use flightid_core::linear::discretisation::{Hold, StateSpace};
+use flightid_core::linear::linear_simulation::Discrete;
 use flightid_core::vehicles::closed_loop::{ClosedLoop, Disturbance};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;

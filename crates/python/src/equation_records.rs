@@ -1,11 +1,11 @@
 //! Face of `flightid_core::records::nonlinear_output_error`. (Python side:
 //! identification/output_error/equation_records.py)
 
-use flightid_core::records::linear_output_error::Driven;
+use flightid_core::records::model_on_records::Wanted;
 use flightid_core::records::nonlinear_output_error::{EquationTrajectories, Passage};
-use flightid_core::records::output_error::Wanted;
 use flightid_core::records::record_data::RecordData;
-use flightid_core::state_space::ode_model::Motion;
+use flightid_core::records::record_data::RecordInputs;
+use flightid_core::state_space::ode_model::OdeModel;
 use flightid_core::trajectories::shooting::Plan;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
@@ -29,7 +29,7 @@ type Segments<'py> = (Vec<usize>, PyReadonlyArray2<'py, f64>, usize, PyReadonlyA
 #[pyclass(frozen, module = "flightid._native")]
 struct EquationRecords {
     model: Py<StateSpace>,
-    motion: Motion,
+    ode: OdeModel,
     substeps: Vec<usize>,
     plans: Vec<Plan>,
 }
@@ -47,14 +47,14 @@ impl EquationRecords {
         let passages = driven(records)?
             .into_iter()
             .zip(known)
-            .map(|(driven, (&substeps, plan)): (Driven, _)| Passage {
+            .map(|(driven, (&substeps, plan)): (RecordInputs, _)| Passage {
                 driven,
                 substeps,
                 plan: plan.clone(),
             })
             .collect();
-        let motion = self.motion.clone();
-        EquationTrajectories::new(motion, values, free, hold(first_order_hold), passages)
+        let ode = self.ode.clone();
+        EquationTrajectories::new(ode, values, free, hold(first_order_hold), passages)
             .map_err(from_core)
     }
 }
@@ -74,8 +74,8 @@ impl EquationRecords {
                 Ok(Plan { cuts, ends, n_growing, guesses })
             })
             .collect::<PyResult<_>>()?;
-        let motion = Motion::new(&model.get().tape).map_err(from_core)?;
-        Ok(Self { model, motion, substeps, plans })
+        let ode = OdeModel::new(&model.get().tape).map_err(from_core)?;
+        Ok(Self { model, ode, substeps, plans })
     }
 
     /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]

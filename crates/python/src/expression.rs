@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use flightid_core::language::expression::{Expression, Node};
+use flightid_core::language::expression::Expression;
+use flightid_core::language::syntax::Node;
 use flightid_core::tape::expression_tape::{Registers, Tape as CoreTape};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;

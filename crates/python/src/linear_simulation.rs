@@ -2,7 +2,8 @@
 
 use crate::error::from_core;
 use flightid_core::linear::discretisation::discretise;
-use flightid_core::linear::linear_simulation::{Discrete, Hold, StateSpace};
+use flightid_core::linear::discretisation::{Hold, StateSpace};
+use flightid_core::linear::linear_simulation::Discrete;
 use flightid_core::numerics::matrix_exponential::exponential;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};

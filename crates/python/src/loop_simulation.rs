@@ -4,7 +4,8 @@ use crate::closed_loop::{Matrices, system};
 use crate::error::from_core;
 use crate::linear_simulation::matrix;
 use crate::state_space::StateSpace;
-use flightid_core::linear::linear_simulation::{Discrete, Hold};
+use flightid_core::linear::discretisation::Hold;
+use flightid_core::linear::linear_simulation::Discrete;
 use flightid_core::trajectories::equation_step::EquationStep;
 use flightid_core::trajectories::loop_simulation::{
     Element, Equations, Kept, Port, Recursion, simulate,

@@ -3,10 +3,11 @@
 
 use crate::error::from_core;
 use flightid_core::CoreError;
+use flightid_core::black_box::candidates::Candidates;
 use flightid_core::black_box::local_regularisation::{Regularisation, select_regularised};
 use flightid_core::black_box::narx::{Lag, Monomial, Narx};
-use flightid_core::black_box::orthogonal_least_squares::{Candidates, Stop};
 use flightid_core::black_box::radial_basis::{Kernel, Radial};
+use flightid_core::black_box::stop_rule::Stop;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 

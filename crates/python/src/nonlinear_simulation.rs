@@ -1,7 +1,7 @@
 //! Binding of simulation by Runge–Kutta steps (Python side: `simulation/nonlinear.py`).
 
-use flightid_core::linear::linear_simulation::Hold;
-use flightid_core::state_space::ode_model::Motion;
+use flightid_core::linear::discretisation::Hold;
+use flightid_core::state_space::ode_model::OdeModel;
 use flightid_core::trajectories::runge_kutta::{Course, Setting};
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -34,10 +34,10 @@ fn simulate_equations<'py>(
     let tape = &model.tape;
     let (states, outputs) = py
         .detach(|| {
-            let motion = Motion::new(tape)?;
+            let ode = OdeModel::new(tape)?;
             let mut setting = Setting::default();
-            setting.prepare(&motion, values, &course)?;
-            setting.simulate(&motion, initial)
+            setting.prepare(&ode, values, &course)?;
+            setting.simulate(&ode, initial)
         })
         .map_err(from_core)?;
     let (n, p) = (initial.len(), tape.n_outputs());

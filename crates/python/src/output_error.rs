@@ -3,11 +3,14 @@
 
 use flightid_core::CoreError;
 use flightid_core::fits::least_squares::{Options, Problem};
-use flightid_core::linear::linear_simulation::Hold;
-use flightid_core::records::linear_output_error::{Driven, LinearFamily, LinearTrajectories};
-use flightid_core::records::output_error::{Estimate, Trajectories, Wanted, fit_from};
+use flightid_core::linear::discretisation::Hold;
+use flightid_core::records::linear_family::LinearFamily;
+use flightid_core::records::linear_output_error::LinearTrajectories;
+use flightid_core::records::model_on_records::{Trajectories, Wanted};
+use flightid_core::records::output_error::{Estimate, fit_from};
 use flightid_core::records::output_error_weights::Noise;
 use flightid_core::records::record_data::RecordData;
+use flightid_core::records::record_data::RecordInputs;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
 };
@@ -49,12 +52,12 @@ type Ending<'py> = (
 ///
 /// # Errors
 /// For arrays that are not contiguous.
-pub fn driven(records: &[Flown<'_>]) -> PyResult<Vec<Driven>> {
+pub fn driven(records: &[Flown<'_>]) -> PyResult<Vec<RecordInputs>> {
     records
         .iter()
         .map(|(inputs, outputs, sample_s)| {
             let n_samples = outputs.as_array().ncols();
-            Ok(Driven { inputs: inputs.as_slice()?.to_vec(), n_samples, sample_s: *sample_s })
+            Ok(RecordInputs { inputs: inputs.as_slice()?.to_vec(), n_samples, sample_s: *sample_s })
         })
         .collect()
 }

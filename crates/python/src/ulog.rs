@@ -2,7 +2,7 @@
 
 use flightid_logs::LogError;
 use flightid_logs::ulog::Ulog;
-use flightid_logs::ulog_entry::{Entry, Value};
+use flightid_logs::ulog::entry::{Entry, Value};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;

@@ -53,9 +53,9 @@ impl Mixer {
         let [roll, pitch, yaw] = command.map(|c| c * compensation);
         let throttle = (throttle * compensation).clamp(0.0, 1.0);
         let roll_pitch = FACTORS.map(|f| f[0] * roll + f[1] * pitch);
-        let room = roll_pitch.iter().map(|v| 1.0 - v.abs() - 0.5).fold(f64::MAX, f64::min);
-        // Room for yaw is counted on one side of mid-range; each motor sees half the command.
-        let yaw_bound = 2.0 * room.max(YAW_HEADROOM);
+        let headroom = roll_pitch.iter().map(|v| 1.0 - v.abs() - 0.5).fold(f64::MAX, f64::min);
+        // Headroom for yaw is counted on one side of mid-range; each motor sees half the command.
+        let yaw_bound = 2.0 * headroom.max(YAW_HEADROOM);
         let yaw_given = yaw.clamp(-yaw_bound, yaw_bound);
         let mut rpy: [f64; 4] = std::array::from_fn(|i| roll_pitch[i] + FACTORS[i][2] * yaw_given);
         let low = rpy.iter().copied().fold(f64::MAX, f64::min);

@@ -9,7 +9,9 @@
 //!
 //! Reference: Chen, Neurocomputing 69 (2006), section 2.2.
 
-use crate::black_box::orthogonal_least_squares::{Candidates, Selection, Stop, select};
+use crate::black_box::candidates::Candidates;
+use crate::black_box::orthogonal_least_squares::{Selection, select};
+use crate::black_box::stop_rule::Stop;
 use crate::error::CoreError;
 
 /// After so many rounds the order of the terms is held: two orders may follow each other for ever.

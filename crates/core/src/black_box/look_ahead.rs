@@ -11,7 +11,7 @@
 use std::collections::BTreeMap;
 
 use crate::black_box::candidates::Candidates;
-use crate::black_box::orthogonal_least_squares::Remainder;
+use crate::black_box::remainder::Remainder;
 use crate::numerics::gram_schmidt::{AT_ONCE, dot, orthogonalise};
 
 /// Candidates among which the next terms are guessed.

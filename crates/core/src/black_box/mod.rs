@@ -1,6 +1,6 @@
 //! Polynomial models and NARX: predictors, fits, scans of orders, choice of terms.
 
-pub(crate) mod candidates;
+pub mod candidates;
 pub mod digital_filter;
 pub mod local_regularisation;
 pub(crate) mod look_ahead;
@@ -11,4 +11,5 @@ pub mod polynomial_fit;
 pub mod polynomial_normal;
 pub mod polynomial_predictor;
 pub mod radial_basis;
+pub(crate) mod remainder;
 pub mod stop_rule;

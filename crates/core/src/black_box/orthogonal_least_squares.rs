@@ -12,11 +12,12 @@
 
 use rayon::prelude::*;
 
-pub use crate::black_box::candidates::Candidates;
+use crate::black_box::candidates::Candidates;
 use crate::black_box::look_ahead::{LookAhead, Progress};
 use crate::black_box::radial_basis::require_finite;
+use crate::black_box::remainder::Remainder;
 use crate::black_box::stop_rule::Path;
-pub use crate::black_box::stop_rule::Stop;
+use crate::black_box::stop_rule::Stop;
 use crate::error::CoreError;
 use crate::numerics::gram_schmidt::{dot, orthogonalise, subtract};
 
@@ -52,28 +53,6 @@ pub struct Selection {
     pub factor: Vec<f64>,
     /// Candidates that were combinations of the chosen terms at the end.
     pub collinear: usize,
-}
-
-/// What is left of a candidate beside the chosen terms.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Remainder {
-    /// Squared length a.
-    pub length: f64,
-    /// Product b with the target.
-    pub product: f64,
-    /// Squared length of the whole candidate.
-    pub full: f64,
-    exact: f64,
-    penalty: f64,
-    /// Whether it can be chosen.
-    pub open: bool,
-}
-
-impl Remainder {
-    /// How much choosing it lowers the (penalised) sum of squares.
-    pub fn reduction(&self) -> f64 {
-        self.product * self.product / (self.length + self.penalty)
-    }
 }
 
 struct State<'a> {

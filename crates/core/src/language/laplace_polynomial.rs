@@ -2,7 +2,8 @@
 //! coefficients that are expressions of the other names.
 
 use crate::error::CoreError;
-use crate::language::expression::{Binary, Expression, Node, Unary};
+use crate::language::expression::Expression;
+use crate::language::syntax::{Binary, Node, Unary};
 
 /// Highest power accepted.
 pub const MAXIMUM_DEGREE: usize = 20;

@@ -4,3 +4,4 @@ pub mod expression;
 pub mod laplace_polynomial;
 pub mod lookup_table;
 pub(crate) mod parser;
+pub mod syntax;

@@ -1,9 +1,7 @@
 //! From text to the nodes of an expression; `expression.rs` states the grammar.
 
 use crate::error::CoreError;
-use crate::language::expression::{
-    Binary, MAXIMUM_DEPTH, MAXIMUM_LENGTH, MAXIMUM_NODES, Node, Unary,
-};
+use crate::language::syntax::{Binary, MAXIMUM_DEPTH, MAXIMUM_LENGTH, MAXIMUM_NODES, Node, Unary};
 
 /// Nodes of a text, and the place of the root.
 ///

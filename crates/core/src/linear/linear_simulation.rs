@@ -2,8 +2,7 @@
 //! the first sample an input is taken to have had the value of that sample.
 
 use crate::error::CoreError;
-pub use crate::linear::discretisation::{Hold, StateSpace};
-use crate::linear::discretisation::{Sampled, discretise_each, split_delay};
+use crate::linear::discretisation::{Hold, Sampled, StateSpace, discretise_each, split_delay};
 use crate::numerics::householder::dot;
 
 /// A discretised system with what turns its state into outputs.

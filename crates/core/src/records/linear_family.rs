@@ -1,21 +1,62 @@
-//! State-space models and transfer functions as linear systems with derivatives by their parameters.
+//! Linear systems that depend on free parameters, with their derivatives by these.
 //! (Python side: identification/output_error/fit.py)
 
 use crate::error::CoreError;
-use crate::frequency_domain::rational::Rational;
-use crate::frequency_domain::transfer::TransferFunctions;
-use crate::records::linear_output_error::{LinearFamily, LinearPoint};
-use crate::state_space::model_tape::ModelTape;
+use crate::linear::discretisation::StateSpace;
+
+/// A linear system with derivatives by the free parameters, row-major.
+#[derive(Debug, Clone, Default)]
+pub struct LinearPoint {
+    /// n × n.
+    pub a: Vec<f64>,
+    /// n × m.
+    pub b: Vec<f64>,
+    /// p × n.
+    pub c: Vec<f64>,
+    /// p × m.
+    pub d: Vec<f64>,
+    /// m delays, s.
+    pub delays_s: Vec<f64>,
+    /// By each free parameter, in the same shapes.
+    pub slopes: Vec<LinearPoint>,
+}
+
+impl LinearPoint {
+    /// The system, as the discretisation takes it.
+    pub(crate) fn view(&self, n_outputs: usize) -> StateSpace<'_> {
+        let Self { a, b, c, d, delays_s, .. } = self;
+        StateSpace { a, b, c, d, delays_s, n_outputs }
+    }
+}
+
+/// Linear systems that depend on free parameters.
+pub trait LinearFamily: Sync {
+    /// Number of states.
+    fn n_states(&self) -> usize;
+    /// Number of outputs.
+    fn n_outputs(&self) -> usize;
+    /// Number of measured inputs.
+    fn n_inputs(&self) -> usize;
+    /// Number of free parameters.
+    fn n_parameters(&self) -> usize;
+    /// Measured input behind each column of B; None for a constant 1.
+    fn columns(&self) -> &[Option<usize>];
+    /// The system at θ.
+    ///
+    /// # Errors
+    /// Where it has no value there.
+    fn at(&self, theta: &[f64], with_slopes: bool) -> Result<LinearPoint, CoreError>;
+}
 
 /// Parameter values of which some vary.
 #[derive(Debug, Clone)]
-struct Values {
-    all: Vec<f64>,
-    free: Vec<usize>,
+pub(crate) struct Values {
+    pub(crate) all: Vec<f64>,
+    pub(crate) free: Vec<usize>,
 }
 
 impl Values {
-    fn new(all: &[f64], free: &[usize], needed: usize) -> Result<Self, CoreError> {
+    pub(crate) fn new(all: &[f64], free: &[usize], needed: usize) -> Result<Self, CoreError> {
         let found = all.len();
         if found != needed {
             return Err(CoreError::Shape { what: "parameter values", found, needed });
@@ -26,373 +67,10 @@ impl Values {
         Ok(Self { all: all.to_vec(), free: free.to_vec() })
     }
 
-    fn at(&self, theta: &[f64]) -> Vec<f64> {
+    /// All values, the free ones at θ.
+    pub(crate) fn at(&self, theta: &[f64]) -> Vec<f64> {
         let mut values = self.all.clone();
         self.free.iter().zip(theta).for_each(|(&place, &value)| values[place] = value);
         values
-    }
-}
-
-/// A state-space model linearised at its point; what its equations hold beside the linear terms
-/// (constants, the trim) drives it as a constant input.
-#[derive(Debug, Clone)]
-pub struct StateSpaceFamily<'a> {
-    tape: &'a ModelTape,
-    point: &'a [f64],
-    values: Values,
-    columns: Vec<Option<usize>>,
-}
-
-impl<'a> StateSpaceFamily<'a> {
-    /// Take the values of all parameters and the indices of those that vary.
-    ///
-    /// # Errors
-    /// `Shape` for what does not fit, `NotFinite` where the model has no linearisation.
-    pub fn new(
-        tape: &'a ModelTape,
-        point: &'a [f64],
-        values: &[f64],
-        free: &[usize],
-    ) -> Result<Self, CoreError> {
-        let values = Values::new(values, free, tape.n_parameters())?;
-        let mut columns: Vec<_> = (0..tape.n_inputs()).map(Some).collect();
-        columns.push(None);
-        let mut family = Self { tape, point, values, columns };
-        let theta: Vec<f64> = free.iter().map(|&place| family.values.all[place]).collect();
-        let first = family.at(&theta, true)?;
-        // Most models have no constant terms: their constant input is left out.
-        let m = family.columns.len();
-        let acts = |each: &LinearPoint| {
-            let last = |matrix: &[f64]| matrix.chunks_exact(m).any(|row| row[m - 1] != 0.0);
-            last(&each.b) || last(&each.d)
-        };
-        if !acts(&first) && !first.slopes.iter().any(acts) {
-            family.columns.pop();
-        }
-        Ok(family)
-    }
-
-    /// Constant terms of equations and outputs, from slopes and values at the point.
-    fn constants(&self, slopes: &[f64], values: &[f64]) -> Vec<f64> {
-        slopes
-            .chunks_exact(self.tape.width())
-            .zip(values)
-            .map(|(row, value)| row.iter().zip(self.point).map(|(s, z)| s * z).sum::<f64>() - value)
-            .collect()
-    }
-}
-
-/// [F G k] and [H₁ H₀ D k] from slopes of residuals and outputs and their constants.
-struct Parts {
-    mass: Vec<f64>,
-    right: Vec<f64>,
-    rate: Vec<f64>,
-    state: Vec<f64>,
-    through: Vec<f64>,
-}
-
-impl Parts {
-    fn new(tape: &ModelTape, slopes: &[f64], constants: &[f64], m: usize) -> Self {
-        let (n, width, inputs) = (tape.n_states(), tape.width(), tape.n_inputs());
-        let mut parts = Self {
-            mass: Vec::new(),
-            right: Vec::new(),
-            rate: Vec::new(),
-            state: Vec::new(),
-            through: Vec::new(),
-        };
-        for (k, row) in slopes.chunks_exact(width).enumerate() {
-            let extra = if m > inputs { Some(constants[k]) } else { None };
-            if k < n {
-                parts.mass.extend(&row[..n]);
-                parts.right.extend(row[n..].iter().map(|value| -value).chain(extra));
-            } else {
-                parts.rate.extend(&row[..n]);
-                parts.state.extend(&row[n..2 * n]);
-                parts.through.extend(row[2 * n..].iter().copied().chain(extra.map(|c| -c)));
-            }
-        }
-        parts
-    }
-}
-
-/// result += a (rows × inner) · b (inner × columns).
-fn add_matrices(result: &mut [f64], a: &[f64], b: &[f64], inner: usize, columns: usize) {
-    if columns == 0 || inner == 0 {
-        return;
-    }
-    for (line, row) in result.chunks_exact_mut(columns).zip(a.chunks_exact(inner)) {
-        for (&factor, other) in row.iter().zip(b.chunks_exact(columns)) {
-            line.iter_mut().zip(other).for_each(|(entry, value)| *entry += factor * value);
-        }
-    }
-}
-
-fn split(joined: &[f64], n: usize, m: usize) -> (Vec<f64>, Vec<f64>) {
-    let rows = joined.chunks_exact((n + m).max(1));
-    (
-        rows.clone().flat_map(|row| &row[..n]).copied().collect(),
-        rows.flat_map(|row| &row[n..]).copied().collect(),
-    )
-}
-
-impl LinearFamily for StateSpaceFamily<'_> {
-    fn n_states(&self) -> usize {
-        self.tape.n_states()
-    }
-
-    fn n_outputs(&self) -> usize {
-        self.tape.n_outputs()
-    }
-
-    fn n_inputs(&self) -> usize {
-        self.tape.n_inputs()
-    }
-
-    fn n_parameters(&self) -> usize {
-        self.values.free.len()
-    }
-
-    fn columns(&self) -> &[Option<usize>] {
-        &self.columns
-    }
-
-    fn at(&self, theta: &[f64], with_slopes: bool) -> Result<LinearPoint, CoreError> {
-        let (tape, values) = (self.tape, self.values.at(theta));
-        let (n, p, m) = (tape.n_states(), tape.n_outputs(), self.columns.len());
-        let linear = tape.linearise(self.point, &values)?;
-        let parts =
-            Parts::new(tape, &linear.slopes, &self.constants(&linear.slopes, &linear.values), m);
-        let inverse = inverted(&parts.mass, n)?;
-        let mut joined = vec![0.0; n * (n + m)];
-        add_matrices(&mut joined, &inverse, &parts.right, n, n + m);
-        let (a, b) = split(&joined, n, m);
-        let (mut c, mut d) = (parts.state.clone(), parts.through.clone());
-        add_matrices(&mut c, &parts.rate, &a, n, n);
-        add_matrices(&mut d, &parts.rate, &b, n, m);
-        let late = |values: &[f64]| {
-            let mut delays = values.to_vec();
-            delays.resize(m, 0.0);
-            delays
-        };
-        let delays_s = late(&linear.values[tape.height()..]);
-        let mut found = LinearPoint { a, b, c, d, delays_s, slopes: Vec::new() };
-        if !with_slopes {
-            return Ok(found);
-        }
-        let free = &self.values.free;
-        let sensitivities = tape.sensitivities(self.point, &values, free)?;
-        let moved = tape.value_slopes(self.point, &values, free)?;
-        let (size, count) = (tape.height() * tape.width(), free.len());
-        let mut dense = vec![0.0; count * size];
-        for each in sensitivities {
-            dense[each.parameter * size + each.row * tape.width() + each.column] = each.value;
-        }
-        for (j, slopes) in dense.chunks_exact(size.max(1)).enumerate() {
-            let change: Vec<f64> = moved.iter().skip(j).step_by(count).copied().collect();
-            let each = Parts::new(tape, slopes, &self.constants(slopes, &change), m);
-            // M dA = dF − dM A, and so for B.
-            let mut right = each.right.clone();
-            let negative: Vec<f64> = each.mass.iter().map(|value| -value).collect();
-            add_matrices(&mut right, &negative, &joined, n, n + m);
-            let mut both = vec![0.0; n * (n + m)];
-            add_matrices(&mut both, &inverse, &right, n, n + m);
-            let (a, b) = split(&both, n, m);
-            let (mut c, mut d) = (each.state.clone(), each.through.clone());
-            for (rate, a, b) in [(&parts.rate, &a, &b), (&each.rate, &found.a, &found.b)] {
-                add_matrices(&mut c, rate, a, n, n);
-                add_matrices(&mut d, rate, b, n, m);
-            }
-            let delays_s = late(&change[tape.height()..]);
-            found.slopes.push(LinearPoint { a, b, c, d, delays_s, slopes: Vec::new() });
-        }
-        debug_assert_eq!(found.c.len(), p * n);
-        Ok(found)
-    }
-}
-
-/// Inverse of the factors of the state derivatives, most often the identity.
-fn inverted(mass: &[f64], n: usize) -> Result<Vec<f64>, CoreError> {
-    let singular = CoreError::Singular { what: "the matrix of factors of the state derivatives" };
-    let mut work = mass.to_vec();
-    let mut inverse = vec![0.0; n * n];
-    (0..n).for_each(|i| inverse[i * (n + 1)] = 1.0);
-    for k in 0..n {
-        let pivot =
-            (k..n).fold(
-                k,
-                |best, i| if work[i * n + k].abs() > work[best * n + k].abs() { i } else { best },
-            );
-        let largest = (0..n).map(|j| work[pivot * n + j].abs()).fold(0.0, f64::max);
-        if work[pivot * n + k].abs() <= 1e-14 * largest {
-            return Err(singular);
-        }
-        for j in 0..n {
-            work.swap(k * n + j, pivot * n + j);
-            inverse.swap(k * n + j, pivot * n + j);
-        }
-        let scale = 1.0 / work[k * n + k];
-        for j in 0..n {
-            work[k * n + j] *= scale;
-            inverse[k * n + j] *= scale;
-        }
-        for i in (0..n).filter(|&i| i != k) {
-            let factor = work[i * n + k];
-            if factor != 0.0 {
-                for j in 0..n {
-                    work[i * n + j] -= factor * work[k * n + j];
-                    inverse[i * n + j] -= factor * inverse[k * n + j];
-                }
-            }
-        }
-    }
-    Ok(inverse)
-}
-
-/// Transfer functions, each with states of its own in controllable form and a delay of its own.
-#[derive(Debug, Clone)]
-pub struct TransferFamily<'a> {
-    functions: &'a TransferFunctions,
-    /// Output and input of each response.
-    pairs: &'a [(usize, usize)],
-    values: Values,
-    columns: Vec<Option<usize>>,
-    orders: Vec<usize>,
-}
-
-impl<'a> TransferFamily<'a> {
-    /// Take the pair of each response, the values of all parameters and the indices of those that
-    /// vary.
-    ///
-    /// # Errors
-    /// `Shape` for what does not fit, `Range` for more zeros than poles.
-    pub fn new(
-        functions: &'a TransferFunctions,
-        pairs: &'a [(usize, usize)],
-        values: &[f64],
-        free: &[usize],
-    ) -> Result<Self, CoreError> {
-        let (found, needed) = (pairs.len(), functions.n_responses());
-        if found != needed {
-            return Err(CoreError::Shape { what: "pairs of the responses", found, needed });
-        }
-        let values = Values::new(values, free, functions.n_parameters())?;
-        let orders = functions
-            .rationals(&values.all, &[])?
-            .iter()
-            .map(Rational::order)
-            .collect::<Result<_, _>>()?;
-        let columns = pairs.iter().map(|&(_, input)| Some(input)).collect();
-        Ok(Self { functions, pairs, values, columns, orders })
-    }
-}
-
-impl LinearFamily for TransferFamily<'_> {
-    fn n_states(&self) -> usize {
-        self.orders.iter().sum()
-    }
-
-    fn n_outputs(&self) -> usize {
-        self.pairs.iter().map(|&(output, _)| output + 1).max().unwrap_or(0)
-    }
-
-    fn n_inputs(&self) -> usize {
-        self.pairs.iter().map(|&(_, input)| input + 1).max().unwrap_or(0)
-    }
-
-    fn n_parameters(&self) -> usize {
-        self.values.free.len()
-    }
-
-    fn columns(&self) -> &[Option<usize>] {
-        &self.columns
-    }
-
-    fn at(&self, theta: &[f64], with_slopes: bool) -> Result<LinearPoint, CoreError> {
-        let free: &[usize] = if with_slopes { &self.values.free } else { &[] };
-        let rationals = self.functions.rationals(&self.values.at(theta), free)?;
-        let (n, p, m) = (self.n_states(), self.n_outputs(), self.pairs.len());
-        let empty = || LinearPoint {
-            a: vec![0.0; n * n],
-            b: vec![0.0; n * m],
-            c: vec![0.0; p * n],
-            d: vec![0.0; p * m],
-            delays_s: vec![0.0; m],
-            slopes: Vec::new(),
-        };
-        let (mut found, mut slopes) = (empty(), vec![empty(); free.len()]);
-        let mut start = 0;
-        for (column, (rational, &order)) in rationals.iter().zip(&self.orders).enumerate() {
-            let output = self.pairs[column].0;
-            let place = |into: &mut LinearPoint, form: &Form, delay: f64| {
-                for k in 0..order {
-                    into.a[start * n + start + k] = form.feedback[k];
-                    into.c[output * n + start + k] = form.output[k];
-                }
-                into.d[output * m + column] = form.through;
-                into.delays_s[column] = delay;
-            };
-            let form = Form::new(rational, order)?;
-            place(&mut found, &form, rational.delay);
-            for k in 1..order {
-                found.a[(start + k) * n + start + k - 1] = 1.0;
-            }
-            if order > 0 {
-                found.b[start * m + column] = 1.0;
-            }
-            for (j, into) in slopes.iter_mut().enumerate() {
-                place(into, &form.slope(rational, j), rational.delay_slopes[j]);
-            }
-            start += order;
-        }
-        found.slopes = slopes;
-        Ok(found)
-    }
-}
-
-/// First row of A, row of C and feedthrough of one response in controllable form.
-struct Form {
-    feedback: Vec<f64>,
-    output: Vec<f64>,
-    through: f64,
-    order: usize,
-}
-
-impl Form {
-    fn new(rational: &Rational, order: usize) -> Result<Self, CoreError> {
-        let (above, below) = (&rational.numerator, &rational.denominator);
-        let lead = below[order];
-        if lead == 0.0 || !lead.is_finite() {
-            return Err(CoreError::Singular { what: "the leading coefficient of a denominator" });
-        }
-        let at = |k: usize| above.get(k).copied().unwrap_or(0.0) / lead;
-        let through = at(order);
-        // Highest power first, as the rows of the controllable form go.
-        let feedback: Vec<f64> = (0..order).rev().map(|k| -below[k] / lead).collect();
-        let output =
-            (0..order).rev().zip(&feedback).map(|(k, row)| at(k) + through * row).collect();
-        Ok(Self { feedback, output, through, order })
-    }
-
-    fn slope(&self, rational: &Rational, direction: usize) -> Self {
-        let order = self.order;
-        let lead = rational.denominator[order];
-        let at = |from: &[f64], k: usize| from.get(k).copied().unwrap_or(0.0);
-        let (above, below) =
-            (&rational.numerator_slopes[direction], &rational.denominator_slopes[direction]);
-        let d_lead = at(below, order);
-        let quotient = |value: f64, slope: f64| (slope - value / lead * d_lead) / lead;
-        let by = |k: usize| quotient(at(&rational.numerator, k), at(above, k));
-        let through = by(order);
-        let feedback: Vec<f64> = (0..order)
-            .rev()
-            .map(|k| -quotient(at(&rational.denominator, k), at(below, k)))
-            .collect();
-        let output = (0..order)
-            .rev()
-            .enumerate()
-            .map(|(row, k)| by(k) + through * self.feedback[row] + self.through * feedback[row])
-            .collect();
-        Self { feedback, output, through, order }
     }
 }

@@ -3,70 +3,18 @@
 
 use crate::error::CoreError;
 use crate::linear::block_recursion::BLOCK;
-use crate::linear::discretisation::{Hold, Sampled, StateSpace, discretise};
+use crate::linear::discretisation::{Hold, Sampled, discretise};
 use crate::linear::linear_simulation::sample;
-use crate::records::output_error::{Trajectories, Wanted};
-use crate::records::sensitivity_recursion::{Recursion, Room};
-
-/// A linear system with derivatives by the free parameters, row-major.
-#[derive(Debug, Clone, Default)]
-pub struct LinearPoint {
-    /// n × n.
-    pub a: Vec<f64>,
-    /// n × m.
-    pub b: Vec<f64>,
-    /// p × n.
-    pub c: Vec<f64>,
-    /// p × m.
-    pub d: Vec<f64>,
-    /// m delays, s.
-    pub delays_s: Vec<f64>,
-    /// By each free parameter, in the same shapes.
-    pub slopes: Vec<LinearPoint>,
-}
-
-impl LinearPoint {
-    fn view(&self, n_outputs: usize) -> StateSpace<'_> {
-        let Self { a, b, c, d, delays_s, .. } = self;
-        StateSpace { a, b, c, d, delays_s, n_outputs }
-    }
-}
-
-/// Linear systems that depend on free parameters.
-pub trait LinearFamily: Sync {
-    /// Number of states.
-    fn n_states(&self) -> usize;
-    /// Number of outputs.
-    fn n_outputs(&self) -> usize;
-    /// Number of measured inputs.
-    fn n_inputs(&self) -> usize;
-    /// Number of free parameters.
-    fn n_parameters(&self) -> usize;
-    /// Measured input behind each column of B; None for a constant 1.
-    fn columns(&self) -> &[Option<usize>];
-    /// The system at θ.
-    ///
-    /// # Errors
-    /// Where it has no value there.
-    fn at(&self, theta: &[f64], with_slopes: bool) -> Result<LinearPoint, CoreError>;
-}
-
-/// Inputs of one record (n_inputs × n_samples, time last) on its time base.
-#[derive(Debug, Clone)]
-pub struct Driven {
-    /// Measured inputs.
-    pub inputs: Vec<f64>,
-    /// Number of samples.
-    pub n_samples: usize,
-    /// Sample time, s.
-    pub sample_s: f64,
-}
+use crate::records::linear_family::{LinearFamily, LinearPoint};
+use crate::records::model_on_records::{Trajectories, Wanted};
+use crate::records::record_data::RecordInputs;
+use crate::records::sensitivity_recursion::{Recursion, Workspace};
 
 /// A linear family on records.
 #[derive(Debug, Clone)]
 pub struct LinearTrajectories<F> {
     family: F,
-    records: Vec<Driven>,
+    records: Vec<RecordInputs>,
     lengths: Vec<usize>,
     hold: Hold,
 }
@@ -83,7 +31,7 @@ impl<F: LinearFamily> LinearTrajectories<F> {
     ///
     /// # Errors
     /// `Shape` for inputs that do not fit, `NotFinite` for values that are not finite.
-    pub fn new(family: F, records: Vec<Driven>, hold: Hold) -> Result<Self, CoreError> {
+    pub fn new(family: F, records: Vec<RecordInputs>, hold: Hold) -> Result<Self, CoreError> {
         for each in &records {
             let (found, needed) = (each.inputs.len(), each.n_samples * family.n_inputs());
             if found != needed || each.n_samples == 0 {
@@ -162,41 +110,39 @@ impl<F: LinearFamily> Trajectories for LinearTrajectories<F> {
         };
         let (p, columns) = (self.family.n_outputs(), self.family.columns());
         let recursion = Recursion::new(p, columns, &shared.continuous, discrete, slopes, wanted);
-        let mut room = recursion.room(initial, wanted);
+        let mut workspace = recursion.workspace(initial, wanted);
         let row_length = recursion.row_length();
         scratch.clear();
         scratch.resize(BLOCK * row_length, 0.0);
         for first in (0..driven.n_samples).step_by(BLOCK) {
             let count = BLOCK.min(driven.n_samples - first);
             let rows = &mut scratch[..count * row_length];
-            driven.gather(recursion.taps(), shift, first, count, &mut room);
-            recursion.advance(&mut room, rows);
+            gather(driven, recursion.taps(), shift, first, count, &mut workspace);
+            recursion.advance(&mut workspace, rows);
             sink(first, rows);
         }
         Ok(())
     }
 }
 
-impl Driven {
-    /// Samples of the inputs behind each tap for a block.
-    fn gather(
-        &self,
-        taps: &[(Option<usize>, isize)],
-        shift: &[f64],
-        first: usize,
-        count: usize,
-        room: &mut Room,
-    ) {
-        for (line, &(input, ahead)) in room.taps().zip(taps) {
-            let Some(j) = input else { continue };
-            let values = &self.inputs[j * self.n_samples..(j + 1) * self.n_samples];
-            let inside = first.checked_add_signed(ahead);
-            match inside.and_then(|start| values.get(start..start + count)) {
-                Some(values) => line.iter_mut().zip(values).for_each(|(u, v)| *u = v + shift[j]),
-                None => line[..count].iter_mut().enumerate().for_each(|(k, u)| {
-                    *u = sample(values, first + k, ahead) + shift[j];
-                }),
-            }
+/// Samples of the inputs behind each tap for a block.
+fn gather(
+    driven: &RecordInputs,
+    taps: &[(Option<usize>, isize)],
+    shift: &[f64],
+    first: usize,
+    count: usize,
+    workspace: &mut Workspace,
+) {
+    for (line, &(input, ahead)) in workspace.taps().zip(taps) {
+        let Some(j) = input else { continue };
+        let values = &driven.inputs[j * driven.n_samples..(j + 1) * driven.n_samples];
+        let inside = first.checked_add_signed(ahead);
+        match inside.and_then(|start| values.get(start..start + count)) {
+            Some(values) => line.iter_mut().zip(values).for_each(|(u, v)| *u = v + shift[j]),
+            None => line[..count].iter_mut().enumerate().for_each(|(k, u)| {
+                *u = sample(values, first + k, ahead) + shift[j];
+            }),
         }
     }
 }

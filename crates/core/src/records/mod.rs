@@ -1,7 +1,9 @@
 //! Output error: models on records, the records' own numbers, weights and sums.
 
+pub(crate) mod bias_sums;
 pub mod linear_family;
 pub mod linear_output_error;
+pub mod model_on_records;
 pub mod nonlinear_output_error;
 pub mod normal_equations;
 pub mod output_error;
@@ -10,3 +12,5 @@ pub mod output_sums;
 pub mod record_data;
 pub mod record_pass;
 pub(crate) mod sensitivity_recursion;
+pub mod state_space_family;
+pub mod transfer_family;

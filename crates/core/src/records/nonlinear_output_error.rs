@@ -4,10 +4,10 @@
 use std::sync::{Mutex, PoisonError};
 
 use crate::error::CoreError;
-use crate::linear::linear_simulation::Hold;
-use crate::records::linear_output_error::Driven;
-use crate::records::output_error::{Trajectories, Wanted};
-use crate::state_space::ode_model::Motion;
+use crate::linear::discretisation::Hold;
+use crate::records::model_on_records::{Trajectories, Wanted};
+use crate::records::record_data::RecordInputs;
+use crate::state_space::ode_model::OdeModel;
 use crate::trajectories::runge_kutta::{Course, expect};
 use crate::trajectories::shooting::{Flight, Plan, Wish};
 
@@ -15,7 +15,7 @@ use crate::trajectories::shooting::{Flight, Plan, Wish};
 #[derive(Debug, Clone)]
 pub struct Passage {
     /// Its inputs.
-    pub driven: Driven,
+    pub driven: RecordInputs,
     /// Runge–Kutta steps in a sample interval.
     pub substeps: usize,
     /// A single run, or segments.
@@ -24,7 +24,7 @@ pub struct Passage {
 
 /// A model by its equations on records, some of its parameters free.
 pub struct EquationTrajectories {
-    motion: Motion,
+    ode: OdeModel,
     values: Vec<f64>,
     free: Vec<usize>,
     hold: Hold,
@@ -40,21 +40,21 @@ impl EquationTrajectories {
     /// # Errors
     /// `Shape` for what does not fit.
     pub fn new(
-        motion: Motion,
+        ode: OdeModel,
         values: &[f64],
         free: &[usize],
         hold: Hold,
         passages: Vec<Passage>,
     ) -> Result<Self, CoreError> {
-        expect("parameter values", values.len(), motion.n_parameters())?;
+        expect("parameter values", values.len(), ode.n_parameters())?;
         if let Some(&found) = free.iter().find(|&&index| index >= values.len()) {
             let needed = values.len();
             return Err(CoreError::Shape { what: "index of a free parameter", found, needed });
         }
         for passage in &passages {
-            let needed = motion.n_inputs() * passage.driven.n_samples;
+            let needed = ode.n_inputs() * passage.driven.n_samples;
             expect("inputs of a record", passage.driven.inputs.len(), needed)?;
-            passage.plan.check(motion.n_states(), passage.driven.n_samples)?;
+            passage.plan.check(ode.n_states(), passage.driven.n_samples)?;
         }
         Ok(Self {
             values: values.to_vec(),
@@ -63,7 +63,7 @@ impl EquationTrajectories {
             lengths: passages.iter().map(|passage| passage.driven.n_samples).collect(),
             flights: passages.iter().map(|_| Mutex::default()).collect(),
             passages,
-            motion,
+            ode,
         })
     }
 
@@ -85,7 +85,7 @@ impl EquationTrajectories {
         let stride = wanted.stride(self.free.len());
         let mut sink = |_: usize, _: &mut [f64]| {};
         self.fly(&mut flight, record, &shared, (initial, shift), wanted, stride, &mut sink)?;
-        let (state, slopes) = flight.start(&self.motion);
+        let (state, slopes) = flight.start(&self.ode);
         Ok((state.to_vec(), slopes.to_vec()))
     }
 
@@ -116,7 +116,7 @@ impl EquationTrajectories {
             free_initial: wanted.initial,
             free_shift: wanted.shift,
         };
-        flight.run(&self.motion, &course, plan, &wish, stride, sink)
+        flight.run(&self.ode, &course, plan, &wish, stride, sink)
     }
 }
 
@@ -125,7 +125,7 @@ impl Trajectories for EquationTrajectories {
     type Shared = Vec<f64>;
 
     fn n_outputs(&self) -> usize {
-        self.motion.n_outputs()
+        self.ode.n_outputs()
     }
 
     fn n_parameters(&self) -> usize {
@@ -133,7 +133,7 @@ impl Trajectories for EquationTrajectories {
     }
 
     fn n_shifts(&self) -> usize {
-        self.motion.n_inputs()
+        self.ode.n_inputs()
     }
 
     fn record_lengths(&self) -> &[usize] {
@@ -141,11 +141,11 @@ impl Trajectories for EquationTrajectories {
     }
 
     fn n_initial(&self, _record: usize) -> usize {
-        self.motion.n_states()
+        self.ode.n_states()
     }
 
     fn is_affine(&self) -> bool {
-        self.motion.is_affine()
+        self.ode.is_affine()
     }
 
     fn share(&self, theta: &[f64], _with_slopes: bool) -> Result<Vec<f64>, CoreError> {

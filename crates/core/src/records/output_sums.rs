@@ -3,8 +3,9 @@
 //! (Python side: identification/output_error/fit.py)
 
 use crate::numerics::widest::widest;
+use crate::records::bias_sums::BiasSums;
+use crate::records::model_on_records::LANES;
 use crate::records::normal_equations::add_rows;
-use crate::records::output_error::LANES;
 use crate::records::output_error_weights::{Moments, Weights};
 
 /// Products and sums of rows before any weight.
@@ -17,15 +18,6 @@ pub struct OutputSums {
     products: Vec<f64>,
     /// By output, stride.
     sums: Vec<f64>,
-}
-
-/// Sums that bias columns need: for each whitened output Σ w and Σ √w · row.
-#[derive(Debug, Clone)]
-pub struct BiasSums {
-    /// By output.
-    pub weight: Vec<f64>,
-    /// By output, one row each.
-    pub rows: Vec<f64>,
 }
 
 impl OutputSums {

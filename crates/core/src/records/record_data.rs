@@ -108,3 +108,14 @@ impl RecordData {
 pub(crate) fn same(what: &'static str, found: usize, needed: usize) -> Result<(), CoreError> {
     if found == needed { Ok(()) } else { Err(CoreError::Shape { what, found, needed }) }
 }
+
+/// Inputs of one record (n_inputs × n_samples, time last) on its time base.
+#[derive(Debug, Clone)]
+pub struct RecordInputs {
+    /// Measured inputs.
+    pub inputs: Vec<f64>,
+    /// Number of samples.
+    pub n_samples: usize,
+    /// Sample time, s.
+    pub sample_s: f64,
+}

@@ -9,17 +9,17 @@
 use crate::linear::block_recursion::{Acting, BLOCK, Line, carry};
 use crate::linear::discretisation::Sampled;
 use crate::numerics::widest::widest;
-use crate::records::linear_output_error::LinearPoint;
-use crate::records::output_error::{LANES, Wanted};
+use crate::records::linear_family::LinearPoint;
+use crate::records::model_on_records::{LANES, Wanted};
 
 /// One number at each sample.
 type Scalars = Line<1>;
 /// A few columns at each sample.
 type Columns = Line<LANES>;
 
-/// Reused room of a run.
+/// Buffers of a run, kept from block to block.
 #[derive(Debug, Clone)]
-pub struct Room {
+pub struct Workspace {
     n_states: usize,
     /// States, taps, the constant.
     sources: Vec<Scalars>,
@@ -35,8 +35,8 @@ pub struct Room {
     moved_output: Columns,
 }
 
-impl Room {
-    /// Room for the samples behind each tap.
+impl Workspace {
+    /// Where the samples behind each tap go.
     pub fn taps(&mut self) -> impl Iterator<Item = &mut [f64]> {
         self.sources[self.n_states..].iter_mut().map(|line| line.as_flattened_mut())
     }
@@ -180,14 +180,14 @@ impl Recursion {
         &self.taps
     }
 
-    /// Room with S at the first sample.
-    pub fn room(&self, initial: &[f64], wanted: &Wanted<'_>) -> Room {
+    /// A workspace with S at the first sample.
+    pub fn workspace(&self, initial: &[f64], wanted: &Wanted<'_>) -> Workspace {
         let mut slopes = vec![[0.0; LANES]; self.n_chunks * self.n];
         for (offset, &l) in wanted.initial.iter().enumerate() {
             let column = 1 + self.n_theta + offset;
             slopes[column / LANES * self.n + l][column % LANES] = 1.0;
         }
-        Room {
+        Workspace {
             n_states: self.n,
             sources: vec![[[1.0]; BLOCK]; self.n_sources],
             output: [[0.0]; BLOCK],
@@ -198,51 +198,51 @@ impl Recursion {
         }
     }
 
-    /// Carry state and derivatives through a block and write its rows, as many as there is room for.
-    pub fn advance(&self, room: &mut Room, rows: &mut [f64]) {
+    /// Carry state and derivatives through a block and write its rows, as many as fit.
+    pub fn advance(&self, workspace: &mut Workspace, rows: &mut [f64]) {
         widest(
             #[inline(always)]
             || {
-                self.advance_state(room);
+                self.advance_state(workspace);
                 for chunk in 0..self.n_chunks {
-                    self.drive(chunk, room);
+                    self.drive(chunk, workspace);
                 }
                 let transition = &self.matrix[..self.n * self.n];
-                carry(transition, &mut room.slopes, &mut room.moved);
+                carry(transition, &mut workspace.slopes, &mut workspace.moved);
                 for chunk in 0..self.n_chunks {
-                    self.write_slopes(chunk, room, rows);
+                    self.write_slopes(chunk, workspace, rows);
                 }
-                self.write_outputs(room, rows);
+                self.write_outputs(workspace, rows);
             },
         );
     }
 
     /// The state itself, into the sources.
     #[inline(always)]
-    fn advance_state(&self, room: &mut Room) {
-        let (states, others) = room.sources.split_at_mut(self.n);
+    fn advance_state(&self, workspace: &mut Workspace) {
+        let (states, others) = workspace.sources.split_at_mut(self.n);
         for (line, acting) in states.iter_mut().zip(&self.plain) {
             *line = [[0.0]; BLOCK];
             acting.drive(line, others, self.n);
         }
-        carry(&self.matrix[..self.n * self.n], &mut room.state, states);
+        carry(&self.matrix[..self.n * self.n], &mut workspace.state, states);
     }
 
     /// What drives the derivatives of the states.
     #[inline(always)]
-    fn drive(&self, chunk: usize, room: &mut Room) {
+    fn drive(&self, chunk: usize, workspace: &mut Workspace) {
         let acting = &self.acting[chunk * (self.n + self.p)..];
-        let lines = &mut room.moved[chunk * self.n..(chunk + 1) * self.n];
+        let lines = &mut workspace.moved[chunk * self.n..(chunk + 1) * self.n];
         for (line, acting) in lines.iter_mut().zip(acting) {
             *line = [[0.0; LANES]; BLOCK];
-            acting.drive(line, &room.sources, 0);
+            acting.drive(line, &workspace.sources, 0);
         }
     }
 
     /// Outputs' derivatives from those of the state.
     #[inline(always)]
-    fn write_slopes(&self, chunk: usize, room: &mut Room, rows: &mut [f64]) {
-        let Room { sources, moved, moved_output, .. } = room;
+    fn write_slopes(&self, chunk: usize, workspace: &mut Workspace, rows: &mut [f64]) {
+        let Workspace { sources, moved, moved_output, .. } = workspace;
         let lines = &moved[chunk * self.n..(chunk + 1) * self.n];
         let acting = &self.acting[chunk * (self.n + self.p) + self.n..];
         for (o, (seen, acting)) in self.seen.iter().zip(acting).enumerate() {
@@ -275,12 +275,12 @@ impl Recursion {
 
     /// The outputs themselves, into the first column.
     #[inline(always)]
-    fn write_outputs(&self, room: &mut Room, rows: &mut [f64]) {
+    fn write_outputs(&self, workspace: &mut Workspace, rows: &mut [f64]) {
         for (o, acting) in self.plain[self.n..].iter().enumerate() {
-            room.output = [[0.0]; BLOCK];
-            acting.drive(&mut room.output, &room.sources, 0);
+            workspace.output = [[0.0]; BLOCK];
+            acting.drive(&mut workspace.output, &workspace.sources, 0);
             let places = rows.chunks_exact_mut(self.row_length());
-            for (row, value) in places.zip(room.output.as_flattened()) {
+            for (row, value) in places.zip(workspace.output.as_flattened()) {
                 let row = &mut row[o * self.stride..(o + 1) * self.stride];
                 if self.n_chunks == 0 {
                     row.fill(0.0);

@@ -3,8 +3,8 @@
 
 use crate::error::CoreError;
 use crate::state_space::model_tape::ModelTape;
-use crate::state_space::ode_model::Motion;
-use crate::tape::expression_tape::Operation;
+use crate::state_space::ode_model::OdeModel;
+use crate::tape::operation::Operation;
 
 /// One operation; its arguments are places of earlier lines.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,7 +38,7 @@ impl ModelTape {
     /// # Errors
     /// `Expression` where a state derivative does not enter linearly, or the list would be too long.
     pub fn listing(&self) -> Result<Listing, CoreError> {
-        Motion::new(self)?;
+        OdeModel::new(self)?;
         let n = self.n_states();
         let (tape, entries) = self.tape().differentiated()?;
         let mass: Vec<_> = entries.iter().filter(|e| e.row < n && e.column < n).collect();

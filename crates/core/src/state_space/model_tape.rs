@@ -7,8 +7,9 @@
 use std::collections::BTreeMap;
 
 use crate::error::CoreError;
-use crate::language::expression::{Binary, Expression, Node};
+use crate::language::expression::Expression;
 use crate::language::lookup_table::LookupTable;
+use crate::language::syntax::{Binary, Node};
 use crate::numerics::dual::{Dual, Scalar};
 use crate::tape::expression_tape::{Registers, Tape};
 

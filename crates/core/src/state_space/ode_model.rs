@@ -7,12 +7,13 @@
 use crate::error::CoreError;
 use crate::state_space::model_tape::ModelTape;
 use crate::tape::derivative_tape::Entry;
-use crate::tape::expression_tape::{Operation, Tape};
+use crate::tape::expression_tape::Tape;
+use crate::tape::operation::Operation;
 use crate::tape::tape_program::Program;
 
 /// Programs of one model. Their inputs are ẋ, x, u, then the leaves.
 #[derive(Debug, Clone)]
-pub struct Motion {
+pub struct OdeModel {
     pub(crate) n_states: usize,
     pub(crate) n_inputs: usize,
     pub(crate) n_outputs: usize,
@@ -54,7 +55,7 @@ impl Mass {
     }
 }
 
-impl Motion {
+impl OdeModel {
     /// Take a compiled model apart.
     ///
     /// # Errors

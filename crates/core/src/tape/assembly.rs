@@ -4,11 +4,15 @@
 use std::collections::{BTreeMap, HashMap};
 
 use crate::error::CoreError;
-use crate::language::expression::{Binary, Expression, Node, Unary};
+use crate::language::expression::Expression;
 use crate::language::lookup_table::{LookupTable, Part};
-use crate::tape::expression_tape::{
-    MAXIMUM_CHAIN, MAXIMUM_OPERATIONS, Operation, apply_binary, apply_unary,
-};
+use crate::language::syntax::{Binary, Node, Unary};
+use crate::tape::operation::{Operation, apply_binary, apply_unary};
+
+/// Longest chain of definitions that refer to one another.
+pub const MAXIMUM_CHAIN: usize = 100;
+/// Most operations on one tape.
+pub const MAXIMUM_OPERATIONS: usize = 200_000;
 
 #[derive(PartialEq, Eq, Hash)]
 enum Key {

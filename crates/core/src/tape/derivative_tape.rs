@@ -4,10 +4,11 @@
 //! numbers that carry all of them. Rules and conventions (kinks, ties) are those of `dual.rs`.
 
 use crate::error::CoreError;
-use crate::language::expression::{Binary, Unary};
 use crate::language::lookup_table::Part;
+use crate::language::syntax::{Binary, Unary};
 use crate::tape::assembly::Assembler;
-use crate::tape::expression_tape::{Operation, Tape};
+use crate::tape::expression_tape::Tape;
+use crate::tape::operation::Operation;
 
 /// One derivative of one output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,4 +3,5 @@
 pub(crate) mod assembly;
 pub(crate) mod derivative_tape;
 pub mod expression_tape;
+pub(crate) mod operation;
 pub(crate) mod tape_program;

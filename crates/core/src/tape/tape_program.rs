@@ -1,9 +1,10 @@
 //! A tape made ready to run along a trajectory: what never changes there is computed once, dead parts
 //! are left out, and B points are evaluated side by side.
 
-use crate::language::expression::{Binary, Unary};
 use crate::language::lookup_table::{LookupTable, Part};
-use crate::tape::expression_tape::{Operation, Tape, apply_binary, apply_unary};
+use crate::language::syntax::{Binary, Unary};
+use crate::tape::expression_tape::Tape;
+use crate::tape::operation::{Operation, apply_binary, apply_unary};
 
 #[derive(Debug, Clone, Copy)]
 enum Step {

@@ -2,16 +2,16 @@
 //! (Python side: `control/loops/simulation.py`)
 
 use crate::error::CoreError;
-use crate::linear::linear_simulation::Hold;
+use crate::linear::discretisation::Hold;
 use crate::state_space::model_tape::ModelTape;
-use crate::state_space::ode_model::Motion;
+use crate::state_space::ode_model::OdeModel;
 use crate::trajectories::held_input::Line;
 use crate::trajectories::runge_kutta::{Course, Setting, expect};
 
 /// A model with the values of its parameters, ready to step.
 #[derive(Debug, Clone)]
 pub struct EquationStep {
-    motion: Motion,
+    ode: OdeModel,
     setting: Setting,
     substeps: usize,
     still: Vec<f64>,
@@ -21,19 +21,19 @@ impl EquationStep {
     /// Take a model apart for steps of `sample_s` seconds, each in `substeps` parts.
     ///
     /// # Errors
-    /// As `Motion::new` and `Setting::prepare`.
+    /// As `OdeModel::new` and `Setting::prepare`.
     pub fn new(
         model: &ModelTape,
         parameters: &[f64],
         sample_s: f64,
         substeps: usize,
     ) -> Result<Self, CoreError> {
-        let motion = Motion::new(model)?;
+        let ode = OdeModel::new(model)?;
         let still = vec![0.0; model.n_inputs()];
         let course = Course { inputs: &still, n_samples: 1, sample_s, hold: Hold::First, substeps };
         let mut setting = Setting::default();
-        setting.prepare(&motion, parameters, &course)?;
-        Ok(Self { motion, setting, substeps, still })
+        setting.prepare(&ode, parameters, &course)?;
+        Ok(Self { ode, setting, substeps, still })
     }
 
     /// Advance a state while the inputs go in straight lines from one sample to the next. Delays of
@@ -49,7 +49,7 @@ impl EquationStep {
     ) -> Result<(), CoreError> {
         expect("inputs of a step", from.len(), self.still.len())?;
         expect("inputs of a step", to.len(), self.still.len())?;
-        expect("state of a step", state.len(), self.motion.n_states)?;
+        expect("state of a step", state.len(), self.ode.n_states)?;
         let parts = self.substeps as f64;
         for (held, (from, to)) in self.setting.held.iter_mut().zip(from.iter().zip(to)) {
             held.steps.clear();
@@ -59,7 +59,7 @@ impl EquationStep {
             }));
         }
         for step in 0..self.substeps {
-            self.setting.advance(&self.motion, step, &self.still, state)?;
+            self.setting.advance(&self.ode, step, &self.still, state)?;
         }
         Ok(())
     }
@@ -75,17 +75,17 @@ impl EquationStep {
         outputs: &mut [f64],
     ) -> Result<(), CoreError> {
         expect("inputs of a step", inputs.len(), self.still.len())?;
-        expect("outputs of a step", outputs.len(), self.motion.n_outputs)?;
+        expect("outputs of a step", outputs.len(), self.ode.n_outputs)?;
         for (held, &value) in self.setting.held.iter_mut().zip(inputs) {
             held.samples.clear();
             held.samples.push((value, 0.0));
         }
-        self.setting.measure(&self.motion, 0, state, &self.still, outputs, 1)
+        self.setting.measure(&self.ode, 0, state, &self.still, outputs, 1)
     }
 
     /// Numbers of states, inputs and outputs.
     #[must_use]
     pub fn size(&self) -> (usize, usize, usize) {
-        (self.motion.n_states, self.motion.n_inputs, self.motion.n_outputs)
+        (self.ode.n_states, self.ode.n_inputs, self.ode.n_outputs)
     }
 }

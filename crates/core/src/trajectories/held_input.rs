@@ -6,7 +6,7 @@
 //! third order of the step. So the trajectory is a differentiable function of the delays.
 
 use crate::error::CoreError;
-use crate::linear::linear_simulation::Hold;
+use crate::linear::discretisation::Hold;
 
 /// A line over one step: values at its ends, and their derivatives by the delay.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

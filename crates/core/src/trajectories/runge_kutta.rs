@@ -9,9 +9,9 @@
 use std::ops::Range;
 
 use crate::error::CoreError;
-use crate::linear::linear_simulation::Hold;
+use crate::linear::discretisation::Hold;
 use crate::numerics::matrix_exponential::solve;
-use crate::state_space::ode_model::{Mass, Motion};
+use crate::state_space::ode_model::{Mass, OdeModel};
 use crate::tape::derivative_tape::Entry;
 use crate::tape::expression_tape::Registers;
 use crate::tape::tape_program::Lanes;
@@ -97,22 +97,22 @@ impl Setting {
     /// where the equations do not give every state derivative.
     pub fn prepare(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         parameters: &[f64],
         course: &Course<'_>,
     ) -> Result<(), CoreError> {
-        check(motion, course)?;
+        check(ode, course)?;
         let mut values = std::mem::take(&mut self.leaves);
         values.clear();
-        values.resize(motion.leaves.n_outputs(), 0.0);
-        motion.leaves.evaluate(parameters, &mut self.registers, &mut values)?;
+        values.resize(ode.leaves.n_outputs(), 0.0);
+        ode.leaves.evaluate(parameters, &mut self.registers, &mut values)?;
         self.delays.clear();
-        self.delays.extend(values.drain(motion.n_leaves..));
+        self.delays.extend(values.drain(ode.n_leaves..));
         self.leaves = values;
         self.n_samples = course.n_samples;
         self.substeps = course.substeps;
         self.step_s = course.sample_s / course.substeps as f64;
-        self.held.resize_with(motion.n_inputs, HeldInput::default);
+        self.held.resize_with(ode.n_inputs, HeldInput::default);
         if self.followed.as_ref() != Some(&self.delays) {
             self.followed = None;
             for (input, held) in self.held.iter_mut().enumerate() {
@@ -122,16 +122,16 @@ impl Setting {
             }
             self.followed = Some(self.delays.clone());
         }
-        let n_moving = motion.n_moving();
-        motion.rates.prepare(n_moving, &self.leaves, &mut self.rates);
-        motion.outputs.prepare(n_moving, &self.leaves, &mut self.outputs);
-        let n = motion.n_states;
+        let n_moving = ode.n_moving();
+        ode.rates.prepare(n_moving, &self.leaves, &mut self.rates);
+        ode.outputs.prepare(n_moving, &self.leaves, &mut self.outputs);
+        let n = ode.n_states;
         self.inverse_mass.clear();
         self.inverse_mass.resize(n * n, 0.0);
-        self.driven.resize(motion.n_inputs, 0.0);
+        self.driven.resize(ode.n_inputs, 0.0);
         self.moved.resize(n, 0.0);
         self.derivatives.iter_mut().for_each(|k| k.resize(n, 0.0));
-        if let Mass::Fixed(entries) = &motion.mass {
+        if let Mass::Fixed(entries) = &ode.mass {
             let lanes = &self.rates;
             inverse(entries, n, |r| lanes[r][0], &mut self.mass, &mut self.inverse_mass)?;
             self.gather_weights(n);
@@ -146,34 +146,29 @@ impl Setting {
     }
 
     /// ẋ at a state and the driven inputs.
-    fn rate(
-        &mut self,
-        motion: &Motion,
-        state: &[f64],
-        result: &mut [f64],
-    ) -> Result<(), CoreError> {
-        let n = motion.n_states;
+    fn rate(&mut self, ode: &OdeModel, state: &[f64], result: &mut [f64]) -> Result<(), CoreError> {
+        let n = ode.n_states;
         for (place, &value) in state.iter().enumerate() {
-            motion.rates.load(n + place, [value], &mut self.rates);
+            ode.rates.load(n + place, [value], &mut self.rates);
         }
         for (place, &value) in self.driven.iter().enumerate() {
-            motion.rates.load(2 * n + place, [value], &mut self.rates);
+            ode.rates.load(2 * n + place, [value], &mut self.rates);
         }
-        motion.rates.run(&mut self.rates);
+        ode.rates.run(&mut self.rates);
         let lanes = &self.rates;
-        if let Mass::Moving(entries) = &motion.mass {
+        if let Mass::Moving(entries) = &ode.mass {
             inverse(entries, n, |r| lanes[r][0], &mut self.mass, &mut self.inverse_mass)?;
             self.gather_weights(n);
         }
         let lanes = &self.rates;
-        if motion.mass.is_one() {
-            for (rate, &register) in result.iter_mut().zip(&motion.residuals) {
+        if ode.mass.is_one() {
+            for (rate, &register) in result.iter_mut().zip(&ode.residuals) {
                 *rate = -lanes[register][0];
             }
         } else {
             result.fill(0.0);
             for &(row, column, weight) in &self.weights {
-                result[row] -= weight * lanes[motion.residuals[column]][0];
+                result[row] -= weight * lanes[ode.residuals[column]][0];
             }
         }
         Ok(())
@@ -182,32 +177,32 @@ impl Setting {
     /// Outputs at a sample.
     pub(crate) fn measure(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         sample: usize,
         state: &[f64],
         shift: &[f64],
         outputs: &mut [f64],
         stride: usize,
     ) -> Result<(), CoreError> {
-        let n = motion.n_states;
+        let n = ode.n_states;
         for (input, shift) in shift.iter().enumerate() {
             self.driven[input] = self.held[input].samples[sample].0 + shift;
-            motion.outputs.load(2 * n + input, [self.driven[input]], &mut self.outputs);
+            ode.outputs.load(2 * n + input, [self.driven[input]], &mut self.outputs);
         }
-        if motion.outputs_need_rates {
+        if ode.outputs_need_rates {
             let mut rates = std::mem::take(&mut self.moved);
-            let found = self.rate(motion, state, &mut rates);
+            let found = self.rate(ode, state, &mut rates);
             for (place, &rate) in rates.iter().enumerate() {
-                motion.outputs.load(place, [rate], &mut self.outputs);
+                ode.outputs.load(place, [rate], &mut self.outputs);
             }
             self.moved = rates;
             found?;
         }
         for (place, &value) in state.iter().enumerate() {
-            motion.outputs.load(n + place, [value], &mut self.outputs);
+            ode.outputs.load(n + place, [value], &mut self.outputs);
         }
-        motion.outputs.run(&mut self.outputs);
-        for (row, &register) in motion.output_registers.iter().enumerate() {
+        ode.outputs.run(&mut self.outputs);
+        for (row, &register) in ode.output_registers.iter().enumerate() {
             outputs[row * stride] = self.outputs[register][0];
         }
         Ok(())
@@ -216,7 +211,7 @@ impl Setting {
     /// Advance a state by step number `step` of the record.
     pub(crate) fn advance(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         step: usize,
         shift: &[f64],
         state: &mut [f64],
@@ -237,7 +232,7 @@ impl Setting {
                 }
                 None => moved.copy_from_slice(state),
             }
-            found = self.rate(motion, &moved, &mut now[0]);
+            found = self.rate(ode, &moved, &mut now[0]);
             if found.is_err() {
                 break;
             }
@@ -260,18 +255,18 @@ impl Setting {
     /// `Diverged` where a state or output grows beyond all bounds, `Singular` as in `prepare`.
     pub fn run(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         range: Range<usize>,
         initial: &[f64],
         shift: &[f64],
         states: &mut Vec<f64>,
         mut outputs: Option<&mut [f64]>,
     ) -> Result<(), CoreError> {
-        let (n, n_samples) = (motion.n_states, self.n_samples);
+        let (n, n_samples) = (ode.n_states, self.n_samples);
         expect("initial state", initial.len(), n)?;
-        expect("input shifts", shift.len(), motion.n_inputs)?;
+        expect("input shifts", shift.len(), ode.n_inputs)?;
         if let Some(outputs) = &outputs {
-            expect("outputs", outputs.len(), motion.n_outputs * n_samples)?;
+            expect("outputs", outputs.len(), ode.n_outputs * n_samples)?;
         }
         if range.end > n_samples {
             let (found, needed) = (range.end, n_samples);
@@ -282,7 +277,7 @@ impl Setting {
         let mut state = initial.to_vec();
         for sample in range {
             if let Some(outputs) = outputs.as_deref_mut() {
-                self.measure(motion, sample, &state, shift, &mut outputs[sample..], n_samples)?;
+                self.measure(ode, sample, &state, shift, &mut outputs[sample..], n_samples)?;
                 let found = outputs[sample..].iter().step_by(n_samples);
                 if !found.copied().all(|v| v.abs() < LARGEST_STATE) {
                     return Err(CoreError::Diverged { sample });
@@ -295,7 +290,7 @@ impl Setting {
                 break;
             }
             for step in sample * self.substeps..(sample + 1) * self.substeps {
-                self.advance(motion, step, shift, &mut state)?;
+                self.advance(ode, step, shift, &mut state)?;
                 states.extend_from_slice(&state);
             }
         }
@@ -311,21 +306,21 @@ impl Setting {
     /// As `run`.
     pub fn simulate(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         initial: &[f64],
     ) -> Result<(Vec<f64>, Vec<f64>), CoreError> {
-        let (n, n_samples) = (motion.n_states, self.n_samples);
-        let mut outputs = vec![0.0; motion.n_outputs * n_samples];
-        let (shift, mut steps) = (vec![0.0; motion.n_inputs], Vec::new());
-        self.run(motion, 0..n_samples, initial, &shift, &mut steps, Some(&mut outputs))?;
+        let (n, n_samples) = (ode.n_states, self.n_samples);
+        let mut outputs = vec![0.0; ode.n_outputs * n_samples];
+        let (shift, mut steps) = (vec![0.0; ode.n_inputs], Vec::new());
+        self.run(ode, 0..n_samples, initial, &shift, &mut steps, Some(&mut outputs))?;
         let stride = n * self.substeps;
         let place = |k: usize| k % n_samples * stride + k / n_samples;
         Ok(((0..n * n_samples).map(|k| steps[place(k)]).collect(), outputs))
     }
 }
 
-fn check(motion: &Motion, course: &Course<'_>) -> Result<(), CoreError> {
-    expect("inputs of the record", course.inputs.len(), motion.n_inputs * course.n_samples)?;
+fn check(ode: &OdeModel, course: &Course<'_>) -> Result<(), CoreError> {
+    expect("inputs of the record", course.inputs.len(), ode.n_inputs * course.n_samples)?;
     if !(course.sample_s > 0.0 && course.sample_s.is_finite()) {
         let (found, needed) = (course.sample_s, "more than zero seconds");
         return Err(CoreError::Range { what: "sample time", found, needed });

@@ -6,12 +6,12 @@
 //! sequence is a sparse product for each stage.
 
 use crate::error::CoreError;
-use crate::state_space::ode_model::{Mass, Motion};
+use crate::state_space::ode_model::{Mass, OdeModel};
 use crate::tape::expression_tape::Registers;
 use crate::tape::tape_program::Lanes;
 use crate::trajectories::runge_kutta::{STAGES, Setting, WEIGHTS, expect, inverse};
 use crate::trajectories::sensitivity_pattern::{Directions, GROUP, Pattern, Seeds};
-use crate::trajectories::trajectory::{Rate, Walk};
+use crate::trajectories::trajectory::{Rate, Trajectory};
 
 /// Samples that are evaluated side by side.
 const BLOCK: usize = 16;
@@ -19,7 +19,7 @@ type Many = [f64; GROUP];
 
 /// Buffers, kept from run to run.
 #[derive(Debug, Clone, Default)]
-pub struct Tangent {
+pub struct TrajectorySensitivity {
     registers: Registers,
     leaf_values: Vec<f64>,
     leaf_slopes: Vec<f64>,
@@ -42,7 +42,7 @@ pub struct Tangent {
     rows: Vec<f64>,
 }
 
-impl Tangent {
+impl TrajectorySensitivity {
     /// Differentiate the run that `states` holds. `seeds` (n_states × columns, row-major) are the
     /// derivatives of the state at its beginning. Rows of `stride` numbers, the output and its
     /// derivatives in the order of `directions`, go to `sink` block by block: first sample of the
@@ -54,37 +54,37 @@ impl Tangent {
     #[allow(clippy::too_many_arguments)]
     pub fn run(
         &mut self,
-        walk: &Walk<'_>,
+        trajectory: &Trajectory<'_>,
         parameters: &[f64],
         directions: &Directions<'_>,
         seeds: &[f64],
         stride: usize,
         sink: &mut dyn FnMut(usize, &mut [f64]),
     ) -> Result<(), CoreError> {
-        let (motion, setting) = (walk.motion, walk.setting);
+        let (ode, setting) = (trajectory.ode, trajectory.setting);
         let n_columns = directions.count();
-        expect("seeds of the derivatives", seeds.len(), motion.n_states * n_columns)?;
-        self.prepare(motion, setting, parameters, directions)?;
+        expect("seeds of the derivatives", seeds.len(), ode.n_states * n_columns)?;
+        self.prepare(ode, setting, parameters, directions)?;
         for (place, &seed) in seeds.iter().enumerate() {
             let (state, column) = (place / n_columns, place % n_columns);
-            self.sensitivity[column / GROUP * motion.n_states + state][column % GROUP] = seed;
+            self.sensitivity[column / GROUP * ode.n_states + state][column % GROUP] = seed;
         }
-        let height = motion.n_outputs * stride;
-        let mut start = walk.range.start;
-        while start < walk.range.end {
-            let stop = (start + BLOCK).min(walk.range.end);
-            self.evaluate(walk, start, stop)?;
+        let height = ode.n_outputs * stride;
+        let mut start = trajectory.range.start;
+        while start < trajectory.range.end {
+            let stop = (start + BLOCK).min(trajectory.range.end);
+            self.evaluate(trajectory, start, stop)?;
             let mut rows = std::mem::take(&mut self.rows);
             rows.clear();
             rows.resize((stop - start) * height, 0.0);
             for sample in start..stop {
                 if stride > 0 {
                     let rows = &mut rows[(sample - start) * height..][..height];
-                    self.measure(walk, sample, sample - start, n_columns, stride, rows);
+                    self.measure(trajectory, sample, sample - start, n_columns, stride, rows);
                 }
                 if sample + 1 < setting.n_samples {
                     (0..setting.substeps).for_each(|part| {
-                        self.advance(walk, sample, part, sample - start);
+                        self.advance(trajectory, sample, part, sample - start);
                     });
                 }
             }
@@ -95,29 +95,29 @@ impl Tangent {
             start = stop;
         }
         let sound = self.sensitivity.iter().flatten().all(|entry| entry.is_finite());
-        if sound { Ok(()) } else { Err(CoreError::Diverged { sample: walk.range.end }) }
+        if sound { Ok(()) } else { Err(CoreError::Diverged { sample: trajectory.range.end }) }
     }
 
     /// Derivative of the state after the last step of the run by a column.
-    pub fn end(&self, motion: &Motion, state: usize, column: usize) -> f64 {
-        self.sensitivity[column / GROUP * motion.n_states + state][column % GROUP]
+    pub fn end(&self, ode: &OdeModel, state: usize, column: usize) -> f64 {
+        self.sensitivity[column / GROUP * ode.n_states + state][column % GROUP]
     }
 
     fn prepare(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         setting: &Setting,
         parameters: &[f64],
         directions: &Directions<'_>,
     ) -> Result<(), CoreError> {
-        let (n, n_moving) = (motion.n_states, motion.n_moving());
+        let (n, n_moving) = (ode.n_states, ode.n_moving());
         let count = directions.parameters.len();
-        let n_values = motion.leaves.n_outputs();
+        let n_values = ode.leaves.n_outputs();
         self.leaf_values.resize(n_values, 0.0);
         self.leaf_slopes.clear();
         self.leaf_slopes.resize(n_values * count, 0.0);
         let (values, slopes) = (&mut self.leaf_values, &mut self.leaf_slopes);
-        motion.leaves.jacobian(
+        ode.leaves.jacobian(
             parameters,
             directions.parameters,
             &mut self.registers,
@@ -126,16 +126,16 @@ impl Tangent {
         )?;
         let n_groups = directions.count().div_ceil(GROUP);
         let leaf_slopes = &self.leaf_slopes;
-        let seeds = Seeds { motion, directions, leaf_slopes, n_groups };
-        self.rate_pattern = seeds.pattern(&motion.rate_entries);
-        self.output_pattern = seeds.pattern(&motion.output_entries);
+        let seeds = Seeds { ode, directions, leaf_slopes, n_groups };
+        self.rate_pattern = seeds.pattern(&ode.rate_entries);
+        self.output_pattern = seeds.pattern(&ode.output_entries);
         for buffer in [&mut self.sensitivity, &mut self.moved, &mut self.slope, &mut self.sum] {
             buffer.clear();
             buffer.resize(n_groups * n, [0.0; GROUP]);
         }
-        motion.rates.prepare(n_moving, &setting.leaves, &mut self.rates);
-        motion.rate_slopes.prepare(n_moving, &setting.leaves, &mut self.slopes);
-        motion.output_slopes.prepare(n_moving, &setting.leaves, &mut self.outputs);
+        ode.rates.prepare(n_moving, &setting.leaves, &mut self.rates);
+        ode.rate_slopes.prepare(n_moving, &setting.leaves, &mut self.slopes);
+        ode.output_slopes.prepare(n_moving, &setting.leaves, &mut self.outputs);
         let n_stages = 4 * setting.substeps + 1;
         self.stages.resize(n_stages, Vec::new());
         self.masses.resize(n_stages, Vec::new());
@@ -144,18 +144,23 @@ impl Tangent {
     }
 
     /// All derivatives of the equations for the samples `start..stop`.
-    fn evaluate(&mut self, walk: &Walk<'_>, start: usize, stop: usize) -> Result<(), CoreError> {
-        let &Walk { motion, setting, shift, .. } = walk;
-        let n = motion.n_states;
+    fn evaluate(
+        &mut self,
+        trajectory: &Trajectory<'_>,
+        start: usize,
+        stop: usize,
+    ) -> Result<(), CoreError> {
+        let &Trajectory { ode, setting, shift, .. } = trajectory;
+        let n = ode.n_states;
         let mut state = vec![[0.0; BLOCK]; n];
         let mut slope = vec![[0.0; BLOCK]; n];
-        let mut driven = vec![[0.0; BLOCK]; motion.n_inputs];
+        let mut driven = vec![[0.0; BLOCK]; ode.n_inputs];
         let sample = |lane: usize| (start + lane).min(stop - 1);
         for part in 0..setting.substeps {
             for (stage, (place, share)) in STAGES.into_iter().enumerate() {
                 for lane in 0..BLOCK {
                     let step = sample(lane) * setting.substeps + part;
-                    let from = walk.state(step);
+                    let from = trajectory.state(step);
                     for i in 0..n {
                         let k = if stage == 0 { 0.0 } else { slope[i][lane] };
                         state[i][lane] = from[i] + share * setting.step_s * k;
@@ -164,26 +169,26 @@ impl Tangent {
                         lanes[lane] = setting.held[input].steps[step].at(place).0 + shift[input];
                     }
                 }
-                self.stage(walk, 4 * part + stage, &state, &driven, &mut slope)?;
+                self.stage(trajectory, 4 * part + stage, &state, &driven, &mut slope)?;
             }
         }
         for lane in 0..BLOCK {
-            let from = walk.state(sample(lane) * setting.substeps);
+            let from = trajectory.state(sample(lane) * setting.substeps);
             (0..n).for_each(|i| state[i][lane] = from[i]);
             for (input, lanes) in driven.iter_mut().enumerate() {
                 lanes[lane] = setting.held[input].samples[sample(lane)].0 + shift[input];
             }
         }
-        let program = &motion.output_slopes;
-        if motion.outputs_need_rates {
-            self.stage(walk, 4 * setting.substeps, &state, &driven, &mut slope)?;
+        let program = &ode.output_slopes;
+        if ode.outputs_need_rates {
+            self.stage(trajectory, 4 * setting.substeps, &state, &driven, &mut slope)?;
             slope.iter().enumerate().for_each(|(i, v)| program.load(i, *v, &mut self.outputs));
         }
         state.iter().enumerate().for_each(|(i, v)| program.load(n + i, *v, &mut self.outputs));
         driven.iter().enumerate().for_each(|(i, v)| program.load(2 * n + i, *v, &mut self.outputs));
         program.run(&mut self.outputs);
         self.output_stage.clear();
-        let registers = motion.output_entries.iter().map(|e| self.outputs[e.register]);
+        let registers = ode.output_entries.iter().map(|e| self.outputs[e.register]);
         self.output_stage.extend(registers);
         Ok(())
     }
@@ -191,56 +196,53 @@ impl Tangent {
     /// Derivatives of the residuals at one stage of a block; `slope` becomes ẋ there.
     fn stage(
         &mut self,
-        walk: &Walk<'_>,
+        trajectory: &Trajectory<'_>,
         place: usize,
         state: &[[f64; BLOCK]],
         driven: &[[f64; BLOCK]],
         slope: &mut [[f64; BLOCK]],
     ) -> Result<(), CoreError> {
-        let motion = walk.motion;
-        let n = motion.n_states;
-        let program = &motion.rate_slopes;
-        if !motion.mass.is_one() {
-            state
-                .iter()
-                .enumerate()
-                .for_each(|(i, v)| motion.rates.load(n + i, *v, &mut self.rates));
+        let ode = trajectory.ode;
+        let n = ode.n_states;
+        let program = &ode.rate_slopes;
+        if !ode.mass.is_one() {
+            state.iter().enumerate().for_each(|(i, v)| ode.rates.load(n + i, *v, &mut self.rates));
             driven
                 .iter()
                 .enumerate()
-                .for_each(|(i, v)| motion.rates.load(2 * n + i, *v, &mut self.rates));
-            motion.rates.run(&mut self.rates);
-            self.solve_mass(walk, place, slope)?;
+                .for_each(|(i, v)| ode.rates.load(2 * n + i, *v, &mut self.rates));
+            ode.rates.run(&mut self.rates);
+            self.solve_mass(trajectory, place, slope)?;
             slope.iter().enumerate().for_each(|(i, v)| program.load(i, *v, &mut self.slopes));
         }
         state.iter().enumerate().for_each(|(i, v)| program.load(n + i, *v, &mut self.slopes));
         driven.iter().enumerate().for_each(|(i, v)| program.load(2 * n + i, *v, &mut self.slopes));
         program.run(&mut self.slopes);
-        if motion.mass.is_one() {
-            for (rate, &register) in slope.iter_mut().zip(&motion.residuals) {
+        if ode.mass.is_one() {
+            for (rate, &register) in slope.iter_mut().zip(&ode.residuals) {
                 *rate = self.slopes[register].map(|r| -r);
             }
         }
         let stage = &mut self.stages[place];
         stage.clear();
-        stage.extend(motion.rate_entries.iter().map(|entry| self.slopes[entry.register]));
+        stage.extend(ode.rate_entries.iter().map(|entry| self.slopes[entry.register]));
         Ok(())
     }
 
     fn solve_mass(
         &mut self,
-        walk: &Walk<'_>,
+        trajectory: &Trajectory<'_>,
         place: usize,
         slope: &mut [[f64; BLOCK]],
     ) -> Result<(), CoreError> {
-        let motion = walk.motion;
-        let n = motion.n_states;
+        let ode = trajectory.ode;
+        let n = ode.n_states;
         let store = &mut self.masses[place];
         store.clear();
         store.resize(n * n, [0.0; BLOCK]);
-        self.inverse.copy_from_slice(&walk.setting.inverse_mass);
+        self.inverse.copy_from_slice(&trajectory.setting.inverse_mass);
         for lane in 0..BLOCK {
-            if let Mass::Moving(entries) = &motion.mass {
+            if let Mass::Moving(entries) = &ode.mass {
                 let value = |register: usize| self.rates[register][lane];
                 inverse(entries, n, value, &mut self.scratch, &mut self.inverse)?;
             }
@@ -249,7 +251,7 @@ impl Tangent {
                 for j in 0..n {
                     let weight = self.inverse[i * n + j];
                     store[i * n + j][lane] = weight;
-                    sum -= weight * self.rates[motion.residuals[j]][lane];
+                    sum -= weight * self.rates[ode.residuals[j]][lane];
                 }
                 slope[i][lane] = sum;
             }
@@ -258,8 +260,15 @@ impl Tangent {
     }
 
     /// K of one group of columns at a stage, from the moved sensitivities.
-    fn tangent(&mut self, walk: &Walk<'_>, place: usize, lane: usize, group: usize, rate: Rate) {
-        let n = walk.motion.n_states;
+    fn stage_slopes(
+        &mut self,
+        trajectory: &Trajectory<'_>,
+        place: usize,
+        lane: usize,
+        group: usize,
+        rate: Rate,
+    ) {
+        let n = trajectory.ode.n_states;
         let stage = &self.stages[place];
         let own = group * n..(group + 1) * n;
         let moved = &self.moved[own.clone()];
@@ -273,10 +282,10 @@ impl Tangent {
             }
         }
         for force in &self.rate_pattern.forces[group] {
-            let late = force.delayed.map_or(1.0, |input| rate.of(walk, input));
+            let late = force.delayed.map_or(1.0, |input| rate.of(trajectory, input));
             slope[force.row][force.lane] -= stage[force.entry][lane] * force.factor * late;
         }
-        if !walk.motion.mass.is_one() {
+        if !trajectory.ode.mass.is_one() {
             let weights = &self.masses[place];
             let plain: Vec<Many> = slope.to_vec();
             for i in 0..n {
@@ -290,10 +299,10 @@ impl Tangent {
         }
     }
 
-    fn advance(&mut self, walk: &Walk<'_>, sample: usize, part: usize, lane: usize) {
-        let n = walk.motion.n_states;
-        let h = walk.setting.step_s;
-        let step = sample * walk.setting.substeps + part;
+    fn advance(&mut self, trajectory: &Trajectory<'_>, sample: usize, part: usize, lane: usize) {
+        let n = trajectory.ode.n_states;
+        let h = trajectory.setting.step_s;
+        let step = sample * trajectory.setting.substeps + part;
         for group in 0..self.rate_pattern.forces.len() {
             let own = group * n..(group + 1) * n;
             for (stage, (place, share)) in STAGES.into_iter().enumerate() {
@@ -303,7 +312,13 @@ impl Tangent {
                         self.moved[i][column] = self.sensitivity[i][column] + share * h * k;
                     }
                 }
-                self.tangent(walk, 4 * part + stage, lane, group, Rate::Step(step, place));
+                self.stage_slopes(
+                    trajectory,
+                    4 * part + stage,
+                    lane,
+                    group,
+                    Rate::Step(step, place),
+                );
                 for i in own.clone() {
                     for column in 0..GROUP {
                         let before = if stage == 0 { 0.0 } else { self.sum[i][column] };
@@ -322,24 +337,24 @@ impl Tangent {
     /// Rows of one sample.
     fn measure(
         &mut self,
-        walk: &Walk<'_>,
+        trajectory: &Trajectory<'_>,
         sample: usize,
         lane: usize,
         n_columns: usize,
         stride: usize,
         rows: &mut [f64],
     ) {
-        let motion = walk.motion;
-        let n = motion.n_states;
-        for (row, &register) in rows.chunks_exact_mut(stride).zip(&motion.output_registers) {
+        let ode = trajectory.ode;
+        let n = ode.n_states;
+        for (row, &register) in rows.chunks_exact_mut(stride).zip(&ode.output_registers) {
             row[0] = self.outputs[register][lane];
         }
         for group in 0..self.output_pattern.forces.len() {
             let own = group * n..(group + 1) * n;
-            if motion.outputs_need_rates {
+            if ode.outputs_need_rates {
                 self.moved[own.clone()].copy_from_slice(&self.sensitivity[own.clone()]);
-                let place = 4 * walk.setting.substeps;
-                self.tangent(walk, place, lane, group, Rate::Sample(sample));
+                let place = 4 * trajectory.setting.substeps;
+                self.stage_slopes(trajectory, place, lane, group, Rate::Sample(sample));
             }
             let (state, slope) = (&self.sensitivity[own.clone()], &self.slope[own]);
             let (pattern, first) = (&self.output_pattern, 1 + group * GROUP);
@@ -355,7 +370,7 @@ impl Tangent {
             }
             for force in &pattern.forces[group] {
                 let rate = Rate::Sample(sample);
-                let late = force.delayed.map_or(1.0, |input| rate.of(walk, input));
+                let late = force.delayed.map_or(1.0, |input| rate.of(trajectory, input));
                 let factor = self.output_stage[force.entry][lane];
                 rows[force.row * stride + first + force.lane] += factor * force.factor * late;
             }

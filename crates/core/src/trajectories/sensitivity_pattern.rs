@@ -1,6 +1,6 @@
 //! Which derivatives of a model's rows meet which columns: sparse, found once for a run.
 
-use crate::state_space::ode_model::Motion;
+use crate::state_space::ode_model::OdeModel;
 use crate::tape::derivative_tape::Entry;
 
 /// Derivatives that are carried side by side.
@@ -54,7 +54,7 @@ pub(crate) struct Pattern {
 }
 
 pub(crate) struct Seeds<'a> {
-    pub(crate) motion: &'a Motion,
+    pub(crate) ode: &'a OdeModel,
     pub(crate) directions: &'a Directions<'a>,
     pub(crate) leaf_slopes: &'a [f64],
     pub(crate) n_groups: usize,
@@ -63,8 +63,8 @@ pub(crate) struct Seeds<'a> {
 impl Seeds<'_> {
     /// Where the derivatives of some rows go.
     pub(crate) fn pattern(&self, entries: &[Entry]) -> Pattern {
-        let motion = self.motion;
-        let (n, n_moving) = (motion.n_states, motion.n_moving());
+        let ode = self.ode;
+        let (n, n_moving) = (ode.n_states, ode.n_moving());
         let count = self.directions.parameters.len();
         let first_shift = count + self.directions.n_initial;
         let mut pattern = Pattern { forces: vec![Vec::new(); self.n_groups], ..Pattern::default() };
@@ -78,7 +78,7 @@ impl Seeds<'_> {
                     if let Some(k) = self.directions.shift.iter().position(|&s| s == input) {
                         pattern.force(entry.row, place, first_shift + k, 1.0, None);
                     }
-                    let delay = motion.n_leaves + input;
+                    let delay = ode.n_leaves + input;
                     self.scatter(&mut pattern, entry.row, place, delay, Some(input));
                 }
                 column => self.scatter(&mut pattern, entry.row, place, column - n_moving, None),

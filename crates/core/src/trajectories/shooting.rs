@@ -13,12 +13,12 @@
 use std::ops::Range;
 
 use crate::error::CoreError;
-use crate::state_space::ode_model::Motion;
+use crate::state_space::ode_model::OdeModel;
 use crate::trajectories::boundary_system::BoundarySystem;
 use crate::trajectories::runge_kutta::{Course, LARGEST_STATE, Setting, expect};
-use crate::trajectories::sensitivity::Tangent;
+use crate::trajectories::sensitivity::TrajectorySensitivity;
 use crate::trajectories::sensitivity_pattern::Directions;
-use crate::trajectories::trajectory::Walk;
+use crate::trajectories::trajectory::Trajectory;
 
 /// Most Newton steps for the nodes.
 const MAXIMUM_STEPS: usize = 30;
@@ -43,7 +43,7 @@ pub struct Plan {
 pub struct Flight {
     /// Parameters on this record.
     pub setting: Setting,
-    tangent: Tangent,
+    sensitivity: TrajectorySensitivity,
     states: Vec<f64>,
     nodes: Vec<f64>,
     /// Derivatives of the nodes by all columns, (nodes × n_states) × columns.
@@ -110,61 +110,61 @@ impl Plan {
 }
 
 impl Flight {
-    /// Run, and hand rows of `stride` numbers (output, then its derivatives) to `sink` as in `Tangent`.
+    /// Run, and hand rows of `stride` numbers (output, then its derivatives) to `sink` as in `TrajectorySensitivity`.
     ///
     /// # Errors
     /// `Diverged`, `Singular`, `NotFinite` where the trajectory or a derivative has no value.
     pub fn run(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         course: &Course<'_>,
         plan: &Plan,
         wish: &Wish<'_>,
         stride: usize,
         sink: &mut dyn FnMut(usize, &mut [f64]),
     ) -> Result<(), CoreError> {
-        self.setting.prepare(motion, wish.parameters, course)?;
+        self.setting.prepare(ode, wish.parameters, course)?;
         if plan.is_single() {
             self.nodes.clear();
             self.nodes.extend_from_slice(wish.initial);
             self.node_slopes.clear();
-            self.node_slopes.resize(motion.n_states * wish.count(), 0.0);
+            self.node_slopes.resize(ode.n_states * wish.count(), 0.0);
             for (column, &state) in wish.free_initial.iter().enumerate() {
                 self.node_slopes[state * wish.count() + wish.free.len() + column] = 1.0;
             }
         } else {
-            self.find_nodes(motion, plan, wish)?;
+            self.find_nodes(ode, plan, wish)?;
         }
         for (place, segment) in plan.segments(course.n_samples).into_iter().enumerate() {
             match wish.count() {
-                0 => self.plain(motion, segment, place, wish.shift, stride, sink)?,
-                _ => self.differentiated(motion, segment, place, wish, stride, sink)?,
+                0 => self.plain(ode, segment, place, wish.shift, stride, sink)?,
+                _ => self.differentiated(ode, segment, place, wish, stride, sink)?,
             }
         }
         Ok(())
     }
 
     /// State at the first sample and its derivatives (n_states × columns), of the last run.
-    pub fn start(&self, motion: &Motion) -> (&[f64], &[f64]) {
-        let n = motion.n_states;
+    pub fn start(&self, ode: &OdeModel) -> (&[f64], &[f64]) {
+        let n = ode.n_states;
         let width = self.node_slopes.len() * n / self.nodes.len().max(1);
         (&self.nodes[..n], &self.node_slopes[..width])
     }
 
     fn plain(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         segment: Range<usize>,
         place: usize,
         shift: &[f64],
         stride: usize,
         sink: &mut dyn FnMut(usize, &mut [f64]),
     ) -> Result<(), CoreError> {
-        let (n, p, n_samples) = (motion.n_states, motion.n_outputs, self.setting.n_samples);
+        let (n, p, n_samples) = (ode.n_states, ode.n_outputs, self.setting.n_samples);
         let node = &self.nodes[place * n..(place + 1) * n];
         self.outputs.resize(p * n_samples, 0.0);
         let (states, outputs) = (&mut self.states, &mut self.outputs);
-        self.setting.run(motion, segment.clone(), node, shift, states, Some(outputs))?;
+        self.setting.run(ode, segment.clone(), node, shift, states, Some(outputs))?;
         self.rows.clear();
         self.rows.resize(segment.len() * p * stride, 0.0);
         for (rows, sample) in self.rows.chunks_exact_mut(p * stride).zip(segment.clone()) {
@@ -178,46 +178,46 @@ impl Flight {
 
     fn differentiated(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         segment: Range<usize>,
         place: usize,
         wish: &Wish<'_>,
         stride: usize,
         sink: &mut dyn FnMut(usize, &mut [f64]),
     ) -> Result<(), CoreError> {
-        let n = motion.n_states;
+        let n = ode.n_states;
         let node = &self.nodes[place * n..(place + 1) * n];
         let states = &mut self.states;
-        self.setting.run(motion, segment.clone(), node, wish.shift, states, None)?;
+        self.setting.run(ode, segment.clone(), node, wish.shift, states, None)?;
         let width = n * wish.count();
         let seeds = &self.node_slopes[place * width..(place + 1) * width];
         let (setting, states, shift) = (&self.setting, &self.states[..], wish.shift);
-        let walk = Walk { motion, setting, range: segment, states, shift };
+        let trajectory = Trajectory { ode, setting, range: segment, states, shift };
         let directions = Directions {
             parameters: wish.free,
             n_initial: wish.free_initial.len(),
             shift: wish.free_shift,
         };
-        self.tangent.run(&walk, wish.parameters, &directions, seeds, stride, sink)
+        self.sensitivity.run(&trajectory, wish.parameters, &directions, seeds, stride, sink)
     }
 
     /// Newton steps from the plan's guesses until the segments meet, then the derivatives of the nodes.
     fn find_nodes(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         plan: &Plan,
         wish: &Wish<'_>,
     ) -> Result<(), CoreError> {
-        let n = motion.n_states;
+        let n = ode.n_states;
         expect("numbers at the ends of a record", wish.initial.len(), n)?;
         self.nodes.clear();
         self.nodes.extend_from_slice(&plan.guesses);
         let n_nodes = plan.cuts.len() + 2;
         for _ in 0..MAXIMUM_STEPS {
-            self.shoot(motion, plan, wish, false)?;
+            self.shoot(ode, plan, wish, false)?;
             let mut sides = std::mem::take(&mut self.sides);
-            self.gaps(motion, plan, wish.initial, &mut sides);
-            let solved = self.system(motion, plan).solve(&mut sides, 1);
+            self.gaps(ode, plan, wish.initial, &mut sides);
+            let solved = self.system(ode, plan).solve(&mut sides, 1);
             let (mut step, mut size) = (0.0_f64, 0.0_f64);
             for (node, change) in self.nodes.iter_mut().zip(&sides) {
                 *node += change;
@@ -232,7 +232,7 @@ impl Flight {
             if step <= SMALL_STEP * size.max(f64::MIN_POSITIVE) {
                 return match wish.count() {
                     0 => Ok(()),
-                    _ => self.slopes_of_nodes(motion, plan, wish, n_nodes),
+                    _ => self.slopes_of_nodes(ode, plan, wish, n_nodes),
                 };
             }
         }
@@ -243,12 +243,12 @@ impl Flight {
     /// the derivatives by parameters and shifts if asked.
     fn shoot(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         plan: &Plan,
         wish: &Wish<'_>,
         forced: bool,
     ) -> Result<(), CoreError> {
-        let n = motion.n_states;
+        let n = ode.n_states;
         let (parameters, shifts) = match forced {
             true => (wish.free, wish.free_shift),
             false => (&[][..], &[][..]),
@@ -263,15 +263,15 @@ impl Flight {
         for (place, segment) in plan.segments(self.setting.n_samples).into_iter().enumerate() {
             let node = &self.nodes[place * n..(place + 1) * n];
             let states = &mut self.states;
-            self.setting.run(motion, segment.clone(), node, wish.shift, states, None)?;
+            self.setting.run(ode, segment.clone(), node, wish.shift, states, None)?;
             self.ends.extend_from_slice(&self.states[self.states.len() - n..]);
             let (setting, states, shift) = (&self.setting, &self.states[..], wish.shift);
-            let walk = Walk { motion, setting, range: segment, states, shift };
+            let trajectory = Trajectory { ode, setting, range: segment, states, shift };
             let none = &mut |_: usize, _: &mut [f64]| {};
-            self.tangent.run(&walk, wish.parameters, &directions, &seeds, 0, none)?;
+            self.sensitivity.run(&trajectory, wish.parameters, &directions, &seeds, 0, none)?;
             for state in 0..n {
                 for column in 0..count {
-                    let slope = self.tangent.end(motion, state, column);
+                    let slope = self.sensitivity.end(ode, state, column);
                     let is_node = (parameters.len()..parameters.len() + n).contains(&column);
                     if is_node { &mut self.transitions } else { &mut self.forced }.push(slope);
                 }
@@ -280,15 +280,15 @@ impl Flight {
         expect("derivatives of the segments", self.forced.len(), self.ends.len() * width)
     }
 
-    fn system<'a>(&'a self, motion: &Motion, plan: &'a Plan) -> BoundarySystem<'a> {
-        let n = motion.n_states;
+    fn system<'a>(&'a self, ode: &OdeModel, plan: &'a Plan) -> BoundarySystem<'a> {
+        let n = ode.n_states;
         let (n_forward, ends) = (n - plan.n_growing, &plan.ends[..]);
         BoundarySystem { n, n_forward, ends, transitions: &self.transitions }
     }
 
     /// What is missing in each condition on the nodes.
-    fn gaps(&self, motion: &Motion, plan: &Plan, initial: &[f64], sides: &mut Vec<f64>) {
-        let n = motion.n_states;
+    fn gaps(&self, ode: &OdeModel, plan: &Plan, initial: &[f64], sides: &mut Vec<f64>) {
+        let n = ode.n_states;
         let n_forward = n - plan.n_growing;
         let (first, last) = (&self.nodes[..n], &self.nodes[self.nodes.len() - n..]);
         let missing = |row: usize, node: &[f64]| {
@@ -304,13 +304,13 @@ impl Flight {
     /// Derivatives of the nodes by every column: the same equations with other right sides.
     fn slopes_of_nodes(
         &mut self,
-        motion: &Motion,
+        ode: &OdeModel,
         plan: &Plan,
         wish: &Wish<'_>,
         n_nodes: usize,
     ) -> Result<(), CoreError> {
-        self.shoot(motion, plan, wish, true)?;
-        let n = motion.n_states;
+        self.shoot(ode, plan, wish, true)?;
+        let n = ode.n_states;
         let (count, n_forward) = (wish.count(), n - plan.n_growing);
         let (n_free, n_initial) = (wish.free.len(), wish.free_initial.len());
         let width = n_free + wish.free_shift.len();
@@ -324,7 +324,7 @@ impl Flight {
             let column = if column < n_free { column } else { column + n_initial };
             sides[(n_forward + row) * count + column] = slope;
         }
-        self.system(motion, plan).solve(&mut sides, count)?;
+        self.system(ode, plan).solve(&mut sides, count)?;
         self.node_slopes = sides;
         Ok(())
     }

@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use crate::state_space::ode_model::Motion;
+use crate::state_space::ode_model::OdeModel;
 use crate::trajectories::runge_kutta::Setting;
 
 /// One run to be differentiated.
 #[derive(Debug, Clone)]
-pub struct Walk<'a> {
+pub struct Trajectory<'a> {
     /// The model.
-    pub motion: &'a Motion,
+    pub ode: &'a OdeModel,
     /// Parameters and record.
     pub setting: &'a Setting,
     /// Its samples.
@@ -20,10 +20,10 @@ pub struct Walk<'a> {
     pub shift: &'a [f64],
 }
 
-impl Walk<'_> {
+impl Trajectory<'_> {
     /// State at the beginning of a step of the record.
     pub(crate) fn state(&self, step: usize) -> &[f64] {
-        let n = self.motion.n_states;
+        let n = self.ode.n_states;
         let place = (step - self.range.start * self.setting.substeps) * n;
         // Lanes beyond the last step repeat the last state; nothing is taken from them.
         let place = place.min(self.states.len().saturating_sub(n));
@@ -40,8 +40,8 @@ pub(crate) enum Rate {
 
 impl Rate {
     /// That derivative.
-    pub(crate) fn of(self, walk: &Walk<'_>, input: usize) -> f64 {
-        let held = &walk.setting.held[input];
+    pub(crate) fn of(self, trajectory: &Trajectory<'_>, input: usize) -> f64 {
+        let held = &trajectory.setting.held[input];
         match self {
             Self::Step(step, place) => held.steps[step].at(place).1,
             Self::Sample(sample) => held.samples[sample].1,

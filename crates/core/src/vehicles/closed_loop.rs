@@ -134,7 +134,7 @@ fn require(what: &'static str, found: usize, needed: usize) -> Result<(), CoreEr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear::linear_simulation::{Hold, StateSpace};
+    use crate::linear::discretisation::{Hold, StateSpace};
 
     const STILL: [Disturbance; 1] = [Disturbance { deviation: 0.0, time_s: 1.0 }];
 

@@ -1,5 +1,5 @@
 use super::*;
-use crate::linear::linear_simulation::{Hold, StateSpace};
+use crate::linear::discretisation::{Hold, StateSpace};
 
 /// x' = −x + v₀, signals: v₁ (what drives), x, and v₁ again where a port reads it.
 fn lag(holds: &[Hold], delays_s: &[f64]) -> Discrete {

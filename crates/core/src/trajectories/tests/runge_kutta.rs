@@ -2,16 +2,16 @@ use super::*;
 use crate::state_space::model_tape::ModelTape;
 use crate::state_space::model_tape::ModelText;
 use crate::state_space::model_tape::tests::text;
-use crate::trajectories::sensitivity::Tangent;
+use crate::trajectories::sensitivity::TrajectorySensitivity;
 use crate::trajectories::sensitivity_pattern::Directions;
-use crate::trajectories::trajectory::Walk;
+use crate::trajectories::trajectory::Trajectory;
 
 const VALUES: [f64; 4] = [2.0, 0.3, 5.0, 0.013];
 
-pub(crate) fn motion(equations: &[(&str, &str)], outputs: &[&str]) -> Motion {
+pub(crate) fn ode(equations: &[(&str, &str)], outputs: &[&str]) -> OdeModel {
     let mut text = text(equations, outputs);
     text.delays = vec!["tau".to_string()];
-    Motion::new(&ModelTape::new(&text).unwrap()).unwrap()
+    OdeModel::new(&ModelTape::new(&text).unwrap()).unwrap()
 }
 
 fn wave(n: usize, dt: f64) -> Vec<f64> {
@@ -23,17 +23,17 @@ fn course(inputs: &[f64], sample_s: f64, substeps: usize) -> Course<'_> {
 }
 
 fn outputs(
-    motion: &Motion,
+    ode: &OdeModel,
     values: &[f64],
     course: &Course<'_>,
     initial: &[f64],
     shift: f64,
 ) -> Vec<f64> {
     let mut setting = Setting::default();
-    setting.prepare(motion, values, course).unwrap();
-    let mut outputs = vec![0.0; motion.n_outputs * course.n_samples];
+    setting.prepare(ode, values, course).unwrap();
+    let mut outputs = vec![0.0; ode.n_outputs * course.n_samples];
     let range = 0..course.n_samples;
-    setting.run(motion, range, initial, &[shift], &mut Vec::new(), Some(&mut outputs)).unwrap();
+    setting.run(ode, range, initial, &[shift], &mut Vec::new(), Some(&mut outputs)).unwrap();
     outputs
 }
 
@@ -42,10 +42,10 @@ const PENDULUM: [(&str, &str); 2] =
 
 #[test]
 fn error_falls_with_the_fourth_power_of_the_step() {
-    let motion = motion(&PENDULUM, &["x", "v"]);
+    let ode = ode(&PENDULUM, &["x", "v"]);
     let inputs = vec![0.0; 51];
     let run =
-        |substeps| outputs(&motion, &VALUES, &course(&inputs, 0.1, substeps), &[1.2, 0.7], 0.2)[50];
+        |substeps| outputs(&ode, &VALUES, &course(&inputs, 0.1, substeps), &[1.2, 0.7], 0.2)[50];
     let best = run(64);
     let (coarse, fine) = ((run(1) - best).abs(), (run(2) - best).abs());
     let order = (coarse / fine).log2();
@@ -54,9 +54,9 @@ fn error_falls_with_the_fourth_power_of_the_step() {
 
 #[test]
 fn a_linear_model_follows_its_exact_solution() {
-    let motion = motion(&[("x'", "v"), ("m*v'", "-k*x - c*v")], &["x", "v'"]);
+    let ode = ode(&[("x'", "v"), ("m*v'", "-k*x - c*v")], &["x", "v'"]);
     let inputs = vec![0.0; 201];
-    let found = outputs(&motion, &VALUES, &course(&inputs, 0.01, 4), &[1.0, 0.0], 0.0);
+    let found = outputs(&ode, &VALUES, &course(&inputs, 0.01, 4), &[1.0, 0.0], 0.0);
     let (decay, square) = (0.3 / 4.0, 5.0 / 2.0);
     let omega = f64::sqrt(square - decay * decay);
     for k in [0, 77, 200] {
@@ -70,22 +70,24 @@ fn a_linear_model_follows_its_exact_solution() {
 }
 
 fn derivatives(
-    motion: &Motion,
+    ode: &OdeModel,
     course: &Course<'_>,
     initial: &[f64],
     range: Range<usize>,
 ) -> (Vec<f64>, Vec<f64>) {
     let (mut setting, mut states) = (Setting::default(), Vec::new());
-    setting.prepare(motion, &VALUES, course).unwrap();
-    let mut values = vec![0.0; motion.n_outputs * course.n_samples];
-    setting.run(motion, range.clone(), initial, &[0.1], &mut states, Some(&mut values)).unwrap();
+    setting.prepare(ode, &VALUES, course).unwrap();
+    let mut values = vec![0.0; ode.n_outputs * course.n_samples];
+    setting.run(ode, range.clone(), initial, &[0.1], &mut states, Some(&mut values)).unwrap();
     let directions = Directions { parameters: &[3, 0, 1, 2], n_initial: 2, shift: &[0] };
     let mut seeds = vec![0.0; 14];
     (seeds[4], seeds[7 + 5]) = (1.0, 1.0);
-    let walk = Walk { motion, setting: &setting, range, states: &states, shift: &[0.1] };
+    let trajectory = Trajectory { ode, setting: &setting, range, states: &states, shift: &[0.1] };
     let mut rows = Vec::new();
     let mut sink = |_: usize, block: &mut [f64]| rows.extend_from_slice(block);
-    Tangent::default().run(&walk, &VALUES, &directions, &seeds, 8, &mut sink).unwrap();
+    TrajectorySensitivity::default()
+        .run(&trajectory, &VALUES, &directions, &seeds, 8, &mut sink)
+        .unwrap();
     (values, rows)
 }
 
@@ -97,12 +99,12 @@ fn derivatives_match_differences() {
         &[("m*x' + v'", "v + f"), ("v' - c*x'", "-k*x + min(v, 0.4)*f")],
     ];
     for (equations, formulas) in models.iter().zip([["x", "v' + f"], ["x*v", "c*f"], ["x'", "v"]]) {
-        let motion = motion(equations, &formulas);
+        let ode = ode(equations, &formulas);
         let inputs = wave(41, 0.05);
         let initial = [0.4, -0.2];
         for substeps in [1, 3] {
             let course = course(&inputs, 0.05, substeps);
-            let (plain, rows) = derivatives(&motion, &course, &initial, 0..41);
+            let (plain, rows) = derivatives(&ode, &course, &initial, 0..41);
             let at = |column: usize, h: f64| {
                 let (mut values, mut x0, mut shift) = (VALUES, initial, 0.1);
                 match column {
@@ -111,7 +113,7 @@ fn derivatives_match_differences() {
                     4 | 5 => x0[column - 4] += h,
                     _ => shift += h,
                 }
-                outputs(&motion, &values, &course, &x0, shift)
+                outputs(&ode, &values, &course, &x0, shift)
             };
             for column in 0..7 {
                 let h = 1e-6;
@@ -134,16 +136,16 @@ fn derivatives_match_differences() {
 
 #[test]
 fn part_of_a_record_is_what_the_whole_run_does_there() {
-    let motion = motion(&PENDULUM, &["x", "v"]);
+    let ode = ode(&PENDULUM, &["x", "v"]);
     let inputs = wave(41, 0.05);
     let course = course(&inputs, 0.05, 2);
     let mut setting = Setting::default();
-    setting.prepare(&motion, &VALUES, &course).unwrap();
+    setting.prepare(&ode, &VALUES, &course).unwrap();
     let (mut states, mut whole) = (Vec::new(), vec![0.0; 82]);
-    setting.run(&motion, 0..41, &[0.4, -0.2], &[0.1], &mut states, Some(&mut whole)).unwrap();
+    setting.run(&ode, 0..41, &[0.4, -0.2], &[0.1], &mut states, Some(&mut whole)).unwrap();
     let middle = states[17 * 2 * 2..][..2].to_vec();
     let mut part = vec![0.0; 82];
-    setting.run(&motion, 17..30, &middle, &[0.1], &mut states, Some(&mut part)).unwrap();
+    setting.run(&ode, 17..30, &middle, &[0.1], &mut states, Some(&mut part)).unwrap();
     assert_eq!(part[17..30], whole[17..30]);
     assert_eq!(states.len(), 2 * (13 * 2 + 1));
 }
@@ -152,24 +154,24 @@ fn part_of_a_record_is_what_the_whole_run_does_there() {
 fn what_cannot_run_is_refused() {
     let inputs = wave(400, 0.1);
     let mut setting = Setting::default();
-    let explosive = motion(&[("x'", "x^2 + f^2"), ("v'", "k*v")], &["x"]);
+    let explosive = ode(&[("x'", "x^2 + f^2"), ("v'", "k*v")], &["x"]);
     setting.prepare(&explosive, &VALUES, &course(&inputs, 0.1, 1)).unwrap();
     let mut y = vec![0.0; 400];
     let found = setting.run(&explosive, 0..400, &[1.0, 0.0], &[0.0], &mut Vec::new(), Some(&mut y));
     assert!(matches!(found, Err(CoreError::Diverged { .. })), "{found:?}");
-    let root = motion(&[("x'", "-1"), ("v'", "sqrt(x)")], &["x"]);
+    let root = ode(&[("x'", "-1"), ("v'", "sqrt(x)")], &["x"]);
     setting.prepare(&root, &VALUES, &course(&inputs, 0.1, 1)).unwrap();
     let found = setting.run(&root, 0..400, &[1.0, 0.0], &[0.0], &mut Vec::new(), Some(&mut y));
     assert!(matches!(found, Err(CoreError::Diverged { .. })), "{found:?}");
-    let singular = motion(&[("x' + v'", "f"), ("2*x' + 2*v'", "k*x")], &["x"]);
+    let singular = ode(&[("x' + v'", "f"), ("2*x' + 2*v'", "k*x")], &["x"]);
     let found = setting.prepare(&singular, &VALUES, &course(&inputs, 0.1, 1));
     assert!(matches!(found, Err(CoreError::Singular { .. })));
-    let crossing = motion(&[("x'", "-1"), ("x*v'", "f")], &["x"]);
+    let crossing = ode(&[("x'", "-1"), ("x*v'", "f")], &["x"]);
     setting.prepare(&crossing, &VALUES, &course(&inputs, 0.1, 1)).unwrap();
     let found = setting.run(&crossing, 0..400, &[0.0, 0.0], &[0.0], &mut Vec::new(), Some(&mut y));
     assert!(matches!(found, Err(CoreError::Singular { .. })), "{found:?}");
     let squared = ModelText { ..text(&[("x'", "v"), ("v'*abs(v')", "f")], &["x"]) };
-    let found = Motion::new(&ModelTape::new(&squared).unwrap());
+    let found = OdeModel::new(&ModelTape::new(&squared).unwrap());
     assert!(matches!(found, Err(CoreError::Expression { .. })));
     for bad in [course(&inputs, 0.0, 1), course(&inputs, 0.1, 0)] {
         assert!(matches!(setting.prepare(&root, &VALUES, &bad), Err(CoreError::Range { .. })));

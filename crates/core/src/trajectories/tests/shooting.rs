@@ -1,6 +1,6 @@
 use super::*;
-use crate::linear::linear_simulation::Hold;
-use crate::trajectories::runge_kutta::tests::motion;
+use crate::linear::discretisation::Hold;
+use crate::trajectories::runge_kutta::tests::ode;
 
 const VALUES: [f64; 4] = [2.0, 0.3, 5.0, 0.013];
 const N: usize = 121;
@@ -44,7 +44,7 @@ fn rows(
     shift: f64,
     slopes: bool,
 ) -> (Vec<f64>, Flight) {
-    let motion = motion(&INVERTED, &["x", "v' + f"]);
+    let ode = ode(&INVERTED, &["x", "v' + f"]);
     let (free, initials): (&[usize], &[usize]) =
         if slopes { (&[2, 0, 1, 3], &[0, 1]) } else { (&[], &[]) };
     let free_shift: &[usize] = if slopes { &[0] } else { &[] };
@@ -61,7 +61,7 @@ fn rows(
         assert_eq!(first * 16, found.len());
         found.extend_from_slice(rows);
     };
-    flight.run(&motion, &course(inputs), plan, &wish, 8, &mut sink).unwrap();
+    flight.run(&ode, &course(inputs), plan, &wish, 8, &mut sink).unwrap();
     (found, flight)
 }
 
@@ -76,7 +76,7 @@ fn segments_make_one_continuous_trajectory() {
         // The feedback held its input between samples; the model draws straight lines.
         assert!((found[sample * 16] - state[0]).abs() < 0.05, "{sample}");
     }
-    let motion = motion(&INVERTED, &["x", "v' + f"]);
+    let ode = ode(&INVERTED, &["x", "v' + f"]);
     let first = flight.nodes[..2].to_vec();
     let wish = Wish {
         parameters: &VALUES,
@@ -89,7 +89,7 @@ fn segments_make_one_continuous_trajectory() {
     let mut single = Vec::new();
     let mut sink = |_: usize, rows: &mut [f64]| single.extend_from_slice(rows);
     let (mut alone, course) = (Flight::default(), course(&inputs));
-    alone.run(&motion, &course, &Plan::default(), &wish, 8, &mut sink).unwrap();
+    alone.run(&ode, &course, &Plan::default(), &wish, 8, &mut sink).unwrap();
     for sample in 0..N {
         // A single run agrees until rounding has grown by exp(1.5 t).
         let growth = (1.6 * 0.05 * sample as f64).exp();
@@ -103,8 +103,8 @@ fn derivatives_match_differences() {
     let plan = plan(&states);
     let ends = [plan.ends[0] * 0.2 + 0.1, plan.ends[2] * states[N - 1][0] + states[N - 1][1]];
     let (exact, flight) = rows(&plan, &inputs, &VALUES, &ends, 0.1, true);
-    let motion = motion(&INVERTED, &["x", "v' + f"]);
-    let starts = flight.start(&motion).1.to_vec();
+    let ode = ode(&INVERTED, &["x", "v' + f"]);
+    let starts = flight.start(&ode).1.to_vec();
     for column in 0..7 {
         let at = |h: f64| {
             let (mut values, mut ends, mut shift) = (VALUES, ends, 0.1);
@@ -114,7 +114,7 @@ fn derivatives_match_differences() {
                 _ => shift += h,
             }
             let (rows, flight) = rows(&plan, &inputs, &values, &ends, shift, false);
-            (rows, flight.start(&motion).0.to_vec())
+            (rows, flight.start(&ode).0.to_vec())
         };
         let h = 1e-6;
         let (up, down) = (at(h), at(-h));
