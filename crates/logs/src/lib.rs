@@ -6,10 +6,5 @@
 pub mod dataflash;
 pub mod error;
 pub mod ulog;
-mod ulog_columns;
-pub mod ulog_entry;
-pub mod ulog_format;
-pub mod ulog_record;
-pub mod ulog_scalar;
 
 pub use error::LogError;

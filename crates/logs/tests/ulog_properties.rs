@@ -92,7 +92,7 @@ fn the_crate_px4_ulog_agrees_on_an_intact_log() {
 
 #[test]
 fn the_crate_px4_ulog_panics_where_this_reader_goes_on() {
-    // The reason for a walk of our own: see the head of `ulog.rs`.
+    // The reason for a walk of our own: see the head of `ulog/mod.rs`.
     use px4_ulog::stream_parser::LogParser;
     let mut built = Builder::new();
     built.format("a:uint64_t timestamp;").record(b'P', &[200, b'x']);

@@ -4,7 +4,8 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use super::format::{Field, Kind, Scale, text};
-use super::{Dataflash, Table};
+use super::log_index::Dataflash;
+use super::message_table::Table;
 
 /// Numbers of an array field in one row.
 const ARRAY_WIDTH: usize = 32;
@@ -35,8 +36,8 @@ impl<B: AsRef<[u8]>> Dataflash<B> {
         instance: Option<i64>,
     ) -> Vec<Vec<f64>> {
         let places = self.places(table, instance);
-        let room = |field: &&Field| Vec::with_capacity(places.len() * field.kind.width());
-        let mut columns: Vec<Vec<f64>> = fields.iter().map(room).collect();
+        let reserved = |field: &&Field| Vec::with_capacity(places.len() * field.kind.width());
+        let mut columns: Vec<Vec<f64>> = fields.iter().map(reserved).collect();
         for block in places.chunks(BLOCK) {
             for (column, field) in columns.iter_mut().zip(fields) {
                 self.append(column, block, field);

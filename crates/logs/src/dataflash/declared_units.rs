@@ -5,8 +5,8 @@
 
 use std::collections::HashMap;
 
-use super::format::{Scale, fixed_scale, terminated, text};
-use super::{Kind, Table};
+use super::format::{Kind, Scale, fixed_scale, terminated, text};
+use super::message_table::Table;
 
 /// Character of `FMTU` that marks the instance field.
 const INSTANCE: u8 = b'#';

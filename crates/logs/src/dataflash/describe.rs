@@ -1,7 +1,9 @@
 //! What the stamps of a table say: span and usual interval.
 
 use super::column::BLOCK;
-use super::{Dataflash, Field, Table};
+use super::format::Field;
+use super::log_index::Dataflash;
+use super::message_table::Table;
 
 /// Steps that the median is taken of: the rate of a table needs no more.
 const STEPS: usize = 4096;

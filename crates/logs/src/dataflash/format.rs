@@ -1,6 +1,11 @@
 //! Layout of a message type: what one `FMT` row says, checked against itself.
 
-use super::HEADER_SIZE;
+/// First byte of every message.
+pub const HEADER_1: u8 = 0xA3;
+/// Second byte of every message.
+pub const HEADER_2: u8 = 0x95;
+/// Bytes before the payload.
+pub const HEADER_SIZE: usize = 3;
 
 /// Type number of `FMT`, the only layout that is known before reading.
 pub const FMT_TYPE: u8 = 128;

@@ -12,8 +12,8 @@
 //! Everything else is skipped and reported. The work is linear in the number of bytes: each search
 //! begins where the one before ended.
 
-use super::format::{FMT_SIZE, FMT_TYPE, Layout, definition};
-use super::{HEADER_1, HEADER_2, HEADER_SIZE, Table};
+use super::format::{FMT_SIZE, FMT_TYPE, HEADER_1, HEADER_2, HEADER_SIZE, Layout, definition};
+use super::message_table::Table;
 
 /// Stamps this close to the last one prove a message after garbage, µs.
 const NEAR_US: u64 = 60_000_000;

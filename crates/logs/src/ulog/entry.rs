@@ -1,6 +1,6 @@
 //! Payloads of ULog that are not samples: typed keys with values, and logged text.
 
-use crate::ulog_scalar::Primitive;
+use super::scalar::Primitive;
 
 /// Value of an information entry or parameter.
 #[derive(Debug, Clone, PartialEq)]

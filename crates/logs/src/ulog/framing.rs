@@ -1,7 +1,7 @@
 //! Framing of ULog records: is what lies at a place a record, and how sure is that?
 
-use crate::ulog_entry::{is_entry, is_line, is_parameter};
-use crate::ulog_format::{is_definition, is_message_name};
+use super::entry::{is_entry, is_line, is_parameter};
+use super::message_format::{is_definition, is_message_name};
 
 /// Magic payload of synchronisation records.
 pub const SYNC: [u8; 8] = [0x2f, 0x73, 0x13, 0x20, 0x25, 0x0c, 0xbb, 0x12];

@@ -1,23 +1,14 @@
-//! PX4 ULog: bytes to an index of what the log holds (Python side: `logs/ulog/reader.py`).
-//!
-//! The record walk is our own. The crate `px4-ulog` 0.6.1, which the tests use as a cross-check, stops
-//! for good at the first record that it cannot read, keeps no place to resume from, and panics on a
-//! parameter whose key length exceeds the record, so nothing can be built around it that a stranger's
-//! damaged file would not bring down. Here every record is judged before it is believed
-//! (`ulog_record.rs`); after damage the walk resumes at the next record that can be vouched for, and
-//! every byte range that was not read is listed with its reason.
-//!
-//! Memory: an offset of eight bytes for each sample, and entries in proportion to their records.
+//! A ULog as an index of its records: definitions, samples, entries, and what could not be read.
 
 use std::collections::HashMap;
 
-use crate::LogError;
-use crate::ulog_entry::{self, Entry, Line};
-use crate::ulog_format::{Formats, Shape, is_message_name};
-use crate::ulog_record::{
+use super::entry::{self, Entry, Line};
+use super::framing::{
     Found, Known, Reason, Worth, carries_on, is_one_damaged_record, judge, next_record,
     record_across,
 };
+use super::message_format::{Formats, Shape, is_message_name};
+use crate::LogError;
 
 const MAGIC: [u8; 7] = [0x55, 0x4c, 0x6f, 0x67, 0x01, 0x12, 0x35];
 const HEADER: usize = 16;
@@ -248,17 +239,17 @@ impl Ulog {
             b'F' => {
                 self.formats.add(payload);
             }
-            b'I' => self.infos.extend(ulog_entry::read(payload)),
+            b'I' => self.infos.extend(entry::read(payload)),
             b'M' => self
                 .multi_infos
                 .extend(flagged(payload).map(|(first, entry)| (first & 1 == 1, entry))),
             b'Q' => self.defaults.extend(flagged(payload)),
             b'P' if self.in_data => {
                 self.changes.extend(
-                    ulog_entry::read(payload).map(|item| Stamped { stamp_us: self.last_us, item }),
+                    entry::read(payload).map(|item| Stamped { stamp_us: self.last_us, item }),
                 );
             }
-            b'P' => self.parameters.extend(ulog_entry::read(payload)),
+            b'P' => self.parameters.extend(entry::read(payload)),
             b'L' | b'C' => self.lines.extend(Line::read(payload, kind == b'C')),
             b'O' => self.dropouts.push(Stamped {
                 stamp_us: self.last_us,
@@ -324,7 +315,7 @@ impl Ulog {
 
 fn flagged(payload: &[u8]) -> Option<(u8, Entry)> {
     let (&first, rest) = payload.split_first()?;
-    ulog_entry::read(rest).map(|entry| (first, entry))
+    entry::read(rest).map(|entry| (first, entry))
 }
 
 fn little_endian(bytes: &[u8]) -> u64 {

@@ -5,7 +5,7 @@
 
 use std::collections::HashMap;
 
-use crate::ulog_scalar::Primitive;
+use super::scalar::Primitive;
 
 /// Nesting deeper than this is refused; PX4 nests once.
 const MAXIMUM_DEPTH: usize = 16;

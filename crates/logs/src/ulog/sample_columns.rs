@@ -3,10 +3,10 @@
 use std::borrow::Cow;
 use std::collections::HashMap;
 
+use super::log_index::{Table, Ulog};
+use super::message_format::Column;
+use super::scalar::Primitive;
 use crate::LogError;
-use crate::ulog::{Table, Ulog};
-use crate::ulog_format::Column;
-use crate::ulog_scalar::Primitive;
 
 /// Rows gathered for all columns before the next ones: their bytes stay in the first-level cache.
 const BLOCK: usize = 256;

@@ -1,4 +1,4 @@
-"""ArduPilot DataFlash logs as a `LogSource` (native side: `crates/logs/src/dataflash.rs`)."""
+"""ArduPilot DataFlash logs as a `LogSource` (native side: `crates/logs/src/dataflash/mod.rs`)."""
 
 from __future__ import annotations
 

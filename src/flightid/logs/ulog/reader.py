@@ -1,4 +1,4 @@
-"""PX4 ULog behind the `Log` noun (native half: `crates/logs/src/ulog.rs`).
+"""PX4 ULog behind the `Log` noun (native half: `crates/logs/src/ulog/mod.rs`).
 
 The format carries no units: stamps are microseconds, everything else is given as it was logged with
 unit "1"; the channel maps know the units of the fields that they use.
