@@ -81,7 +81,7 @@ def run() -> Table:
     rows: list[tuple[Cell, ...]] = []
     rng = np.random.default_rng(0)
     model = fid.load_model("r50_hover").with_fixed(tau_ped=0.0)
-    system = fid.LinearSystem.of(model)
+    system = model.linear_system()
     u = 0.01 * rng.standard_normal((len(system.inputs), 2000))
     per_step = 1e9 / u.shape[1]
     with tempfile.TemporaryDirectory() as folder:

@@ -22,7 +22,7 @@ from fly import fly, write_csv
 from numpy.typing import ArrayLike
 
 import flightid as fid
-from flightid.models.linear.discrete_modes import discrete_modes
+from flightid.models.sampled.discrete_modes import discrete_modes
 from flightid.study import run_study
 from flightid.table import Cell, Column, Table
 from flightid.vehicles import TwinRotor

@@ -95,7 +95,7 @@ def test_navion_against_its_documented_modes() -> None:
 def test_python_control_agrees() -> None:
     control = pytest.importorskip("control")
     for name in ("r50_hover", "ah64_hover", "helicopter_6dof"):
-        system = fid.LinearSystem.of(fid.load_model(name))
+        system = fid.load_model(name).linear_system()
         omega, zeta, poles = control.damp(control.ss(*system.state_space()[:4]), doprint=False)
         found = fid.modes(system)
         keep = poles.imag >= 0.0

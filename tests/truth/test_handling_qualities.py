@@ -247,7 +247,7 @@ def test_low_coherence_and_several_crossings_are_said() -> None:
 
 def test_black_box_models_and_systems_are_read_to_nyquist() -> None:
     continuous = fid.load_model("attitude_first_order")
-    sampled = fid.LinearSystem.of(continuous).sampled(0.002)
+    sampled = continuous.linear_system().sampled(0.002)
     exact = attitude_bandwidth(continuous, "phi", "tau_phi", band_rad_s=(0.3, 100.0))
     found = attitude_bandwidth(sampled, "phi", "tau_phi", band_rad_s=(0.3, 1e4))
     delayed = continuous.with_values({"tau": continuous.parameters["tau"].value + 0.001})

@@ -147,7 +147,7 @@ def test_intervals_of_fits_cover():
         )
         fit = fid.identify(model, response, hold="zero")
         # The plant as the controller sees it: held inputs, samples out.
-        sampled = spread_of(fit).then(lambda m: fid.LinearSystem.of(m).sampled(STEP_S))
+        sampled = spread_of(fit).then(lambda m: m.linear_system().sampled(STEP_S))
         found = fid.margins(sampled, controller=lambda s: law(np.exp(s * STEP_S)))
         covered(found, truth, MARGINS, hits)
     judge(hits, "fits")

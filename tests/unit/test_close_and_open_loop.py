@@ -227,7 +227,7 @@ def test_a_digital_loop_may_leave_a_delayed_input_alone() -> None:
 
 def test_a_connection_is_a_linear_system_to_whoever_asks() -> None:
     closed = fid.close_loop(vehicle(), controller(), draws=0)
-    system = fid.LinearSystem.of(closed.loops)
+    system = closed.loops.linear_system()
     slow = np.array([0.3, 2.0])
     assert_close(system.frequency_response(slow), closed.loops.frequency_response(slow), rtol=1e-5,
                  why="delays of order three at 0.2 rad")  # fmt: skip

@@ -70,7 +70,7 @@ def test_a_wrong_model_is_red() -> None:
 
 
 def test_a_narx_model_runs_beside_the_linear_model_of_its_lags() -> None:
-    model = fid.NarxModel("y", ("u",), 2, 2, kernel=None, degree=2, stop="bic")
+    model = fid.NarxStructure("y", ("u",), 2, 2, kernel=None, degree=2, stop="bic")
     fit = fid.identify(model, fly(0, curve=0.8))
     found = cross_validate(fit, fly(1, curve=0.8))
     one, linear = found.of("run"), found.of("run", model="linear, same lags")
@@ -82,7 +82,7 @@ def test_a_narx_model_runs_beside_the_linear_model_of_its_lags() -> None:
     assert_close(left["y"], np.subtract(*one.scored), rtol=1e-15, why="measured minus predicted")
     # On a linear vehicle the same terms, chosen on few samples, have nothing to win.
     few = fid.identify(
-        fid.NarxModel("y", ("u",), 2, 2, width=0.5, stop="terms", maximum_terms=40),
+        fid.NarxStructure("y", ("u",), 2, 2, width=0.5, stop="terms", maximum_terms=40),
         fly(0).segment(0.0, 10.0),
     )
     codes = [finding.code for finding in cross_validate(few, fly(3)).findings]
@@ -91,7 +91,7 @@ def test_a_narx_model_runs_beside_the_linear_model_of_its_lags() -> None:
 
 def test_a_run_that_is_held_is_red() -> None:
     fit = fid.identify(
-        fid.NarxModel("y", ("u",), 2, 2, kernel=None, degree=3, stop="terms", maximum_terms=25),
+        fid.NarxStructure("y", ("u",), 2, 2, kernel=None, degree=3, stop="terms", maximum_terms=25),
         fly(0).segment(0.0, 5.0),
     )
     record = fly(1)

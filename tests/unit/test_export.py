@@ -28,8 +28,8 @@ def test_formats_that_are_read_again(suffix: str, tmp_path: Path) -> None:
     made = fid.export(ARMAX, tmp_path / f"model.{suffix}")
     assert made.format == suffix
     read = fid.load_model if suffix == "toml" else fid.read_system
-    back = fid.LinearSystem.of(read(made.files[0]))
-    assert np.array_equal(back.a, fid.LinearSystem.of(ARMAX).a)
+    back = read(made.files[0]).linear_system()
+    assert np.array_equal(back.a, ARMAX.linear_system().a)
     assert repr(made) == f"Exported({suffix}: model.{suffix})"
     assert "model." in str(made.summary())
     assert made.to_dict()["schema"] == "flightid.exported/1"
@@ -85,7 +85,7 @@ def test_what_cannot_be_exported_is_said(tmp_path: Path) -> None:
 
 def test_options_of_c_are_checked(tmp_path: Path) -> None:
     roll = fid.load_model("rate_first_order")
-    sampled = fid.LinearSystem.of(roll).sampled(0.1)
+    sampled = roll.linear_system().sampled(0.1)
     path = tmp_path / "roll.c"
     with pytest.raises(OptionError, match="needs the time of one step"):
         fid.export(roll, path)

@@ -9,7 +9,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, ModelError, OptionError
-from flightid.models.linear.recursion import run_recursion
+from flightid.models.sampled.recursion import run_recursion
 from flightid.plot.subspace import singular_values
 from tests.closeness import assert_close
 from tests.innovations_records import PAIR, SINGLE, flown
@@ -233,10 +233,10 @@ def test_models_that_contradict_themselves_are_refused():
         M(("y",), ("u",), 0.0, [[0.5]], [[1.0]], [[1.0]])
     with pytest.raises(ModelError, match="noise covariance"):
         M(("y",), ("u",), 0.1, [[0.5]], [[1.0]], [[1.0]], noise_covariance=np.eye(2))
-    with pytest.raises(ModelError, match="no innovations model"):
+    with pytest.raises(ModelError, match="has no outputs"):
         M.from_dict({"a": []})
-    with pytest.raises(ModelError, match="do not make a model"):
-        M.from_dict({"schema": "flightid.innovations_model/1", "a": "text"})
+    with pytest.raises(ModelError, match="must be a list"):
+        M.from_dict({"outputs": ["y"], "inputs": ["u"], "a": "text"})
 
 
 def test_predictions_refuse_what_they_do_not_know():

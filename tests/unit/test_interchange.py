@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 
 import flightid as fid
 from flightid.errors import ExportError, FileFormatError, ModelError
-from flightid.models.description import model_from_description
-from flightid.models.linear.description import system_to_table
+from flightid.models.kinds import model_from_description
 from flightid.models.linear.system_files import MAXIMUM_BYTES
 from flightid.models.save import model_as_toml
 from tests.closeness import assert_close
@@ -204,7 +203,7 @@ def test_every_number_survives_json_and_toml(numbers: list[float]) -> None:
     a, b, c, d = ([[number]] for number in numbers)
     system = fid.LinearSystem(a, b, c, d, ("u",), ("y",))
     for table in (
-        json.loads(json.dumps(system_to_table(system))),
+        json.loads(json.dumps(system.to_dict())),
         tomllib.loads(model_as_toml(system)),
     ):
         same(model_from_description(table), system)

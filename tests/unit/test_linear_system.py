@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import flightid as fid
 from flightid import errors
+from flightid.models import linear_system
 from flightid.models.linear.delay_states import pade_delay
 from tests.closeness import assert_close
 
@@ -112,13 +113,13 @@ def test_every_kind_of_model_gives_one() -> None:
         polynomial,
         innovations,
     ):
-        system = fid.LinearSystem.of(model)
-        assert fid.LinearSystem.of(system) is system
+        system = model.linear_system()
+        assert system.linear_system() is system
         found, wanted = system.frequency_response(omega), model.frequency_response(omega)
         assert_close(found, wanted, rtol=1e-9, atol=1e-12, why=type(model).__name__)
-    assert fid.LinearSystem.of(fid.load_model("r50_hover")).states[:2] == ("u", "v")
+    assert fid.load_model("r50_hover").linear_system().states[:2] == ("u", "v")
     with pytest.raises(errors.ModelError, match="no linear system"):
-        fid.LinearSystem.of("roll")
+        linear_system("roll")
 
 
 def test_selection_keeps_order_and_delays() -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 import flightid as fid
 from flightid.errors import FlightidError
 from flightid.models import StateSpaceModel
-from flightid.models.description import model_from_description
+from flightid.models.kinds import model_from_description
 
 LIBRARY = files("flightid.models") / "library"
 # Small models that hold every kind of table.

@@ -9,7 +9,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, FileFormatError, ModelError, OptionError, UnknownNameError
-from flightid.models.description import model_from_description
+from flightid.models.kinds import model_from_description
 from tests.closeness import assert_close
 
 P = fid.Parameter

@@ -12,7 +12,7 @@ import flightid as fid
 from flightid import errors
 from flightid.dynamics.modes.modes import UNFITTED, UNSIGNED
 from flightid.dynamics.modes.participation import eigenpairs
-from flightid.models.linear.discrete_modes import NO_COUNTERPART
+from flightid.models.sampled.discrete_modes import NO_COUNTERPART
 from tests.closeness import assert_close
 
 
@@ -137,7 +137,7 @@ def test_crossing_without_coupling_keeps_its_intervals() -> None:
 
 
 def test_shares_do_not_depend_on_units() -> None:
-    model = fid.LinearSystem.of(fid.load_model("r50_hover"))
+    model = fid.load_model("r50_hover").linear_system()
     a = np.asarray(model.a)
     scale = np.geomspace(1e-3, 1e3, len(a))
     first, second = (list(eigenpairs(each)) for each in (a, a * scale / scale[:, None]))
@@ -148,7 +148,7 @@ def test_shares_do_not_depend_on_units() -> None:
 
 
 def test_sampled_models_are_turned_to_continuous_time() -> None:
-    continuous = fid.LinearSystem.of(fid.load_model("fixed_wing_longitudinal"))
+    continuous = fid.load_model("fixed_wing_longitudinal").linear_system()
     sampled = fid.LinearSystem(
         *continuous.sampled(0.02).state_space()[:4],
         continuous.inputs,
@@ -223,7 +223,7 @@ def test_transfer_functions_take_their_slopes_from_differences() -> None:
 def test_words_follow_the_states_and_their_names() -> None:
     wing = fid.load_model("fixed_wing_lateral")
     assert [m.name for m in fid.modes(wing)] == ["spiral", "Dutch roll", "roll"]
-    system = fid.LinearSystem.of(wing)
+    system = wing.linear_system()
     renamed = replace(system, states=("sideslip", "rr", "yr", "bank"), units={})
     assert fid.modes(renamed).modes[-1].name == "rr"
     told = fid.modes(

@@ -8,7 +8,7 @@ import pytest
 import flightid as fid
 from flightid.errors import DataError, FitError, OptionError, UnitError
 from flightid.identification.prediction_error.starts import polynomial_starts
-from flightid.models.polynomial.data import gather_channels
+from flightid.models.sampled.channels import gather_channels
 from tests.closeness import assert_close
 from tests.polynomial_records import ARMAX, TWO_INPUTS, flown
 

@@ -9,7 +9,7 @@ from scipy.signal import dlsim, freqz, lfilter
 
 import flightid as fid
 from flightid.errors import DataError, ModelError, OptionError, UnitError, UnknownNameError
-from flightid.models.linear.discrete_modes import discrete_modes
+from flightid.models.sampled.discrete_modes import discrete_modes
 from tests.closeness import assert_close
 from tests.polynomial_records import ARMAX, TWO_INPUTS, flown
 

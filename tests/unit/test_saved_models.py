@@ -10,9 +10,9 @@ import pytest
 
 import flightid as fid
 from flightid.errors import FlightidError, ModelError
-from flightid.models import Lag, NarxEquation, Term, load_structure
-from flightid.models.description import model_from_description, model_to_description
-from flightid.models.narx.model import Scaling
+from flightid.models import Lag, NarxModel, Term, load_structure
+from flightid.models.kinds import model_from_description, model_to_description
+from flightid.models.narx.scaling import Scaling
 
 ARMAX = fid.PolynomialModel(
     "theta", ("v", "w"), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5], [0.3]], c=[1, 0.2], nk=(2, 1),
@@ -22,8 +22,8 @@ INNOVATIONS = fid.InnovationsModel(
     ("p", "q"), ("lat",), 0.02, [[0.8, 0.1], [0.0, 0.3]], [[2.0], [1 / 3]], np.eye(2),
     k=[[0.1, 0.0], [0.0, 0.2]], noise_covariance=np.diag([1e-3, 2e-3]), units={"p": "rad/s"},
 )  # fmt: skip
-STRUCTURE = fid.NarxModel("y", ("u",), 2, 1, degree=2, width=1.3)
-NARX = NarxEquation(
+STRUCTURE = fid.NarxStructure("y", ("u",), 2, 1, degree=2, width=1.3)
+NARX = NarxModel(
     STRUCTURE,
     (
         Term("constant"),
@@ -56,10 +56,10 @@ def test_a_narx_equation_runs_as_before(tmp_path: Path) -> None:
 
 
 def test_a_narx_model_without_radial_terms_stays_so(tmp_path: Path) -> None:
-    bare = fid.NarxModel("y", ("u",), 1, 1, kernel=None)
-    equation = NarxEquation(bare, (Term("constant"),), (1.0,), NARX.scaling)
+    bare = fid.NarxStructure("y", ("u",), 1, 1, kernel=None)
+    equation = NarxModel(bare, (Term("constant"),), (1.0,), NARX.scaling)
     back = fid.load_model(fid.write_model(equation, tmp_path / "narx.toml"))
-    assert back.model.kernel is None
+    assert back.structure.kernel is None
 
 
 def test_black_boxes_are_no_structures_to_fit(tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ import click
 from flightid.cli.output import emit, json_option, leave_by_verdict, note
 
 if TYPE_CHECKING:
-    from flightid.models import Model
+    from flightid.models import GreyBoxModel
     from flightid.record import Record
     from flightid.responses import FrequencyResponse
 
@@ -88,7 +88,7 @@ def command(
 
 def _records(
     file: Path,
-    model: Model,
+    model: GreyBoxModel,
     span: tuple[float, float] | None,
     sid_run: int | None,
 ) -> list[Record]:

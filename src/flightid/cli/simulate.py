@@ -126,15 +126,15 @@ def model(
 
 
 def _model(name: str, axis: str | None, values: dict[str, float]) -> Flown:
-    from flightid import LinearSystem, load_model
-    from flightid.models import StateSpaceModel, TransferFunctionModel
+    from flightid import load_model
+    from flightid.models import StateSpaceModel, TransferFunctionModel, linear_system
 
     found = load_model(name, axis=axis)
     if isinstance(found, StateSpaceModel | TransferFunctionModel):
         return found.with_values(values) if values else found
     if values:
         raise click.UsageError("--value needs a model with named parameters")
-    return LinearSystem.of(found)
+    return linear_system(found)
 
 
 def _gusts(given: tuple[str, ...]) -> dict[str, tuple[float, float]]:

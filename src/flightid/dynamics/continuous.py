@@ -11,7 +11,8 @@ from scipy.linalg import expm, logm, schur, solve_sylvester
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.identification import InnovationsFit, PolynomialFit
 from flightid.models import InnovationsModel, PolynomialModel
-from flightid.models.linear.linear_system import LinearModel, LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
+from flightid.models.model import LinearModel, linear_system
 
 Array = NDArray[np.float64]
 Four = tuple[Array, Array, Array, Array]
@@ -113,7 +114,7 @@ def to_discrete(model: LinearModel, sample_time_s: float, hold: str = "zero") ->
     _require_hold(hold)
     if not sample_time_s > 0:
         raise DataError("the sample time is not positive", found=sample_time_s, needed="seconds")
-    system = LinearSystem.of(model)
+    system = linear_system(model)
     if hold == "tustin":
         a, b, c, d, delays_s = system.state_space()
         parts = _to_tustin(a, b, c, d, sample_time_s)

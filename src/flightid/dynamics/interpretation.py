@@ -22,7 +22,7 @@ from flightid.identification.prediction_error.roots import (
 )
 from flightid.identification.subspace.roots import ALL, innovations_roots
 from flightid.models import InnovationsModel, PolynomialModel
-from flightid.models.linear.discrete_modes import AT_ORIGIN, NO_COUNTERPART
+from flightid.models.sampled.discrete_modes import AT_ORIGIN, NO_COUNTERPART
 from flightid.table import Cell, Column, Table
 
 SCHEMA = "flightid.interpretation/1"

@@ -9,7 +9,8 @@ from flightid.export.c_source import CSource, Hold, equation_source, linear_sour
 from flightid.export.exported import Exported
 from flightid.export.names import identifier
 from flightid.files import write_atomically
-from flightid.models import LinearSystem, StateSpaceModel
+from flightid.models import StateSpaceModel
+from flightid.models.model import linear_system
 
 
 def model_source(
@@ -26,7 +27,7 @@ def model_source(
 
     Parameters
     ----------
-    model : StateSpaceModel, LinearSystem or what `LinearSystem.of` takes
+    model : StateSpaceModel, LinearSystem or what `linear_system` takes
     name, stem : str
         Of the model, and of the files.
     sample_time_s : float or None
@@ -64,7 +65,7 @@ def model_source(
         raise OptionError(
             "a linear model has no substeps: its discretisation is exact", found=substeps
         )
-    return linear_source(LinearSystem.of(model), name, stem, sample_time_s, hold)
+    return linear_source(linear_system(model), name, stem, sample_time_s, hold)
 
 
 def export_c(

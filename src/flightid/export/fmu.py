@@ -36,6 +36,7 @@ from flightid.export.names import comment, identifier
 from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.models import LinearSystem, StateSpaceModel
+from flightid.models.model import linear_system
 from flightid.version import VERSION
 
 BOTH: tuple[Interface, ...] = ("model-exchange", "co-simulation")
@@ -68,7 +69,7 @@ def export_fmu(
 
     Parameters
     ----------
-    model : StateSpaceModel, or what `LinearSystem.of` takes
+    model : StateSpaceModel, or what `linear_system` takes
         A continuous one keeps its parameters, or the entries of its matrices, tunable.
     path : Path
         File ending in ``.fmu``.
@@ -147,7 +148,7 @@ def _prepared(model: object, pade_order: int | None) -> StateSpaceModel | Linear
                 found=f"pade_order={pade_order}",
                 action="put a block of kind 'pade_delay' into the model",
             )
-    system = LinearSystem.of(model)
+    system = linear_system(model)
     if system.is_discrete:
         return system
     if pade_order is not None:

@@ -22,6 +22,7 @@ from flightid.export.names import identifier
 from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.models import LinearSystem
+from flightid.models.model import linear_system
 
 Array = NDArray[np.float64]
 FT_M = 0.3048
@@ -54,7 +55,7 @@ def export_jsbsim(
 
     Parameters
     ----------
-    model : what `LinearSystem.of` takes, with states named u, v or beta, w or alpha, p, q, r
+    model : what `linear_system` takes, with states named u, v or beta, w or alpha, p, q, r
         In SI units and radians, body axes; phi, theta and psi may be states too.
     path : Path
         File ending in ``.xml``, for ``<aerodynamics file="..."/>``.
@@ -93,7 +94,7 @@ def export_jsbsim(
     """
     if path.suffix.lower() != ".xml":
         raise OptionError("a JSBSim file ends in .xml", found=path.name)
-    system = LinearSystem.of(model)
+    system = linear_system(model)
     if system.is_discrete:
         raise ExportError("JSBSim takes derivatives in continuous time", found=repr(system))
     point = _trim_of(model, trim)

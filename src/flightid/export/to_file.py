@@ -18,7 +18,7 @@ from flightid.identification import Fit, NarxFit
 from flightid.models import (
     InnovationsModel,
     LinearSystem,
-    NarxEquation,
+    NarxModel,
     PolynomialModel,
     StateSpaceModel,
     TransferFunctionModel,
@@ -26,6 +26,7 @@ from flightid.models import (
     write_system,
 )
 from flightid.models.linear.system_files import MATLAB_RECIPE
+from flightid.models.model import linear_system
 
 FORMATS = {
     ".toml": "toml",
@@ -124,7 +125,7 @@ def model_of(source: object) -> object:
     if isinstance(source, NarxFit):
         return source.equation
     model = getattr(source, "model", None)
-    return source if model is None or isinstance(source, NarxEquation) else model
+    return source if model is None or isinstance(source, NarxModel) else model
 
 
 def _called(
@@ -143,9 +144,7 @@ def _called(
 
 
 def _toml(model: object, path: Path) -> Exported:
-    known = (
-        TransferFunctionModel | StateSpaceModel | PolynomialModel | InnovationsModel | NarxEquation
-    )
+    known = TransferFunctionModel | StateSpaceModel | PolynomialModel | InnovationsModel | NarxModel
     if not isinstance(model, known | LinearSystem):
         raise ExportError(
             "this is no model that a file could hold", found=type(model).__name__, needed="a model"
@@ -157,11 +156,11 @@ def _toml(model: object, path: Path) -> Exported:
 
 
 def _matrices(source: object, model: object, path: Path, format: str) -> Exported:
-    if isinstance(model, NarxEquation):
-        raise ExportError("a NARX equation has no matrices", needed="toml")
+    if isinstance(model, NarxModel):
+        raise ExportError("a NARX model has no matrices", needed="toml")
     if path.suffix.lower() != f".{format}":
         raise OptionError("the suffix is not that of the format", found=path.name, needed=format)
-    system = LinearSystem.of(model)
+    system = linear_system(model)
     write_system(system, path, _parameters(source))
     facts = {"read": f"flightid.read_system({path.name!r})"}
     if format == "mat":

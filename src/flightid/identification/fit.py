@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from flightid.findings import Finding
 from flightid.identification.fitted_record import FittedRecord
-from flightid.models import Model
+from flightid.models import GreyBoxModel
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.responses import PairResponse
 from flightid.table import Cell, Column, Table
 
@@ -207,7 +208,7 @@ class Fit:
     200.0
     """
 
-    model: Model
+    model: GreyBoxModel
     parameters: Mapping[str, FittedParameter]
     cost: float
     average_cost: float
@@ -225,6 +226,10 @@ class Fit:
     provenance: Mapping[str, object] = field(default_factory=dict)
     records: tuple[FittedRecord, ...] = ()
     noise_covariance: NDArray[np.float64] | None = None
+
+    def linear_system(self) -> LinearSystem:
+        """The linear system of the fitted model; ModelError with the reason where there is none."""
+        return self.model.linear_system()
 
     def __repr__(self) -> str:
         """Size and average cost on one line."""

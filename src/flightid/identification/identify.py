@@ -31,9 +31,9 @@ from flightid.identification.regression.options import (
 )
 from flightid.identification.subspace.fit import fit_subspace
 from flightid.identification.subspace.result import InnovationsFit
-from flightid.models import Model, StateSpaceModel, TransferFunctionModel
+from flightid.models import GreyBoxModel, StateSpaceModel, TransferFunctionModel
 from flightid.models.innovations.structure import SubspaceStructure
-from flightid.models.narx.model import NarxModel
+from flightid.models.narx.structure import NarxStructure
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
@@ -68,7 +68,7 @@ class Method:
 METHODS: dict[tuple[type, str, str], Method] = {
     (TransferFunctionModel, RESPONSES, "frequency_domain"): Method(fit_responses, Options),
     (StateSpaceModel, RESPONSES, "frequency_domain"): Method(fit_responses, Options),
-    (NarxModel, RECORDS, "orthogonal_least_squares"): Method(
+    (NarxStructure, RECORDS, "orthogonal_least_squares"): Method(
         lambda model, data, _: fit_narx(model, data), NoOptions
     ),
     (PolynomialStructure, RECORDS, "prediction_error"): Method(
@@ -126,7 +126,7 @@ def _method(model: object, data: object, name: str | None) -> Method:
             "there is no fit for this model and these data",
             found=f"{type(model).__name__} and {type(data).__name__}",
             needed="TransferFunctionModel or StateSpaceModel and FrequencyResponse or Record, "
-            "or NarxModel, PolynomialStructure or SubspaceStructure and Record",
+            "or NarxStructure, PolynomialStructure or SubspaceStructure and Record",
         )
     if name is None:
         return next(iter(ways.values()))
@@ -152,7 +152,7 @@ def _options(method: Method, given: dict[str, Any]) -> object:
 
 
 @overload
-def identify(model: NarxModel, data: Record | Sequence[Record]) -> NarxFit: ...
+def identify(model: NarxStructure, data: Record | Sequence[Record]) -> NarxFit: ...
 
 
 @overload
@@ -165,7 +165,7 @@ def identify(model: SubspaceStructure, data: Record | Sequence[Record]) -> Innov
 
 @overload
 def identify(
-    model: Model,
+    model: GreyBoxModel,
     data: FrequencyResponse,
     *,
     method: str | None = ...,
@@ -185,7 +185,7 @@ def identify(
 
 @overload
 def identify(
-    model: Model,
+    model: GreyBoxModel,
     data: Record | Sequence[Record],
     *,
     method: str | None = ...,
@@ -208,7 +208,7 @@ def identify(
 
 @overload
 def identify(
-    model: Model,
+    model: GreyBoxModel,
     data: JointData,
     *,
     method: str | None = ...,
@@ -230,7 +230,7 @@ def identify(
 
 
 def identify(
-    model: Model | NarxModel | PolynomialStructure | SubspaceStructure,
+    model: GreyBoxModel | NarxStructure | PolynomialStructure | SubspaceStructure,
     data: FrequencyResponse | Record | Sequence[Record] | JointData,
     *,
     method: str | None = None,
@@ -253,14 +253,14 @@ def identify(
       with estimated process noise, for turbulence).
     - model on (response, records): ``"joint"``. Both likelihoods together, the response's with the
       covariance of its errors; the flights of the response are to be others than the records.
-    - `NarxModel` on records: orthogonal least squares; polynomial structure
+    - `NarxStructure` on records: orthogonal least squares; polynomial structure
       (`PolynomialModel.arx` … `.general`) on records: prediction errors. Subspace structure
       (`InnovationsModel.subspace`): singular values, then prediction errors. Options are the
       model's.
 
     Parameters
     ----------
-    model : Model, NarxModel, PolynomialStructure or SubspaceStructure
+    model : GreyBoxModel, NarxStructure, PolynomialStructure or SubspaceStructure
         Structure, start values and bounds; everything in it is fitted.
     data : FrequencyResponse, Record or sequence of Record, or tuple of both
         Measured, with the model's channels, in the model's units.

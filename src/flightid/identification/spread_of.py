@@ -12,7 +12,7 @@ from flightid.errors import OptionError
 from flightid.identification.fit import Fit
 from flightid.identification.prediction_error.result import PolynomialFit
 from flightid.identification.subspace.result import InnovationsFit
-from flightid.models import InnovationsModel, Model, PolynomialModel
+from flightid.models import GreyBoxModel, InnovationsModel, PolynomialModel
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.spread import Spread
 
@@ -76,13 +76,13 @@ def spread_of(source: object, output: str | None = None, input: str | None = Non
     return Spread(np.zeros(0), None, lambda _: source, None, NO_COVARIANCE)
 
 
-def _of_fit(fit: Fit) -> Spread[Model]:
+def _of_fit(fit: Fit) -> Spread[GreyBoxModel]:
     model, names = fit.model, fit.names
     centre = np.array([fit.parameters[name].value for name in names])
     parameters = [model.parameters[name] for name in names]
     bounds = np.array([p.minimum for p in parameters]), np.array([p.maximum for p in parameters])
 
-    def make(numbers: Array) -> Model:
+    def make(numbers: Array) -> GreyBoxModel:
         return model.with_values(dict(zip(names, map(float, numbers), strict=True)))
 
     reason = "" if fit.covariance is not None else "the fit knows no errors of its data"

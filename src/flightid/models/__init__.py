@@ -3,18 +3,21 @@
 State space: `model_tape.rs`, `state_space_response.rs`.
 """
 
-from flightid.models.description import Model, SavedModel
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.prediction import InnovationsPrediction
 from flightid.models.innovations.structure import SubspaceStructure
+from flightid.models.kinds import GreyBoxModel
 from flightid.models.language.blocks import Block
 from flightid.models.language.record_values import RecordValue
 from flightid.models.language.tables import Axis, TableFunction
 from flightid.models.linear.interchange import from_control, from_scipy, to_control, to_scipy
-from flightid.models.linear.linear_system import LinearModel, LinearSystem
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.system_files import read_system, write_system
 from flightid.models.load import library_names, load_model, load_structure
-from flightid.models.narx.model import NarxEquation, NarxModel, NarxPrediction
+from flightid.models.model import LinearModel, Model, linear_system
+from flightid.models.narx.model import NarxModel
+from flightid.models.narx.prediction import NarxPrediction
+from flightid.models.narx.structure import NarxStructure
 from flightid.models.narx.terms import Lag, Term
 from flightid.models.parameters import Parameter, Parameters
 from flightid.models.polynomial.model import PolynomialModel
@@ -29,6 +32,7 @@ from flightid.models.transfer.model import TransferFunction, TransferFunctionMod
 __all__ = [
     "Axis",
     "Block",
+    "GreyBoxModel",
     "InnovationsModel",
     "InnovationsPrediction",
     "Lag",
@@ -36,9 +40,9 @@ __all__ = [
     "LinearSystem",
     "Model",
     "ModelBuilder",
-    "NarxEquation",
     "NarxModel",
     "NarxPrediction",
+    "NarxStructure",
     "Output",
     "Parameter",
     "Parameters",
@@ -47,7 +51,6 @@ __all__ = [
     "PolynomialStructure",
     "RecordValue",
     "ResponsePair",
-    "SavedModel",
     "StateSpaceMatrices",
     "StateSpaceModel",
     "SubspaceStructure",
@@ -58,6 +61,7 @@ __all__ = [
     "from_control",
     "from_scipy",
     "library_names",
+    "linear_system",
     "load_model",
     "load_structure",
     "read_system",

@@ -8,7 +8,8 @@ from importlib.resources import files
 from pathlib import Path
 
 from flightid.errors import FileFormatError, ModelError, OptionError, UnknownNameError
-from flightid.models.description import Model, SavedModel, model_from_description
+from flightid.models.kinds import GreyBoxModel, model_from_description
+from flightid.models.model import Model
 from flightid.models.state_space.model import StateSpaceModel
 from flightid.models.transfer.model import TransferFunctionModel
 
@@ -41,7 +42,7 @@ def library_names() -> list[str]:
     return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
-def load_model(source: str | Path, *, axis: str | None = None) -> SavedModel:
+def load_model(source: str | Path, *, axis: str | None = None) -> Model:
     """Load a model from a TOML file, or one of the library by its name.
 
     Parameters
@@ -54,8 +55,8 @@ def load_model(source: str | Path, *, axis: str | None = None) -> SavedModel:
 
     Returns
     -------
-    TransferFunctionModel or StateSpaceModel; from a file also a PolynomialModel, InnovationsModel,
-    NarxEquation or LinearSystem
+    Model
+        TransferFunctionModel or StateSpaceModel; from a file any kind of `models.kinds.KINDS`.
 
     Raises
     ------
@@ -96,7 +97,7 @@ def load_model(source: str | Path, *, axis: str | None = None) -> SavedModel:
     return _build(_parse(text, name), axis, name)
 
 
-def load_structure(source: str | Path, *, axis: str | None = None) -> Model:
+def load_structure(source: str | Path, *, axis: str | None = None) -> GreyBoxModel:
     """As `load_model`, for a model with named parameters that a fit can start from.
 
     Raises
@@ -140,7 +141,7 @@ def _parse(text: str, name: str) -> dict[str, object]:
         ) from error
 
 
-def _build(content: dict[str, object], axis: str | None, name: str) -> SavedModel:
+def _build(content: dict[str, object], axis: str | None, name: str) -> Model:
     axes = content.pop("axes", None)
     if not isinstance(axes, dict):
         if axis is not None:

@@ -57,17 +57,20 @@ class Parameter:
     note: str = ""
 
     def __post_init__(self) -> None:
+        self._check_name()
+        object.__setattr__(self, "unit", canonical(self.unit))
+        if self.tie is not None:
+            object.__setattr__(self, "free", False)
+            return
+        self._check_numbers()
+
+    def _check_name(self) -> None:
         if not _NAME.fullmatch(self.name) or self.name in RESERVED:
             raise ModelError(
                 "name of a parameter cannot stand in a formula",
                 found=repr(self.name),
                 needed="letters, digits and underscores, not a function, 'pi' or 's'",
             )
-        object.__setattr__(self, "unit", canonical(self.unit))
-        if self.tie is not None:
-            object.__setattr__(self, "free", False)
-            return
-        self._check_numbers()
 
     def _check_numbers(self) -> None:
         if self.value is None or not math.isfinite(self.value):

@@ -9,19 +9,19 @@ from pathlib import Path
 
 from flightid.errors import ModelError
 from flightid.files import write_atomically
-from flightid.models.description import SavedModel, model_to_description
+from flightid.models.kinds import model_to_description
+from flightid.models.model import Model
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def write_model(model: SavedModel, path: str | Path) -> Path:
+def write_model(model: Model, path: str | Path) -> Path:
     """Write a model to a TOML file; `load_model` gives the same model back.
 
     Parameters
     ----------
-    model : StateSpaceModel, TransferFunctionModel, PolynomialModel, InnovationsModel, NarxEquation
-        or LinearSystem
-        With all its numbers; of a fit its ``model``, of a NARX fit its ``equation``.
+    model : Model
+        Of any kind, with all its numbers; of a fit its ``model``, of a NARX fit its ``equation``.
     path : str or Path
         File ending in ``.toml``; its folder must exist. It is written whole or not at all.
 
@@ -55,7 +55,7 @@ def write_model(model: SavedModel, path: str | Path) -> Path:
     return write_atomically(path, model_as_toml(model))
 
 
-def model_as_toml(model: SavedModel) -> str:
+def model_as_toml(model: Model) -> str:
     """Text of the TOML file.
 
     Example

@@ -17,7 +17,7 @@ from scipy.linalg import schur, solve_sylvester
 
 from flightid import _native
 from flightid.errors import ModelError
-from flightid.models import Model, TransferFunctionModel
+from flightid.models import GreyBoxModel, TransferFunctionModel
 from flightid.models.linear.realisation import canonical_form
 
 Array = NDArray[np.float64]
@@ -57,7 +57,7 @@ class Modes:
     backwards: bool
 
 
-def systems_of(model: Model) -> list[System]:
+def systems_of(model: GreyBoxModel) -> list[System]:
     """State spaces of a model: one of a state-space model, one for each response of the others.
 
     Responses of a transfer-function model may each have a delay of their own.

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from flightid.errors import ModelError, OptionError, UnknownNameError
-from flightid.models import LinearModel, LinearSystem, StateSpaceModel
-from flightid.models.linear.recursion import run_recursion
+from flightid.models import LinearModel, StateSpaceModel
+from flightid.models.model import linear_system
+from flightid.models.sampled.recursion import run_recursion
 from flightid.models.state_space.checks import derivative
 
 Array = NDArray[np.float64]
@@ -129,7 +130,7 @@ def linear_disturbance(
     Van Loan, *IEEE Trans. Automatic Control* 23 (1978), eqs. 1.2 and 2.1: the covariance
     ∫ exp(Aτ) Q exp(Aᵀτ) dτ of a sample's noise.
     """
-    system = LinearSystem.of(model)
+    system = linear_system(model)
     _require_known("state", (*noise.process, *noise.gusts), system.states)
     a, _, c, _, _ = system.state_space()
     sizes = np.array([noise.process.get(name, 0.0) for name in system.states])

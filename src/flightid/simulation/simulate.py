@@ -13,7 +13,7 @@ from flightid.conventions import Role
 from flightid.errors import DataError, ModelError, OptionError, ShapeError
 from flightid.models import LinearModel, LinearSystem, StateSpaceModel
 from flightid.models.linear.hold_equivalent import Hold
-from flightid.models.linear.recursion import run_recursion
+from flightid.models.sampled.recursion import run_recursion
 from flightid.record import Channel, InputHold, InputShape, Record, Step
 from flightid.record.chosen_hold import chosen_hold
 from flightid.simulation.noise import (

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.models import LinearSystem, StateSpaceModel
+from flightid.models.model import linear_system
 from flightid.simulation.nonlinear import run_equations, start_of
 
 Array = NDArray[np.float64]
@@ -23,7 +24,7 @@ class Stepper:
 
     Parameters
     ----------
-    model : StateSpaceModel, or what `LinearSystem.of` takes
+    model : StateSpaceModel, or what `linear_system` takes
         Nonlinear ones take inputs whole, linear ones as departures.
     sample_time_s : float
         s.
@@ -63,7 +64,7 @@ class Stepper:
         self._plant = (
             _Equations(model, sample_time_s)
             if isinstance(model, StateSpaceModel) and is_whole
-            else _Samples(LinearSystem.of(model), sample_time_s)
+            else _Samples(linear_system(model), sample_time_s)
         )
         self.inputs, self.outputs = self._plant.inputs, self._plant.outputs
         self.rest = self._plant.rest

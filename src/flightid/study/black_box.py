@@ -9,7 +9,7 @@ from typing import Any
 from flightid.conventions import Light, Role
 from flightid.findings import Finding
 from flightid.identification import NarxFit, PolynomialFit, identify
-from flightid.models import NarxModel, PolynomialModel
+from flightid.models import NarxStructure, PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.responses import CoherentPairs, FrequencyResponse, coherent_pairs, estimate_response
@@ -233,7 +233,7 @@ def _narx(
     unseen: list[Record],
 ) -> tuple[NarxSearch | None, NarxFit]:
     outputs_back, inputs_back = settings.orders["output_lags"], settings.orders["input_lags"]
-    model = NarxModel(
+    model = NarxStructure(
         settings.output,
         inputs,
         outputs_back[0],

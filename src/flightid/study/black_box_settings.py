@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from flightid.models import NarxModel
-from flightid.models.narx.model import CANDIDATES, STOPS
+from flightid.models import NarxStructure
+from flightid.models.narx.structure import CANDIDATES, STOPS
 from flightid.models.narx.terms import KERNELS, WIDTH_FACTORS
-from flightid.models.polynomial.structure import INITIAL_STATES, OFFSETS
+from flightid.models.polynomial.structure import INITIAL_STATES
+from flightid.models.sampled.channels import OFFSETS
 from flightid.study.reading import TableReader
 
 ORDERS = {
@@ -110,7 +111,7 @@ def read_black_box(reader: TableReader) -> BlackBoxSettings:
         reader.positive("minimum_coherence", 0.6),
         reader.positive("minimum_decades", 0.3),
         _orders(reader, ("output_lags", "input_lags") if is_narx else ORDERS[structure]),
-        reader.numbers("width", (NarxModel.width,)) if is_narx else (),
+        reader.numbers("width", (NarxStructure.width,)) if is_narx else (),
         reader.choice("choose", CHOICES, "free_run" if is_narx else CHOICES[0]),
         _narx_options(reader) if is_narx else _polynomial_options(reader),
     )
@@ -143,7 +144,7 @@ def _polynomial_options(reader: TableReader) -> dict[str, Any]:
 
 
 def _narx_options(reader: TableReader) -> dict[str, Any]:
-    usual = NarxModel
+    usual = NarxStructure
     kernel = reader.choice("kernel", (*KERNELS, "none"), usual.kernel or "none")
     return {
         "kernel": None if kernel == "none" else kernel,

@@ -11,7 +11,7 @@ from flightid.errors import StudyError
 from flightid.findings import Finding
 from flightid.identification import Fit, Reduction, identify, reduce
 from flightid.logs import Log, SidRun
-from flightid.models import Model, load_structure
+from flightid.models import GreyBoxModel, load_structure
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
 from flightid.study.record_files import load_record
@@ -36,8 +36,8 @@ class Task:
     """
 
     settings: ModelSettings
-    model: Model
-    rivals: Mapping[str, Model] = field(default_factory=dict)
+    model: GreyBoxModel
+    rivals: Mapping[str, GreyBoxModel] = field(default_factory=dict)
 
     @property
     def channels(self) -> tuple[str, ...]:

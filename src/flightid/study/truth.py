@@ -16,7 +16,7 @@ from flightid.vehicles import Flight, RateTruth
 from flightid.vehicles.truth import AXES, RATES
 
 if TYPE_CHECKING:
-    from flightid.models import Model
+    from flightid.models import GreyBoxModel
 
 NAMES = {
     "damping_1_s": ("Lp", "Mq", "Nr"),
@@ -49,13 +49,13 @@ class Truth:
         return cls({rate: flight.truth(axis) for rate, axis in zip(RATES, AXES, strict=True)})
 
     def response(
-        self, model: Model, omega_rad_s: NDArray[np.float64]
+        self, model: GreyBoxModel, omega_rad_s: NDArray[np.float64]
     ) -> NDArray[np.complex128] | None:
         """Exact response of the model's output, shape (n_freqs,); None where it is no body rate."""
         truth = self.rates.get(model.outputs[0])
         return None if truth is None else truth.frequency_response(omega_rad_s)
 
-    def parameters(self, model: Model) -> dict[str, float]:
+    def parameters(self, model: GreyBoxModel) -> dict[str, float]:
         """True value of each parameter of a model that can follow the true response exactly.
 
         Parameters

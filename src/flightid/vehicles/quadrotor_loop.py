@@ -12,8 +12,8 @@ from flightid import _native
 from flightid.errors import OptionError, UnitError, UnknownNameError
 from flightid.excitation.excitation import Excitation
 from flightid.models.linear.hold_equivalent import Hold
-from flightid.models.linear.linear_system import LinearModel
 from flightid.models.linear.realisation import Matrices
+from flightid.models.model import LinearModel
 from flightid.record import Record, Step
 from flightid.simulation.actuators import check_actuators, contiguous, with_actuators
 from flightid.units import canonical

@@ -19,6 +19,7 @@ from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.identification.spread_of import spread_of
 from flightid.models.linear.linear_system import LinearSystem
+from flightid.models.model import linear_system
 from flightid.uncertainty.quantity import Quantity
 from flightid.uncertainty.spread import Propagated, Spread
 
@@ -90,14 +91,14 @@ def close_loop(
         raise OptionError("the number of draws", found=draws, needed="0 or more")
     spread: Spread[Any] = spread_of(source)
     model = spread.estimate
-    vehicle = LinearSystem.of(model)
+    vehicle = linear_system(model)
     # Telling whether a model is linear takes longer than everything else about it.
     linear = not isinstance(system(model).part, Equations)
     around = controller_blocks(controller, vehicle.units)
     moved = tuple(moved_by(around, vehicle.inputs, vehicle.outputs))
 
     def closed(model: object) -> Interconnection:
-        plant = LinearSystem.of(model) if linear else model
+        plant = linear_system(model) if linear else model
         return _closed(plant, vehicle, around, moved, name)
 
     loops = spread.then(closed)

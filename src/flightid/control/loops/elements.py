@@ -11,6 +11,7 @@ from flightid.control.loops.block import Block, Equations, Hold, Limits, RateLim
 from flightid.errors import ModelError, OptionError
 from flightid.models import StateSpaceModel
 from flightid.models.linear.linear_system import LinearSystem
+from flightid.models.model import linear_system
 
 
 def gain(
@@ -288,7 +289,7 @@ def system(source: object, *, rename: Mapping[str, str] | None = None, name: str
     Parameters
     ----------
     source : fit, model or LinearSystem
-        What `LinearSystem.of` takes. One with a sample time becomes a sampled block.
+        What `linear_system` takes. One with a sample time becomes a sampled block.
     rename : mapping of str to str, optional
         Signal by channel, where the two have different names.
     name : str
@@ -317,7 +318,7 @@ def system(source: object, *, rename: Mapping[str, str] | None = None, name: str
     ('u',)
     """
     model = getattr(source, "model", source)
-    linear = LinearSystem.of(source)
+    linear = linear_system(source)
     names = dict(rename or {})
     for channel in names:
         if channel not in (*linear.inputs, *linear.outputs):

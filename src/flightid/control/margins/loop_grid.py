@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FlightidError
-from flightid.models.linear.linear_system import LinearSystem
+from flightid.models.model import linear_system
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -70,7 +70,7 @@ def roots_of(part: object) -> Roots:
     if part is None or callable(part) or not hasattr(part, "frequency_response"):
         return Roots()
     try:
-        system = LinearSystem.of(part)
+        system = linear_system(part)
     except FlightidError:
         return Roots()
     delay = float(np.max(np.asarray(system.delays_s), initial=0.0))

@@ -16,6 +16,7 @@ from flightid.findings import Finding
 from flightid.identification.spread_of import spread_of
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.linear.linear_system import LinearSystem
+from flightid.models.model import linear_system
 from flightid.uncertainty.spread import Spread
 
 CORNER = 2.0
@@ -194,8 +195,8 @@ def _linear(source: object, sample_time_s: float) -> LinearSystem:
     if isinstance(model, PolynomialModel | InnovationsModel):
         if abs(model.sample_time_s / sample_time_s - 1.0) > 1e-6:
             return to_continuous(model)
-        return LinearSystem.of(model)
-    return LinearSystem.of(source)
+        return linear_system(model)
+    return linear_system(source)
 
 
 def _corners(spread: Spread[Any], sample_time_s: float) -> Iterable[LinearSystem]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.control.tuning.loop_problem import Plants
 from flightid.errors import ModelError
 from flightid.models.linear.linear_system import LinearSystem
+from flightid.models.model import linear_system
 from flightid.progress import track
 
 Array = NDArray[np.float64]
@@ -128,7 +129,7 @@ def sample_plants(
         A model in discrete time whose samples are not those of the loop.
     """
     made = [
-        _sampled(LinearSystem.of(source), outputs, inputs, sample_time_s, hold_in_model)
+        _sampled(linear_system(source), outputs, inputs, sample_time_s, hold_in_model)
         for source in track(sources, "sampling the plants")
     ]
     systems, delays, advances = zip(*made, strict=True)

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from flightid.errors import DataError, UnknownNameError
 from flightid.models import LinearSystem, StateSpaceModel, TransferFunctionModel
+from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
 
 GRID_POINTS = 2000
@@ -203,7 +204,7 @@ def _evaluator(thing: object, pair: Pair) -> tuple[Callable[[Array], Complex], f
     system = (
         thing
         if isinstance(thing, TransferFunctionModel | StateSpaceModel)
-        else LinearSystem.of(thing)
+        else linear_system(thing)
     )
     for name, known in ((pair.output, system.outputs), (pair.input, system.inputs)):
         if name not in known:

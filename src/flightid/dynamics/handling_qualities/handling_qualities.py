@@ -15,7 +15,7 @@ from flightid.dynamics.modes.modes import modes
 from flightid.dynamics.modes.result import Modes
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.findings import Finding
-from flightid.models import LinearSystem
+from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.quantity import Quantity
@@ -308,7 +308,7 @@ def _channels(source: object) -> tuple[Sequence[str], Sequence[str]]:
     inner = getattr(source, "model", source)
     if hasattr(inner, "outputs") and hasattr(inner, "inputs"):
         return tuple(inner.outputs), tuple(inner.inputs)
-    system = LinearSystem.of(source)
+    system = linear_system(source)
     return system.outputs, system.inputs
 
 

@@ -17,7 +17,8 @@ from flightid.errors import DataError, FitError, OptionError, UnknownNameError
 from flightid.findings import Finding
 from flightid.identification import Fit, identify
 from flightid.identification.spread_of import spread_of
-from flightid.models import LinearSystem, Model, StateSpaceModel, TransferFunctionModel
+from flightid.models import GreyBoxModel, LinearSystem, StateSpaceModel, TransferFunctionModel
+from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.spread import Propagated, Spread
 from flightid.validation.verification.muad import Mismatch, mismatch
@@ -188,16 +189,16 @@ def _choose(known: Sequence[str], given: str | None) -> str:
     return given
 
 
-def _system(thing: object) -> Model | LinearSystem:
+def _system(thing: object) -> GreyBoxModel | LinearSystem:
     return (
         thing
         if isinstance(thing, TransferFunctionModel | StateSpaceModel)
-        else LinearSystem.of(thing)
+        else linear_system(thing)
     )
 
 
 def _response(
-    task: _Task, thing: Model | LinearSystem, output: str, control: str
+    task: _Task, thing: GreyBoxModel | LinearSystem, output: str, control: str
 ) -> FrequencyResponse:
     """The pair's response at the frequencies of the fit."""
     omega = np.geomspace(*task.band, task.n_omega)

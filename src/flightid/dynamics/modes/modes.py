@@ -15,7 +15,7 @@ from flightid.dynamics.modes.participation import UNINVOLVED, Eigenpair, eigenpa
 from flightid.dynamics.modes.result import Mode, Modes, Participation
 from flightid.dynamics.modes.state_matrix import StateMatrix, read_states
 from flightid.findings import Finding
-from flightid.models.linear.discrete_modes import AT_ORIGIN, NO_COUNTERPART
+from flightid.models.sampled.discrete_modes import AT_ORIGIN, NO_COUNTERPART
 from flightid.uncertainty.quantity import Quantity
 from flightid.uncertainty.spread import NORMAL_95
 

@@ -12,6 +12,7 @@ from flightid.errors import UnknownNameError
 from flightid.identification import Fit
 from flightid.identification.spread_of import spread_of
 from flightid.models import LinearSystem, StateSpaceModel
+from flightid.models.model import linear_system
 from flightid.uncertainty.spread import Propagated
 
 Array = NDArray[np.float64]
@@ -96,7 +97,7 @@ def read_states(source: object, states: Mapping[str, str]) -> StateMatrix:
     UnknownNameError
         There is no such state.
     """
-    system = LinearSystem.of(source)
+    system = linear_system(source)
     model = getattr(source, "model", source)
     for name in states:
         if name not in system.states:
@@ -125,8 +126,8 @@ def _directions(source: object) -> tuple[Array | None, str]:
         return None, spread.reason
     if isinstance(source, Fit) and isinstance(source.model, StateSpaceModel):
         return _exact_directions(source, source.model), ""
-    order = LinearSystem.of(source).order
-    slopes = spread.slopes(lambda model: np.asarray(LinearSystem.of(model).a).ravel())
+    order = linear_system(source).order
+    slopes = spread.slopes(lambda model: np.asarray(linear_system(model).a).ravel())
     return slopes.reshape(-1, order, order), ""
 
 

@@ -13,7 +13,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
 from flightid.identification.advice.impulse_response import ImpulseResponse, impulse_response
-from flightid.models.polynomial.data import PolynomialData, gather_channels
+from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 from flightid.table import Column, Table
 
@@ -178,7 +178,7 @@ def advise(
     return Advice(name, names, data.output.size, len(listed), orders, response, findings)
 
 
-def excitation_order(row: Array, data: PolynomialData) -> int:
+def excitation_order(row: Array, data: SampledChannels) -> int:
     """Order of persistent excitation: rank of the covariance of as many successive samples."""
     size = min(LARGEST_ORDER, min(data.lengths) // 4)
     sums = np.zeros(size)
@@ -208,7 +208,7 @@ def _excitation(orders: Mapping[str, int]) -> list[Finding]:
     return found
 
 
-def _related(names: Sequence[str], data: PolynomialData) -> list[Finding]:
+def _related(names: Sequence[str], data: SampledChannels) -> list[Finding]:
     found = []
     matrix = np.atleast_2d(np.corrcoef(data.inputs))
     for i in range(len(names)):
@@ -270,7 +270,7 @@ def _responses(response: ImpulseResponse | None, reason: str) -> list[Finding]:
     return found
 
 
-def _sampling(name: str, data: PolynomialData) -> list[Finding]:
+def _sampling(name: str, data: SampledChannels) -> list[Finding]:
     pairs = [(data.output[s][1:], data.output[s][:-1]) for s in data.spans]
     size = sum(float(a @ a + b @ b) / 2 for a, b in pairs)
     share = sum(float(a @ b) for a, b in pairs) / size
@@ -287,7 +287,7 @@ def _sampling(name: str, data: PolynomialData) -> list[Finding]:
     ]
 
 
-def _levels(names: Sequence[str], data: PolynomialData) -> list[Finding]:
+def _levels(names: Sequence[str], data: SampledChannels) -> list[Finding]:
     found = []
     for name, row in zip(names, data.inputs, strict=True):
         if all(np.unique(np.round(row[s], 12)).size == 2 for s in data.spans):

@@ -13,8 +13,8 @@ from scipy.stats import chi2, norm
 from flightid.errors import DataError, OptionError
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
 from flightid.identification.prediction_error.linear_regression import Regression, regress
-from flightid.models.polynomial.data import PolynomialData, gather_channels
 from flightid.models.polynomial.structure import KERNELS
+from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 from flightid.table import Column, Table
 
@@ -264,7 +264,7 @@ def _require(names: tuple[str, ...], n_lags: int, negative_lags: int, kernel: st
         raise OptionError("a decaying prior has no lags before the pulse", needed="kernel=None")
 
 
-def _shifted(data: PolynomialData, negative: int) -> PolynomialData:
+def _shifted(data: SampledChannels, negative: int) -> SampledChannels:
     """Inputs `negative` samples early, so that lag 0 of the regression is lag -negative."""
     if negative == 0:
         return data
@@ -273,7 +273,7 @@ def _shifted(data: PolynomialData, negative: int) -> PolynomialData:
     output = np.concatenate([data.output[span] for span in keep])
     inputs = np.concatenate([data.inputs[:, span] for span in late], axis=1)
     lengths = tuple(length - negative for length in data.lengths)
-    return PolynomialData(output, inputs, lengths, data.offsets, data.units, data.sample_time_s)
+    return SampledChannels(output, inputs, lengths, data.offsets, data.units, data.sample_time_s)
 
 
 def _fir(output: Array, inputs: Array, lengths: Sequence[int], n: int, skip: int) -> Regression:
@@ -281,7 +281,7 @@ def _fir(output: Array, inputs: Array, lengths: Sequence[int], n: int, skip: int
     return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip)
 
 
-def _estimate(data: PolynomialData, n: int, kernel: str | None) -> tuple[Array, Array, int]:
+def _estimate(data: SampledChannels, n: int, kernel: str | None) -> tuple[Array, Array, int]:
     first = _fir(data.output, data.inputs, data.lengths, n, n - 1)
     left = np.array(data.output)
     for i, row in enumerate(data.inputs):

@@ -14,7 +14,7 @@ from flightid.findings import Finding
 from flightid.identification.frequency_domain.error_model import ErrorModel
 from flightid.identification.frequency_domain.estimator_bias import Correction, why_unknown
 from flightid.identification.frequency_domain.selection import SelectedResponse
-from flightid.models import Model
+from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ class BiasRounds:
 
     Attributes
     ----------
-    model : Model
+    model : GreyBoxModel
         The model after the last round.
     data : FrequencyResponse
         The response that the last fit saw.
@@ -68,7 +68,7 @@ class BiasRounds:
         follows the parameters.
     """
 
-    model: Model
+    model: GreyBoxModel
     data: FrequencyResponse
     rounds: int
     move: float
@@ -87,16 +87,16 @@ class BiasRounds:
 
 
 def iterate(
-    first: Model,
+    first: GreyBoxModel,
     correction: Correction,
     scales: Mapping[str, float],
-    refit: Callable[[Model, FrequencyResponse], Model],
+    refit: Callable[[GreyBoxModel, FrequencyResponse], GreyBoxModel],
 ) -> BiasRounds:
     """Correct by the fitted model and fit again, until the parameters stand still.
 
     Parameters
     ----------
-    first : Model
+    first : GreyBoxModel
         Fitted to the response as it was measured.
     correction : Correction
         Of the response as measured.
@@ -135,16 +135,16 @@ def iterate(
     return BiasRounds(moved, corrected, rounds, move, contraction=contraction)
 
 
-def _scaled(model: Model, scales: Mapping[str, float]) -> Array:
+def _scaled(model: GreyBoxModel, scales: Mapping[str, float]) -> Array:
     return np.array([(p.value or 0.0) / scales.get(p.name, 1.0) for p in model.parameters.free])
 
 
 def _ahead(
-    moved: Model,
+    moved: GreyBoxModel,
     before: tuple[Array, Array] | None,
     here: tuple[Array, Array],
     scales: Mapping[str, float],
-) -> Model:
+) -> GreyBoxModel:
     """Where to correct from next: beyond the last fit, as far as the last two moves suggest.
 
     Rounds alone shrink a move by a constant factor, near one where the records say little of a
@@ -172,7 +172,7 @@ def _ahead(
     )
 
 
-def _move(before: Model, after: Model, scales: Mapping[str, float]) -> float:
+def _move(before: GreyBoxModel, after: GreyBoxModel, scales: Mapping[str, float]) -> float:
     found = 0.0
     for parameter in after.parameters.free:
         new, old = parameter.value or 0.0, before.parameters[parameter.name].value or 0.0

@@ -12,7 +12,7 @@ from flightid.identification.frequency_domain.bias_rounds import BiasRounds
 from flightid.identification.frequency_domain.error_model import ErrorModel, error_model
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.selection import SelectedResponse
-from flightid.models import Model
+from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
 
 Array = NDArray[np.float64]
@@ -46,7 +46,7 @@ def errors_after(
 
 def points_follow(
     done: BiasRounds,
-    fitted: Model,
+    fitted: GreyBoxModel,
     correction: Correction,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
@@ -59,7 +59,7 @@ def points_follow(
     Parameters
     ----------
     done : BiasRounds
-    fitted : Model
+    fitted : GreyBoxModel
         After the last fit.
     correction : Correction
     selected : sequence of SelectedResponse

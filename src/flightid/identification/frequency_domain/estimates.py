@@ -13,7 +13,7 @@ from flightid.identification.fit import FittedParameter
 from flightid.identification.frequency_domain.error_model import UNKNOWN, ErrorModel
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.multistart import DenseEnd
-from flightid.models import Model, Parameter
+from flightid.models import GreyBoxModel, Parameter
 from flightid.uncertainty import correlation as correlation_of
 from flightid.uncertainty import (
     cramer_rao,
@@ -57,7 +57,7 @@ class Statistics:
 
 
 def statistics(
-    fitted: Model,
+    fitted: GreyBoxModel,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     end: DenseEnd,
@@ -123,7 +123,7 @@ def require_identifiable(names: tuple[str, ...], jacobian: Array) -> None:
     )
 
 
-def coherence_jacobian(fitted: Model, selected: Sequence[SelectedResponse]) -> Array:
+def coherence_jacobian(fitted: GreyBoxModel, selected: Sequence[SelectedResponse]) -> Array:
     """Derivatives of the weighted dB and degree residuals with respect to the free parameters."""
     values = fitted.parameters.independent_values()
     free = fitted.parameters.free_indices
@@ -143,7 +143,7 @@ def coherence_jacobian(fitted: Model, selected: Sequence[SelectedResponse]) -> A
 
 
 def fitted_parameters(
-    fitted: Model,
+    fitted: GreyBoxModel,
     names: tuple[str, ...],
     covariance: Array | None,
     weighted: Array,
@@ -211,7 +211,7 @@ def _reason(parameter: Parameter, *, at_bound: bool, known: bool, value: float) 
 
 
 def _standard_errors(
-    fitted: Model, names: tuple[str, ...], covariance: Array | None
+    fitted: GreyBoxModel, names: tuple[str, ...], covariance: Array | None
 ) -> dict[str, float]:
     """Of the estimated parameters and, through their ties, of the tied ones."""
     if covariance is None:

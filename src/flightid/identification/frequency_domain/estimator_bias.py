@@ -14,7 +14,7 @@ import numpy as np
 
 from flightid.errors import DataError
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
-from flightid.models import Model
+from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
 from flightid.responses.errors.random_error import CovarianceSource
 from flightid.responses.estimators.linear_estimate import Functional, LinearEstimate
@@ -57,7 +57,7 @@ class Correction:
     data: FrequencyResponse
     hold: str
 
-    def apply(self, model: Model) -> FrequencyResponse:
+    def apply(self, model: GreyBoxModel) -> FrequencyResponse:
         """The measured response without the bias that its estimator has for this model.
 
         Unknown initial states and trims of each record are fitted to its outputs, so that a record
@@ -83,7 +83,7 @@ class Correction:
             values[row, column] = curves[place] + left[row, column]
         return replace(data, response=values)
 
-    def errors(self, model: Model) -> CovarianceSource | None:
+    def errors(self, model: GreyBoxModel) -> CovarianceSource | None:
         """Errors of a corrected response: their noise is what the model leaves.
 
         The noise of the estimate itself holds the leakage that the correction has removed.

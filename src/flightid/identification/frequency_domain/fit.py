@@ -47,7 +47,7 @@ from flightid.identification.frequency_domain.selection import (
 )
 from flightid.identification.frequency_domain.setup_checks import check_setup
 from flightid.identification.multistart import DenseEnd, cluster, local_minima
-from flightid.models import Model
+from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
 from flightid.simulation.model_outputs import HOLDS
 from flightid.units import require_match
@@ -93,7 +93,7 @@ class Options:
             )
 
 
-def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fit:
+def fit_responses(model: GreyBoxModel, data: FrequencyResponse, options: Options) -> Fit:
     """Fit a model to measured responses; see `flightid.identify`."""
     options.check()
     check_channels(model, data)
@@ -112,7 +112,7 @@ def fit_responses(model: Model, data: FrequencyResponse, options: Options) -> Fi
 
 
 def _fit_selected(
-    model: Model,
+    model: GreyBoxModel,
     data: FrequencyResponse,
     selected: list[SelectedResponse],
     setup: list[Finding],
@@ -143,7 +143,9 @@ def _fit_selected(
     return replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
 
 
-def select_by(model: Model, data: FrequencyResponse, options: Options) -> list[SelectedResponse]:
+def select_by(
+    model: GreyBoxModel, data: FrequencyResponse, options: Options
+) -> list[SelectedResponse]:
     """Points of the model's responses that the options choose."""
     return select_points(
         data,
@@ -156,13 +158,13 @@ def select_by(model: Model, data: FrequencyResponse, options: Options) -> list[S
     )
 
 
-def _at(model: Model, end: DenseEnd) -> Model:
+def _at(model: GreyBoxModel, end: DenseEnd) -> GreyBoxModel:
     names = (parameter.name for parameter in model.parameters.free)
     return model.with_values(dict(zip(names, map(float, end.x), strict=True)))
 
 
 def _statistics(
-    fitted: Model,
+    fitted: GreyBoxModel,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     end: DenseEnd,
@@ -174,7 +176,7 @@ def _statistics(
 
 
 def _without_bias(
-    fitted: Model,
+    fitted: GreyBoxModel,
     correction: Correction,
     errors: ErrorModel,
     found: Statistics,
@@ -182,7 +184,7 @@ def _without_bias(
 ) -> BiasRounds:
     once = replace(options, starts=1)
 
-    def refit(model: Model, corrected: FrequencyResponse) -> Model:
+    def refit(model: GreyBoxModel, corrected: FrequencyResponse) -> GreyBoxModel:
         selected = select_by(model, corrected, options)
         return _at(model, _minimise(model, selected, errors, once)[0])
 
@@ -190,7 +192,7 @@ def _without_bias(
     return iterate(fitted, correction, scales, refit)
 
 
-def check_channels(model: Model, data: FrequencyResponse) -> None:
+def check_channels(model: GreyBoxModel, data: FrequencyResponse) -> None:
     """Refuse a model without free parameters, and data without its channels or units.
 
     Raises
@@ -216,13 +218,13 @@ def check_channels(model: Model, data: FrequencyResponse) -> None:
         require_match(data.units[name], model.units[name], subject=f"channel {name}")
 
 
-def response_at(model: Model, omega: Array, place: int) -> NDArray[np.complex128]:
+def response_at(model: GreyBoxModel, omega: Array, place: int) -> NDArray[np.complex128]:
     """One response of the model, by its place."""
     values = model.parameters.independent_values()
     return np.asarray(model.native.response(values, np.ascontiguousarray(omega))[place])
 
 
-def check_start(model: Model, selected: Sequence[SelectedResponse]) -> list[Finding]:
+def check_start(model: GreyBoxModel, selected: Sequence[SelectedResponse]) -> list[Finding]:
     """Look at the model's start values beside the data.
 
     Raises
@@ -249,7 +251,7 @@ def check_start(model: Model, selected: Sequence[SelectedResponse]) -> list[Find
 
 
 def _minimise(
-    model: Model,
+    model: GreyBoxModel,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     options: Options,
@@ -266,7 +268,7 @@ def _minimise(
 
 
 def _sensitivity(
-    fitted: Model,
+    fitted: GreyBoxModel,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     options: Options,
@@ -283,7 +285,7 @@ def _sensitivity(
 
 
 def compare_responses(
-    fitted: Model, selected: Sequence[SelectedResponse]
+    fitted: GreyBoxModel, selected: Sequence[SelectedResponse]
 ) -> tuple[FittedResponse, ...]:
     """Measured and fitted responses side by side, each with its cost J."""
     result = []
@@ -301,7 +303,7 @@ def compare_responses(
 
 
 def _assemble(
-    fitted: Model,
+    fitted: GreyBoxModel,
     options: Options,
     data: FrequencyResponse,
     groups: Sequence[Sequence[DenseEnd]],

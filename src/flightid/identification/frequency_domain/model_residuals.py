@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
-from flightid.models import Model
+from flightid.models import GreyBoxModel
 from flightid.responses.estimators.linear_estimate import LinearEstimate
 from flightid.simulation.model_outputs import (
     Modes,
@@ -113,7 +113,7 @@ class ModelResiduals:
     outputs: tuple[str, ...]
     hold: str
 
-    def of(self, model: Model) -> list[Array]:
+    def of(self, model: GreyBoxModel) -> list[Array]:
         """Residuals of each record, shape (n_out, n_samples) each.
 
         Outputs that no response of the model needs stay as they are. Motion from unknown states
@@ -151,7 +151,7 @@ class ModelResiduals:
         """Inputs of each record, with what they do between their samples."""
         return [between_samples(each, self.hold) for each in self.linear.input_records]
 
-    def _motion(self, model: Model, kept: Places, n: int) -> tuple[list[_Motion], _Unknown]:
+    def _motion(self, model: GreyBoxModel, kept: Places, n: int) -> tuple[list[_Motion], _Unknown]:
         step = self.linear.sample_time_s
         motions, free = [], []
         for each in systems_of(model):

@@ -10,7 +10,7 @@ from flightid.identification.fit_findings import EXCELLENT_COST
 from flightid.identification.frequency_domain.error_model import ErrorModel, whitening
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.multistart import DenseEnd, collect, draw_starts
-from flightid.models import Model
+from flightid.models import GreyBoxModel
 
 LIGHT = 0.1
 """Factor of the decibels' residuals while the phase leads."""
@@ -18,7 +18,7 @@ LEADING_ITERATIONS = 10
 
 
 def minimise(
-    model: Model,
+    model: GreyBoxModel,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     *,
@@ -35,7 +35,7 @@ def minimise(
 
     Parameters
     ----------
-    model : Model
+    model : GreyBoxModel
     selected : sequence of SelectedResponse
     errors : ErrorModel
     starts, seed, cost, maximum_iterations

@@ -45,7 +45,7 @@ from flightid.identification.records.findings import judge_channels
 from flightid.identification.records.options import RecordOptions
 from flightid.identification.records.setup import RecordSet, prepare_records
 from flightid.identification.records.statistics import Beside
-from flightid.models import Model
+from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 
@@ -91,7 +91,7 @@ class ChosenPoints:
         ]
         return data, whitening(self.errors)
 
-    def beside(self, fitted: Model, following: Array | None = None) -> Beside:
+    def beside(self, fitted: GreyBoxModel, following: Array | None = None) -> Beside:
         """Derivatives of the whitened errors, of data at rest and of data that follow the model.
 
         `following` are the derivatives of the points by the free parameters, run after run.
@@ -106,7 +106,7 @@ class ChosenPoints:
         ]
         return Beside(slopes, slopes - np.vstack(moved))
 
-    def _slopes(self, fitted: Model) -> Array:
+    def _slopes(self, fitted: GreyBoxModel) -> Array:
         values, free = fitted.parameters.independent_values(), fitted.parameters.free_indices
         by_response = []
         for place, each in enumerate(self.selected):
@@ -120,7 +120,7 @@ class ChosenPoints:
         return np.vstack(rows)
 
 
-def fit_jointly(model: Model, data: Sequence[object], options: JointOptions) -> Fit:
+def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptions) -> Fit:
     """Fit a model to a frequency response and records together; see `flightid.identify`."""
     response, records = _divided(data)
     of_responses = options.of_responses
@@ -157,7 +157,7 @@ def _divided(data: Sequence[object]) -> tuple[FrequencyResponse, list[Record]]:
     return responses[0], [item for item in data if isinstance(item, Record)]
 
 
-def _points(model: Model, response: FrequencyResponse, options: Options) -> ChosenPoints:
+def _points(model: GreyBoxModel, response: FrequencyResponse, options: Options) -> ChosenPoints:
     selected = select_by(model, response, options)
     return ChosenPoints(selected, error_model(response, selected))
 
@@ -176,7 +176,7 @@ def _without_bias(
         # The errors stay those of the response as it was measured.
         return ChosenPoints(select_by(prepared.model, corrected, once.of_responses), points.errors)
 
-    def refit(model: Model, corrected: FrequencyResponse) -> Model:
+    def refit(model: GreyBoxModel, corrected: FrequencyResponse) -> GreyBoxModel:
         return searched(model, prepared, once, corrected_points(corrected).native).fitted
 
     first = conclude(found, options, (), points.beside(found.fitted))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 
 from flightid.errors import FitError, OptionError
-from flightid.models.narx.model import NarxModel
+from flightid.models.narx.structure import NarxStructure
 from flightid.models.narx.terms import Term, product_term
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ class CandidateTerms:
         return np.array([term.centre for term in self.radial]).reshape(-1, dimension)
 
 
-def candidate_terms(model: NarxModel, vectors: Array) -> CandidateTerms:
+def candidate_terms(model: NarxStructure, vectors: Array) -> CandidateTerms:
     """What a model may choose from; centres come from the regressor vectors."""
     products, forced = _products(model)
     rows = _centres(model, vectors).tolist()
@@ -50,7 +50,7 @@ def candidate_terms(model: NarxModel, vectors: Array) -> CandidateTerms:
     return CandidateTerms(tuple(products), tuple(radial), forced)
 
 
-def product_columns(terms: Sequence[Term], model: NarxModel, vectors: Array) -> Array:
+def product_columns(terms: Sequence[Term], model: NarxStructure, vectors: Array) -> Array:
     """Values of products, (n_terms, n_samples)."""
     places = {lag: place for place, lag in enumerate(model.lags)}
     columns = np.ones((len(terms), len(vectors)))
@@ -60,7 +60,7 @@ def product_columns(terms: Sequence[Term], model: NarxModel, vectors: Array) -> 
     return columns
 
 
-def _products(model: NarxModel) -> tuple[list[Term], int]:
+def _products(model: NarxStructure) -> tuple[list[Term], int]:
     """Terms of products, the forced ones first, and how many are forced."""
     lags = model.lags
     forced = [product_term([])] if model.constant else []
@@ -82,7 +82,7 @@ def _require_few(count: int, what: str, action: str) -> None:
         )
 
 
-def _centres(model: NarxModel, regressors: Array) -> Array:
+def _centres(model: NarxStructure, regressors: Array) -> Array:
     dimension = regressors.shape[1]
     if model.kernel is None:
         return np.empty((0, dimension))

@@ -22,7 +22,9 @@ from flightid.identification.narx.candidates import (
 from flightid.identification.narx.findings import collinear_finding, free_run_findings
 from flightid.identification.narx.regressors import Regressors, regressors_of, scaling_of
 from flightid.identification.narx.result import ChosenTerm, NarxFit
-from flightid.models.narx.model import NarxEquation, NarxModel, Scaling
+from flightid.models.narx.model import NarxModel
+from flightid.models.narx.scaling import Scaling
+from flightid.models.narx.structure import NarxStructure
 from flightid.record import Record
 
 Array = NDArray[np.float64]
@@ -30,7 +32,7 @@ Array = NDArray[np.float64]
 MAXIMUM_BYTES = 1 << 30
 
 
-def fit_narx(model: NarxModel, data: Record | Sequence[Record]) -> NarxFit:
+def fit_narx(model: NarxStructure, data: Record | Sequence[Record]) -> NarxFit:
     """Choose terms by error reduction and fit them; the linear model of the same lags beside it.
 
     Reference: Chen, Cowan & Grant, IEEE Trans. Neural Networks 2 (1991), section III; penalties:
@@ -56,7 +58,7 @@ def fit_narx(model: NarxModel, data: Record | Sequence[Record]) -> NarxFit:
     return NarxFit(equation, baseline, chosen, one_step, free, linear_free, n_samples, findings)
 
 
-def _baseline(model: NarxModel, scaling: Scaling, records: Sequence[Record]) -> NarxEquation:
+def _baseline(model: NarxStructure, scaling: Scaling, records: Sequence[Record]) -> NarxModel:
     """Linear model with all lags on all samples; combinations of other lags are left out."""
     linear = replace(
         model,
@@ -75,13 +77,13 @@ def _baseline(model: NarxModel, scaling: Scaling, records: Sequence[Record]) -> 
     return _equation(linear, scaling, _select(linear, candidates, data)[0])
 
 
-def _equation(model: NarxModel, scaling: Scaling, chosen: Sequence[ChosenTerm]) -> NarxEquation:
+def _equation(model: NarxStructure, scaling: Scaling, chosen: Sequence[ChosenTerm]) -> NarxModel:
     terms = tuple(item.term for item in chosen)
-    return NarxEquation(model, terms, tuple(item.weight for item in chosen), scaling)
+    return NarxModel(model, terms, tuple(item.weight for item in chosen), scaling)
 
 
 def _estimated(
-    model: NarxModel, chosen: Sequence[ChosenTerm], data: Regressors
+    model: NarxStructure, chosen: Sequence[ChosenTerm], data: Regressors
 ) -> tuple[ChosenTerm, ...]:
     """Weights of chosen terms by least squares on samples that took no part in the choice."""
     products = tuple(item.term for item in chosen if not item.term.centre)
@@ -99,7 +101,7 @@ def _estimated(
 
 
 def _select(
-    model: NarxModel, candidates: CandidateTerms, data: Regressors
+    model: NarxStructure, candidates: CandidateTerms, data: Regressors
 ) -> tuple[tuple[ChosenTerm, ...], int]:
     target, forced = data.target, candidates.forced
     try:
@@ -151,10 +153,10 @@ def _standard_errors(factor: Array, penalties: Array, squares: float, n: int) ->
 
 
 def _rms(
-    equation: NarxEquation, records: Sequence[Record], horizon: int | str
+    equation: NarxModel, records: Sequence[Record], horizon: int | str
 ) -> tuple[float, str | None]:
     """Error over all records that are longer than the lags, and where the guard first held it."""
-    start = max(lag.lag for lag in equation.model.lags)
+    start = max(lag.lag for lag in equation.structure.lags)
     runs = [
         (record.name, equation.predict(record, horizon))
         for record in records

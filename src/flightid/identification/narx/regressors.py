@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
-from flightid.models.narx.model import NarxModel, Scaling
+from flightid.models.narx.scaling import Scaling
+from flightid.models.narx.structure import NarxStructure
 from flightid.record import Record
 
 Array = NDArray[np.float64]
@@ -23,7 +24,7 @@ class Regressors:
     target: Array
 
 
-def scaling_of(model: NarxModel, records: Sequence[Record]) -> Scaling:
+def scaling_of(model: NarxStructure, records: Sequence[Record]) -> Scaling:
     """Means and deviations of the channels over all records; a constant channel is refused."""
     mean, deviation, units = {}, {}, {}
     for name in (model.output, *model.inputs):
@@ -47,7 +48,7 @@ def scaling_of(model: NarxModel, records: Sequence[Record]) -> Scaling:
 
 
 def regressors_of(
-    model: NarxModel, scaling: Scaling, records: Sequence[Record]
+    model: NarxStructure, scaling: Scaling, records: Sequence[Record]
 ) -> tuple[Regressors, Regressors]:
     """Samples to choose terms on, and to estimate their weights on: the same, or each record's end.
 
@@ -71,7 +72,7 @@ def regressors_of(
     return first, _joined(estimated_on, model, start) if model.held_back else first
 
 
-def _joined(parts: Sequence[tuple[Array, Array]], model: NarxModel, start: int) -> Regressors:
+def _joined(parts: Sequence[tuple[Array, Array]], model: NarxStructure, start: int) -> Regressors:
     n_samples = sum(target.size for _, target in parts)
     least = len(model.lags) + 3
     if n_samples < least:

@@ -6,7 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flightid.findings import Finding
-from flightid.models.narx.model import NarxEquation, NarxModel, NarxPrediction
+from flightid.models.linear.linear_system import LinearSystem
+from flightid.models.narx.model import NarxModel
+from flightid.models.narx.prediction import NarxPrediction
+from flightid.models.narx.structure import NarxStructure
 from flightid.models.narx.terms import Term
 from flightid.record import Record
 from flightid.table import Column, Table
@@ -21,7 +24,7 @@ class ChosenTerm:
     `error_reduction` is the share of the scaled output's sum of squares that the term explained
     when it was chosen; `sum_of_squares` and `leave_one_out` (mean square) are the errors after it.
     `penalty` is λ of its regularisation. `stderr` holds for the terms as given, in white noise: it
-    ignores the choice unless samples were held back for the weights (`NarxModel.held_back`).
+    ignores the choice unless samples were held back for the weights (`NarxStructure.held_back`).
     """
 
     term: Term
@@ -39,9 +42,9 @@ class NarxFit:
 
     Attributes
     ----------
-    equation : NarxEquation
+    equation : NarxModel
         Terms and weights that run.
-    baseline : NarxEquation
+    baseline : NarxModel
         Linear ARX model with constant, of the same lags and records.
     chosen : tuple of ChosenTerm
         In the order of choice; with samples held back, products before radial functions.
@@ -60,7 +63,7 @@ class NarxFit:
     >>> for t in range(1, 300):
     ...     y[t] = 0.7 * y[t - 1] + 0.4 * u[t - 1] - 0.3 * u[t - 1] ** 2
     >>> record = fid.Record.from_arrays(np.arange(300) / 10, inputs={"u": u}, outputs={"y": y})
-    >>> model = fid.NarxModel("y", ("u",), 1, 1, kernel=None, degree=2, stop="bic")
+    >>> model = fid.NarxStructure("y", ("u",), 1, 1, kernel=None, degree=2, stop="bic")
     >>> fit = fid.identify(model, record)
     >>> [chosen.term.name for chosen in fit.chosen]
     ['constant', 'y(t-1)', 'u(t-1)', 'u(t-1)^2']
@@ -68,8 +71,8 @@ class NarxFit:
     True
     """
 
-    equation: NarxEquation
-    baseline: NarxEquation
+    equation: NarxModel
+    baseline: NarxModel
     chosen: tuple[ChosenTerm, ...]
     one_step_rms: float
     free_run_rms: float
@@ -78,9 +81,13 @@ class NarxFit:
     findings: tuple[Finding, ...]
 
     @property
-    def model(self) -> NarxModel:
+    def model(self) -> NarxStructure:
         """The structure that was asked for."""
-        return self.equation.model
+        return self.equation.structure
+
+    def linear_system(self) -> LinearSystem:
+        """The linear system of the fitted model; ModelError with the reason where there is none."""
+        return self.equation.linear_system()
 
     def predict(self, record: Record, horizon: int | str = "free_run") -> NarxPrediction:
         """Prediction on a record, `horizon` samples ahead or ``"free_run"``."""

@@ -18,7 +18,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError, OptionError, SingularError
 from flightid.findings import Finding
 from flightid.identification.records.setup import OwnNumbers, RecordSet
-from flightid.models import Model, StateSpaceModel
+from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.integration_steps import steps_per_sample
 
 Array = NDArray[np.float64]
@@ -61,7 +61,9 @@ class EquationRuns:
         """Modes of each record that are set at its end."""
         return [n_growing for _, _, n_growing, _ in self.segments]
 
-    def start(self, fitted: Model, prepared: RecordSet, place: int, own: OwnNumbers) -> OwnNumbers:
+    def start(
+        self, fitted: GreyBoxModel, prepared: RecordSet, place: int, own: OwnNumbers
+    ) -> OwnNumbers:
         """The same numbers with the state at the first sample and its derivatives."""
         if not self.segments[place][2]:
             return own
@@ -76,7 +78,7 @@ class EquationRuns:
         return replace(own, start=(state, slopes))
 
 
-def equation_runs(model: Model, prepared: RecordSet) -> EquationRuns | None:
+def equation_runs(model: GreyBoxModel, prepared: RecordSet) -> EquationRuns | None:
     """The way to integrate a model's equations on records; None where it is linear and stable.
 
     Parameters

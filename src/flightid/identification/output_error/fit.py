@@ -40,7 +40,7 @@ from flightid.identification.records.statistics import (
 from flightid.identification.regression.equation_error import equation_error_start
 from flightid.identification.regression.fourier_output_error_fit import fit_fourier_output_error
 from flightid.identification.regression.options import FourierOutputErrorOptions
-from flightid.models import Model, StateSpaceModel
+from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Channel, Record, Step
 from flightid.version import VERSION
 
@@ -71,7 +71,9 @@ class RecordEnd(End):
         return cls(x, cost, iterations, termination, noise, own, determined)
 
 
-def fit_output_error(model: Model, data: Record | Sequence[Record], options: RecordOptions) -> Fit:
+def fit_output_error(
+    model: GreyBoxModel, data: Record | Sequence[Record], options: RecordOptions
+) -> Fit:
     """Fit a model to records by output error; see `flightid.identify`."""
     if options.start_from == "equation_error":
         model = equation_error_start(model, data)
@@ -94,13 +96,13 @@ class Searched:
         Ends of all starts, best group first.
     """
 
-    model: Model
+    model: GreyBoxModel
     prepared: RecordSet
     runs_of: EquationRuns | None
     groups: list[list[RecordEnd]]
 
     @property
-    def fitted(self) -> Model:
+    def fitted(self) -> GreyBoxModel:
         """The model at the best end."""
         return _with_estimates(self.model, self.groups[0][0])
 
@@ -149,7 +151,7 @@ def conclude(
 
 
 def searched(
-    model: Model,
+    model: GreyBoxModel,
     prepared: RecordSet,
     options: RecordOptions,
     responses: WhitenedResponses | None = None,
@@ -188,8 +190,8 @@ def searched(
 
 
 def _overgrown(
-    model: Model, fitted: Model, after: EquationRuns | None, prepared: RecordSet
-) -> Model:
+    model: GreyBoxModel, fitted: GreyBoxModel, after: EquationRuns | None, prepared: RecordSet
+) -> GreyBoxModel:
     """Where to search from, once the estimates grow otherwise than the model that was run.
 
     A run from the first sample to the last of a vehicle that turns out unstable tells nothing, and
@@ -209,7 +211,7 @@ def _growing(runs: EquationRuns | None) -> list[int]:
     return [] if runs is None or not runs.is_segmented else runs.n_growing
 
 
-def _with_estimates(model: Model, end: RecordEnd) -> Model:
+def _with_estimates(model: GreyBoxModel, end: RecordEnd) -> GreyBoxModel:
     names = [parameter.name for parameter in model.parameters.free]
     return model.with_values(dict(zip(names, map(float, end.x), strict=True)))
 
@@ -243,7 +245,7 @@ def search_records(
 
 
 def _run(
-    fitted: Model,
+    fitted: GreyBoxModel,
     prepared: RecordSet,
     runs_of: EquationRuns | None,
     place: int,
@@ -296,7 +298,7 @@ def _fitted_records(
 
 
 def _assemble(
-    fitted: Model,
+    fitted: GreyBoxModel,
     prepared: RecordSet,
     options: RecordOptions,
     groups: Sequence[Sequence[RecordEnd]],

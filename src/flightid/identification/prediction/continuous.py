@@ -14,7 +14,7 @@ from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.prediction.result import Prediction, Shifts
 from flightid.identification.prediction.weights import guide_weights
 from flightid.models import StateSpaceModel
-from flightid.models.linear.linear_system import LinearModel
+from flightid.models.model import LinearModel
 from flightid.record import Channel, Record, Step
 
 

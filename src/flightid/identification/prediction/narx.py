@@ -5,12 +5,12 @@ from __future__ import annotations
 from flightid.errors import OptionError
 from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.prediction.result import Prediction
-from flightid.models import NarxEquation
+from flightid.models import NarxModel
 from flightid.record import Channel, Record, Step
 
 
 def predict_narx(
-    model: NarxEquation, record: Record, outputs: tuple[str, ...], request: Request
+    model: NarxModel, record: Record, outputs: tuple[str, ...], request: Request
 ) -> Prediction:
     """Predict one record; `flightid.predict` says how.
 
@@ -34,7 +34,7 @@ def predict_narx(
     run = model.predict(record, request.horizon)
     (name,) = outputs
     known = record.channels
-    channels = [known[each] for each in model.model.inputs]
+    channels = [known[each] for each in model.inputs]
     channels.append(Channel(name, known[name].unit, known[name].role, "predicted"))
     predicted = record.replace({name: run.predicted}, channels=channels, step=Step("predict", {}))
     settle = request.settle_samples(record.n_samples, record.sample_time_s) or 0

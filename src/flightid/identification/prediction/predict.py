@@ -11,16 +11,16 @@ from flightid.identification.prediction.narx import predict_narx
 from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.sampled import predict_sampled
-from flightid.models import InnovationsModel, LinearSystem, NarxEquation, PolynomialModel
+from flightid.models import InnovationsModel, LinearSystem, NarxModel, PolynomialModel
 from flightid.models.linear.hold_equivalent import Hold
-from flightid.models.linear.linear_system import LinearModel
+from flightid.models.model import LinearModel
 from flightid.record import Record
 from flightid.units import canonical
 
 Predictor = Callable[[Any, Record, tuple[str, ...], Request], Prediction]
 # Kind of model -> how it predicts; the first that fits. A new kind adds its line.
 PREDICTORS: tuple[tuple[type[Any], Predictor], ...] = (
-    (NarxEquation, predict_narx),
+    (NarxModel, predict_narx),
     (PolynomialModel, predict_sampled),
     (InnovationsModel, predict_sampled),
     (LinearModel, predict_continuous),

@@ -18,6 +18,7 @@ from flightid.identification.prediction.result import Prediction, Shifts
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.innovations import prediction as innovations
 from flightid.models.polynomial import prediction as polynomial
+from flightid.models.sampled.channels import require_same
 from flightid.record import Channel, Record, Step
 
 Array = NDArray[np.float64]
@@ -61,7 +62,7 @@ def predict_sampled(
     """
     _refuse(request)
     names = _outputs(model)
-    polynomial.require_same(
+    require_same(
         model,
         {name: record.unit(name) for name in (*names, *model.inputs)},
         record.sample_time_s,

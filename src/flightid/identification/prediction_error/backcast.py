@@ -8,15 +8,15 @@ from scipy.signal import lfilter
 
 from flightid import _native
 from flightid.errors import FitError
-from flightid.models.polynomial.data import PolynomialData
 from flightid.models.polynomial.model import PolynomialModel
+from flightid.models.sampled.channels import SampledChannels
 
 Array = NDArray[np.float64]
 FORGOTTEN = 1e-8
 LONGEST = 10_000
 
 
-def backcast(model: PolynomialModel, data: PolynomialData) -> list[list[float]]:
+def backcast(model: PolynomialModel, data: SampledChannels) -> list[list[float]]:
     """Values that stand for the past of each record: inputs at rest, noise as its model foretells.
 
     The disturbance v = y - (B/AF) u is a stationary process, whose reversal has the same model;

@@ -11,9 +11,9 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification.fit import FittedParameter, LocalMinimum
 from flightid.identification.prediction_error.roots import POLE, ZERO, FittedRoot
-from flightid.models.linear.discrete_modes import polynomial_roots
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.sampled.discrete_modes import polynomial_roots
 
 CONVERGED = {"gradient", "step", "cost", "zero", "regression", "instruments", "kernel"}
 SAMPLES_PER_COEFFICIENT = 10

@@ -21,9 +21,9 @@ from flightid.identification.prediction_error.linear_regression import regress, 
 from flightid.identification.prediction_error.result import FitScore, PolynomialFit
 from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
 from flightid.identification.prediction_error.starts import polynomial_starts
-from flightid.models.polynomial.data import PolynomialData, gather_channels
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 from flightid.uncertainty import interval95
 from flightid.version import VERSION
@@ -64,7 +64,7 @@ def fit_polynomial(
     return _assemble(structure, records, channels, found)
 
 
-def _require_samples(structure: PolynomialStructure, data: PolynomialData) -> None:
+def _require_samples(structure: PolynomialStructure, data: SampledChannels) -> None:
     lag = structure.longest_lag
     counted = sum(max(0, n - lag) for n in data.lengths)
     least = structure.n_parameters + SPARE_SAMPLES
@@ -78,7 +78,7 @@ def _require_samples(structure: PolynomialStructure, data: PolynomialData) -> No
         )
 
 
-def _search(structure: PolynomialStructure, data: PolynomialData) -> _Found:
+def _search(structure: PolynomialStructure, data: SampledChannels) -> _Found:
     if structure.is_regression and not structure.backcast:
         found = _regression(structure, data)
         unstable = np.max(np.abs(np.roots([1.0, *found.theta[: structure.na]])), initial=0.0) >= 1.0
@@ -89,7 +89,7 @@ def _search(structure: PolynomialStructure, data: PolynomialData) -> _Found:
     return _iterate(structure, data, polynomial_starts(structure, data), [])
 
 
-def _regression(structure: PolynomialStructure, data: PolynomialData) -> _Found:
+def _regression(structure: PolynomialStructure, data: SampledChannels) -> _Found:
     """ARX: linear in the coefficients, so no iteration."""
     skip = 0 if structure.initial_state == "zero" else structure.longest_lag
     made = regress(
@@ -128,7 +128,7 @@ def _inverse_square(factor: Array) -> Array:
 
 def _iterate(
     structure: PolynomialStructure,
-    data: PolynomialData,
+    data: SampledChannels,
     starts: Array,
     memory: list[list[float]],
 ) -> _Found:
@@ -187,7 +187,7 @@ def _minima(
     return tuple(groups)
 
 
-def _backcast_rounds(structure: PolynomialStructure, data: PolynomialData) -> _Found:
+def _backcast_rounds(structure: PolynomialStructure, data: SampledChannels) -> _Found:
     """The past follows from the model and the model from the past, until both rest."""
     of_inputs, of_noise = _native.polynomial_memory(structure.native)
     memory = [[0.0] * (sum(of_inputs) + of_noise) for _ in data.lengths]
@@ -208,7 +208,7 @@ def _backcast_rounds(structure: PolynomialStructure, data: PolynomialData) -> _F
 def _assemble(
     structure: PolynomialStructure,
     records: tuple[Record, ...],
-    data: PolynomialData,
+    data: SampledChannels,
     found: _Found,
 ) -> PolynomialFit:
     errors = _native.polynomial_errors(
@@ -289,7 +289,7 @@ def _scores(
     structure: PolynomialStructure,
     model: PolynomialModel,
     records: Sequence[Record],
-    data: PolynomialData,
+    data: SampledChannels,
     counted: Sequence[Array],
 ) -> tuple[FitScore, ...]:
     """One step with the errors of the fit, and free run, over all records of the fit."""
@@ -316,7 +316,7 @@ def _scores(
 
 
 def _provenance(
-    structure: PolynomialStructure, records: Sequence[Record], data: PolynomialData
+    structure: PolynomialStructure, records: Sequence[Record], data: SampledChannels
 ) -> dict[str, object]:
     digest = hashlib.sha256(data.output.tobytes())
     digest.update(np.ascontiguousarray(data.inputs).tobytes())

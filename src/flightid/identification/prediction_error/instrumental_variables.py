@@ -10,15 +10,15 @@ from scipy.signal import lfilter
 
 from flightid.errors import DataError
 from flightid.identification.prediction_error.linear_regression import reflected, regress
-from flightid.models.polynomial.data import PolynomialData
 from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.sampled.channels import SampledChannels
 
 Array = NDArray[np.float64]
 SPARE_LAGS = 8
 ROWS_PER_LAG = 20
 
 
-def four_stage(structure: PolynomialStructure, data: PolynomialData) -> tuple[Array, Array]:
+def four_stage(structure: PolynomialStructure, data: SampledChannels) -> tuple[Array, Array]:
     """Coefficients of A y = B u + v with v of any colour, and their covariance.
 
     Least squares; instruments from its noise-free output; a long noise model of what is left; the
@@ -55,7 +55,7 @@ def _numerators(structure: PolynomialStructure, theta: Array) -> list[Array]:
     return [np.concatenate([np.zeros(k), b]) for k, b in zip(structure.nk, parts, strict=True)]
 
 
-def _left(structure: PolynomialStructure, data: PolynomialData, theta: Array) -> Array:
+def _left(structure: PolynomialStructure, data: SampledChannels, theta: Array) -> Array:
     a = np.concatenate([[1.0], theta[: structure.na]])
     left = _filtered(a, np.ones(1), data.output, data.spans)
     for row, b in zip(data.inputs, _numerators(structure, theta), strict=True):
@@ -64,7 +64,7 @@ def _left(structure: PolynomialStructure, data: PolynomialData, theta: Array) ->
 
 
 def _instruments(
-    structure: PolynomialStructure, data: PolynomialData, theta: Array, whitener: Array
+    structure: PolynomialStructure, data: SampledChannels, theta: Array, whitener: Array
 ) -> tuple[Array, Array]:
     below = reflected(np.concatenate([[1.0], theta[: structure.na]]))
     clean = np.zeros_like(data.output)
@@ -97,7 +97,7 @@ def _instruments(
 
 def _columns(
     structure: PolynomialStructure,
-    data: PolynomialData,
+    data: SampledChannels,
     output: Array,
     inputs: Sequence[Array],
     start: int,

@@ -12,6 +12,7 @@ from flightid.findings import Finding
 from flightid.identification.fit import FittedParameter, LocalMinimum
 from flightid.identification.prediction_error.information_criteria import Criteria
 from flightid.identification.prediction_error.roots import POLE, FittedRoot
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.prediction import PolynomialPrediction
 from flightid.models.polynomial.structure import PolynomialStructure
@@ -102,6 +103,10 @@ class PolynomialFit:
     def modes(self) -> tuple[FittedRoot, ...]:
         """Poles with a natural frequency, the slowest first."""
         return tuple(root for root in self.roots if root.kind == POLE and root.natural_frequency)
+
+    def linear_system(self) -> LinearSystem:
+        """The linear system of the fitted model; ModelError with the reason where there is none."""
+        return self.model.linear_system()
 
     def predict(
         self, record: Record, horizon: int | str = "free_run", *, initial_state: str = "estimate"

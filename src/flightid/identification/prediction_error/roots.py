@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.identification.fit import FittedParameter
-from flightid.models.linear.discrete_modes import discrete_modes
-from flightid.models.polynomial.display import zero_note
 from flightid.models.polynomial.model import PolynomialModel
+from flightid.models.sampled.discrete_modes import discrete_modes, zero_note
 from flightid.uncertainty import interval95
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from flightid.identification.prediction_error.linear_regression import reflected, regress
-from flightid.models.polynomial.data import PolynomialData
 from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.sampled.channels import SampledChannels
 
 Array = NDArray[np.float64]
 ROUNDS = 8
@@ -25,7 +25,7 @@ class _Plant:
     f: list[Array]
 
 
-def polynomial_starts(structure: PolynomialStructure, data: PolynomialData) -> Array:
+def polynomial_starts(structure: PolynomialStructure, data: SampledChannels) -> Array:
     """Coefficients to start from, shape (n_starts, n_coefficients), the systematic ones first.
 
     Reference: Ljung, *System Identification*, 2nd ed., section 10.5 (eqs. 10.66 to 10.73);
@@ -52,7 +52,7 @@ def _flat(plant: _Plant, c: Array, d: Array) -> Array:
 
 
 def _long_model(
-    structure: PolynomialStructure, data: PolynomialData
+    structure: PolynomialStructure, data: SampledChannels
 ) -> tuple[Array, Array, list[Array]]:
     """Innovations and polynomials of a long ARX model, which mimics every noise model."""
     n_inputs = len(structure.inputs)
@@ -78,7 +78,7 @@ def _long_model(
 
 def _plants(
     structure: PolynomialStructure,
-    data: PolynomialData,
+    data: SampledChannels,
     innovations: Array,
     long_a: Array,
     long_b: list[Array],
@@ -104,7 +104,7 @@ def _empty(structure: PolynomialStructure) -> list[Array]:
 
 
 def _with_innovations(
-    structure: PolynomialStructure, data: PolynomialData, innovations: Array
+    structure: PolynomialStructure, data: SampledChannels, innovations: Array
 ) -> _Plant:
     """Second stage: the estimated innovations stand in for the noise as one more input."""
     inputs = np.vstack([data.inputs, innovations])
@@ -113,7 +113,7 @@ def _with_innovations(
     return _Plant(*_split(structure, theta), _empty(structure))
 
 
-def _plain(structure: PolynomialStructure, data: PolynomialData) -> _Plant:
+def _plain(structure: PolynomialStructure, data: SampledChannels) -> _Plant:
     theta = regress(
         data.output, data.inputs, data.lengths, structure.na, structure.nb, structure.nk
     ).shortest
@@ -133,7 +133,7 @@ def _reduced(long_a: Array, long_b: Array, nb: int, nf: int) -> tuple[Array, Arr
     return _steiglitz_mcbride(response, pulse[None], [length], [nb], nf, [0])
 
 
-def _filtered(structure: PolynomialStructure, data: PolynomialData) -> _Plant:
+def _filtered(structure: PolynomialStructure, data: SampledChannels) -> _Plant:
     """One denominator for all inputs, from the data themselves."""
     nf = max(structure.nf)
     b, f = _steiglitz_mcbride(
@@ -161,7 +161,7 @@ def _steiglitz_mcbride(
 
 
 def _noise(
-    structure: PolynomialStructure, data: PolynomialData, plant: _Plant
+    structure: PolynomialStructure, data: SampledChannels, plant: _Plant
 ) -> tuple[Array, Array]:
     """C and D of what the plant leaves, by long autoregression and then least squares."""
     nc, nd = structure.nc, structure.nd

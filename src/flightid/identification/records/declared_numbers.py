@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.identification.records.options import ESTIMATE, RecordOptions
-from flightid.models import Model, RecordValue, StateSpaceModel
+from flightid.models import GreyBoxModel, RecordValue, StateSpaceModel
 
 Array = NDArray[np.float64]
 Declared = Mapping[str, RecordValue]
 
 
 def declared_numbers(
-    model: Model, options: RecordOptions, kind: str, names: Sequence[str]
+    model: GreyBoxModel, options: RecordOptions, kind: str, names: Sequence[str]
 ) -> dict[str, RecordValue]:
     """What the model declares for some of the names, where the options leave it to the model.
 

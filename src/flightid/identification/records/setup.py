@@ -15,7 +15,7 @@ from flightid.identification.records.options import (
     chosen,
     initial_values,
 )
-from flightid.models import Model, StateSpaceModel
+from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
 from flightid.units import require_match
 
@@ -99,7 +99,7 @@ class RecordSet:
     first_order_hold : bool
     """
 
-    model: Model
+    model: GreyBoxModel
     records: tuple[Record, ...]
     arrays: list[NativeRecord]
     offsets: list[Array]
@@ -113,7 +113,7 @@ class RecordSet:
         return sum(record.n_samples for record in self.records)
 
 
-def state_names(model: Model) -> tuple[str, ...]:
+def state_names(model: GreyBoxModel) -> tuple[str, ...]:
     """Names of the states; those of a transfer function are its response's, numbered."""
     if isinstance(model, StateSpaceModel):
         return tuple(model.states)
@@ -132,7 +132,7 @@ def _product(factors: Sequence[Array]) -> Array:
 
 
 def prepare_records(
-    model: Model, data: Record | Sequence[Record], options: RecordOptions
+    model: GreyBoxModel, data: Record | Sequence[Record], options: RecordOptions
 ) -> RecordSet:
     """Check records against the model and bring them to arrays.
 
@@ -208,7 +208,9 @@ def prepare_records(
     return RecordSet(model, records, arrays, offsets, own, states, options.hold == "first")
 
 
-def _require_length(model: Model, records: Sequence[Record], own: Sequence[OwnNumbers]) -> None:
+def _require_length(
+    model: GreyBoxModel, records: Sequence[Record], own: Sequence[OwnNumbers]
+) -> None:
     for record, numbers in zip(records, own, strict=True):
         if record.n_samples * len(model.outputs) <= 2 * numbers.n_free:
             raise DataError(
@@ -227,7 +229,7 @@ def _require_length(model: Model, records: Sequence[Record], own: Sequence[OwnNu
         )
 
 
-def _output_trim(model: Model) -> dict[str, float]:
+def _output_trim(model: GreyBoxModel) -> dict[str, float]:
     """Outputs at the point about which the model is linear."""
     if not isinstance(model, StateSpaceModel) or not any(model.trim.values()):
         return {}

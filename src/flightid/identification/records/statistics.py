@@ -22,7 +22,7 @@ from flightid.identification.frequency_domain.estimates import (
     require_identifiable,
 )
 from flightid.identification.records.setup import OwnNumbers, RecordSet
-from flightid.models import Model, StateSpaceModel
+from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.uncertainty import correlation as correlation_of
 from flightid.uncertainty import interval95
 from flightid.uncertainty.coloured_residuals import (
@@ -108,7 +108,7 @@ class Beside:
 
 
 def record_statistics(
-    fitted: Model,
+    fitted: GreyBoxModel,
     prepared: RecordSet,
     own: Sequence[OwnNumbers],
     determined: Sequence[Sequence[bool]],
@@ -322,7 +322,7 @@ def start_errors(
 
 
 def _own_numbers(
-    fitted: Model,
+    fitted: GreyBoxModel,
     prepared: RecordSet,
     numbers: OwnNumbers,
     kept: Sequence[bool],

@@ -11,7 +11,7 @@ from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
 from flightid.identification.reduction.result import Reduction, ReductionStep
 from flightid.identification.reduction.rules import Candidate, ReductionLimits, choose
-from flightid.models import Model
+from flightid.models import GreyBoxModel
 from flightid.progress import progress
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
@@ -188,7 +188,7 @@ class _Walk:
         word = f"the average cost would rise to {found.average_cost:.4g}"
         return replace(step, accepted=False, note=word)
 
-    def _refit(self, model: Model) -> Fit:
+    def _refit(self, model: GreyBoxModel) -> Fit:
         found: Fit = identify(model, self.data, **self.options)
         if found.provenance.get("data_sha256") != self.fit.provenance.get("data_sha256"):
             raise DataError(
@@ -207,7 +207,9 @@ class _Walk:
             self.fit = step.fit
 
 
-def _without(model: Model, name: str, at: Mapping[str, float]) -> tuple[Model, float, str]:
+def _without(
+    model: GreyBoxModel, name: str, at: Mapping[str, float]
+) -> tuple[GreyBoxModel, float, str]:
     """The model with a parameter fixed, the value, and a note where it is neither zero nor asked.
 
     Raises

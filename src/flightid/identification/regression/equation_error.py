@@ -44,7 +44,7 @@ from flightid.identification.regression.weights import (
     level_weights,
     spectral_weights,
 )
-from flightid.models import Model, StateSpaceModel
+from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ def fit_fourier_regression(
     return _finish("Fourier regression", problem, data, options, settled, limits, inner, known)
 
 
-def equation_error_start(model: Model, data: Record | Sequence[Record]) -> Model:
+def equation_error_start(model: GreyBoxModel, data: Record | Sequence[Record]) -> GreyBoxModel:
     """Copy of a model with the values that equation error finds, as a start for output error.
 
     Raises

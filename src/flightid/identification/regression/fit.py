@@ -23,7 +23,7 @@ from flightid.identification.multistart import DenseEnd, local_minima
 from flightid.identification.records.findings import judge_fit
 from flightid.identification.regression.options import RegressionOptions
 from flightid.identification.regression.rounds import Limits
-from flightid.models import Model, StateSpaceModel
+from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
 from flightid.uncertainty import correlation as correlation_of
 from flightid.uncertainty.cramer_rao import inverse_hessian
@@ -37,11 +37,11 @@ Array = NDArray[np.float64]
 class Inner:
     """A model at its estimates, and which free parameters lie inside their bounds."""
 
-    fitted: Model
+    fitted: GreyBoxModel
     mask: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, model: Model, theta: Array) -> Inner:
+    def of(cls, model: GreyBoxModel, theta: Array) -> Inner:
         """Put estimates into a model."""
         names = (parameter.name for parameter in model.parameters.free)
         fitted = model.with_values(dict(zip(names, map(float, theta), strict=True)))
@@ -106,7 +106,7 @@ def check_records(model: StateSpaceModel, data: Record | Sequence[Record]) -> tu
     return records
 
 
-def limits_of(model: Model, maximum_iterations: int) -> tuple[Array, Limits]:
+def limits_of(model: GreyBoxModel, maximum_iterations: int) -> tuple[Array, Limits]:
     """Start values and bounds of the free parameters."""
     free = model.parameters.free
     start = np.array([float(parameter.value or 0.0) for parameter in free])
@@ -177,7 +177,7 @@ def assemble(
 
 
 def _provenance(
-    method: str, model: Model, records: Sequence[Record], options: RegressionOptions
+    method: str, model: GreyBoxModel, records: Sequence[Record], options: RegressionOptions
 ) -> dict[str, object]:
     digest = hashlib.sha256()
     for record in records:

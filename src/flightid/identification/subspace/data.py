@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.models.innovations.structure import SubspaceStructure
-from flightid.models.polynomial.data import PolynomialData, gather_channels
+from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 
 Array = NDArray[np.float64]
@@ -31,14 +31,14 @@ class SubspaceData:
         For each record.
     scales : ndarray, shape (p,)
         Root mean square of each output, so that no unit outweighs another.
-    channels : PolynomialData
+    channels : SampledChannels
         The same end to end, with units and offsets.
     """
 
     outputs: tuple[Array, ...]
     inputs: tuple[Array, ...]
     scales: Array
-    channels: PolynomialData
+    channels: SampledChannels
 
     @property
     def n_outputs(self) -> int:

@@ -10,7 +10,7 @@ from flightid.identification.prediction_error.roots import POLE, FittedRoot
 from flightid.identification.subspace.order import OrderChoice
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.structure import SubspaceStructure
-from flightid.models.linear.recursion import spectral_radius
+from flightid.models.sampled.recursion import spectral_radius
 
 AT_CIRCLE = 1e-3
 

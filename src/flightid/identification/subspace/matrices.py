@@ -8,7 +8,7 @@ from scipy.linalg import solve_discrete_are
 
 from flightid.identification.subspace.data import SubspaceData
 from flightid.models.innovations.prediction import free_motion
-from flightid.models.linear.recursion import run_recursion, spectral_radius
+from flightid.models.sampled.recursion import run_recursion, spectral_radius
 
 Array = NDArray[np.float64]
 STABLE = 1.0 - 1e-6

@@ -11,7 +11,7 @@ from flightid import _native
 from flightid.identification.subspace.data import SubspaceData
 from flightid.identification.subspace.matrices import STABLE, adjoint_run
 from flightid.models.innovations.prediction import RANK
-from flightid.models.linear.recursion import run_recursion, spectral_radius
+from flightid.models.sampled.recursion import run_recursion, spectral_radius
 from flightid.progress import progress
 
 Array = NDArray[np.float64]

@@ -17,6 +17,7 @@ from flightid.identification.subspace.order import OrderChoice
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.prediction import InnovationsPrediction
 from flightid.models.innovations.structure import SubspaceStructure
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.record import Record
 from flightid.table import Cell, Column, Table
 
@@ -89,6 +90,10 @@ class InnovationsFit:
     def modes(self) -> tuple[FittedRoot, ...]:
         """Poles with a natural frequency, the slowest first."""
         return tuple(root for root in self.roots if root.kind == POLE and root.natural_frequency)
+
+    def linear_system(self) -> LinearSystem:
+        """The linear system of the fitted model; ModelError with the reason where there is none."""
+        return self.model.linear_system()
 
     def predict(
         self, record: Record, horizon: int | str = "free_run", *, initial_state: str = "estimate"

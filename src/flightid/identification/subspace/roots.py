@@ -20,7 +20,7 @@ from flightid.identification.prediction_error.roots import (
     propagated,
 )
 from flightid.models.innovations.model import InnovationsModel
-from flightid.models.linear.discrete_modes import discrete_modes
+from flightid.models.sampled.discrete_modes import discrete_modes
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

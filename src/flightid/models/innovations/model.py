@@ -2,31 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Self, Unpack
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from flightid.errors import ModelError
+from flightid.models.innovations.description import innovations_from_table, innovations_to_table
+from flightid.models.innovations.form import Array, InnovationsForm
 from flightid.models.innovations.prediction import InnovationsPrediction, predict
 from flightid.models.innovations.structure import SubspaceOptions, SubspaceStructure
-from flightid.models.linear.discrete_modes import DiscreteMode, discrete_modes
-from flightid.models.polynomial.display import zero_note
+from flightid.models.sampled.discrete_modes import zero_note
 from flightid.record import Record
 from flightid.table import Cell, Column, Table
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-SCHEMA = "flightid.innovations_model/1"
-ABSENT = 1e-9
-"""Pulses smaller than this share of the largest are rounding: the response is delayed."""
 
-
-@dataclass(frozen=True, eq=False, repr=False)
-class InnovationsModel:
+class InnovationsModel(InnovationsForm):
     """x(t+1) = A x(t) + B u(t) + K e(t), y(t) = C x(t) + D u(t) + e(t).
 
     Channels are deviations from an operating point, in the channels' units; the states have no
@@ -63,44 +51,6 @@ class InnovationsModel:
     array([0.8+0.j])
     """
 
-    outputs: tuple[str, ...]
-    inputs: tuple[str, ...]
-    sample_time_s: float
-    a: ArrayLike
-    b: ArrayLike
-    c: ArrayLike
-    d: ArrayLike | None = None
-    k: ArrayLike | None = None
-    noise_covariance: Array | None = None
-    units: Mapping[str, str] = field(default_factory=dict)
-    name: str = "innovations model"
-    operating_point: Mapping[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "outputs", tuple(self.outputs))
-        object.__setattr__(self, "inputs", tuple(self.inputs))
-        p, m, n = len(self.outputs), len(self.inputs), np.shape(self.a)[0]
-        shapes = {"a": (n, n), "b": (n, m), "c": (p, n), "d": (p, m), "k": (n, p)}
-        for letter, shape in shapes.items():
-            given = getattr(self, letter)
-            matrix = np.zeros(shape) if given is None else np.array(given, dtype=np.float64)
-            if matrix.shape != shape or not np.all(np.isfinite(matrix)):
-                raise ModelError(
-                    f"matrix {letter.upper()} does not fit the model or is not finite",
-                    found=matrix.shape,
-                    needed=f"finite numbers of shape {shape}",
-                )
-            matrix.flags.writeable = False
-            object.__setattr__(self, letter, matrix)
-        if not (math.isfinite(self.sample_time_s) and self.sample_time_s > 0):
-            raise ModelError("the sample time is not positive", found=self.sample_time_s)
-        if self.noise_covariance is not None and np.shape(self.noise_covariance) != (p, p):
-            raise ModelError(
-                "the noise covariance does not fit the outputs",
-                found=np.shape(self.noise_covariance),
-                needed=(p, p),
-            )
-
     @staticmethod
     def subspace(
         outputs: str | Sequence[str],
@@ -126,81 +76,6 @@ class InnovationsModel:
             (each,) if isinstance(each, str) else tuple(each) for each in (outputs, inputs)
         )
         return SubspaceStructure(names[0], names[1], order, **options)
-
-    @property
-    def order(self) -> int:
-        """Number of states n."""
-        return int(np.shape(self.a)[0])
-
-    @property
-    def matrices(self) -> tuple[Array, Array, Array, Array, Array]:
-        """A, B, C, D and K."""
-        a, b, c, d, k = (np.asarray(each) for each in (self.a, self.b, self.c, self.d, self.k))
-        return a, b, c, d, k
-
-    def transformed(self, matrix: ArrayLike) -> Self:
-        """The same model with states T x, T of shape (n, n)."""
-        a, b, c, _, k = self.matrices
-        to = np.asarray(matrix, dtype=np.float64)
-        back = np.linalg.inv(to)
-        return replace(self, a=to @ a @ back, b=to @ b, c=c @ back, k=to @ k)
-
-    def poles(self) -> Complex:
-        """Poles in the z plane, shape (n,), shared by all responses."""
-        return np.asarray(np.linalg.eigvals(np.asarray(self.a)), dtype=np.complex128)
-
-    def modes(self) -> tuple[DiscreteMode, ...]:
-        """Natural frequencies and dampings, the slowest first, s = ln z / T."""
-        return discrete_modes(self.poles(), self.sample_time_s)
-
-    def zeros(self) -> dict[str, Complex]:
-        """Zeros in the z plane of each response by ``"output/input"``.
-
-        Reference
-        ---------
-        Kailath, *Linear Systems* (1980), section 2.1: poles of the inverse system.
-        """
-        return {
-            f"{output}/{name}": response_zeros(self, i, j)
-            for i, output in enumerate(self.outputs)
-            for j, name in enumerate(self.inputs)
-        }
-
-    def transfer(self, output: str, name: str) -> tuple[Array, Array]:
-        """Numerator and denominator of one response in powers of z⁻¹."""
-        a, b, c, d, _ = self.matrices
-        i, j = self.outputs.index(output), self.inputs.index(name)
-        below = np.asarray(np.poly(a), dtype=np.float64)
-        above = np.poly(a - np.outer(b[:, j], c[i])) + (d[i, j] - 1.0) * below
-        return np.asarray(above, dtype=np.float64), below
-
-    def gains(self) -> dict[str, float | None]:
-        """Steady gain by ``"output/input"``; None for all with an integrator."""
-        a, b, c, d, _ = self.matrices
-        rest = np.eye(self.order) - a
-        single = self.order > 0 and np.linalg.cond(rest) > 1e13
-        steady = None if single else c @ np.linalg.solve(rest, b) + d
-        return {
-            f"{output}/{name}": None if steady is None else float(steady[i, j])
-            for i, output in enumerate(self.outputs)
-            for j, name in enumerate(self.inputs)
-        }
-
-    def frequency_response(self, omega_rad_s: ArrayLike) -> Complex:
-        """Response from the inputs, shape (p, m, n_freqs), at frequencies in rad/s."""
-        a, b, c, d, _ = self.matrices
-        z = np.exp(1j * np.asarray(omega_rad_s, dtype=np.float64).ravel() * self.sample_time_s)
-        solved = np.linalg.solve(z[:, None, None] * np.eye(self.order) - a, b.astype(complex))
-        return np.asarray(np.moveaxis(c @ solved + d, 0, -1))
-
-    def pulse_response(self, count: int) -> Array:
-        """Markov parameters D, C B, C A B, …, shape (count, p, m)."""
-        a, b, c, d, _ = self.matrices
-        found = [d]
-        for _ in range(count - 1):
-            found.append(c @ b)
-            b = a @ b
-        return np.array(found[:count])
 
     def predict(
         self,
@@ -272,38 +147,19 @@ class InnovationsModel:
         return Table(repr(self), columns, tuple(rows), ("one line for each conjugate pair",))
 
     def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key, which `from_dict` takes back."""
-        r = self.noise_covariance
-        return {
-            "schema": SCHEMA,
-            "name": self.name,
-            "outputs": list(self.outputs),
-            "inputs": list(self.inputs),
-            "sample_time_s": self.sample_time_s,
-            **{x: m.tolist() for x, m in zip("abcdk", self.matrices, strict=True)},
-            "noise_covariance": None if r is None else np.asarray(r).tolist(),
-            "units": dict(self.units),
-            "operating_point": dict(self.operating_point),
-        }
+        """Plain values with a ``schema`` key, which `from_dict` and TOML files take back."""
+        return innovations_to_table(self)
 
     @classmethod
     def from_dict(cls, content: Mapping[str, object]) -> Self:
-        """Model from the plain values of `to_dict`.
+        """Model from plain values such as a TOML file gives.
 
         Raises
         ------
         ModelError
-            Another schema, or a key that is missing or of the wrong type.
+            A key is missing, unknown or of the wrong type, or the matrices do not fit.
         """
-        values = dict(content)
-        if values.pop("schema", None) != SCHEMA:
-            raise ModelError("this is no innovations model", needed=f"schema {SCHEMA!r}")
-        try:
-            noise = values.pop("noise_covariance", None)
-            covariance = None if noise is None else np.array(noise, dtype=np.float64)
-            return cls(noise_covariance=covariance, **values)  # type: ignore[arg-type]
-        except (TypeError, ValueError, IndexError) as problem:
-            raise ModelError("the values do not make a model", found=str(problem)) from problem
+        return cls(**innovations_from_table(content))
 
     def __repr__(self) -> str:
         """Size, channels and sample time on one line."""
@@ -313,25 +169,3 @@ class InnovationsModel:
 
     def _repr_html_(self) -> str:
         return self.summary()._repr_html_()
-
-
-def response_zeros(model: InnovationsModel, i: int, j: int) -> Complex:
-    """Zeros of the response of output i to input j.
-
-    With the first pulse h = c Aʳ⁻¹ b that is not zero, they are the eigenvalues of A - b h⁻¹ c Aʳ
-    on the states that c, c A, …, c Aʳ⁻¹ do not see.
-    """
-    a, b, c, d, _ = model.matrices
-    pulses = model.pulse_response(model.order + 1)[:, i, j]
-    present = np.abs(pulses) > ABSENT * np.max(np.abs(pulses), initial=0.0)
-    if not np.any(present):
-        return np.zeros(0, dtype=np.complex128)
-    lag = int(np.argmax(present))
-    if lag == 0:
-        closed = a - np.outer(b[:, j], c[i]) / d[i, j]
-    else:
-        seen = np.array([c[i] @ np.linalg.matrix_power(a, power) for power in range(lag + 1)])
-        closed = a - np.outer(b[:, j], seen[lag]) / pulses[lag]
-        unseen = np.linalg.svd(seen[:lag])[2][lag:]
-        closed = unseen @ closed @ unseen.T
-    return np.asarray(np.linalg.eigvals(closed), dtype=np.complex128)

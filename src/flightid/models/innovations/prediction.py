@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import OptionError
-from flightid.models.linear.recursion import run_recursion
-from flightid.models.polynomial.data import gather_channels
-from flightid.models.polynomial.prediction import LARGEST, require_same
-from flightid.models.polynomial.structure import OFFSETS
+from flightid.models.innovations.form import InnovationsForm
+from flightid.models.sampled.channels import LARGEST, OFFSETS, gather_channels, require_same
+from flightid.models.sampled.recursion import run_recursion
 from flightid.record import Record
-
-if TYPE_CHECKING:
-    from flightid.models.innovations.model import InnovationsModel
 
 Array = NDArray[np.float64]
 RANK = 1e-10
@@ -88,7 +83,7 @@ class InnovationsPrediction:
 
 
 def predict(
-    model: InnovationsModel, record: Record, horizon: int | str, *, initial_state: str, offsets: str
+    model: InnovationsForm, record: Record, horizon: int | str, *, initial_state: str, offsets: str
 ) -> InnovationsPrediction:
     """Predict one record; `InnovationsModel.predict` says how."""
     if horizon != "free_run" and not (isinstance(horizon, int) and horizon > 0):
@@ -121,13 +116,13 @@ def predict(
     )
 
 
-def forced_run(model: InnovationsModel, u: Array) -> Array:
+def forced_run(model: InnovationsForm, u: Array) -> Array:
     """Response to the inputs alone, shape (p, n_samples), from rest."""
     a, b, c, d, _ = model.matrices
     return np.asarray(c @ run_recursion(a, b @ u) + d @ u)
 
 
-def free_run(model: InnovationsModel, y: Array, u: Array, *, initial_state: str) -> Array:
+def free_run(model: InnovationsForm, y: Array, u: Array, *, initial_state: str) -> Array:
     """Response to the inputs, shape (p, n_samples), from rest or from the state that fits best."""
     a, _, c, _, _ = model.matrices
     run = forced_run(model, u)
@@ -139,7 +134,7 @@ def free_run(model: InnovationsModel, y: Array, u: Array, *, initial_state: str)
     return run + _best(motion, y - run)
 
 
-def one_step_errors(model: InnovationsModel, y: Array, u: Array, initial_state: str) -> Array:
+def one_step_errors(model: InnovationsForm, y: Array, u: Array, initial_state: str) -> Array:
     """Prediction errors one step ahead, shape (p, n_samples)."""
     a, b, c, d, k = model.matrices
     state = run_recursion(a - k @ c, (b - k @ d) @ u + k @ y)
@@ -166,7 +161,7 @@ def _best(motion: Array, errors: Array) -> Array:
 
 
 def ahead(
-    model: InnovationsModel, y: Array, u: Array, horizon: int, initial_state: str = "estimate"
+    model: InnovationsForm, y: Array, u: Array, horizon: int, initial_state: str = "estimate"
 ) -> Array:
     """y(t) minus the part of the noise that is younger than the horizon."""
     errors = one_step_errors(model, y, u, initial_state)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TypedDict
 
 from flightid.errors import OptionError
-from flightid.models.polynomial.structure import OFFSETS
+from flightid.models.sampled.channels import OFFSETS
 
 METHODS = ("moesp", "n4sid", "cva", "pbsid")
 INITIAL_STATES = ("estimate", "zero")

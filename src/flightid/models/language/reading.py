@@ -6,6 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flightid.errors import ModelError
 from flightid.models.parameters import Parameter
 
@@ -131,3 +134,55 @@ def read_parameter(name: str, item: object, ties: Mapping[str, str]) -> Paramete
         tie=None if tie is None else read_text(tie, f"parameters.{name}.tie"),
         note=read_text(item.get("note", ""), f"parameters.{name}.note"),
     )
+
+
+def read_names(content: Mapping[str, object], key: str) -> tuple[str, ...]:
+    """A list of different names.
+
+    Raises
+    ------
+    ModelError
+        It is missing, no list of texts, or names something twice.
+    """
+    if key not in content:
+        raise ModelError(f"the model has no {key}")
+    listed = read_list(content[key], key)
+    names = tuple(read_text(each, key) for each in listed)
+    if len(set(names)) < len(names):
+        raise ModelError(f"a name is given twice among the {key}", found=", ".join(names)[:200])
+    return names
+
+
+def read_matrix(item: object, key: str, shape: tuple[int, int]) -> NDArray[np.float64]:
+    """A matrix as a list of rows; zeros where it is absent.
+
+    Raises
+    ------
+    ModelError
+        It is no list of rows of numbers, or of another shape.
+    """
+    if item is None or 0 in shape:
+        return np.zeros(shape)
+    rows = [[read_number(x, key) for x in read_list(row, key)] for row in read_list(item, key)]
+    if len(rows) != shape[0] or any(len(row) != shape[1] for row in rows):
+        raise ModelError(
+            f"matrix {key} does not fit the names",
+            found=f"{len(rows)} rows of {sorted({len(row) for row in rows})}",
+            needed=f"{shape[0]} rows of {shape[1]}",
+        )
+    return np.array(rows, dtype=np.float64)
+
+
+def read_list(item: object, key: str) -> list[Any]:
+    """A list, bounded in length.
+
+    Raises
+    ------
+    ModelError
+        It is something else, or too long.
+    """
+    if not isinstance(item, list) or len(item) > MAXIMUM_ENTRIES:
+        raise ModelError(
+            f"{key} must be a list of at most {MAXIMUM_ENTRIES}", found=repr(item)[:80]
+        )
+    return item

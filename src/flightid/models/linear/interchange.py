@@ -11,6 +11,7 @@ from scipy.signal import StateSpace, dlti, lti
 from flightid.errors import ExportError, ModelError
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.rational import control_library, require_names
+from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def to_control(
 
     Parameters
     ----------
-    source : FrequencyResponse, or what `LinearSystem.of` takes
+    source : FrequencyResponse, or what `linear_system` takes
     pade_order : int, optional
         Order of the Padé approximation that stands for the delays of a continuous system.
     sample_time_s : float, optional
@@ -64,7 +65,7 @@ def to_control(
     (['tau_phi'], 3)
     """
     if not isinstance(source, FrequencyResponse):
-        system = LinearSystem.of(source)
+        system = linear_system(source)
         return system.to_control(
             pade_order=pade_order, sample_time_s=sample_time_s, hold=hold, name=name
         )
@@ -169,7 +170,7 @@ def to_scipy(
 
     Parameters
     ----------
-    source : what `LinearSystem.of` takes
+    source : what `linear_system` takes
     pade_order, sample_time_s, hold
         As for `to_control`.
 
@@ -194,7 +195,7 @@ def to_scipy(
     >>> fid.to_scipy(roll, sample_time_s=0.1).dt
     0.1
     """
-    system = LinearSystem.of(source)
+    system = linear_system(source)
     return system.to_scipy(pade_order=pade_order, sample_time_s=sample_time_s, hold=hold)
 
 

@@ -2,44 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol, Self, runtime_checkable
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
-from flightid.models.innovations.model import InnovationsModel
 from flightid.models.linear.delay_states import delays_as_states, shift_registers
 from flightid.models.linear.hold_equivalent import Hold, hold_equivalent
 from flightid.models.linear.rational import Rational
 from flightid.models.linear.realisation import Matrices
-from flightid.models.polynomial.model import PolynomialModel
+from flightid.models.parameters import Parameter
+from flightid.table import Column, Table
 
 Array = NDArray[np.float64]
+SCHEMA = "flightid.linear_system/1"
 BLOCK = 1 << 17
 """Elements of the matrices that are solved at a time."""
 DEFAULT_PADE_ORDER = 3
-
-
-@runtime_checkable
-class LinearModel(Protocol):
-    """What can be simulated: named inputs and outputs, and a state space with input delays."""
-
-    @property
-    def inputs(self) -> Sequence[str]:
-        """Names of the inputs."""
-        ...
-
-    @property
-    def outputs(self) -> Sequence[str]:
-        """Names of the outputs."""
-        ...
-
-    def state_space(self) -> Matrices:
-        """A (n, n), B (n, m), C (p, n), D (p, m) and the delay of each input (m,), s."""
-        ...
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -62,6 +44,7 @@ class LinearSystem(Rational):
         s; None for continuous time.
     units : mapping of str to str
         Unit by channel and state name; what is left out is dimensionless.
+    name : str
 
     Raises
     ------
@@ -91,6 +74,7 @@ class LinearSystem(Rational):
     states: tuple[str, ...] = ()
     sample_time_s: float | None = None
     units: Mapping[str, str] = field(default_factory=dict)
+    name: str = "linear system"
 
     def __post_init__(self) -> None:
         inputs, outputs = tuple(self.inputs), tuple(self.outputs)
@@ -131,75 +115,14 @@ class LinearSystem(Rational):
                 action="sample the continuous system with its delay: `sampled` makes states of it",
             )
 
-    @classmethod
-    def of(cls, source: object) -> LinearSystem:
-        """The linear system of a model, a fit, or itself.
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:
+        """None: its entries are numbers without names."""
+        return {}
 
-        Parameters
-        ----------
-        source : TransferFunctionModel, StateSpaceModel, PolynomialModel, InnovationsModel, a fit of
-            one, LinearSystem, another `LinearModel`, or an interconnection
-            Nonlinear state-space models are linearised at their trim; noise models are left out.
-
-        Returns
-        -------
-        LinearSystem
-
-        Raises
-        ------
-        ModelError
-            The source has no state space.
-
-        Example
-        -------
-        >>> import flightid as fid
-        >>> LinearSystem.of(fid.load_model("rate_integrator")).order
-        1
-        """
-        if isinstance(source, LinearSystem):
-            return source
-        if isinstance(source, PolynomialModel):
-            return cls(
-                *source.state_space()[:4],
-                source.inputs,
-                (source.output,),
-                sample_time_s=source.sample_time_s,
-                units=source.units,
-            )
-        if isinstance(source, InnovationsModel):
-            return cls(
-                *source.matrices[:4],
-                source.inputs,
-                source.outputs,
-                sample_time_s=source.sample_time_s,
-                units=source.units,
-            )
-        if isinstance(source, LinearModel):
-            matrices = source.state_space()
-            states = tuple(getattr(source, "states", ()))
-            units = {**getattr(source, "units", {})}
-            if isinstance(getattr(source, "states", None), Mapping):
-                units |= dict(source.states)  # type: ignore[attr-defined]
-            return cls(
-                *matrices[:4],
-                tuple(source.inputs),
-                tuple(source.outputs),
-                matrices[4],
-                states if len(states) == len(matrices[0]) else (),
-                getattr(source, "sample_time_s", None),
-                units,
-            )
-        joined = getattr(source, "linear_system", None)
-        if callable(joined):
-            return cls.of(joined())
-        model = getattr(source, "model", None)
-        if model is None or model is source:
-            raise ModelError(
-                "there is no linear system in this",
-                found=type(source).__name__,
-                needed="a model, a fit of one, or matrices",
-            )
-        return cls.of(model)
+    def linear_system(self) -> LinearSystem:
+        """Itself."""
+        return self
 
     @property
     def order(self) -> int:
@@ -373,6 +296,40 @@ class LinearSystem(Rational):
             inputs=tuple(self.inputs[k] for k in columns),
             outputs=tuple(self.outputs[k] for k in rows),
         )
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values with a ``schema`` key; what is absent is left out, as TOML has no null."""
+        a, b, c, d, delays = self.state_space()
+        table: dict[str, object] = {
+            "schema": SCHEMA,
+            "kind": "linear",
+            "name": self.name,
+            "inputs": list(self.inputs),
+            "outputs": list(self.outputs),
+            "states": list(self.states),
+            "a": a.tolist(),
+            "b": b.tolist(),
+            "c": c.tolist(),
+            "d": d.tolist(),
+            "delays_s": delays.tolist(),
+            "units": dict(self.units),
+        }
+        if self.sample_time_s is not None:
+            table["sample_time_s"] = self.sample_time_s
+        return table
+
+    def summary(self) -> Table:
+        """Table of the poles, one line for each conjugate pair."""
+        columns = (Column("pole real"), Column("pole imaginary"), Column("|pole|"))
+        upper = [pole for pole in self.poles() if pole.imag >= 0.0]
+        rows = tuple((float(p.real), float(p.imag), float(abs(p))) for p in upper)
+        plane = "s plane, rad/s" if self.sample_time_s is None else "z plane"
+        late = ", ".join(f"{delay:g} s" for delay in np.asarray(self.delays_s))
+        kind = f"poles in the {plane}, one line for each conjugate pair"
+        return Table(repr(self), columns, rows, (kind, f"delays of inputs: {late}"))
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()
 
     def __repr__(self) -> str:
         """Size on one line."""

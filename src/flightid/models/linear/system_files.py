@@ -14,7 +14,7 @@ from scipy.io import loadmat, savemat
 
 from flightid.errors import FileFormatError, ModelError
 from flightid.files import write_atomically
-from flightid.models.linear.description import system_from_table, system_to_table
+from flightid.models.linear.description import system_from_table
 from flightid.models.linear.linear_system import LinearSystem
 
 FORMATS = (".mat", ".json", ".npz")
@@ -76,7 +76,7 @@ def write_system(
         )
     extra = dict(parameters or {})
     if suffix == ".json":
-        table = {**system_to_table(system), **({"parameters": _plain(extra)} if extra else {})}
+        table = {**system.to_dict(), **({"parameters": _plain(extra)} if extra else {})}
         return write_atomically(path, json.dumps(table, indent=1, allow_nan=False) + "\n")
     if suffix == ".npz":
         return write_atomically(path, _npz(system, extra))
@@ -151,7 +151,7 @@ def _plain(extra: Mapping[str, object]) -> dict[str, object]:
 
 
 def _npz(system: LinearSystem, extra: Mapping[str, object]) -> bytes:
-    table = system_to_table(system)
+    table = system.to_dict()
     arrays: dict[str, NDArray[Any]] = {
         key: np.asarray(getattr(system, key)) for key in (*_MATRICES, "delays_s")
     }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,9 +17,7 @@ from flightid.models.language.reading import (
     read_texts,
     require_keys,
 )
-
-if TYPE_CHECKING:
-    from flightid.models.polynomial.model import PolynomialModel
+from flightid.models.polynomial.polynomials import Polynomials
 
 SCHEMA = "flightid.polynomial_model/1"
 _KEYS = {"schema", "kind", "name", "output", "inputs", "sample_time_s", "a", "c", "d", "units"}
@@ -27,7 +25,7 @@ _KEYS |= {"noise_variance", "covariance", "operating_point"}
 _INPUT_KEYS = {"b", "f", "nk"}
 
 
-def model_to_table(model: PolynomialModel) -> dict[str, object]:
+def model_to_table(model: Polynomials) -> dict[str, object]:
     """Plain values of a model; what is absent is left out, as TOML has no null."""
 
     def plain(row: object) -> list[float]:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from flightid.models.linear.discrete_modes import discrete_modes
+from flightid.models.polynomial.polynomials import Polynomials
+from flightid.models.sampled.discrete_modes import discrete_modes, zero_note
 from flightid.table import Cell, Column, Table
 
-if TYPE_CHECKING:
-    from flightid.models.polynomial.model import PolynomialModel
 
-
-def difference_equation(model: PolynomialModel) -> str:
+def difference_equation(model: Polynomials) -> str:
     """The model in samples where it is ARX or ARMAX, else with its polynomials named."""
     if np.size(model.d) > 1 or any(np.size(row) > 1 for row in model.f):
         return _in_polynomials(model)
@@ -31,7 +27,7 @@ def _term(value: float, word: str) -> str:
     return f" {'-' if value < 0 else '+'} {abs(value):.6g} {word}"
 
 
-def _in_polynomials(model: PolynomialModel) -> str:
+def _in_polynomials(model: Polynomials) -> str:
     parts = [
         f"[{_polynomial(row, k)} / {_polynomial(f, 0)}] {name}(t)"
         for name, row, k, f in zip(model.inputs, model.b, model.nk, model.f, strict=True)
@@ -48,7 +44,7 @@ def _polynomial(row: object, delay: int) -> str:
     return text or "0"
 
 
-def roots_table(model: PolynomialModel) -> Table:
+def roots_table(model: Polynomials) -> Table:
     """Poles and zeros of each response with natural frequency, damping and what to know."""
     columns = (
         Column("response"),
@@ -72,7 +68,7 @@ def roots_table(model: PolynomialModel) -> Table:
             for zero in zeros[zeros.imag >= 0]
         )
     notes = (
-        model.difference_equation(),
+        difference_equation(model),
         "steady gains: "
         + ", ".join(
             f"{name} {'none (integrator)' if gain is None else f'{gain:.5g}'}"
@@ -82,21 +78,6 @@ def roots_table(model: PolynomialModel) -> Table:
         "one line for each conjugate pair",
     )
     return Table(repr(model), columns, tuple(rows), notes)
-
-
-def zero_note(zero: complex | np.complex128) -> str:
-    """What a zero outside the unit circle means; a negative real one comes from sampling.
-
-    Example
-    -------
-    >>> zero_note(1.2)
-    'non-minimum phase'
-    """
-    if abs(zero) <= 1.0:
-        return ""
-    if zero.imag == 0.0 and zero.real < 0.0:
-        return "outside the circle on the negative axis: sampling makes such zeros"
-    return "non-minimum phase"
 
 
 def _parts(root: complex) -> tuple[float, float, float]:

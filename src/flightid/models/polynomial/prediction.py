@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from flightid import _native
-from flightid.errors import DataError, OptionError, UnitError
-from flightid.models.polynomial.data import SAME_SAMPLE_TIME, gather_channels
-from flightid.models.polynomial.structure import OFFSETS
+from flightid.errors import OptionError
+from flightid.models.polynomial.polynomials import Polynomials
+from flightid.models.sampled.channels import LARGEST, OFFSETS, gather_channels, require_same
 from flightid.record import Record
 
-if TYPE_CHECKING:
-    from flightid.models.innovations.model import InnovationsModel
-    from flightid.models.polynomial.model import PolynomialModel
-
 Array = NDArray[np.float64]
-LARGEST = 1e100
-"""A run beyond this is held at the last sample before it: its squares still are numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +71,7 @@ class PolynomialPrediction:
 
 
 def predict(
-    model: PolynomialModel, record: Record, horizon: int | str, *, initial_state: str, offsets: str
+    model: Polynomials, record: Record, horizon: int | str, *, initial_state: str, offsets: str
 ) -> PolynomialPrediction:
     """Predict one record; `PolynomialModel.predict` says how."""
     if horizon != "free_run" and not (isinstance(horizon, int) and horizon > 0):
@@ -107,30 +99,7 @@ def predict(
     )
 
 
-def require_same(
-    model: PolynomialModel | InnovationsModel, units: Mapping[str, str], sample_time_s: float
-) -> None:
-    """Refuse records with another sample time or other units than the model's."""
-    if abs(sample_time_s / model.sample_time_s - 1.0) > SAME_SAMPLE_TIME:
-        raise DataError(
-            "the record has another sample time than the model",
-            found=f"{sample_time_s:.6g} s",
-            needed=f"{model.sample_time_s:.6g} s",
-            action="resample it with conditioning.resample",
-        )
-    for name, unit in units.items():
-        if unit != model.units.get(name, unit):
-            raise UnitError(
-                f"channel {name!r} has another unit than the model",
-                found=unit,
-                needed=model.units[name],
-                action="convert it with Record.to_units",
-            )
-
-
-def one_step_errors(
-    model: PolynomialModel, output: Array, inputs: Array, initial_state: str
-) -> Array:
+def one_step_errors(model: Polynomials, output: Array, inputs: Array, initial_state: str) -> Array:
     """Prediction errors one step ahead, shape (n_samples,), of deviations from trim."""
     return _native.polynomial_errors(
         output,
@@ -144,7 +113,7 @@ def one_step_errors(
 
 
 def ahead(
-    model: PolynomialModel,
+    model: Polynomials,
     output: Array,
     inputs: Array,
     horizon: int,
@@ -159,7 +128,7 @@ def ahead(
     return np.asarray(output - lfilter(young, [1.0], errors))
 
 
-def forced_run(model: PolynomialModel, inputs: Array) -> Array:
+def forced_run(model: Polynomials, inputs: Array) -> Array:
     """Response to the inputs alone, shape (n_samples,), from rest."""
     run = np.zeros(inputs.shape[1])
     with np.errstate(over="ignore", invalid="ignore"):
@@ -168,7 +137,7 @@ def forced_run(model: PolynomialModel, inputs: Array) -> Array:
     return run
 
 
-def free_motion(model: PolynomialModel, n_samples: int) -> Array:
+def free_motion(model: Polynomials, n_samples: int) -> Array:
     """What each sample before the record makes of the output, shape (count, n_samples)."""
     below = np.asarray(model.a)
     for row in model.f:
@@ -179,7 +148,7 @@ def free_motion(model: PolynomialModel, n_samples: int) -> Array:
         return np.asarray(lfilter([1.0], below, impulse))
 
 
-def free_run(model: PolynomialModel, output: Array, inputs: Array, *, initial_state: str) -> Array:
+def free_run(model: Polynomials, output: Array, inputs: Array, *, initial_state: str) -> Array:
     """Response to the inputs alone, and with ``"estimate"`` the free motion that fits best."""
     run = forced_run(model, inputs)
     if initial_state == "zero":

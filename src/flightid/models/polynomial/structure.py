@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TypedDict
 
 from flightid.errors import OptionError
+from flightid.models.sampled.channels import OFFSETS
 
 INITIAL_STATES = ("estimate", "zero")
 METHODS = ("prediction_error", "iv4")
-OFFSETS = ("mean", "trim", "none")
 KERNELS = ("tc", "dc")
 LARGEST = 100
 """Most coefficients of one polynomial, and the longest delay in samples, times ten."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +12,7 @@ from flightid import _native
 from flightid.errors import DataError, SingularError, UnknownNameError
 from flightid.models.adjustable import Adjustable
 from flightid.models.language.tables import TableFunction
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.realisation import Matrices, one_delay_for_each_input
 from flightid.models.state_space.checks import derivative
 from flightid.models.state_space.parts import Output, StateSpaceMatrices, pair_places
@@ -31,6 +33,14 @@ class Linearised(Adjustable):
     definitions: Mapping[str, Output]
     tables: Mapping[str, TableFunction]
     native: _native.StateSpace
+
+    if TYPE_CHECKING:
+
+        @property
+        def name(self) -> str: ...  # noqa: D102 - the model documents it
+
+        @property
+        def units(self) -> dict[str, str]: ...  # noqa: D102 - the model documents it
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -200,6 +210,28 @@ class Linearised(Adjustable):
         columns = range(len(self.inputs))
         delays = one_delay_for_each_input(columns, list(found.delays_s), list(self.inputs))
         return a, b, found.h0 + found.h1 @ a, found.d + found.h1 @ b, delays
+
+    @property
+    def sample_time_s(self) -> None:
+        """None: continuous time."""
+        return None
+
+    def linear_system(self) -> LinearSystem:
+        """The linear system at the trim, with the delays of the inputs.
+
+        Raises
+        ------
+        SingularError
+            The equations do not give every state derivative.
+        ModelError
+            A negative delay.
+        """
+        a, b, c, d, delays_s = self.state_space()
+        units = {**self.units, **self.states}
+        return LinearSystem(
+            a, b, c, d, self.inputs, self.outputs, delays_s, tuple(self.states), None, units,
+            self.name,
+        )  # fmt: skip
 
     def eigenvalues(
         self, values: Mapping[str, float] | None = None, at: Mapping[str, float] | None = None

@@ -17,6 +17,7 @@ from flightid.errors import DataError, ModelError, UnknownNameError
 from flightid.models.adjustable import Adjustable
 from flightid.models.language.dimensions import require_unit
 from flightid.models.language.formula import formula_names
+from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.realisation import Matrices, canonical_form, one_delay_for_each_input
 from flightid.models.parameters import Parameters
 from flightid.table import Table
@@ -259,6 +260,24 @@ class TransferFunctionModel(Adjustable):
             [(row, column, *f[:3]) for row, column, f in zip(rows, columns, found, strict=True)],
         )
         return a, b, c, d, delays
+
+    @property
+    def sample_time_s(self) -> None:
+        """None: continuous time."""
+        return None
+
+    def linear_system(self) -> LinearSystem:
+        """Its state space with the delays of the inputs.
+
+        Raises
+        ------
+        ModelError
+            A response with more zeros than poles, a negative delay, or one input with several.
+        """
+        a, b, c, d, delays_s = self.state_space()
+        return LinearSystem(
+            a, b, c, d, self.inputs, self.outputs, delays_s, units=self.units, name=self.name
+        )
 
     def response(self, name: str) -> TransferFunction:
         """The transfer function of one pair, by ``"output/input"``.

@@ -13,7 +13,8 @@ from flightid.errors import FitError, OptionError
 from flightid.findings import Finding
 from flightid.identification.identify import identify
 from flightid.identification.narx.result import NarxFit
-from flightid.models.narx.model import NarxEquation, NarxModel
+from flightid.models.narx.model import NarxModel
+from flightid.models.narx.structure import NarxStructure
 from flightid.progress import track
 from flightid.record import Record
 from flightid.simulation.metrics import fit_percent, rms_error
@@ -37,7 +38,7 @@ class FreeRunScore:
 class NarxTrial:
     """One structure of a search: its fit (None with the reason where there is none) and scores."""
 
-    model: NarxModel
+    model: NarxStructure
     fit: NarxFit | None
     score: FreeRunScore | None
     baseline: FreeRunScore | None
@@ -106,7 +107,7 @@ class NarxSearch:
 
 
 def search_narx(
-    model: NarxModel,
+    model: NarxStructure,
     training: Record | Sequence[Record],
     validation: Record | Sequence[Record],
     *,
@@ -120,7 +121,7 @@ def search_narx(
 
     Parameters
     ----------
-    model : NarxModel
+    model : NarxStructure
         What all trials share.
     training, validation : Record or sequence of Record
     lags : sequence of (int, int)
@@ -158,7 +159,7 @@ def search_narx(
     ...     for t in range(2, 200):
     ...         y[t] = 0.8 * np.tanh(y[t - 1]) + 0.5 * u[t - 2]
     ...     return fid.Record.from_arrays(np.arange(200) / 5, inputs={"u": u}, outputs={"y": y})
-    >>> search = search_narx(fid.NarxModel("y", ("u",), 1, 1, maximum_terms=8), fly(0), fly(1),
+    >>> search = search_narx(fid.NarxStructure("y", ("u",), 1, 1, maximum_terms=8), fly(0), fly(1),
     ...                      lags=[(1, 1), (1, 2)])
     >>> search.best.model.input_lags, search.trials[0].baseline.rms > search.trials[0].score.rms
     (2, True)
@@ -186,7 +187,7 @@ def search_narx(
 
 
 def _trial(
-    model: NarxModel, training: Record | Sequence[Record], unseen: Sequence[Record], start: int
+    model: NarxStructure, training: Record | Sequence[Record], unseen: Sequence[Record], start: int
 ) -> NarxTrial:
     try:
         fit = identify(model, training)
@@ -198,7 +199,7 @@ def _trial(
 
 
 def _score(
-    equation: NarxEquation, records: Sequence[Record], start: int, horizon: int | str
+    equation: NarxModel, records: Sequence[Record], start: int, horizon: int | str
 ) -> FreeRunScore:
     runs = [equation.predict(record, horizon) for record in records]
     measured = np.concatenate([run.measured[start:] for run in runs])

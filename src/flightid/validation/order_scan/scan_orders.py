@@ -15,9 +15,9 @@ from flightid.errors import DataError, FitError, OptionError
 from flightid.identification.identify import identify
 from flightid.identification.prediction_error.information_criteria import criteria
 from flightid.identification.prediction_error.result import PolynomialFit
-from flightid.models.polynomial.data import PolynomialData, gather_channels
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialOptions, PolynomialStructure
+from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.progress import progress, track
 from flightid.record import Record
 from flightid.validation.order_scan.result import OrderScan, OrderTrial
@@ -184,7 +184,7 @@ def _structures(
 
 
 def _native_trials(
-    structures: Sequence[PolynomialStructure], data: PolynomialData, check: PolynomialData
+    structures: Sequence[PolynomialStructure], data: SampledChannels, check: SampledChannels
 ) -> list[OrderTrial]:
     start = max(max(s.longest_lag + 1, s.nc) for s in structures)
     shortest = min(*data.lengths, *check.lengths)

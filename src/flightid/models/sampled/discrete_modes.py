@@ -124,3 +124,18 @@ def polynomial_roots(polynomial: Sequence[float] | NDArray[np.float64]) -> NDArr
     array([0.5])
     """
     return np.asarray(np.roots(np.trim_zeros(np.asarray(polynomial), "fb")), dtype=np.complex128)
+
+
+def zero_note(zero: complex | np.complex128) -> str:
+    """What a zero outside the unit circle means; a negative real one comes from sampling.
+
+    Example
+    -------
+    >>> zero_note(1.2)
+    'non-minimum phase'
+    """
+    if abs(zero) <= 1.0:
+        return ""
+    if zero.imag == 0.0 and zero.real < 0.0:
+        return "outside the circle on the negative axis: sampling makes such zeros"
+    return "non-minimum phase"

@@ -1,10 +1,11 @@
-"""Records as the arrays that polynomial models run on, after their checks."""
+"""Records as the arrays that sampled models run on, after their checks."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,27 @@ from flightid.record import Record
 
 Array = NDArray[np.float64]
 SAME_SAMPLE_TIME = 1e-6
+OFFSETS = ("mean", "trim", "none")
+LARGEST = 1e100
+"""A run beyond this is held at the last sample before it: its squares still are numbers."""
+
+
+class SampledModel(Protocol):
+    """What a record must agree with."""
+
+    @property
+    def sample_time_s(self) -> float:
+        """Sample time, s."""
+        ...
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Unit by channel."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
-class PolynomialData:
+class SampledChannels:
     """Channels of all records end to end, their offsets taken off.
 
     Attributes
@@ -80,7 +98,7 @@ class PolynomialData:
 
 def gather_channels(
     records: Sequence[Record], output: str, inputs: Sequence[str], offsets: str
-) -> PolynomialData:
+) -> SampledChannels:
     """Channels of records with one sample time and one set of units.
 
     Raises
@@ -128,7 +146,34 @@ def gather_channels(
     ]
     stacked = np.array(rows[1:]).reshape(len(inputs), rows[0].size)
     lengths = tuple(record.n_samples for record in records)
-    return PolynomialData(rows[0], stacked, lengths, removed, units, first.sample_time_s)
+    return SampledChannels(rows[0], stacked, lengths, removed, units, first.sample_time_s)
+
+
+def require_same(model: SampledModel, units: Mapping[str, str], sample_time_s: float) -> None:
+    """Refuse records with another sample time or other units than the model's.
+
+    Raises
+    ------
+    DataError
+        Another sample time.
+    UnitError
+        A channel in another unit.
+    """
+    if abs(sample_time_s / model.sample_time_s - 1.0) > SAME_SAMPLE_TIME:
+        raise DataError(
+            "the record has another sample time than the model",
+            found=f"{sample_time_s:.6g} s",
+            needed=f"{model.sample_time_s:.6g} s",
+            action="resample it with conditioning.resample",
+        )
+    for name, unit in units.items():
+        if unit != model.units.get(name, unit):
+            raise UnitError(
+                f"channel {name!r} has another unit than the model",
+                found=unit,
+                needed=model.units[name],
+                action="convert it with Record.to_units",
+            )
 
 
 def _offsets(record: Record, names: Sequence[str], kind: str) -> dict[str, float]:

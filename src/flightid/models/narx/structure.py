@@ -1,0 +1,171 @@
+"""Structure of a NARX model: its lags, and the terms that `identify` chooses from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from flightid.errors import OptionError
+from flightid.models.narx.terms import KERNELS, Lag, width_to_beta
+
+STOPS = ("press", "sse", "err", "terms", "aic", "aicc", "bic")
+CANDIDATES = ("data", "kmeans", "grid")
+REGULARISATIONS = ("none", "uniform", "local")
+
+
+@dataclass(frozen=True)
+class NarxStructure:
+    """Structure of y(t) = f(y(t-1) … y(t-n_y), u(t-d) … u(t-d-n_u+1)) for `identify`.
+
+    Every channel is scaled to zero mean and unit deviation (N - 1) over the training records; the
+    scaling stays in the fit. Constant and linear terms are always kept; the others are chosen.
+
+    Attributes
+    ----------
+    output : str
+    inputs : tuple of str
+    output_lags, input_lags : int
+        n_y, and n_u of each input.
+    delay : int
+        Smallest lag d of the inputs; 0 for a direct path.
+    kernel : str or None
+        ``"gaussian"`` exp(-d²/β²), ``"multiquadric"`` √(d²+β²), ``"inverse_multiquadric"``,
+        ``"thin_plate"`` d² ln d (no width), or None for no radial functions.
+    width, width_convention : float, str
+        Width in deviations: ``"beta"``, ``"matlab_spread"`` (β = spread/0.8326) or ``"sigma"``
+        (β = √2 σ).
+    candidates : str
+        Centres to choose from: ``"data"`` every training sample, ``"kmeans"`` or ``"grid"``.
+    n_candidates : int
+        Clusters, or levels of the grid along each regressor.
+    seed : int
+        Of the clusters.
+    constant, linear : bool
+        Whether these terms are in the model.
+    degree : int
+        Largest total power of the products to choose from; below 2 there are none.
+    stop : str
+        ``"press"`` (smallest leave-one-out error), ``"sse"`` or ``"err"`` with `goal` (of the
+        scaled output), ``"aic"``, ``"aicc"``, ``"bic"``, or ``"terms"``.
+    goal : float
+        Sum of squared errors or error-reduction ratio that ends the selection.
+    maximum_terms : int
+        Most terms, constant and linear ones included.
+    regularisation : str
+        ``"none"``, ``"uniform"`` (one `penalty` for all chosen terms) or ``"local"``: a penalty of
+        its own for each chosen term, from the evidence for it; terms without evidence go. Constant
+        and linear terms are not penalised.
+    penalty : float
+        λ of the squared coefficient of a term's part that is orthogonal to the terms before it;
+        for ``"local"`` that of the first choice.
+    held_back : float
+        Share of each record, at its end, that takes no part in the choice of terms: weights and
+        their standard errors come from it alone, so that the errors hold in spite of the choice
+        (in white noise). 0: choice and weights share all samples.
+    guard : float
+        Predictions are held inside the middle of the training outputs ± guard times half their
+        range, and flagged.
+
+    Raises
+    ------
+    OptionError
+        A value outside its range.
+
+    Example
+    -------
+    >>> NarxStructure("theta", ("voltage",), 4, 4, width=2.0, width_convention="sigma")
+    NarxStructure('theta' from voltage, 4 + 4 lags, gaussian β = 2.828 (sigma 2), stop press)
+    """
+
+    output: str
+    inputs: tuple[str, ...]
+    output_lags: int
+    input_lags: int
+    delay: int = 1
+    kernel: str | None = "gaussian"
+    width: float = 5.0
+    width_convention: str = "beta"
+    candidates: str = "data"
+    n_candidates: int = 100
+    seed: int = 0
+    constant: bool = True
+    linear: bool = True
+    degree: int = 1
+    stop: str = "press"
+    goal: float = 0.0
+    maximum_terms: int = 30
+    regularisation: str = "none"
+    penalty: float = 0.0
+    held_back: float = 0.0
+    guard: float = 3.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inputs", tuple(self.inputs))
+        least = {"input_lags": 0, "output_lags": 0, "delay": 0, "degree": 1, "maximum_terms": 1}
+        for name, low in {**least, "n_candidates": 1}.items():
+            if getattr(self, name) < low:
+                raise OptionError(f"{name} is too small", found=getattr(self, name), needed=low)
+        choices = {
+            "stop": STOPS,
+            "candidates": CANDIDATES,
+            "kernel": (*KERNELS, None),
+            "regularisation": REGULARISATIONS,
+        }
+        for name, allowed in choices.items():
+            if getattr(self, name) not in allowed:
+                needed = ", ".join(map(str, allowed))
+                raise OptionError(f"unknown {name}", found=getattr(self, name), needed=needed)
+        if not self.lags:
+            raise OptionError("a NARX model has no lags", needed="output_lags or input_lags")
+        if len({self.output, *self.inputs}) != 1 + len(self.inputs):
+            raise OptionError("a channel is named twice", found=(self.output, *self.inputs))
+        if not (math.isfinite(self.guard) and self.guard >= 1):
+            raise OptionError("guard cuts training data", found=self.guard, needed="1 or more")
+        if self.stop in ("sse", "err") and not self.goal > 0:
+            raise OptionError(f"stop {self.stop!r} has no goal", found=self.goal, needed="above 0")
+        width_to_beta(self.width, self.width_convention)
+        self._check_penalties()
+
+    def _check_penalties(self) -> None:
+        penalty, kind = self.penalty, self.regularisation
+        if not (math.isfinite(penalty) and penalty >= 0):
+            raise OptionError("a penalty is negative", found=penalty, needed="0 or more")
+        if (kind == "uniform") is not (penalty > 0) and kind != "local":
+            raise OptionError(
+                "penalty and regularisation disagree",
+                found=f"regularisation={kind!r}, penalty={penalty}",
+                needed="a penalty above 0 for 'uniform', none for 'none'",
+            )
+        if not 0 <= self.held_back < 1:
+            raise OptionError(
+                "held_back is no share", found=self.held_back, needed="0 to below 1, such as 0.5"
+            )
+        if self.held_back and kind != "none":
+            raise OptionError(
+                "penalised weights have no standard errors to hold samples back for",
+                found=f"regularisation={kind!r}, held_back={self.held_back}",
+                needed="one of the two",
+            )
+
+    @property
+    def beta(self) -> float:
+        """Width β, deviations."""
+        return width_to_beta(self.width, self.width_convention)
+
+    @property
+    def lags(self) -> tuple[Lag, ...]:
+        """The regressor vector: lags of the output, then of each input."""
+        outputs = [Lag(self.output, lag) for lag in range(1, self.output_lags + 1)]
+        span = range(self.delay, self.delay + self.input_lags)
+        return (*outputs, *(Lag(name, lag) for name in self.inputs for lag in span))
+
+    def __repr__(self) -> str:
+        """Structure on one line, the width in β and as it was given."""
+        kernel = "no radial terms" if self.kernel is None else f"{self.kernel}"
+        if self.kernel not in (None, "thin_plate"):
+            kernel += f" β = {self.beta:.4g} ({self.width_convention} {self.width:.4g})"
+        lags = f"{self.output_lags} + {self.input_lags} lags"
+        return (
+            f"NarxStructure({self.output!r} from {', '.join(self.inputs)}, {lags}, {kernel}, "
+            f"stop {self.stop})"
+        )

@@ -1,0 +1,1 @@
+"""What sampled black boxes share: channels, recursions, roots in the z plane, coefficients."""

@@ -1,0 +1,36 @@
+"""Coefficients of black boxes as named parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from flightid.models.parameters import Parameter
+
+
+@dataclass(frozen=True, repr=False)
+class Coefficient(Parameter):
+    """A free number of a black box, named by lag, entry or term.
+
+    Example
+    -------
+    >>> Coefficient("b1[voltage]", 0.5, "deg/V")
+    Parameter(b1[voltage] = 0.5 deg/V, free in [-inf, inf])
+    """
+
+    def _check_name(self) -> None:
+        """No formula names it, so it may be any text."""
+
+
+def coefficients(
+    names: Sequence[str], values: Iterable[float], units: Sequence[str]
+) -> Mapping[str, Parameter]:
+    """Coefficients by name.
+
+    Example
+    -------
+    >>> coefficients(["a1"], [-0.5], ["1"])["a1"].value
+    -0.5
+    """
+    rows = zip(names, values, units, strict=True)
+    return {name: Coefficient(name, float(value), unit) for name, value, unit in rows}
