@@ -10,7 +10,7 @@ FUZZ_RUNS ?= 1000000
 
 PYTEST = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
-.PHONY: demo test test-slow test-nightly fuzz bench lint hooks format stubs develop wheel constraints clean help
+.PHONY: demo test test-slow test-nightly docs fuzz bench lint hooks format stubs develop wheel constraints clean help
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/ —/'
@@ -19,7 +19,7 @@ $(STAMP): pyproject.toml constraints.txt
 	$(PYTHON) tools/check_machine.py
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
-	$(BIN)/python tools/install_dependencies.py dev
+	$(BIN)/python tools/install_dependencies.py dev docs
 	touch $@
 
 develop: $(STAMP)  ## build the native half in place, for working on the code
@@ -62,6 +62,9 @@ test-nightly: wheel  ## every example whole and longer draws, minutes; then what
 test-slow: wheel  ## Monte Carlo calibration of every printed interval, and the full studies
 	$(PYTEST) -m slow
 
+docs: wheel  ## build the documentation site into build/site, warnings as errors
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+
 bench: wheel  ## speed against peers, same data, one run
 	$(BIN)/python -m benchmarks
 
@@ -76,4 +79,4 @@ constraints: $(STAMP)  ## note the installed versions as the ones that `make` in
 	mv constraints.new constraints.txt
 
 clean:
-	rm -rf $(VENV) $(WHEELS) target demo-output
+	rm -rf $(VENV) $(WHEELS) target build demo-output

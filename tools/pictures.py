@@ -35,8 +35,8 @@ SHOTS = {"report-result.png": (0, 1060), "report-model.png": (1080, 2480)}
 SCALE = 0.7
 
 
-def photograph(page: Path, picture: Path) -> None:
-    """Take one picture of a whole page."""
+def photograph(page: Path, picture: Path, size: tuple[int, int] = PAGE_SIZE) -> None:
+    """Take one picture of a page, `size` in px."""
     browser = shutil.which("chromium") or shutil.which("google-chrome")
     if browser is None:
         raise SystemExit("Chromium is not on this machine.")
@@ -45,19 +45,26 @@ def photograph(page: Path, picture: Path) -> None:
             browser,
             *OPTIONS,
             f"--user-data-dir={profile}",
-            f"--window-size={PAGE_SIZE[0]},{PAGE_SIZE[1]}",
+            f"--window-size={size[0]},{size[1]}",
             f"--screenshot={picture}",
             page.resolve().as_uri(),
         ]
         subprocess.run(command, check=True, capture_output=True, timeout=120)
 
 
-def cut(whole: Path, rows: tuple[int, int], picture: Path) -> None:
-    """Cut rows out of the page's picture, shrink them and keep few colours: plots have few."""
+def keep(whole: Path, picture: Path, rows: tuple[int, int] | None = None) -> Path:
+    """Keep a picture with few colours, since plots have few; of a page only some rows, shrunk."""
     with Image.open(whole) as image:
-        part = image.convert("RGB").crop((0, rows[0], image.width, rows[1]))
-        size = (round(part.width * SCALE), round(part.height * SCALE))
-        part.resize(size, Image.Resampling.LANCZOS).quantize(64).save(picture, optimize=True)
+        first, last = rows or (0, image.height)
+        part = image.convert("RGB").crop((0, first, image.width, last))
+        if rows is not None:
+            size = (round(part.width * SCALE), round(part.height * SCALE))
+            part = part.resize(size, Image.Resampling.LANCZOS)
+        part.quantize(64).save(picture, optimize=True)
+    size_bytes = picture.stat().st_size
+    if size_bytes > MAXIMUM_BYTES:
+        raise SystemExit(f"{picture.name} has {size_bytes} bytes, at most {MAXIMUM_BYTES} are kept")
+    return picture
 
 
 def main() -> None:
@@ -69,12 +76,8 @@ def main() -> None:
         whole = Path(folder) / "page.png"
         photograph(Path(sys.argv[1]), whole)
         for name, rows in SHOTS.items():
-            picture = PICTURES / name
-            cut(whole, rows, picture)
-            size = picture.stat().st_size
-            print(f"{picture.relative_to(ROOT)}: {size / 1000:.0f} kB")
-            if size > MAXIMUM_BYTES:
-                raise SystemExit(f"{name} is larger than {MAXIMUM_BYTES / 1000:.0f} kB")
+            picture = keep(whole, PICTURES / name, rows)
+            print(f"{picture.relative_to(ROOT)}: {picture.stat().st_size / 1000:.0f} kB")
 
 
 if __name__ == "__main__":

@@ -1,0 +1,114 @@
+"""The documentation site: every public name has its place, every picture and page is there."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import pytest
+import yaml
+
+import flightid
+from tests.contract.source import ROOT
+
+sys.path.insert(0, str(ROOT / "tools"))
+from reference_groups import GROUPS
+from site_pages import api_page, shown_texts, turned
+
+DOCS = ROOT / "docs"
+
+
+class _Loader(yaml.SafeLoader):
+    """Reads the tags of mkdocs.yml as plain values."""
+
+
+_Loader.add_constructor("!ENV", lambda loader, node: loader.construct_sequence(node))
+
+
+def _pages_in_the_order_of_the_navigation() -> list[str]:
+    found: list[str] = []
+
+    def walk(node: object) -> None:
+        if isinstance(node, str):
+            found.append(node)
+        elif isinstance(node, list):
+            for item in node:
+                walk(item)
+        elif isinstance(node, dict):
+            for item in node.values():
+                walk(item)
+
+    settings = yaml.load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"), Loader=_Loader)
+    assert settings["strict"] is True
+    assert settings["theme"]["font"] is False
+    walk(settings["nav"])
+    return found
+
+
+def test_every_public_name_stands_in_one_group() -> None:
+    listed = [name for group in GROUPS.values() for name in group.names]
+    public = {name for name in flightid.__all__ if not name.startswith("__")}
+    where = "put it into, or take it out of, tools/reference_groups.py"
+    assert sorted(public - set(listed)) == [], where
+    assert sorted(set(listed) - public) == [], where
+    assert len(listed) == len(set(listed)), where
+
+
+@pytest.mark.parametrize("key", GROUPS)
+def test_a_group_becomes_a_page_with_all_its_names(key: str) -> None:
+    group = GROUPS[key]
+    page = api_page(group)
+    assert (DOCS / group.guide).is_file()
+    for name in group.names:
+        assert f"\n::: flightid.{name}\n" in page
+        item = getattr(flightid, name)
+        if isinstance(item, types.ModuleType):
+            assert all(f'"{part}"' in page for part in item.__all__), name
+
+
+def test_the_navigation_has_every_page_once() -> None:
+    listed = _pages_in_the_order_of_the_navigation()
+    guides = {path.name for path in DOCS.glob("*.md")}
+    made = {f"api/{key}.md" for key in GROUPS} | set(shown_texts()) | {"commands.md"}
+    assert sorted(listed) == sorted(guides | made)
+    order = [f"api/{key}.md" for key in ("data", "inspect", "responses", "identify", "check")]
+    assert [page for page in listed if page in order] == order
+
+
+@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
+def test_links_and_pictures_of_a_page_are_there_on_a_disk_too(page: Path) -> None:
+    for target in re.findall(r"\]\((?!https?://|#)([^)#\s]+)", page.read_text(encoding="utf-8")):
+        assert (DOCS / target).exists(), target
+
+
+def test_links_turn_into_links_between_pages() -> None:
+    texts = {"examples/r50.md": "examples/r50/README.md", "conventions.md": "CONVENTIONS.md"}
+    assert turned("[a](../examples/r50/README.md)", "gallery.md", texts) == "[a](examples/r50.md)"
+    assert turned("[a](study.md#gains)", "tasks.md", texts) == "[a](study.md#gains)"
+    assert turned("[a](docs/study.md)", "conventions.md", texts) == "[a](study.md)"
+    from_example = turned("[a](../../docs/study.md)", "examples/r50.md", texts)
+    assert from_example == "[a](../study.md)"
+    assert turned("[a](../ah64/flights.py)", "examples/r50.md", texts) == "a"
+    assert turned("[a](https://x.org/y)", "tasks.md", texts) == "[a](https://x.org/y)"
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning_and_loads_nothing_from_afar(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    pages = {path: path.read_text(encoding="utf-8") for path in tmp_path.rglob("*.html")}
+    for path, text in pages.items():
+        loaded = re.findall(r"<(?:script|img|iframe)[^>]*\ssrc=\"?(https?:|//)", text)
+        styles = re.findall(r"<link[^>]*stylesheet[^>]*href=\"?(https?:|//)", text)
+        assert not loaded + styles, path.name
+    for key, group in GROUPS.items():
+        page = pages[tmp_path / "api" / f"{key}.html"]
+        for name in group.names:
+            assert f'id="flightid.{name}"' in page, name
+        assert "Examples:" in page, "the reader did not know the section"
+        assert "&gt;&gt;&gt;" in page
+    assert 'class="output highlight"' in pages[tmp_path / "start.html"], "what examples print"

@@ -1,0 +1,193 @@
+"""Which page of the reference shows which public name, in the order of the work.
+
+A contract test compares this table with ``flightid.__all__``: a name that is new goes into the
+group of its verb, a name that is gone leaves it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Group(NamedTuple):
+    """One page of the reference."""
+
+    title: str
+    guide: str
+    """Page of docs/ that tells the same in sentences."""
+    names: tuple[str, ...]
+    """Public names ``flightid.X``, verbs before the results that they make."""
+
+
+GROUPS = {
+    "data": Group(
+        "Get data in",
+        "data.md",
+        (
+            "read_log",
+            "Log",
+            "LogTable",
+            "read_records",
+            "write_records",
+            "Record",
+            "Channel",
+            "conditioning",
+        ),
+    ),
+    "inspect": Group(
+        "Inspect and plan",
+        "inspection.md",
+        ("inspect_log", "Inspection", "advise", "Advice", "excitation"),
+    ),
+    "responses": Group(
+        "Responses",
+        "responses.md",
+        (
+            "estimate_response",
+            "FrequencyResponse",
+            "coherent_pairs",
+            "CoherentPairs",
+            "PairResponse",
+            "impulse_response",
+            "ImpulseResponse",
+        ),
+    ),
+    "models": Group(
+        "Models",
+        "models.md",
+        (
+            "load_model",
+            "library_names",
+            "write_model",
+            "ModelBuilder",
+            "StateSpaceModel",
+            "TransferFunctionModel",
+            "PolynomialModel",
+            "InnovationsModel",
+            "NarxModel",
+            "NarxStructure",
+            "LinearSystem",
+            "TransferFunction",
+            "Parameters",
+            "Parameter",
+            "Output",
+        ),
+    ),
+    "identify": Group(
+        "Identify",
+        "identify.md",
+        (
+            "identify",
+            "Fit",
+            "PolynomialFit",
+            "InnovationsFit",
+            "NarxFit",
+            "FittedParameter",
+            "FittedResponse",
+            "FittedRecord",
+            "LocalMinimum",
+            "reduce",
+            "Reduction",
+            "compare_structures",
+            "StructureComparison",
+            "scan_orders",
+            "OrderScan",
+        ),
+    ),
+    "check": Group(
+        "Check",
+        "verification.md",
+        (
+            "predict",
+            "Prediction",
+            "verify",
+            "Verification",
+            "Comparison",
+            "residual_tests",
+            "ResidualTests",
+            "validation",
+        ),
+    ),
+    "use": Group(
+        "Use",
+        "modes.md",
+        (
+            "modes",
+            "Modes",
+            "approximate_modes",
+            "derivatives",
+            "DerivativeTable",
+            "rotor_physics",
+            "RotorPhysics",
+            "compare_conditions",
+            "ConditionComparison",
+            "interpret",
+            "Interpretation",
+            "handling_qualities",
+            "attitude_bandwidth",
+            "pilot_cutoff",
+            "lower_order",
+            "simulate",
+            "Noise",
+        ),
+    ),
+    "loops": Group(
+        "Margins and loops",
+        "margins.md",
+        (
+            "margins",
+            "Margins",
+            "disk_margin",
+            "DiskMargin",
+            "disturbance_rejection",
+            "DisturbanceRejection",
+            "close_loop",
+            "ClosedLoop",
+            "open_loop",
+            "connect",
+            "Interconnection",
+            "loops",
+        ),
+    ),
+    "study": Group(
+        "Studies, results and errors",
+        "study.md",
+        ("run_study", "Study", "Table", "Finding", "FlightidError"),
+    ),
+    "gains": Group(
+        "Gains",
+        "tuning.md",
+        (
+            "tune_pid",
+            "PidDesign",
+            "tune",
+            "Tuning",
+            "TuningRequirements",
+            "axis_loop",
+            "axis_loop_of",
+            "AxisLoop",
+            "replay",
+            "Replay",
+            "px4_autotune_gains",
+            "read_parameters",
+            "write_param",
+            "write_params",
+        ),
+    ),
+    "export": Group(
+        "Export",
+        "export.md",
+        (
+            "export",
+            "Exported",
+            "write_system",
+            "read_system",
+            "to_continuous",
+            "to_discrete",
+            "to_control",
+            "from_control",
+            "to_scipy",
+            "from_scipy",
+        ),
+    ),
+}
