@@ -29,8 +29,8 @@ import scipy.fft
 from numpy.lib.stride_tricks import sliding_window_view
 
 from flightid import Record, Table, estimate_response
-from flightid.responses.estimators.transform import FoldedBasis, WindowPlan
 from flightid.responses.spectra import average_spectra
+from flightid.responses.windows.transform import FoldedBasis, WindowPlan
 from flightid.table import Column
 
 N_INPUTS, N_OUTPUTS, N_RECORDS, N_SAMPLES, N_FREQUENCIES = 4, 9, 12, 10_000, 200

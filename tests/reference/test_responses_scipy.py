@@ -7,8 +7,8 @@ import pytest
 from scipy import signal
 
 from flightid import Record, estimate_response
-from flightid.responses.estimators.transform import FoldedBasis, WindowPlan, frames, transform
 from flightid.responses.spectra import average_spectra
+from flightid.responses.windows.transform import FoldedBasis, WindowPlan, frames, transform
 from tests.closeness import assert_close
 
 RATE_HZ = 50.0

@@ -10,6 +10,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, FitError, ModelError, OptionError, UnknownNameError
+from flightid.identification.reduction.reduce import resume
 from flightid.identification.reduction.rules import ReductionLimits, choose
 from flightid.plot.reduction import reduction_path
 from tests.closeness import assert_close
@@ -101,20 +102,20 @@ def test_by_hand_keep_drop_and_values(fit: fid.Fit, data: fid.FrequencyResponse)
 def test_any_step_can_be_taken_up_again(
     reduction: fid.Reduction, fit: fid.Fit, data: fid.FrequencyResponse
 ) -> None:
-    same = reduction.resume(1)
+    same = resume(reduction, 1)
     assert same.path[0] is reduction.path[0]
     assert list(same.dropped) == list(reduction.dropped)
     assert_close(same.fit.cost, reduction.fit.cost, rtol=1e-9, why="the same steps")
-    assert reduction.resume().path == reduction.path
-    other = reduction.resume(0, keep=["Lz"])
+    assert resume(reduction).path == reduction.path
+    other = resume(reduction, 0, keep=["Lz"])
     assert "Lz" in other.fit.names
     assert other.start is fit
-    further = other.resume(drop=["Lz"])
+    further = resume(other, drop=["Lz"])
     assert list(further.dropped)[-1] == "Lz"
     assert further.keep == ("Lz",)
     assert reduction.fit_after(0) is fit
     with pytest.raises(OptionError, match="the path has no such step"):
-        reduction.resume(9)
+        resume(reduction, 9)
     assert fid.reduce(fit, data).dropped == reduction.dropped
 
 

@@ -14,7 +14,7 @@ from flightid.errors import DataError
 from flightid.responses.errors.covariance import basis_transform
 from flightid.responses.errors.noise import NoiseSpectrum
 from flightid.responses.estimators.local_polynomial import LocalErrors
-from flightid.responses.estimators.transform import WindowPlan, frames
+from flightid.responses.windows.transform import WindowPlan, frames
 from tests.closeness import assert_close
 
 DT = 0.02

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification.fit import FittedParameter
-from flightid.identification.frequency_domain.error_model import APPROXIMATE, UNKNOWN
 from flightid.identification.multistart import CONVERGED, End
 
+APPROXIMATE = "random error"
+UNKNOWN = "nothing"
+"""Where intervals come from that are rough, or are not there."""
 CRAMER_RAO_GUIDE_PERCENT = 20.0
 INSENSITIVITY_GUIDE_PERCENT = 10.0
 CORRELATION_GUIDE = 0.98

@@ -6,11 +6,11 @@ State space: `model_tape.rs`, `state_space_response.rs`.
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.prediction import InnovationsPrediction
 from flightid.models.innovations.structure import SubspaceStructure
+from flightid.models.interchange import from_control, from_scipy, to_control, to_scipy
 from flightid.models.kinds import GreyBoxModel
 from flightid.models.language.blocks import Block
 from flightid.models.language.record_values import RecordValue
 from flightid.models.language.tables import Axis, TableFunction
-from flightid.models.linear.interchange import from_control, from_scipy, to_control, to_scipy
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.system_files import read_system, write_system
 from flightid.models.load import library_names, load_model, load_structure

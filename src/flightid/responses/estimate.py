@@ -12,18 +12,18 @@ from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.record.history import Step
-from flightid.responses.estimators.linear_estimate import LinearEstimate, WindowedWeights
+from flightid.responses.errors.linear_estimate import LinearEstimate, WindowedWeights
 from flightid.responses.estimators.local_polynomial import estimate_local_polynomial
-from flightid.responses.estimators.planning import plan_frequencies, plan_windows
-from flightid.responses.estimators.samples import gather
 from flightid.responses.estimators.windowed import (
     estimate_windowed,
     windowed_errors,
     windowed_response,
 )
-from flightid.responses.estimators.windows import shifts_of
 from flightid.responses.feedback import feedback_findings
 from flightid.responses.response import FrequencyResponse
+from flightid.responses.windows.planning import plan_frequencies, plan_windows
+from flightid.responses.windows.samples import gather
+from flightid.responses.windows.windows import shifts_of
 from flightid.table import Cell
 from flightid.version import VERSION
 

@@ -8,7 +8,7 @@ from scipy import stats
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.responses.estimators.samples import Samples
+from flightid.responses.windows.samples import Samples
 
 LAGS = 12
 """Past samples of each channel that the regression looks at."""

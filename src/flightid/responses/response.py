@@ -12,8 +12,8 @@ from flightid.errors import DataError, ShapeError, UnknownNameError
 from flightid.findings import Finding
 from flightid.record.history import Step
 from flightid.responses.bands import choose_frequencies, nearest
+from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource, Selected
-from flightid.responses.estimators.linear_estimate import LinearEstimate
 from flightid.responses.pair import PairResponse, quotient_unit
 from flightid.table import Column, Table
 from flightid.units import DIMENSIONLESS

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.responses.estimators.transform import HANN_POWER, FoldedBasis, WindowPlan, transform
+from flightid.responses.windows.transform import HANN_POWER, FoldedBasis, WindowPlan, transform
 
 MAXIMUM_CHUNK = 1 << 22
 """Largest number of real values of transforms that are held at a time."""

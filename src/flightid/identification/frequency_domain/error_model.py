@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from flightid.errors import FitError
+from flightid.identification.fit_findings import APPROXIMATE, UNKNOWN
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.responses import FrequencyResponse
 from flightid.responses.errors.random_error import (
@@ -26,8 +27,6 @@ from flightid.uncertainty import decibel_phase_sensitivity, window_covariance
 Array = NDArray[np.float64]
 
 KNOWN = "response covariance"
-APPROXIMATE = "random error"
-UNKNOWN = "nothing"
 _ROUNDING = 1e-10
 
 

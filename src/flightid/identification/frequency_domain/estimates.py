@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from flightid.errors import FitError
 from flightid.identification.fit import FittedParameter
-from flightid.identification.frequency_domain.error_model import UNKNOWN, ErrorModel
+from flightid.identification.fit_findings import UNKNOWN
+from flightid.identification.frequency_domain.error_model import ErrorModel
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.multistart import DenseEnd
 from flightid.models import GreyBoxModel, Parameter

@@ -16,8 +16,8 @@ from flightid.errors import DataError
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
+from flightid.responses.errors.linear_estimate import Functional, LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource
-from flightid.responses.estimators.linear_estimate import Functional, LinearEstimate
 
 
 def why_unknown(data: FrequencyResponse) -> str:

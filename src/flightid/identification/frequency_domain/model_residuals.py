@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.models import GreyBoxModel
-from flightid.responses.estimators.linear_estimate import LinearEstimate
+from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.simulation.model_outputs import (
     Modes,
     between_samples,

@@ -65,7 +65,7 @@ def reduce(
     Returns
     -------
     Reduction
-        The whole path with a fit at each step; ``.fit`` is the last that stood, and ``.resume()``
+        The whole path with a fit at each step; ``.fit`` is the last that stood, and `resume`
         goes on from any step.
 
     Raises
@@ -123,6 +123,56 @@ def reduce(
     return Reduction(
         fit, tuple(walk.path), stopped, limits, walk.keep, walk.at, after_rise, dict(options), data
     )
+
+
+def resume(
+    reduction: Reduction,
+    step: int | None = None,
+    *,
+    keep: Iterable[str] = (),
+    drop: Iterable[str] = (),
+    at: Mapping[str, float] | None = None,
+    **changes: object,
+) -> Reduction:
+    """Go on from any step of a reduction's path, with other choices.
+
+    Parameters
+    ----------
+    reduction : Reduction
+    step : int, optional
+        Steps of the path that stay; default: all of them. 0 begins again.
+    keep, drop, at
+        As of `flightid.reduce`, added to what was asked before.
+    **changes
+        Other options of `flightid.reduce` than before.
+
+    Returns
+    -------
+    Reduction
+        With the steps that stayed and the new ones.
+
+    Raises
+    ------
+    OptionError
+        The path has no such step.
+    """
+    last = len(reduction.path) if step is None else step
+    given: dict[str, object] = {
+        **vars(reduction.limits),
+        "after_rise": reduction.after_rise,
+        **reduction.options,
+        **changes,
+    }
+    again = reduce(
+        reduction.fit_after(last),
+        reduction.data,  # type: ignore[arg-type]  # what reduce was given
+        keep=(*reduction.keep, *keep),
+        drop=drop,
+        at={**reduction.at, **(at or {})},
+        **given,  # type: ignore[arg-type]
+    )
+    path = (*reduction.path[:last], *again.path)
+    return Reduction(**{**vars(again), "start": reduction.start, "path": path})
 
 
 def _options(fit: Fit, given: Mapping[str, object]) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from flightid.conventions import Light
@@ -138,56 +138,6 @@ class Reduction:
     def dropped(self) -> dict[str, float]:
         """Parameters that are out, with the values at which they are fixed."""
         return {each.name: each.value for each in self.path if each.accepted}
-
-    def resume(
-        self,
-        step: int | None = None,
-        *,
-        keep: Iterable[str] = (),
-        drop: Iterable[str] = (),
-        at: Mapping[str, float] | None = None,
-        **changes: object,
-    ) -> Reduction:
-        """Go on from any step of the path, with other choices.
-
-        Parameters
-        ----------
-        step : int, optional
-            Steps of the path that stay; default: all of them. 0 begins again.
-        keep, drop, at
-            As of `flightid.reduce`, added to what was asked before.
-        **changes
-            Other options of `flightid.reduce` than before.
-
-        Returns
-        -------
-        Reduction
-            With the steps that stayed and the new ones.
-
-        Raises
-        ------
-        OptionError
-            The path has no such step.
-        """
-        from flightid.identification.reduction.reduce import reduce  # noqa: PLC0415 (a result needs no verb)
-
-        last = len(self.path) if step is None else step
-        given: dict[str, object] = {
-            **vars(self.limits),
-            "after_rise": self.after_rise,
-            **self.options,
-            **changes,
-        }
-        again = reduce(
-            self.fit_after(last),
-            self.data,  # type: ignore[arg-type]  # what reduce was given
-            keep=(*self.keep, *keep),
-            drop=drop,
-            at={**self.at, **(at or {})},
-            **given,  # type: ignore[arg-type]
-        )
-        path = (*self.path[:last], *again.path)
-        return Reduction(**{**vars(again), "start": self.start, "path": path})
 
     @property
     def findings(self) -> tuple[Finding, ...]:

@@ -9,7 +9,6 @@ from flightid.errors import ModelError
 from flightid.models.language.blocks import Block, read_block
 from flightid.models.language.reading import (
     read_number,
-    read_parameter,
     read_table,
     read_text,
     read_texts,
@@ -18,6 +17,7 @@ from flightid.models.language.reading import (
 from flightid.models.language.record_values import RecordValue, read_record_value
 from flightid.models.language.sympy_input import is_sympy, sympy_formula
 from flightid.models.language.tables import TableFunction, read_table_function
+from flightid.models.parameter_table import read_parameter
 from flightid.models.parameters import Parameter, Parameters
 from flightid.models.state_space.parts import Output
 

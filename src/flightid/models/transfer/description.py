@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 from flightid.errors import ModelError
 from flightid.models.language.reading import (
-    read_parameter,
     read_table,
     read_text,
     read_texts,
     require_keys,
 )
+from flightid.models.parameter_table import read_parameter
 from flightid.models.parameters import Parameters
 from flightid.models.transfer.model import TransferFunction, TransferFunctionModel
 

@@ -19,7 +19,7 @@ from scipy.fft import next_fast_len
 
 from flightid.responses.errors.noise import NoiseSpectrum
 from flightid.responses.errors.random_error import Points, union
-from flightid.responses.estimators.window_weights import WindowShare, WindowWeights
+from flightid.responses.windows.window_weights import WindowShare, WindowWeights
 
 COLUMNS = 128
 """Frequencies of the noise that are worked on at a time: bounds memory, and suits caches."""

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
-from flightid.responses.estimators.local_fit import Bins, bins_needed, fit_locally
-from flightid.responses.estimators.samples import Samples
+from flightid.responses.windows.local_fit import Bins, bins_needed, fit_locally
+from flightid.responses.windows.samples import Samples
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

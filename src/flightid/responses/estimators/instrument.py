@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.responses.estimators.conditioned import Conditioned, assemble, invert_inputs
-from flightid.responses.estimators.samples import Samples
 from flightid.responses.spectra import Spectra
+from flightid.responses.windows.samples import Samples
 
 
 def excitation_projection(spectra: Spectra, samples: Samples) -> NDArray[np.complex128]:

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from flightid.errors import DataError
 from flightid.record.history import Step
 from flightid.responses.cautions import correlation_findings
+from flightid.responses.errors.linear_estimate import LinearEstimate, LocalWeights
 from flightid.responses.errors.noise import NoiseSpectrum
 from flightid.responses.errors.random_error import Points, union
 from flightid.responses.estimators.conditioned import random_error
-from flightid.responses.estimators.linear_estimate import LinearEstimate, LocalWeights
-from flightid.responses.estimators.local_fit import Bins, LocalFit, around, bins_needed, fit_locally
-from flightid.responses.estimators.samples import Samples
 from flightid.responses.response import FrequencyResponse
+from flightid.responses.windows.local_fit import Bins, LocalFit, around, bins_needed, fit_locally
+from flightid.responses.windows.samples import Samples
 
 
 def estimate_local_polynomial(

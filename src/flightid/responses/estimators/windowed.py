@@ -15,12 +15,12 @@ from flightid.responses.errors.noise import estimate_noise
 from flightid.responses.estimators.composite import Composite, combine
 from flightid.responses.estimators.conditioned import Conditioned, condition, random_error
 from flightid.responses.estimators.instrument import condition_on_excitation, excitation_projection
-from flightid.responses.estimators.planning import valid_windows
-from flightid.responses.estimators.samples import Samples
-from flightid.responses.estimators.transform import HANN_POWER, FoldedBasis, WindowPlan
-from flightid.responses.estimators.window_weights import WindowShare, WindowWeights
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.spectra import Spectra, average_spectra
+from flightid.responses.windows.planning import valid_windows
+from flightid.responses.windows.samples import Samples
+from flightid.responses.windows.transform import HANN_POWER, FoldedBasis, WindowPlan
+from flightid.responses.windows.window_weights import WindowShare, WindowWeights
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
-from flightid.responses.estimators.transform import WindowPlan
+from flightid.responses.windows.transform import WindowPlan
 
 CYCLES_AT_LOWEST = 2.0
 """Cycles of the lowest trustworthy frequency that a window must hold."""

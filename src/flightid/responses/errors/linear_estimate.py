@@ -18,9 +18,9 @@ from flightid.errors import ShapeError
 from flightid.responses.errors.covariance import WindowedErrors
 from flightid.responses.errors.noise import NoiseSpectrum, noise_of_residuals
 from flightid.responses.errors.random_error import CovarianceSource, Selected
-from flightid.responses.estimators.local_fit import Bins, LocalFit
-from flightid.responses.estimators.samples import Samples
-from flightid.responses.estimators.transform import transform
+from flightid.responses.windows.local_fit import Bins, LocalFit
+from flightid.responses.windows.samples import Samples
+from flightid.responses.windows.transform import transform
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

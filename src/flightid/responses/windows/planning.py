@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError
-from flightid.responses.estimators.samples import Samples
-from flightid.responses.estimators.transform import WindowPlan
-from flightid.responses.estimators.windows import (
+from flightid.responses.windows.samples import Samples
+from flightid.responses.windows.transform import WindowPlan
+from flightid.responses.windows.windows import (
     CYCLES_AT_LOWEST,
     MINIMUM_LENGTH,
     automatic_windows,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.responses.estimators.transform import FoldedBasis, WindowPlan, transform
+from flightid.responses.windows.transform import FoldedBasis, WindowPlan, transform
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]

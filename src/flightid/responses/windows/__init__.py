@@ -1,0 +1,1 @@
+"""Windows: how a record is cut, tapered and transformed."""
