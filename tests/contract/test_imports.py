@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import ast
 from pathlib import Path
 
-from tests.contract.source import PACKAGE, imported_modules, python_files, stage
+from tests.contract.source import PACKAGE, imported_modules, python_files, stage, tree
 
 BASE = {
     "_native",
@@ -97,3 +98,60 @@ def test_the_rule_can_fail() -> None:
     assert _broken("units", {"record"}) == ["record"]
     assert _broken("simulation", {"identification"}) == ["identification"]
     assert not _broken("responses", {"record"})
+
+
+def _run_time_imports(path: Path) -> set[str]:
+    """Files of the package that a file imports when it runs, by dotted name."""
+    known = {_dotted(each) for each in python_files()}
+    typing_only = {
+        id(line)
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
+        for line in node.body
+    }
+    found = set()
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.ImportFrom) and node.module and id(node) not in typing_only:
+            for alias in node.names:
+                inner = f"{node.module}.{alias.name}"
+                found.add(inner if inner in known else node.module)
+    return found & known
+
+
+def _dotted(path: Path) -> str:
+    return ".".join(("flightid", *path.relative_to(PACKAGE).with_suffix("").parts))
+
+
+def _circles(arrows: dict[str, set[str]]) -> list[str]:
+    """Nodes from which a walk along the arrows comes back."""
+    reached = {node: set(targets) for node, targets in arrows.items()}
+    for middle in arrows:
+        for node in arrows:
+            if middle in reached[node]:
+                reached[node] |= reached[middle]
+    return sorted(node for node in arrows if node in reached[node])
+
+
+def _folder(name: str) -> str:
+    """The folder of a file inside a room; a file that lies in the room itself stands alone."""
+    parts = name.split(".")
+    return ".".join(parts[:3]) if len(parts) > 3 else name
+
+
+def test_no_circle_runs_through_files_or_folders() -> None:
+    files = {
+        _dotted(path): _run_time_imports(path)
+        for path in python_files()
+        if path.name != "__init__.py"
+    }
+    files = {name: targets & set(files) - {name} for name, targets in files.items()}
+    assert not _circles(files)
+    folders: dict[str, set[str]] = {}
+    for name, targets in files.items():
+        folders.setdefault(_folder(name), set()).update(_folder(target) for target in targets)
+    assert not _circles({name: targets - {name} for name, targets in folders.items()})
+
+
+def test_a_circle_is_seen() -> None:
+    assert _circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == ["a", "b", "c"]
+    assert not _circles({"a": {"b"}, "b": {"c"}, "c": set()})
