@@ -50,6 +50,15 @@ def shown_texts() -> dict[str, str]:
     return TEXTS | _example_pages()
 
 
+def _directive(name: str, item: object) -> list[str]:
+    """What mkdocstrings is asked for; it would take a module of the same name for a verb."""
+    homes = {f"flightid.{name}", f"{flightid._HOMES[name]}.{name}"}
+    if isinstance(item, types.ModuleType) or not homes & set(sys.modules):
+        return [f"::: flightid.{name}"]
+    path = f"{item.__module__}.{getattr(item, '__qualname__', name)}"
+    return [f'<a id="flightid.{name}"></a>', "", f"::: {path}"]
+
+
 def api_page(group: Group, folder: str = "..") -> str:
     """One page of the reference as Markdown for mkdocstrings.
 
@@ -67,8 +76,8 @@ def api_page(group: Group, folder: str = "..") -> str:
     """
     lines = [f"# {group.title}", "", f"In sentences: [the guide]({folder}/{group.guide}).", ""]
     for name in group.names:
-        lines += [f"::: flightid.{name}", ""]
         item = getattr(flightid, name)
+        lines += [*_directive(name, item), ""]
         if isinstance(item, types.ModuleType):
             listed = ", ".join(f'"{key}"' for key in item.__all__)
             lines[-1:] = ["    options:", f"      members: [{listed}]", ""]
@@ -164,4 +173,4 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Take out the dash that a result without a description would end with."""
     del page, config, files
-    return re.sub(r"\s+–\s*(</p>|</li>|<ul>)", r"\1", html)
+    return re.sub(r'\s+–\s*<div class="doc-md-description">\s*</div>', "", html)
