@@ -6,7 +6,7 @@ import pytest
 import flightid as fid
 from flightid.excitation import sweep
 from flightid.models import Output, Parameter, Parameters, StateSpaceModel
-from flightid.vehicles.quadrotor_loop import CrudePilot, FlightConditions, fly_closed_loop
+from flightid.vehicles.vehicle_loop import CrudePilot, FlightConditions, fly_closed_loop
 from tests.closeness import assert_close
 
 

@@ -5,32 +5,15 @@
 
 use pyo3::prelude::*;
 
-pub mod autopilots;
-pub mod chirp;
-pub mod closed_loop;
-pub mod dataflash;
-pub mod equation_records;
 pub mod error;
-pub mod expression;
 pub mod file_bytes;
-pub mod frequency_fit;
+pub mod fits;
 pub mod group;
 pub mod interrupt;
-pub mod kinematics;
-pub mod least_squares;
-pub mod linear_recursion;
-pub mod linear_simulation;
-pub mod lookup_table;
-pub mod loop_simulation;
-pub mod narx;
-pub mod nonlinear_simulation;
-pub mod output_error;
-pub mod polynomial;
-pub mod quadrotor;
-pub mod state_space;
-pub mod transfer;
-pub mod twin_rotor;
-pub mod ulog;
+pub mod logs;
+pub mod models;
+pub mod simulation;
+pub mod vehicles;
 
 /// version() -> str
 ///
@@ -44,25 +27,25 @@ fn version() -> &'static str {
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(version, module)?)?;
-    autopilots::register(module)?;
-    chirp::register(module)?;
-    kinematics::register(module)?;
-    linear_recursion::register(module)?;
-    linear_simulation::register(module)?;
-    closed_loop::register(module)?;
-    lookup_table::register(module)?;
-    loop_simulation::register(module)?;
-    dataflash::register(module)?;
-    ulog::register(module)?;
-    quadrotor::register(module)?;
-    equation_records::register(module)?;
-    expression::register(module)?;
-    least_squares::register(module)?;
-    narx::register(module)?;
-    polynomial::register(module)?;
-    nonlinear_simulation::register(module)?;
-    transfer::register(module)?;
-    twin_rotor::register(module)?;
-    state_space::register(module)?;
+    vehicles::autopilot_controllers::register(module)?;
+    vehicles::ardupilot_chirp::register(module)?;
+    vehicles::kinematics::register(module)?;
+    simulation::linear_recursion::register(module)?;
+    simulation::linear_simulation::register(module)?;
+    simulation::vehicle_loop::register(module)?;
+    models::lookup_table::register(module)?;
+    simulation::loop_simulation::register(module)?;
+    logs::dataflash::register(module)?;
+    logs::ulog::register(module)?;
+    vehicles::quadrotor::register(module)?;
+    models::equation_records::register(module)?;
+    models::expression::register(module)?;
+    fits::least_squares::register(module)?;
+    models::narx_models::register(module)?;
+    models::polynomial_models::register(module)?;
+    simulation::nonlinear_simulation::register(module)?;
+    models::transfer::register(module)?;
+    vehicles::twin_rotor::register(module)?;
+    models::state_space::register(module)?;
     Ok(())
 }

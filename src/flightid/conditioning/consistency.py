@@ -13,6 +13,7 @@ from flightid.conditioning.consistency_findings import (
     findings_of,
 )
 from flightid.conditioning.consistency_result import InstrumentParameter, KinematicConsistency
+from flightid.conditioning.instrument_fit import OutputError, too_steep
 from flightid.conditioning.kinematics import (
     FORCES,
     INPUTS,
@@ -24,7 +25,6 @@ from flightid.conditioning.kinematics import (
     KinematicModel,
     rotation_rows,
 )
-from flightid.conditioning.output_error import OutputError, too_steep
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.record import Record, Step
 from flightid.table import Cell

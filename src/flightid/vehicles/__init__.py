@@ -4,16 +4,16 @@ from flightid.vehicles.ardupilot_log import write_ardupilot_log
 from flightid.vehicles.autopilot import Autopilot, PilotDoublet, RateGains, SidRun
 from flightid.vehicles.flight import Flight, fly
 from flightid.vehicles.quadrotor import QuadrotorParameters, Sensors, Turbulence
-from flightid.vehicles.quadrotor_loop import (
+from flightid.vehicles.scenario import fly_scenario
+from flightid.vehicles.truth import RateTruth, rate_truth
+from flightid.vehicles.twin_rotor import TwinRotor
+from flightid.vehicles.twin_rotor_parameters import Draught, Encoders, TwinRotorParameters
+from flightid.vehicles.vehicle_loop import (
     CrudePilot,
     Disturbance,
     FlightConditions,
     fly_closed_loop,
 )
-from flightid.vehicles.scenario import fly_scenario
-from flightid.vehicles.truth import RateTruth, rate_truth
-from flightid.vehicles.twin_rotor import TwinRotor
-from flightid.vehicles.twin_rotor_parameters import Draught, Encoders, TwinRotorParameters
 
 __all__ = [
     "Autopilot",

@@ -6,7 +6,7 @@
 
 use num_traits::{Float, FloatConst};
 
-use crate::CoreError;
+use crate::error::CoreError;
 
 /// A chirp: frequencies in Hz, times in s from the first moment of the chirp.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,5 +1,5 @@
 //! PX4's rate controller, now and as it was until 2017 (Python side:
-//! `control/autopilots/px4_multicopter.py`, `px4_fixed_wing.py`).
+//! `control/autopilots/px4_loop.py`).
 //!
 //! Now: derivative on the measured angular acceleration, an integrator that grows less at large errors
 //! and not at all against a saturated allocation, its old value in the output. Then: derivative of the

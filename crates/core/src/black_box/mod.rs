@@ -4,7 +4,7 @@ pub mod candidates;
 pub mod digital_filter;
 pub mod local_regularisation;
 pub(crate) mod look_ahead;
-pub mod narx;
+pub mod narx_prediction;
 pub mod order_scan;
 pub mod orthogonal_least_squares;
 pub mod polynomial_fit;

@@ -1,6 +1,6 @@
 //! Models as frequency responses, and their fit to measured ones.
 
 pub mod frequency_fit;
-pub mod rational;
 pub mod state_space_response;
 pub mod transfer;
+pub mod transfer_polynomials;

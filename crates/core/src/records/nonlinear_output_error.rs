@@ -1,5 +1,5 @@
 //! Equations of motion on many records, for output error. (Python side:
-//! identification/nonlinear_records.py)
+//! identification/output_error/equation_records.py)
 
 use std::sync::{Mutex, PoisonError};
 

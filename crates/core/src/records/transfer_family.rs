@@ -2,8 +2,8 @@
 //! (Python side: identification/output_error/fit.py)
 
 use crate::error::CoreError;
-use crate::frequency_domain::rational::Rational;
 use crate::frequency_domain::transfer::TransferFunctions;
+use crate::frequency_domain::transfer_polynomials::Rational;
 use crate::records::linear_family::{LinearFamily, LinearPoint, Values};
 
 /// Transfer functions, each with states of its own in controllable form and a delay of its own.

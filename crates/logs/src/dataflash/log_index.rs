@@ -3,7 +3,7 @@
 use super::declared_units::declare;
 use super::message_table::Table;
 use super::scan::{Found, Skipped, scan};
-use crate::LogError;
+use crate::error::LogError;
 
 /// An indexed log: which bytes are which message. Columns are read from it on demand.
 ///

@@ -8,7 +8,7 @@ use super::framing::{
     record_across,
 };
 use super::message_format::{Formats, Shape, is_message_name};
-use crate::LogError;
+use crate::error::LogError;
 
 const MAGIC: [u8; 7] = [0x55, 0x4c, 0x6f, 0x67, 0x01, 0x12, 0x35];
 const HEADER: usize = 16;

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use super::log_index::{Table, Ulog};
 use super::message_format::Column;
 use super::scalar::Primitive;
-use crate::LogError;
+use crate::error::LogError;
 
 /// Rows gathered for all columns before the next ones: their bytes stay in the first-level cache.
 const BLOCK: usize = 256;

@@ -1,4 +1,4 @@
-"""NARX models: terms and weights that can be run (native: `narx.rs`, `radial_basis.rs`)."""
+"""NARX models: terms and weights that can be run (native: `narx_prediction.rs`)."""
 
 from __future__ import annotations
 

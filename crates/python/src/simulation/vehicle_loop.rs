@@ -1,10 +1,10 @@
-//! Binding of closed-loop simulation (Python side: `vehicles/quadrotor_loop.py`).
+//! Binding of closed-loop simulation (Python side: `vehicles/vehicle_loop.py`).
 
 use crate::error::from_core;
-use crate::linear_simulation::{States, matrix};
+use crate::simulation::linear_simulation::{States, matrix};
 use flightid_core::linear::discretisation::{Hold, StateSpace};
 use flightid_core::linear::linear_simulation::Discrete;
-use flightid_core::vehicles::closed_loop::{ClosedLoop, Disturbance};
+use flightid_core::vehicles::vehicle_loop::{ClosedLoop, Disturbance};
 use numpy::{PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 

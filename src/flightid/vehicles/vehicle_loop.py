@@ -1,4 +1,4 @@
-"""Flights of a linear vehicle with a pilot or controller in the loop (native: `closed_loop.rs`)."""
+"""Flights of a linear vehicle with a pilot or controller in its loop (`vehicle_loop.rs`)."""
 
 from __future__ import annotations
 

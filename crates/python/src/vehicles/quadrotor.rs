@@ -1,9 +1,9 @@
-//! Binding of the simulated quadrotor (Python side: `vehicles/flight.py`). Parameter groups come as
+//! Binding of the simulated quadrotor (Python side: `vehicles/quadrotor.py`). Parameter groups come as
 //! mappings from field name to value.
 
-use crate::autopilots::pid_gains;
 use crate::error::from_core;
 use crate::group::{item, read};
+use crate::vehicles::autopilot_controllers::pid_gains;
 use flightid_core::autopilots::ardupilot_mixer::Mixer;
 use flightid_core::autopilots::ardupilot_mode::{AttitudeGains, SidRun};
 use flightid_core::vehicles::quadrotor::{Gust, N_STATES, Quadrotor};

@@ -1,9 +1,9 @@
 //! Binding of the simulation of loops (Python side: `control/loops/simulation.py`).
 
-use crate::closed_loop::{Matrices, system};
 use crate::error::from_core;
-use crate::linear_simulation::matrix;
-use crate::state_space::StateSpace;
+use crate::models::state_space::StateSpace;
+use crate::simulation::linear_simulation::matrix;
+use crate::simulation::vehicle_loop::{Matrices, system};
 use flightid_core::linear::discretisation::Hold;
 use flightid_core::linear::linear_simulation::Discrete;
 use flightid_core::trajectories::equation_step::EquationStep;

@@ -13,11 +13,11 @@ use numpy::{
 use pyo3::prelude::*;
 
 use crate::error::from_core;
-use crate::frequency_fit::{Beside, WhitenedResponses};
-use crate::output_error::{
+use crate::fits::frequency_fit::{Beside, WhitenedResponses};
+use crate::fits::output_error::{
     Flown, NoiseArguments, Own, SearchArguments, driven, fit, hold, record_data, run,
 };
-use crate::state_space::StateSpace;
+use crate::models::state_space::StateSpace;
 
 /// Cuts, conditions at the ends, how many of them at the end, guesses of the nodes.
 type Segments<'py> = (Vec<usize>, PyReadonlyArray2<'py, f64>, usize, PyReadonlyArray2<'py, f64>);

@@ -15,11 +15,13 @@ use numpy::{
 use pyo3::prelude::*;
 
 use crate::error::from_core;
-use crate::frequency_fit::{
+use crate::fits::frequency_fit::{
     Beside, Response, Run, Search, WhitenedResponses, log_gradients, measured, responses, search,
 };
-use crate::lookup_table::{LookupTable, shared};
-use crate::output_error::{self, Flown, NoiseArguments, Own, SearchArguments, linear, record_data};
+use crate::fits::output_error::{
+    self, Flown, NoiseArguments, Own, SearchArguments, linear, record_data,
+};
+use crate::models::lookup_table::{LookupTable, shared};
 
 /// __init__(self, states: Sequence[str], inputs: Sequence[str], equations: Sequence[tuple[str, str]], outputs: Sequence[str], delays: Sequence[str], names: Sequence[str], definitions: dict[str, str], pairs: Sequence[tuple[int, int]], point: Sequence[float], tables: dict[str, LookupTable] = ...) -> None
 ///

@@ -1,4 +1,4 @@
-//! Face of `flightid_core::language::expression` and `tape`. (Python side: models/expression.py)
+//! Face of `flightid_core::language::expression` and `tape`. (Python side: models/language/formula.py)
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
-use crate::lookup_table::{LookupTable, shared};
+use crate::models::lookup_table::{LookupTable, shared};
 
 /// expression_names(text: str, tables: Sequence[str] = ...) -> list[str]
 ///

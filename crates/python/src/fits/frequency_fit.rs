@@ -11,8 +11,8 @@ use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, P
 use pyo3::prelude::*;
 
 use crate::error::from_core;
+use crate::fits::least_squares::{Ending, ending};
 use crate::interrupt;
-use crate::least_squares::{Ending, ending};
 
 /// Frequencies, response, square roots of the weights of decibels and degrees.
 pub type Response<'py> = (

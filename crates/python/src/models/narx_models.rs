@@ -5,7 +5,7 @@ use crate::error::from_core;
 use flightid_core::CoreError;
 use flightid_core::black_box::candidates::Candidates;
 use flightid_core::black_box::local_regularisation::{Regularisation, select_regularised};
-use flightid_core::black_box::narx::{Lag, Monomial, Narx};
+use flightid_core::black_box::narx_prediction::{Lag, Monomial, Narx};
 use flightid_core::black_box::radial_basis::{Kernel, Radial};
 use flightid_core::black_box::stop_rule::Stop;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};

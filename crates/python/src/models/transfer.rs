@@ -13,10 +13,12 @@ use numpy::{PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
-use crate::frequency_fit::{
+use crate::fits::frequency_fit::{
     Beside, Response, Run, Search, WhitenedResponses, log_gradients, measured, responses, search,
 };
-use crate::output_error::{self, Flown, NoiseArguments, Own, SearchArguments, linear, record_data};
+use crate::fits::output_error::{
+    self, Flown, NoiseArguments, Own, SearchArguments, linear, record_data,
+};
 
 type Text = (String, Vec<String>, Vec<String>, String);
 type Numbers = (f64, Vec<Vec<f64>>, Vec<Vec<f64>>, f64);

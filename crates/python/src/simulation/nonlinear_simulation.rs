@@ -7,7 +7,7 @@ use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyA
 use pyo3::prelude::*;
 
 use crate::error::from_core;
-use crate::state_space::StateSpace;
+use crate::models::state_space::StateSpace;
 
 type States<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
 

@@ -197,5 +197,5 @@ impl Narx<'_> {
 }
 
 #[cfg(test)]
-#[path = "tests/narx.rs"]
+#[path = "tests/narx_prediction.rs"]
 mod tests;

@@ -1,4 +1,4 @@
-//! A linear vehicle with a controller or pilot in the loop (Python side: `vehicles/quadrotor_loop.py`).
+//! A linear vehicle with a controller or pilot in the loop (Python side: `vehicles/vehicle_loop.py`).
 //!
 //! Each of the two is discretised exactly (`linear_simulation.rs`). The controller's outputs at a
 //! sample may depend on measurements up to the sample before, so that the loop has no circle within

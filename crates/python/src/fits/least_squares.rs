@@ -1,5 +1,5 @@
 //! Face of `flightid_core::fits::levenberg_marquardt` for residuals written in Python.
-//! (Python side: identification/least_squares.py)
+//! (Python side: identification/regression/rounds.py)
 
 use flightid_core::CoreError;
 use flightid_core::fits::least_squares::{Minimum, Options, Problem};

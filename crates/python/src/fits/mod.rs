@@ -1,0 +1,5 @@
+//! Fits that every kind of model shares: frequency responses, records, residuals of the caller.
+
+pub mod frequency_fit;
+pub mod least_squares;
+pub mod output_error;

@@ -1,0 +1,4 @@
+//! Log files: bytes to columns.
+
+pub mod dataflash;
+pub mod ulog;

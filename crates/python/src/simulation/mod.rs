@@ -1,0 +1,7 @@
+//! Systems, equations and loops run in time.
+
+pub mod linear_recursion;
+pub mod linear_simulation;
+pub mod loop_simulation;
+pub mod nonlinear_simulation;
+pub mod vehicle_loop;
