@@ -223,7 +223,7 @@ def _bandwidths(fit: fid.Fit, closed: fid.ClosedLoop) -> fid.Table:
     rows = []
     for stick, axis in AXES.items():
         kind = "rate" if axis.attitude == axis.rate else "attitude"
-        for name, source in (("off", fit), ("on", closed.spread)):
+        for name, source in (("off", fit), ("on", closed.uncertain)):
             try:
                 found = fid.attitude_bandwidth(
                     source, axis.attitude, stick, output_is=kind, band_rad_s=BAND_RAD_S

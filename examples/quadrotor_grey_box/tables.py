@@ -17,12 +17,12 @@ PUBLISHED = tomllib.loads(Path(__file__).with_name("published.toml").read_text(e
 Attempt = fid.Fit | Refusal
 
 
-def _half(parameter: fid.FittedParameter) -> float | None:
+def _half(parameter: fid.Estimate) -> float | None:
     found = parameter.interval95
     return None if found is None else (found[1] - found[0]) / 2.0
 
 
-def _covers(parameter: fid.FittedParameter, value: float) -> bool | None:
+def _covers(parameter: fid.Estimate, value: float) -> bool | None:
     found = parameter.interval95
     return None if found is None else found[0] <= value <= found[1]
 

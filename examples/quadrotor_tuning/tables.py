@@ -25,7 +25,7 @@ def promised_and_flown(
         for loop, found in loops.items():
             for name, (attribute, unit) in QUANTITIES.items():
                 promise, seen = tuning[axis].promise(loop, name), getattr(found, attribute)
-                low, high = promise.interval95 or (None, None)
+                low, high = promise.estimate.interval95 or (None, None)
                 least, most = seen.interval95 or (None, None)
                 agree = (
                     None

@@ -68,7 +68,7 @@ def bandwidths(fit: fid.Fit, closed: fid.ClosedLoop) -> fid.Table:
     """Attitude bandwidth to the stick, augmentation off and on."""
     rows = []
     for stick, (_, attitude, _, _, gain, _) in GAINS.items():
-        for name, source in (("off", fit), ("on", closed.spread)):
+        for name, source in (("off", fit), ("on", closed.uncertain)):
             try:
                 band = fid.attitude_bandwidth(
                     source, attitude, stick, band_rad_s=(0.5, 60.0), sign=1 if gain > 0 else -1

@@ -12,7 +12,7 @@ from identification import Identified
 
 import flightid as fid
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty import Quantity
+from flightid.uncertainty.estimate import Reading
 
 PUBLISHED = tomllib.loads(Path(__file__).with_name("published.toml").read_text(encoding="utf-8"))
 
@@ -132,7 +132,7 @@ def eigenvalues(condition: str, fit: fid.Fit) -> Table:
     return Table(f"Table {number}, {condition}: eigenvalues", columns, tuple(rows), notes)
 
 
-def half(quantity: Quantity) -> float | None:
+def half(quantity: Reading) -> float | None:
     """Half of a 95 % interval."""
     interval = quantity.interval95
     return None if interval is None else (interval[1] - interval[0]) / 2.0

@@ -64,7 +64,6 @@ if TYPE_CHECKING:
     from flightid.identification import (
         Advice,
         Fit,
-        FittedParameter,
         FittedRecord,
         FittedResponse,
         ImpulseResponse,
@@ -119,6 +118,7 @@ if TYPE_CHECKING:
     from flightid.simulation.simulate import simulate
     from flightid.study import Study, run_study
     from flightid.table import Table
+    from flightid.uncertainty import Estimate, Uncertain
     from flightid.validation import Comparison, OrderScan, ResidualTests, Verification
     from flightid.validation.order_scan.scan_orders import scan_orders
     from flightid.validation.residuals.residual_tests import residual_tests
@@ -147,9 +147,10 @@ _HOMES = {
     "Channel": "flightid.record",
     "CoherentPairs": "flightid.responses",
     "Comparison": "flightid.validation",
+    "Estimate": "flightid.uncertainty",
     "Finding": "flightid.findings",
+    "Uncertain": "flightid.uncertainty",
     "Fit": "flightid.identification",
-    "FittedParameter": "flightid.identification",
     "FittedRecord": "flightid.identification",
     "FittedResponse": "flightid.identification",
     "FlightidError": "flightid.errors",
@@ -255,10 +256,10 @@ __all__ = [
     "DerivativeTable",
     "DiskMargin",
     "DisturbanceRejection",
+    "Estimate",
     "Exported",
     "Finding",
     "Fit",
-    "FittedParameter",
     "FittedRecord",
     "FittedResponse",
     "FlightidError",
@@ -302,6 +303,7 @@ __all__ = [
     "TransferFunctionModel",
     "Tuning",
     "TuningRequirements",
+    "Uncertain",
     "Verification",
     "__version__",
     "advise",

@@ -10,7 +10,7 @@ import pytest
 import flightid as fid
 from flightid import errors
 from flightid.dynamics.conditions.ratios import chance_of, holm, ratio_of
-from flightid.uncertainty import Quantity
+from flightid.uncertainty.estimate import Estimate
 from tests.closeness import assert_close
 
 
@@ -97,8 +97,8 @@ def test_ratios_cover_by_fieller() -> None:
         ):
             half = 1.959964 * error
             ratio = ratio_of(
-                Quantity("b", above, "1", (above - half, above + half)),
-                Quantity("a", below, "1", (below - half, below + half)),
+                Estimate("b", above, "1", half / 1.959964),
+                Estimate("a", below, "1", half / 1.959964),
             )
             if ratio.interval95 is None:
                 # Fieller's set is not bounded there: it holds almost everything.
@@ -109,17 +109,17 @@ def test_ratios_cover_by_fieller() -> None:
 
 
 def test_ratios_without_an_answer() -> None:
-    known = Quantity("a", 2.0, "1", (1.0, 3.0))
-    none = Quantity("b", None, "1", None, "not there")
+    known = Estimate("a", 2.0, "1", 0.51)
+    none = Estimate("b", None, "1", None, "not there")
     assert ratio_of(none, known).reason == "not there"
     assert ratio_of(known, none).reason == "not there"
-    assert ratio_of(known, Quantity("c", 0.0)).reason == "the denominator is zero"
-    loose = ratio_of(known, Quantity("d", 1.0, "1", (-1.0, 3.0)))
+    assert ratio_of(known, Estimate("c", 0.0)).reason == "the denominator is zero"
+    loose = ratio_of(known, Estimate("d", 1.0, "1", 1.02))
     assert loose.value == 2.0
     assert "holds zero" in loose.reason
     assert chance_of(known, none) is None
-    assert chance_of(Quantity("e", 1.0), Quantity("f", 1.0)) is None
-    assert chance_of(Quantity("e", 1.0, "1", (1.0, 1.0)), Quantity("f", 1.0)) is None
+    assert chance_of(Estimate("e", 1.0), Estimate("f", 1.0)) is None
+    assert chance_of(Estimate("e", 1.0, "1", 0.0), Estimate("f", 1.0)) is None
     assert holm({"a": 0.04, "b": 0.04}) == set()
     assert holm({"a": 0.02, "b": 0.04}) == {"a", "b"}
 

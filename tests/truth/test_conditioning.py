@@ -117,7 +117,7 @@ def test_skew_is_found_to_a_hundredth_of_a_sample_and_removed(lag: float) -> Non
     assert aligned.n_samples == record.n_samples - int(
         np.ceil(abs(estimate.skew_s) * RATE_HZ - 1e-9)
     )
-    assert estimate.to_dict()["schema"] == "flightid.skew_estimate/1"
+    assert estimate.to_dict()["schema"] == "flightid.skew/1"
     assert "behind" in estimate.summary().to_text()
     assert estimate._repr_html_().startswith("<table>")
 
@@ -126,7 +126,7 @@ def test_skew_interval_covers_the_truth() -> None:
     inside = 0
     for seed in range(40):
         estimate = c.estimate_skew(_skewed(3.37, seed, 0.3), "a", "b", band_hz=(0.5, 8), window_s=4)
-        low, high = estimate.interval95_s
+        low, high = estimate.lag.interval95
         inside += low <= 0.0337 <= high
     # 40 flights at 95 %: 35 or fewer has a chance of 5 in 1000.
     assert inside >= 35
@@ -138,7 +138,7 @@ def test_skew_interval_is_calibrated() -> None:
         c.estimate_skew(_skewed(3.37, seed, 0.3), "a", "b", band_hz=(0.5, 8), window_s=4)
         for seed in range(1000)
     ]
-    covered = np.mean([d.interval95_s[0] <= 0.0337 <= d.interval95_s[1] for d in draws])
+    covered = np.mean([d.lag.interval95[0] <= 0.0337 <= d.lag.interval95[1] for d in draws])
     assert 0.93 <= covered <= 0.97
 
 

@@ -138,14 +138,14 @@ def test_a_rate_is_integrated_and_a_sign_turned() -> None:
     )
     found = attitude_bandwidth(rate, "p", "lat", output_is="rate", sign=-1)
     plain = attitude_bandwidth(response, "phi", "lat")
-    assert_close(found.spread.values, plain.spread.values, rtol=1e-9, why="the same attitude")
+    assert_close(found.uncertain.numbers, plain.uncertain.numbers, rtol=1e-9, why="attitude")
     first = fid.load_model("rate_first_order")
     as_rate = attitude_bandwidth(first, "p", "tau_phi", output_is="rate")
     attitude = fid.load_model("attitude_first_order").with_values(
         {name: first.parameters[name].value for name in ("Lp", "Ltphi", "tau")}
     )
     as_angle = attitude_bandwidth(attitude, "phi", "tau_phi")
-    assert_close(as_rate.spread.values, as_angle.spread.values, rtol=1e-9, why="p = s phi")
+    assert_close(as_rate.uncertain.numbers, as_angle.uncertain.numbers, rtol=1e-9, why="p = s phi")
 
 
 def test_a_control_of_the_other_sign_is_told() -> None:
@@ -253,8 +253,10 @@ def test_black_box_models_and_systems_are_read_to_nyquist() -> None:
     delayed = continuous.with_values({"tau": continuous.parameters["tau"].value + 0.001})
     half_sample = attitude_bandwidth(delayed, "phi", "tau_phi", band_rad_s=(0.3, 100.0))
     assert found.curve.omega[-1] < np.pi / 0.002
-    assert_close(found.spread.values, half_sample.spread.values, rtol=2e-3, why="half a sample")
-    assert abs(found.spread.values[3] - exact.spread.values[3]) > 2e-4
+    assert_close(
+        found.uncertain.numbers, half_sample.uncertain.numbers, rtol=2e-3, why="half a sample"
+    )
+    assert abs(found.uncertain.numbers[3] - exact.uncertain.numbers[3]) > 2e-4
 
 
 def test_intervals_are_those_of_the_parameters() -> None:
@@ -275,16 +277,16 @@ def test_intervals_are_those_of_the_parameters() -> None:
     slope = np.array(
         [
             (
-                attitude_bandwidth(_moved(fit, name, step[name]), "phi", "lat").spread.values
-                - attitude_bandwidth(_moved(fit, name, -step[name]), "phi", "lat").spread.values
+                attitude_bandwidth(_moved(fit, name, step[name]), "phi", "lat").uncertain.numbers
+                - attitude_bandwidth(_moved(fit, name, -step[name]), "phi", "lat").uncertain.numbers
             )
             / (2.0 * step[name])
             for name in names
         ]
     ).T
-    assert found.spread.covariance is not None
+    assert found.uncertain.covariance is not None
     expected = slope @ fit.covariance @ slope.T
-    assert_close(found.spread.covariance, expected, rtol=0.02, why="first order")
+    assert_close(found.uncertain.covariance, expected, rtol=0.02, why="first order")
     low, high = found.bandwidth.interval95 or (0.0, 0.0)
     half = 1.96 * np.sqrt(expected[1, 1])
     assert_close([low, high], [2.14214 - half, 2.14214 + half], rtol=2e-3, why="quantiles of draws")
@@ -320,5 +322,5 @@ def test_intervals_of_a_measured_response_are_those_of_its_errors() -> None:
         )
         drawn.append(bandwidth_numbers(Curve.of(one, pair, smoother)))
     scatter = np.std(drawn, axis=0)
-    assert found.spread.stderr is not None
-    assert_close(found.spread.stderr, scatter, rtol=0.12, why="scatter of 500 noisy responses")
+    assert found.uncertain.stderr is not None
+    assert_close(found.uncertain.stderr, scatter, rtol=0.12, why="scatter of 500 noisy responses")

@@ -69,22 +69,22 @@ def response_of(record: fid.Record) -> fid.FrequencyResponse:
 
 def bandwidth_of(source: object) -> tuple[np.ndarray, np.ndarray]:
     found = fid.attitude_bandwidth(source, "p", "lat", output_is="rate", band_rad_s=BAND)
-    assert found.spread.stderr is not None
-    return found.spread.values, found.spread.stderr
+    assert found.uncertain.stderr is not None
+    return found.uncertain.numbers, found.uncertain.stderr
 
 
 def equivalent_of(source: object) -> tuple[np.ndarray, np.ndarray]:
     found = fid.lower_order(source, kind="roll", band_rad_s=(0.6, 10.0))
     assert found.names == ("K", "T_R", "tau")
-    assert found.spread.stderr is not None
-    return found.spread.values, found.spread.stderr
+    assert found.uncertain.stderr is not None
+    return found.uncertain.numbers, found.uncertain.stderr
 
 
 def true_bandwidth() -> np.ndarray:
     return np.array(
         fid.attitude_bandwidth(
             vehicle(), "p", "lat", output_is="rate", band_rad_s=BAND
-        ).spread.values
+        ).uncertain.numbers
     )
 
 

@@ -159,10 +159,10 @@ def test_intervals_of_a_fit_follow_its_parameters() -> None:
     assert fit.covariance is not None
     order = [fit.names.index(name) for name in found.names]
     expected = fit.covariance[np.ix_(order, order)]
-    assert found.spread.covariance is not None
+    assert found.uncertain.covariance is not None
     scale = np.sqrt(np.diag(expected))
     assert_close(
-        found.spread.covariance / np.outer(scale, scale),
+        found.uncertain.covariance / np.outer(scale, scale),
         expected / np.outer(scale, scale),
         atol=0.01,
         why="central differences of the identity",
@@ -171,18 +171,18 @@ def test_intervals_of_a_fit_follow_its_parameters() -> None:
     assert found.ratings()[0].probabilities is not None
     late = fid.lower_order(fit, kind=kind, fixed={"zeta": 0.69})
     assert "zeta" not in late.names
-    assert late.spread.covariance is not None
+    assert late.uncertain.covariance is not None
 
 
 def test_intervals_of_a_measured_response_are_those_of_its_fit() -> None:
     found = fid.lower_order(noisy("dutch_roll", 0.02, 3), kind="dutch_roll")
-    assert found.spread.covariance is not None
+    assert found.uncertain.covariance is not None
     for name in found.names:
         parameter = found.fit.parameters[name]
         assert parameter.stderr is not None
         place = found.names.index(name)
-        assert found.spread.stderr is not None
-        assert_close(found.spread.stderr[place], parameter.stderr, rtol=1e-9, why="the same")
+        assert found.uncertain.stderr is not None
+        assert_close(found.uncertain.stderr[place], parameter.stderr, rtol=1e-9, why="the same")
     part = noisy("dutch_roll", 0.02, 3).select(omega=(1.0, 6.0))
     cut = fid.lower_order(part, kind="dutch_roll")
     assert "equivalent-system-band" in [finding.code for finding in cut.findings]

@@ -9,7 +9,7 @@ import pytest
 from scipy import signal
 
 import flightid as fid
-from flightid.identification.spread_of import spread_of
+from flightid.identification.uncertain_of import uncertain_of
 from flightid.responses.errors.random_error import Known
 from tests.closeness import assert_close
 
@@ -147,7 +147,7 @@ def test_intervals_of_fits_cover():
         )
         fit = fid.identify(model, response, hold="zero")
         # The plant as the controller sees it: held inputs, samples out.
-        sampled = spread_of(fit).then(lambda m: m.linear_system().sampled(STEP_S))
+        sampled = uncertain_of(fit).then(lambda m: m.linear_system().sampled(STEP_S))
         found = fid.margins(sampled, controller=lambda s: law(np.exp(s * STEP_S)))
         covered(found, truth, MARGINS, hits)
     judge(hits, "fits")

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import flightid as fid
 from flightid.control.margins.loop_metrics import loop_metrics
-from flightid.identification.spread_of import spread_of
+from flightid.identification.uncertain_of import uncertain_of
 from tests.closeness import assert_close
 
 LAW = 0.15
@@ -75,7 +75,7 @@ def test_intervals_agree_with_draws():
         omega = found.curve.omega_rad_s
         draws = [
             each.response if each.__class__ is type(data) else each.frequency_response(omega)
-            for each in spread_of(source).draws(300, 3)
+            for each in uncertain_of(source).draws(300, 3)
         ]
         drawn = loop_metrics(omega, LAW * np.array(draws)[:, 0, 0])
         for quantity, values in (

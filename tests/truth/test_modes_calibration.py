@@ -28,7 +28,7 @@ def _measured(truth: fid.StateSpaceModel, seed: int) -> fid.FrequencyResponse:
     )
 
 
-def _numbers(mode: fid.dynamics.Mode) -> dict[str, fid.dynamics.Quantity]:
+def _numbers(mode: fid.dynamics.Mode) -> dict[str, fid.dynamics.Estimate]:
     found = {each.name: each for each in mode.quantities}
     for part in mode.participations:
         found[f"share {part.state}"] = part.share

@@ -16,7 +16,7 @@ from flightid.control.tuning.gain_search import HEADROOM, Found, search
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.responses import responses
 from flightid.control.tuning.sampled_plants import loop_grid, sample_plants
-from flightid.identification.spread_of import spread_of
+from flightid.identification.uncertain_of import uncertain_of
 from flightid.vehicles import rate_truth
 from tests.closeness import assert_close
 from tests.tuning_loops import closed_loop_poles, integrators_with_delay, largest_pole
@@ -224,7 +224,7 @@ def test_designs_are_stable_for_every_plant_or_there_are_none(
         assert design.binding
         assert design.findings[0].code == "no-gains"
         return
-    drawn = [fit.model, *spread_of(fit).draws(10, 0)]
+    drawn = [fit.model, *uncertain_of(fit).draws(10, 0)]
     plants = sample_plants(drawn, ["p"], ["tau_phi"], STEP_S, hold_in_model=True)
     assert not np.any(plants.advances_s)
     for row in range(len(plants)):

@@ -48,7 +48,9 @@ def test_a_rotorcraft_model_in_one_table() -> None:
     found = fid.handling_qualities(hover, signs={"pitch": -1}, band_rad_s=(1.0, 60.0))
     assert list(found.bandwidths) == ["roll", "pitch", "yaw"]
     roll = fid.attitude_bandwidth(hover, "phi", "lat", band_rad_s=(1.0, 60.0))
-    assert_close(found.bandwidths["roll"].spread.values, roll.spread.values, rtol=1e-12, why="same")
+    assert_close(
+        found.bandwidths["roll"].uncertain.numbers, roll.uncertain.numbers, rtol=1e-12, why="same"
+    )
     assert found.bandwidths["yaw"].output == "r"
     assert {rating.subject for rating in found.ratings} == {"phi/lat", "theta/lon", "r/ped"}
     assert found.modes is not None

@@ -10,7 +10,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, FitError, OptionError, UnitError, UnknownNameError
-from flightid.uncertainty import interval95, null_combination, propagate
+from flightid.uncertainty import null_combination, propagate
 from flightid.uncertainty.cramer_rao import cramer_rao
 from flightid.uncertainty.insensitivity import insensitivity
 from tests.closeness import assert_close
@@ -231,10 +231,6 @@ def test_values_of_inference_are_checked() -> None:
     with pytest.raises(ArithmeticError, match="singular"):
         propagate(same, np.eye(2), np.eye(2))
     assert null_combination(np.eye(2)) is None
-    with pytest.raises(OptionError, match="degrees of freedom"):
-        interval95(0.0, 1.0, degrees_of_freedom=0.0)
-    wide = interval95(0.0, 1.0, degrees_of_freedom=5.0)
-    assert_close(wide[1], 2.570582, rtol=1e-6, why="Student's table, 5 degrees of freedom")
 
 
 def test_errors_shared_by_neighbours_widen_intervals() -> None:

@@ -8,7 +8,7 @@ import pytest
 import flightid as fid
 from flightid.control.margins.findings import guide_finding
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
-from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.estimate import Estimate
 
 
 def loop(gain=4.0, delay=0.1):
@@ -48,7 +48,7 @@ def test_guides_are_judged_at_the_worse_end():
     doubtful = fid.margins(measured(error=0.8))
     assert codes(doubtful)["phase-margin"] == "amber"
     assert codes(fid.margins(measured(9.0)))["phase-margin"] == "red"
-    pm = Quantity("peak", 4.0, "dB", (2.0, 6.0))
+    pm = Estimate("peak", 4.0, "dB", 1.02)
     found = guide_finding(pm, 5.0, "peak", "lower the gain", at_least=False)
     assert (found.light.value, "to 6" in found.message) == ("amber", True)
     assert guide_finding(pm, 3.0, "peak", "", at_least=False).light.value == "red"

@@ -65,9 +65,9 @@ def test_gains_meet_every_requirement_for_fresh_plants(design: fid.PidDesign) ->
 
 def test_worst_lies_beyond_nominal_and_the_flown_gains_stand_beside(design: fid.PidDesign) -> None:
     for each in design.promises:
-        if None in (each.nominal, each.worst, each.interval95):
+        if None in (each.nominal, each.worst, each.estimate.interval95):
             continue
-        low, high = each.interval95 or (0.0, 0.0)
+        low, high = each.estimate.interval95 or (0.0, 0.0)
         assert low <= high
         assert each.worst is not None
         assert min(low, each.worst) <= (each.nominal or 0.0) <= max(high, each.worst)

@@ -9,10 +9,10 @@
 ['conditioning.detrend', 'conditioning.resample']
 """
 
-from flightid.conditioning.align import SkewEstimate, align, estimate_skew
+from flightid.conditioning.align import Skew, align, estimate_skew
 from flightid.conditioning.axes import AxisConversion, convert_attitude, convert_axes, flip_sign
 from flightid.conditioning.consistency import check_consistency
-from flightid.conditioning.consistency_result import InstrumentParameter, KinematicConsistency
+from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.conditioning.detrend import Trend, detrend
 from flightid.conditioning.filter import FilterDesign, filter_record
 from flightid.conditioning.resample import resample
@@ -35,10 +35,9 @@ __all__ = [
     "AxisConversion",
     "FilterDesign",
     "GapPolicy",
-    "InstrumentParameter",
     "Interpolation",
     "KinematicConsistency",
-    "SkewEstimate",
+    "Skew",
     "Smoothed",
     "StampPolicy",
     "Trend",

@@ -15,6 +15,8 @@ from flightid.findings import Finding
 from flightid.record import InputShape, Record, Step
 from flightid.record.interpolation import windowed_sinc
 from flightid.table import Column, Table
+from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.quantiles import LEVEL, interval_words
 from flightid.units import require_match
 
 HANN_NEIGHBOURS = 2.000
@@ -28,17 +30,15 @@ ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class SkewEstimate:
+class Skew:
     """By how much one channel lags another.
 
     Attributes
     ----------
     reference, channel : str
         Names.
-    skew_s : float
-        Lag of `channel` behind `reference`, s; negative where it leads.
-    stderr_s : float
-        Standard error, s.
+    lag : Estimate
+        Of `channel` behind `reference`, s; negative where it leads.
     coherence : float
         Mean squared coherence over the band, as the fit weighed it.
     band_hz : (float, float)
@@ -50,33 +50,31 @@ class SkewEstimate:
 
     Example
     -------
-    >>> estimate = SkewEstimate("p", "phi_dot", 0.012, 0.001, 0.98, (0.1, 5.0), 0.01)
-    >>> estimate
-    SkewEstimate('phi_dot' behind 'p': 0.012 ± 0.002 s, coherence 0.98)
+    >>> Skew("p", "phi_dot", Estimate("skew", 0.012, "s", 0.001), 0.98, (0.1, 5.0), 0.01)
+    Skew('phi_dot' behind 'p': 0.012 (0.01004 to 0.01396) s, coherence 0.98)
     """
 
     reference: str
     channel: str
-    skew_s: float
-    stderr_s: float
+    lag: Estimate
     coherence: float
     band_hz: tuple[float, float]
     sample_time_s: float
     findings: tuple[Finding, ...] = ()
 
     @property
-    def interval95_s(self) -> tuple[float, float]:
-        """95 % interval of the skew, s."""
-        return self.skew_s - 1.96 * self.stderr_s, self.skew_s + 1.96 * self.stderr_s
+    def skew_s(self) -> float:
+        """Lag of `channel` behind `reference`, s."""
+        return self.lag.value
 
-    def summary(self) -> Table:
-        """Table of the estimate."""
-        low, high = self.interval95_s
+    def summary(self, *, level: float = LEVEL) -> Table:
+        """Table of the estimate with its interval at a level."""
+        low, high = self.lag.interval(level) or (None, None)
         columns = (
             Column("channel"),
             Column("behind"),
             Column("skew", "s"),
-            Column("95 % from", "s"),
+            Column(f"{interval_words(level)} from", "s"),
             Column("to", "s"),
             Column("samples"),
             Column("coherence"),
@@ -95,18 +93,21 @@ class SkewEstimate:
     def to_dict(self) -> dict[str, object]:
         """Plain values."""
         return {
-            "schema": "flightid.skew_estimate/1",
-            **{key: value for key, value in vars(self).items() if key != "findings"},
+            "schema": "flightid.skew/1",
+            "reference": self.reference,
+            "channel": self.channel,
+            "lag": self.lag.to_dict(),
+            "coherence": self.coherence,
             "band_hz": list(self.band_hz),
-            "interval95_s": list(self.interval95_s),
+            "sample_time_s": self.sample_time_s,
             "findings": [finding.to_dict() for finding in self.findings],
         }
 
     def __repr__(self) -> str:
-        """Skew with two standard errors on one line."""
+        """Skew with its interval on one line."""
         return (
-            f"SkewEstimate({self.channel!r} behind {self.reference!r}: {self.skew_s:.4g} ± "
-            f"{2 * self.stderr_s:.2g} s, coherence {self.coherence:.2g})"
+            f"Skew({self.channel!r} behind {self.reference!r}: {self.lag.text}, "
+            f"coherence {self.coherence:.2g})"
         )
 
     def _repr_html_(self) -> str:
@@ -121,7 +122,7 @@ def estimate_skew(
     band_hz: tuple[float, float] | None = None,
     window_s: float | None = None,
     largest_s: float = 0.5,
-) -> SkewEstimate:
+) -> Skew:
     """Lag of a channel behind another that shows the same quantity, to a fraction of a sample.
 
     The peak of the cross-correlation gives the whole samples; the slope of the cross-spectrum's
@@ -148,7 +149,7 @@ def estimate_skew(
 
     Returns
     -------
-    SkewEstimate
+    Skew
 
     Raises
     ------
@@ -201,11 +202,10 @@ def estimate_skew(
         skew += slope.lag
         if abs(slope.lag) < 1e-5:
             break
-    return SkewEstimate(
+    return Skew(
         reference,
         channel,
-        skew * step,
-        slope.stderr * step,
+        Estimate("skew", skew * step, "s", slope.stderr * step),
         slope.coherence,
         (low, high),
         step,

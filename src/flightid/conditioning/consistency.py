@@ -12,7 +12,7 @@ from flightid.conditioning.consistency_findings import (
     drift_findings,
     findings_of,
 )
-from flightid.conditioning.consistency_result import InstrumentParameter, KinematicConsistency
+from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.conditioning.instrument_fit import OutputError, too_steep
 from flightid.conditioning.kinematics import (
     FORCES,
@@ -29,6 +29,7 @@ from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.record import Record, Step
 from flightid.table import Cell
 from flightid.uncertainty.coloured_residuals import corrected_covariance
+from flightid.uncertainty.estimate import Estimate
 from flightid.units import require_match
 
 Array = NDArray[np.float64]
@@ -137,7 +138,9 @@ def check_consistency(
     )
     spread = np.sqrt(np.diag(white))
     found = {
-        name: InstrumentParameter(name, float(value), float(error), _unit(name), float(degrees))
+        name: Estimate(
+            name, float(value), _unit(name), float(error), freedom=float(degrees), status="free"
+        )
         for name, value, error, degrees in zip(
             parameters, theta, np.sqrt(np.diag(covariance)), freedom, strict=True
         )
@@ -264,9 +267,7 @@ def _unit(parameter: str) -> str:
     return UNIT_OF_KIND.get(kind, UNITS[name])
 
 
-def _corrected(
-    record: Record, source: Mapping[str, str], found: Mapping[str, InstrumentParameter]
-) -> Record:
+def _corrected(record: Record, source: Mapping[str, str], found: Mapping[str, Estimate]) -> Record:
     """The record without the estimated instrument errors."""
     samples = {}
     delays = {}

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.conditioning.consistency_result import InstrumentParameter
 from flightid.conventions import Light
 from flightid.errors import SingularError
 from flightid.findings import Finding
+from flightid.uncertainty.estimate import Estimate
 
 CORRELATED = 0.9
 INSEPARABLE = 0.99
@@ -54,7 +54,7 @@ def require_separable(
 
 
 def findings_of(
-    parameters: Mapping[str, InstrumentParameter],
+    parameters: Mapping[str, Estimate],
     correlation: NDArray[np.float64],
     fit_percent: Mapping[str, float | None],
     sample_time_s: float,
@@ -120,9 +120,10 @@ def drift_findings(
     return tuple(found)
 
 
-def _of_parameter(parameter: InstrumentParameter, sample_time_s: float) -> list[Finding]:
+def _of_parameter(parameter: Estimate, sample_time_s: float) -> list[Finding]:
     kind, _, channel = parameter.name.partition("_")
-    text = f"{parameter.value:.4g} ± {1.96 * parameter.stderr:.2g} {parameter.unit}"
+    half = parameter.half_width95 or 0.0
+    text = f"{parameter.value:.4g} ± {half:.2g} {parameter.unit}"
     size = abs(parameter.value)
     if kind == "bias":
         limit = {"rad/s": RATE_BIAS_RAD_S, "m/s^2": FORCE_BIAS_M_S2}.get(parameter.unit)
@@ -151,7 +152,7 @@ def _of_parameter(parameter: InstrumentParameter, sample_time_s: float) -> list[
             Finding(
                 "scale-factor",
                 light,
-                f"{channel} reads {gain:.4g} ± {1.96 * parameter.stderr:.2g} of the truth",
+                f"{channel} reads {gain:.4g} ± {half:.2g} of the truth",
                 "check the unit" if light is Light.RED else "use the corrected record",
             )
         ]

@@ -2,57 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.table import Column, Table
-
-
-@dataclass(frozen=True)
-class InstrumentParameter:
-    """One estimated bias, scale factor, delay or initial state.
-
-    Attributes
-    ----------
-    name : str
-        For example ``"bias_p"``, ``"scale_q"``, ``"delay_phi"``, ``"theta_0"``.
-    value, stderr : float
-        Estimate and its standard error, corrected for coloured residuals.
-    unit : str
-        Unit of both; scale factors are relative (0.02: reads 2 % too much).
-    freedom : float
-        Degrees of freedom of the standard error, for Student's distribution.
-
-    Example
-    -------
-    >>> InstrumentParameter("bias_p", 0.02, 0.001, "rad/s").is_significant
-    True
-    """
-
-    name: str
-    value: float
-    stderr: float
-    unit: str
-    freedom: float = math.inf
-
-    @property
-    def interval95(self) -> tuple[float, float]:
-        """95 % interval, by Student's distribution."""
-        half = float(stdtrit(self.freedom, 0.975)) * self.stderr
-        return self.value - half, self.value + half
-
-    @property
-    def is_significant(self) -> bool:
-        """Tell whether zero lies outside the 95 % interval."""
-        low, high = self.interval95
-        return low > 0 or high < 0
+from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.quantiles import LEVEL, interval_words
 
 
 @dataclass(frozen=True)
@@ -61,7 +21,7 @@ class KinematicConsistency:
 
     Attributes
     ----------
-    parameters : mapping of str to InstrumentParameter
+    parameters : mapping of str to Estimate
         Estimates by name.
     covariance : ndarray, shape (n_parameters, n_parameters)
         Covariance in the order of `parameters`, corrected for coloured residuals.
@@ -90,7 +50,7 @@ class KinematicConsistency:
     KinematicConsistency(500 samples, 3 parameters, worst fit 100 % (phi))
     """
 
-    parameters: Mapping[str, InstrumentParameter]
+    parameters: Mapping[str, Estimate]
     covariance: NDArray[np.float64]
     correlation: NDArray[np.float64]
     reconstructed: Mapping[str, NDArray[np.float64]]
@@ -99,18 +59,18 @@ class KinematicConsistency:
     corrected: Record
     findings: tuple[Finding, ...]
 
-    def summary(self) -> Table:
-        """Table of the estimates with their 95 % intervals."""
+    def summary(self, *, level: float = LEVEL) -> Table:
+        """Table of the estimates with their intervals at a level."""
         columns = (
             Column("parameter"),
             Column("unit"),
             Column("value"),
-            Column("95 % from"),
+            Column(f"{interval_words(level)} from"),
             Column("to"),
             Column("significant"),
         )
         rows = tuple(
-            (p.name, p.unit, p.value, *p.interval95, p.is_significant)
+            (p.name, p.unit, p.value, *(p.interval(level) or (None, None)), p.is_significant)
             for p in self.parameters.values()
         )
         return Table(repr(self), columns, rows, tuple(map(str, self.findings)))
@@ -125,15 +85,7 @@ class KinematicConsistency:
         """Plain values, signals left out."""
         return {
             "schema": "flightid.kinematic_consistency/1",
-            "parameters": {
-                key: {
-                    "value": p.value,
-                    "stderr": p.stderr,
-                    "interval95": list(p.interval95),
-                    "unit": p.unit,
-                }
-                for key, p in self.parameters.items()
-            },
+            "parameters": {key: p.to_dict() for key, p in self.parameters.items()},
             "covariance": self.covariance.tolist(),
             "correlation": self.correlation.tolist(),
             "residual_rms": dict(self.residual_rms),

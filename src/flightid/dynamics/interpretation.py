@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import ModelError
 from flightid.findings import Finding
-from flightid.identification import FittedParameter, InnovationsFit, PolynomialFit
+from flightid.identification import InnovationsFit, PolynomialFit
 from flightid.identification.prediction_error.roots import (
     POLE,
     ZERO,
@@ -24,6 +24,8 @@ from flightid.identification.subspace.roots import ALL, innovations_roots
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.sampled.discrete_modes import AT_ORIGIN, NO_COUNTERPART
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.uneven import turned
 
 SCHEMA = "flightid.interpretation/1"
 LIGHT_DAMPING = 0.3
@@ -47,7 +49,7 @@ class InterpretedRoot:
         Place and errors.
     character : str
         What it may stand for, in words.
-    time_constant : FittedParameter or None
+    time_constant : Estimate or None
         Of a real stable pole, s.
 
     Example
@@ -58,7 +60,7 @@ class InterpretedRoot:
 
     root: FittedRoot
     character: str
-    time_constant: FittedParameter | None = None
+    time_constant: Estimate | None = None
 
     @property
     def frequency_hz(self) -> float | None:
@@ -299,19 +301,14 @@ def _zero(z: complex) -> str:
     return "non-minimum phase"
 
 
-def _decay(root: FittedRoot) -> FittedParameter | None:
+def _decay(root: FittedRoot) -> Estimate | None:
     """1/ω of a stable real pole; its interval is that of ω turned over."""
     omega = root.natural_frequency
     if root.kind == ZERO or omega is None or root.z.imag or abs(root.z) >= 1.0:
         return None
     name = f"time constant at z = {root.z.real:.4g}"
-    tau = 1.0 / omega.value
-    if omega.interval95 is None or omega.stderr is None or omega.interval95[0] <= 0.0:
-        reason = omega.reason or "the interval of the pole holds an integrator"
-        return FittedParameter(name, "s", tau, "derived", reason=reason)
-    low, high = omega.interval95
-    stderr = omega.stderr * tau**2
-    return FittedParameter(name, "s", tau, "derived", stderr, (1.0 / high, 1.0 / low))
+    unsigned = "the interval of the pole holds an integrator"
+    return replace(turned(name, "s", 1.0, omega, unsigned), status="derived")
 
 
 def _judge(items: Sequence[InterpretedRoot]) -> list[Finding]:
@@ -371,7 +368,7 @@ def _sentence(item: InterpretedRoot) -> str:
     return f"{text}; {item.character}." if item.character else f"{text}."
 
 
-def _half(item: FittedParameter | None) -> float | None:
+def _half(item: Estimate | None) -> float | None:
     if item is None or item.interval95 is None:
         return None
     return (item.interval95[1] - item.interval95[0]) / 2

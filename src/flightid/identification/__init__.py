@@ -2,7 +2,7 @@
 
 from flightid.identification.advice.advice import Advice, advise
 from flightid.identification.advice.impulse_response import ImpulseResponse, impulse_response
-from flightid.identification.fit import Fit, FittedParameter, FittedResponse, LocalMinimum
+from flightid.identification.fit import Fit, FittedResponse, LocalMinimum
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.identify import identify
 from flightid.identification.narx.result import ChosenTerm, NarxFit
@@ -14,15 +14,14 @@ from flightid.identification.reduction.structures import (
     StructureRow,
     compare_structures,
 )
-from flightid.identification.spread_of import spread_of
 from flightid.identification.subspace.order import OrderChoice
 from flightid.identification.subspace.result import InnovationsFit
+from flightid.identification.uncertain_of import uncertain_of
 
 __all__ = [
     "Advice",
     "ChosenTerm",
     "Fit",
-    "FittedParameter",
     "FittedRecord",
     "FittedResponse",
     "ImpulseResponse",
@@ -40,5 +39,5 @@ __all__ = [
     "identify",
     "impulse_response",
     "reduce",
-    "spread_of",
+    "uncertain_of",
 ]

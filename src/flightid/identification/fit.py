@@ -14,66 +14,9 @@ from flightid.models import GreyBoxModel
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.responses import PairResponse
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty.estimate import Estimate
 
 SCHEMA = "flightid.fit/1"
-
-
-@dataclass(frozen=True)
-class FittedParameter:
-    """One parameter after a fit.
-
-    Attributes
-    ----------
-    name, unit : str
-    value : float
-        Estimate, in `unit`.
-    status : str
-        ``"free"``, ``"at bound"``, ``"fixed"`` or ``"tied"``.
-    stderr : float or None
-        Standard error over repeated flights, in `unit`; None where `reason` says why.
-    interval95 : tuple of float or None
-        95 % interval, in `unit`.
-    cramer_rao_percent, insensitivity_percent : float or None
-        In the convention of CIFER, percent of the value; no confidence interval.
-    reason : str
-        Why a number is missing; empty where none is.
-
-    Example
-    -------
-    >>> FittedParameter("Lp", "1/s", -5.0, "free", 0.1, (-5.2, -4.8), 3.0, 1.5)
-    FittedParameter(Lp = -5 ± 0.2 1/s, free)
-    """
-
-    name: str
-    unit: str
-    value: float
-    status: str
-    stderr: float | None = None
-    interval95: tuple[float, float] | None = None
-    cramer_rao_percent: float | None = None
-    insensitivity_percent: float | None = None
-    reason: str = ""
-
-    def __repr__(self) -> str:
-        """Value with half its 95 % interval on one line."""
-        half = ""
-        if self.interval95 is not None:
-            half = f" ± {(self.interval95[1] - self.interval95[0]) / 2:.2g}"
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"FittedParameter({self.name} = {self.value:.5g}{half}{unit}, {self.status})"
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {
-            "value": self.value,
-            "unit": self.unit,
-            "status": self.status,
-            "stderr": self.stderr,
-            "interval95": None if self.interval95 is None else list(self.interval95),
-            "cramer_rao_percent": self.cramer_rao_percent,
-            "insensitivity_percent": self.insensitivity_percent,
-            "reason": self.reason,
-        }
 
 
 @dataclass(frozen=True)
@@ -160,7 +103,7 @@ class Fit:
     ----------
     model : TransferFunctionModel or StateSpaceModel
         The model with the estimates as values.
-    parameters : mapping of str to FittedParameter
+    parameters : mapping of str to Estimate
         All parameters, in the model's order.
     cost, average_cost : float
         Σ J_l and its average over the responses; guide: average at most 100, below 50 nearly
@@ -209,7 +152,7 @@ class Fit:
     """
 
     model: GreyBoxModel
-    parameters: Mapping[str, FittedParameter]
+    parameters: Mapping[str, Estimate]
     cost: float
     average_cost: float
     costs: Mapping[str, float]

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.identification.fit import FittedParameter
 from flightid.identification.multistart import CONVERGED, End
+from flightid.uncertainty.estimate import Estimate
 
 APPROXIMATE = "random error"
 UNKNOWN = "nothing"
@@ -57,7 +57,7 @@ def judge_cost(costs: Mapping[str, float], average: float) -> list[Finding]:
     return found
 
 
-def judge_parameters(parameters: Mapping[str, FittedParameter]) -> list[Finding]:
+def judge_parameters(parameters: Mapping[str, Estimate]) -> list[Finding]:
     """Verdicts on each parameter: at a bound, insensitive, badly bounded."""
     found = []
     for p in parameters.values():
@@ -74,7 +74,7 @@ def judge_parameters(parameters: Mapping[str, FittedParameter]) -> list[Finding]
     return found
 
 
-def _judge_guides(p: FittedParameter) -> list[Finding]:
+def _judge_guides(p: Estimate) -> list[Finding]:
     insensitive, bounded = p.insensitivity_percent, p.cramer_rao_percent
     if insensitive is not None and insensitive > INSENSITIVITY_GUIDE_PERCENT:
         code, what = "insensitive", f"insensitivity {insensitive:.0f} % is above the guide of 10 %"
@@ -92,7 +92,7 @@ def _judge_guides(p: FittedParameter) -> list[Finding]:
     return [Finding(code, Light.AMBER, f"{p.name}: {what}", action)]
 
 
-def _half_width_share(p: FittedParameter) -> float | None:
+def _half_width_share(p: Estimate) -> float | None:
     if p.interval95 is None or p.value == 0.0:
         return None
     low, high = p.interval95

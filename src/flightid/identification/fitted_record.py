@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flightid.record import Record
 
 if TYPE_CHECKING:
-    from flightid.identification.fit import FittedParameter
+    from flightid.uncertainty.estimate import Estimate
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -27,7 +27,7 @@ class FittedRecord:
         The model's inputs and its outputs with biases, on the record's time base.
     outputs : tuple of str
         Channels that were fitted.
-    initial_state, bias, reference_shift : mapping of str to FittedParameter
+    initial_state, bias, reference_shift : mapping of str to Estimate
         By state, output and input: what was estimated or held in this record. A bias is added to
         the model's output, a reference shift to its input.
     states : mapping of str to ndarray, shape (n_samples,)
@@ -49,9 +49,9 @@ class FittedRecord:
     measured: Record
     modelled: Record
     outputs: tuple[str, ...]
-    initial_state: Mapping[str, FittedParameter]
-    bias: Mapping[str, FittedParameter]
-    reference_shift: Mapping[str, FittedParameter]
+    initial_state: Mapping[str, Estimate]
+    bias: Mapping[str, Estimate]
+    reference_shift: Mapping[str, Estimate]
     states: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def residual(self, name: str) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ FRAME_PX = 130
 
 
 @dataclass(frozen=True)
-class Estimate:
+class EstimateBar:
     """One parameter as it is drawn.
 
     Attributes
@@ -25,7 +25,7 @@ class Estimate:
     name : str
         Parameter and model.
     value, low, high : float
-        Estimate and its 95 % interval, any unit.
+        EstimateBar and its 95 % interval, any unit.
     truth : float or None
         True value where it is known.
     """
@@ -37,12 +37,12 @@ class Estimate:
     truth: float | None = None
 
 
-def parameter_intervals(estimates: Sequence[Estimate], *, name: str = "estimate") -> go.Figure:
+def parameter_intervals(estimates: Sequence[EstimateBar], *, name: str = "estimate") -> go.Figure:
     """Draw 95 % intervals in percent of the reference: the truth where known, else the estimate.
 
     Parameters
     ----------
-    estimates : sequence of Estimate
+    estimates : sequence of EstimateBar
         Top to bottom.
     name : str
         Name in the legend.
@@ -140,7 +140,7 @@ def _response_figure(each: FittedResponse) -> go.Figure:
     return bode(curves, unit=measured.unit)
 
 
-def estimates_of(fit: Fit, truth: Mapping[str, float] | None = None) -> list[Estimate]:
+def estimates_of(fit: Fit, truth: Mapping[str, float] | None = None) -> list[EstimateBar]:
     """The fit's parameters that have an interval, for `parameter_intervals`.
 
     Parameters
@@ -152,10 +152,10 @@ def estimates_of(fit: Fit, truth: Mapping[str, float] | None = None) -> list[Est
 
     Returns
     -------
-    list of Estimate
+    list of EstimateBar
     """
     return [
-        Estimate(p.name, p.value, *p.interval95, (truth or {}).get(p.name))
+        EstimateBar(p.name, p.value, *p.interval95, (truth or {}).get(p.name))
         for p in fit.parameters.values()
         if p.interval95 is not None and p.value != 0.0
     ]

@@ -10,8 +10,8 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from flightid.plot import look
+from flightid.uncertainty.quantiles import half_width
 
-DEVIATIONS_95 = 1.959964
 """Standard deviations of a normal 95 % interval."""
 
 
@@ -90,7 +90,7 @@ def _line(curve: Curve, values: NDArray[np.float64], *, legend: bool) -> go.Scat
 def _add_gain(made: go.Figure, curve: Curve) -> None:
     magnitude = np.abs(curve.response)
     if curve.random_error is not None:
-        wide = DEVIATIONS_95 * curve.random_error
+        wide = half_width() * curve.random_error
         # A lower edge at or below zero gain has no decibels; it is drawn 40 dB down.
         edges = (_decibel(magnitude * np.maximum(1 - wide, 0.01)), _decibel(magnitude * (1 + wide)))
         made.add_traces(
@@ -101,7 +101,7 @@ def _add_gain(made: go.Figure, curve: Curve) -> None:
 
 def _add_phase(made: go.Figure, curve: Curve, phase_deg: NDArray[np.float64]) -> None:
     if curve.random_error is not None:
-        wide = np.minimum(np.degrees(DEVIATIONS_95 * curve.random_error), 180.0)
+        wide = np.minimum(np.degrees(half_width() * curve.random_error), 180.0)
         edges = (phase_deg - wide, phase_deg + wide)
         made.add_traces(
             look.band(curve.name, curve.omega_rad_s, *edges, colour=curve.colour), rows=2, cols=1

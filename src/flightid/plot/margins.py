@@ -12,10 +12,10 @@ from flightid.control.margins.disturbance_rejection import DisturbanceRejection
 from flightid.control.margins.loop_metrics import DISTURBANCE_LEVEL_DB
 from flightid.control.margins.margins import GAIN_GUIDE_DB, PHASE_GUIDE_DEG, LoopCurve, Margins
 from flightid.plot import look
-from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.quantiles import half_width
 
 Array = NDArray[np.float64]
-DEVIATIONS_95 = 1.959964
 WIDEST_DEG = 180.0
 NAME = "loop"
 ROUND_DEG = np.linspace(0.0, 360.0, 361)
@@ -233,7 +233,7 @@ def disk_figure(found: DiskMargin) -> go.Figure:
     return made
 
 
-def _curve(curve: LoopCurve, crossover: Quantity) -> tuple[Array, Array, Array]:
+def _curve(curve: LoopCurve, crossover: Reading) -> tuple[Array, Array, Array]:
     """Frequencies, dB, and degrees on the turn that has the crossover within ±180° of −180°."""
     omega = curve.omega_rad_s
     degrees = np.degrees(np.unwrap(np.angle(curve.response)))
@@ -247,15 +247,15 @@ def _curve(curve: LoopCurve, crossover: Quantity) -> tuple[Array, Array, Array]:
 def _add_band(made: go.Figure, omega: Array, values: Array, stderr: Array | None, row: int) -> None:
     if stderr is None:
         return
-    wide = np.minimum(DEVIATIONS_95 * np.nan_to_num(stderr, nan=WIDEST_DEG), WIDEST_DEG)
+    wide = np.minimum(half_width() * np.nan_to_num(stderr, nan=WIDEST_DEG), WIDEST_DEG)
     edges = look.band(NAME, omega, values - wide, values + wide, colour=look.MODEL)
     made.add_traces(edges, rows=row, cols=1)
 
 
 def _mark(
     made: go.Figure,
-    margin: Quantity,
-    place: Quantity,
+    margin: Reading,
+    place: Reading,
     omega: Array,
     values: Array,
     row: int,
@@ -322,7 +322,7 @@ def _nyquist_marks(made: go.Figure, margins: Margins) -> None:
             made.add_trace(_points(text, [float(real)], [0.0], colour, "square"))
 
 
-def _same(omega: float, quantity: Quantity) -> bool:
+def _same(omega: float, quantity: Reading) -> bool:
     return quantity.value is not None and abs(omega - quantity.value) < 1e-6 * quantity.value
 
 
@@ -336,7 +336,7 @@ def _ordered(margins: Margins, decibel: Array, degrees: Array) -> tuple[Array, A
     return decibel[pair], degrees[pair]
 
 
-def _half(quantity: Quantity) -> float | None:
+def _half(quantity: Reading) -> float | None:
     if quantity.interval95 is None:
         return None
     return 0.5 * (quantity.interval95[1] - quantity.interval95[0])

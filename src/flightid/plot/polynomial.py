@@ -10,6 +10,7 @@ from flightid.identification import ImpulseResponse, InnovationsFit, PolynomialF
 from flightid.identification.subspace.roots import ALL
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.plot import look
+from flightid.uncertainty.quantiles import half_width
 from flightid.validation import OrderScan
 
 CHI2_95_2 = 5.991
@@ -173,10 +174,8 @@ def impulse_response(item: ImpulseResponse, name: str | None = None) -> go.Figur
     )
     for row, (time, values, wide) in enumerate(curves, start=1):
         # The band lies about zero for pulses: outside it, chance does not explain a lag.
-        middle = 0.0 * values if row == 1 else values
-        for edge in look.band(
-            "95 %", time, middle - 1.96 * wide, middle + 1.96 * wide, colour=look.TRUTH
-        ):
+        middle, half = 0.0 * values if row == 1 else values, half_width() * wide
+        for edge in look.band("95 %", time, middle - half, middle + half, colour=look.TRUTH):
             made.add_trace(edge, row=row, col=1)
         if row == 1:
             bars = go.Bar(x=time, y=values, name="pulse", marker={"color": look.MODEL})

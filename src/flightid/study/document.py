@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flightid.findings import Finding, worst
-from flightid.plot.fit import Estimate, parameter_intervals
+from flightid.plot.fit import EstimateBar, parameter_intervals
 from flightid.report.blocks import provenance
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
@@ -25,9 +25,9 @@ from flightid.table import Cell, Column, Table
 from flightid.version import VERSION
 
 if TYPE_CHECKING:
-    from flightid.identification import FittedParameter
     from flightid.study.stages import Identified
     from flightid.study.study import Study
+    from flightid.uncertainty.estimate import Estimate
 
 
 def study_document(study: Study) -> Document:
@@ -107,14 +107,14 @@ def parameter_table(study: Study) -> Table:
     return Table("Parameters", tuple(columns), tuple(rows), notes)
 
 
-def _parameters(study: Study) -> Iterator[tuple[Identified, FittedParameter, float | None]]:
+def _parameters(study: Study) -> Iterator[tuple[Identified, Estimate, float | None]]:
     for item in study.identified:
         truth = {} if study.truth is None else study.truth.parameters(item.fit.model)
         for name, parameter in item.fit.parameters.items():
             yield item, parameter, truth.get(name)
 
 
-def _inside(parameter: FittedParameter, true_value: float | None) -> bool | None:
+def _inside(parameter: Estimate, true_value: float | None) -> bool | None:
     if parameter.interval95 is None or true_value is None:
         return None
     return parameter.interval95[0] <= true_value <= parameter.interval95[1]
@@ -187,7 +187,7 @@ def _record_table(study: Study) -> Table:
 
 def _interval_figure(study: Study) -> tuple[Figure, ...]:
     estimates = [
-        Estimate(f"{parameter.name}, {item.settings.name}", parameter.value, low, high, true)
+        EstimateBar(f"{parameter.name}, {item.settings.name}", parameter.value, low, high, true)
         for item, parameter, true in _parameters(study)
         if parameter.interval95 is not None
         for low, high in [parameter.interval95]

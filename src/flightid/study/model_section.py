@@ -22,9 +22,10 @@ from flightid.report.verification import verification_blocks
 from flightid.table import Cell, Column, Table
 
 if TYPE_CHECKING:
-    from flightid.identification import Fit, FittedParameter
+    from flightid.identification import Fit
     from flightid.study.stages import Identified
     from flightid.study.truth import Truth
+    from flightid.uncertainty.estimate import Estimate
 
 ESTIMATORS = {
     "composite": "direct estimate",
@@ -120,7 +121,7 @@ def _comparison(item: Identified, truth: Truth | None) -> Table:
     )
 
 
-def _with_interval(parameter: FittedParameter) -> str:
+def _with_interval(parameter: Estimate) -> str:
     if parameter.interval95 is None:
         return f"{parameter.value:.4g}"
     low, high = parameter.interval95

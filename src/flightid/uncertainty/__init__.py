@@ -3,28 +3,29 @@
 from flightid.uncertainty.covariance import (
     decibel_phase_sensitivity,
     estimator_gain,
-    interval95,
     propagate,
     window_covariance,
 )
 from flightid.uncertainty.cramer_rao import correlation, cramer_rao, gauss_newton_hessian
+from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
 from flightid.uncertainty.insensitivity import insensitivity, null_combination
-from flightid.uncertainty.quantity import Quantity, quantity_table
-from flightid.uncertainty.spread import Propagated, Spread
+from flightid.uncertainty.quantiles import half_width
+from flightid.uncertainty.uncertain import Uncertain, uncertain_numbers
 
 __all__ = [
-    "Propagated",
-    "Quantity",
-    "Spread",
+    "Estimate",
+    "Reading",
+    "Uncertain",
     "correlation",
     "cramer_rao",
     "decibel_phase_sensitivity",
+    "estimate_table",
     "estimator_gain",
     "gauss_newton_hessian",
+    "half_width",
     "insensitivity",
-    "interval95",
     "null_combination",
     "propagate",
-    "quantity_table",
+    "uncertain_numbers",
     "window_covariance",
 ]

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm, t
 
-from flightid.errors import OptionError, SingularError
+from flightid.errors import SingularError
 
 Array = NDArray[np.float64]
 _DECIBEL = 20.0 / np.log(10.0)
@@ -201,44 +200,3 @@ def _squared_hann(bins: Array) -> Array:
         + (np.sinc(bins - 1.0) + np.sinc(bins + 1.0)) * 2.0 / 3.0
         + (np.sinc(bins - 2.0) + np.sinc(bins + 2.0)) / 6.0
     )
-
-
-def interval95(
-    value: float, standard_error: float, *, degrees_of_freedom: float | None = None
-) -> tuple[float, float]:
-    """95 % interval about an estimate.
-
-    Parameters
-    ----------
-    value, standard_error : float
-        Estimate and its standard error, in the same unit.
-    degrees_of_freedom : float, optional
-        Of Student's distribution where the standard error itself is uncertain; default: normal.
-
-    Returns
-    -------
-    tuple of float
-        Lower and upper end.
-
-    Raises
-    ------
-    OptionError
-        The degrees of freedom are not positive.
-
-    Reference
-    ---------
-    Any text on statistics: z₀.₉₇₅ = 1.95996.
-
-    Example
-    -------
-    >>> low, high = interval95(10.0, 1.0)
-    >>> round(low, 4), round(high, 4)
-    (8.04, 11.96)
-    """
-    if degrees_of_freedom is not None and not degrees_of_freedom > 0.0:
-        raise OptionError(
-            "degrees of freedom must be positive", found=degrees_of_freedom, needed="above 0"
-        )
-    law = norm if degrees_of_freedom is None else t(degrees_of_freedom)
-    half = float(law.ppf(0.975)) * standard_error
-    return value - half, value + half

@@ -17,11 +17,11 @@ from flightid.control.loops.stability_over import followed_poles, unstable_count
 from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.findings import Finding
-from flightid.identification.spread_of import spread_of
+from flightid.identification.uncertain_of import uncertain_of
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.model import linear_system
-from flightid.uncertainty.quantity import Quantity
-from flightid.uncertainty.spread import Propagated, Spread
+from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.uncertain import Uncertain
 
 DRAWS = 200
 
@@ -89,8 +89,8 @@ def close_loop(
     """
     if draws < 0:
         raise OptionError("the number of draws", found=draws, needed="0 or more")
-    spread: Spread[Any] = spread_of(source)
-    model = spread.estimate
+    uncertain: Uncertain[Any] = uncertain_of(source)
+    model = uncertain.value
     vehicle = linear_system(model)
     # Telling whether a model is linear takes longer than everything else about it.
     linear = not isinstance(system(model).part, Equations)
@@ -101,8 +101,8 @@ def close_loop(
         plant = linear_system(model) if linear else model
         return _closed(plant, vehicle, around, moved, name)
 
-    loops = spread.then(closed)
-    estimate = loops.estimate
+    loops = uncertain.then(closed)
+    estimate = loops.value
     poles, propagated = _poles(loops, estimate)
     tried = loops.draws(draws, seed) if draws and loops.known else []
     unstable = sum(unstable_count(each) > 0 for each in tried)
@@ -131,8 +131,8 @@ def _closed(
 
 
 def _poles(
-    loops: Spread[Interconnection], estimate: Interconnection
-) -> tuple[tuple[ClosedPole, ...], Propagated]:
+    loops: Uncertain[Interconnection], estimate: Interconnection
+) -> tuple[tuple[ClosedPole, ...], Uncertain[np.ndarray[Any, np.dtype[np.float64]]]]:
     stability = estimate.stability()
     count = max(1, estimate.order)
     step = stability.sample_time_s
@@ -149,11 +149,11 @@ def _poles(
         damping = np.where(size > 0.0, -s.real / np.where(size > 0.0, size, 1.0), np.nan)
         return np.concatenate([s.real, s.imag, size, damping])
 
-    spread = loops.propagate(numbers)
+    carried = loops.carried(numbers)
     n = len(kept)
 
-    def quantity(row: int, kind: int, what: str, unit: str) -> Quantity:
-        return spread.quantity(kind * n + row, what, unit, "the pole is lost over the uncertainty")
+    def quantity(row: int, kind: int, what: str, unit: str) -> Reading:
+        return carried.number(kind * n + row, what, unit, "the pole is lost over the uncertainty")
 
     found = tuple(
         ClosedPole(
@@ -164,7 +164,7 @@ def _poles(
         )
         for row in range(n)
     )
-    return found, spread
+    return found, carried
 
 
 def _findings(estimate: Interconnection, tried: int, unstable: int) -> tuple[Finding, ...]:

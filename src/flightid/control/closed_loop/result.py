@@ -10,8 +10,8 @@ from flightid.control.margins.margins import Margins, margins
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
 from flightid.table import Column, Table
-from flightid.uncertainty.quantity import Quantity
-from flightid.uncertainty.spread import Spread
+from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.uncertain import Uncertain
 
 SCHEMA = "flightid.closed_loop/1"
 
@@ -22,15 +22,15 @@ class ClosedPole:
 
     Attributes
     ----------
-    real, imaginary, frequency : Quantity
+    real, imaginary, frequency : Estimate
         rad/s; of a sampled loop, of ln z/T.
-    damping : Quantity
+    damping : Estimate
     """
 
-    real: Quantity
-    imaginary: Quantity
-    frequency: Quantity
-    damping: Quantity
+    real: Reading
+    imaginary: Reading
+    frequency: Reading
+    damping: Reading
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,7 +46,7 @@ class ClosedLoop:
         All signals at the estimate: outputs of the model and ``"<input>_total"``.
     actuators : tuple of str
         Inputs of the model that the controller moves.
-    spread : Spread of Interconnection
+    uncertain : Uncertain of Interconnection
         The loops over the uncertainty of the model.
     poles : tuple of ClosedPole
         The slowest, as many as there are states.
@@ -62,7 +62,7 @@ class ClosedLoop:
     >>> yaw = fid.LinearSystem([[-0.4]], [[2.0]], [[1.0]], [[0.0]], ("ped",), ("r",))
     >>> closed = fid.close_loop(yaw, {"ped": {"r": 1.0}})
     >>> closed.poles[0].real
-    Quantity(real part = -2.4 rad/s)
+    Estimate(real part = -2.4 rad/s)
     >>> closed.broken_at("ped").frequency_response([0.0]).real.item()
     5.0
     """
@@ -70,7 +70,7 @@ class ClosedLoop:
     name: str
     loops: Interconnection
     actuators: tuple[str, ...]
-    spread: Spread[Interconnection]
+    uncertain: Uncertain[Interconnection]
     poles: tuple[ClosedPole, ...]
     draws: int
     unstable_draws: int
@@ -115,7 +115,7 @@ class ClosedLoop:
         """
         found = {}
         for name in self.actuators:
-            broken = self.spread.then(methodcaller("broken_at", self._total(name)))
+            broken = self.uncertain.then(methodcaller("broken_at", self._total(name)))
             found[name] = margins(broken, band_rad_s=band_rad_s)
         return found
 
@@ -182,7 +182,7 @@ class ClosedLoop:
         return self.summary()._repr_html_()
 
 
-def _interval(quantity: Quantity) -> str:
+def _interval(quantity: Reading) -> str:
     if quantity.interval95 is None:
         return ""
     return f"{quantity.interval95[0]:.4g} to {quantity.interval95[1]:.4g}"

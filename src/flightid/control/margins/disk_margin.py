@@ -20,14 +20,14 @@ from flightid.control.margins.matrix_loop import (
     MatrixLoop,
     equivalent_loop,
     read_loops,
-    spread_at,
+    uncertain_at,
 )
 from flightid.control.margins.structured_gain import structured_gain
 from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.table import Table
-from flightid.uncertainty.quantity import Quantity, quantity_table
+from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
 
 SCHEMA = "flightid.disk_margin/1"
 Array = NDArray[np.float64]
@@ -57,13 +57,13 @@ class DiskMargin:
         Where loops are broken.
     skew : float
         σ of the disk.
-    alpha : Quantity
+    alpha : Estimate
         Size α of the least disk of gains that may be unstable.
-    gain_rise, gain_fall : Quantity
+    gain_rise, gain_fall : Estimate
         How much all gains may rise or fall at once, each for itself, dB; None where without limit.
-    phase : Quantity
+    phase : Estimate
         How much phase all may lose or gain at once, degrees.
-    frequency : Quantity
+    frequency : Estimate
         Where the disk is least, rad/s.
     omega_rad_s, alphas : ndarray, shape (n_f,)
         α over frequency.
@@ -81,18 +81,18 @@ class DiskMargin:
 
     channels: tuple[str, ...]
     skew: float
-    alpha: Quantity
-    gain_rise: Quantity
-    gain_fall: Quantity
-    phase: Quantity
-    frequency: Quantity
+    alpha: Reading
+    gain_rise: Reading
+    gain_fall: Reading
+    phase: Reading
+    frequency: Reading
     omega_rad_s: Array = field(repr=False)
     alphas: Array = field(repr=False)
     response: Complex | None = field(repr=False, default=None)
     findings: tuple[Finding, ...] = ()
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[Reading, ...]:
         """All numbers with their intervals."""
         return tuple(getattr(self, key) for key, *_ in QUANTITIES)
 
@@ -115,7 +115,7 @@ class DiskMargin:
         Table
         """
         title = f"Disk margin at {', '.join(self.channels)}, skew {self.skew:g}"
-        return quantity_table(title, self.quantities, tuple(map(str, self.findings)))
+        return estimate_table(title, self.quantities, tuple(map(str, self.findings)))
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""
@@ -219,7 +219,7 @@ def disk_margin(
     omega, alphas, count = _over_frequency(loops, skew)
     findings = _stability(count)
     if count > 0:
-        none = {key: Quantity(name, None, unit, None, UNSTABLE) for key, name, unit in QUANTITIES}
+        none = {key: Estimate(name, None, unit, None, UNSTABLE) for key, name, unit in QUANTITIES}
         return DiskMargin(
             loops.channels,
             skew,
@@ -232,7 +232,7 @@ def disk_margin(
     made, unknown = _carried(loops, omega, alphas, skew)
     findings += _guides(made) + unknown
     single = len(loops.channels) == 1
-    response = loops.of(loops.spread.estimate, omega)[:, 0, 0] if single else None
+    response = loops.of(loops.uncertain.value, omega)[:, 0, 0] if single else None
     return DiskMargin(
         loops.channels,
         skew,
@@ -254,7 +254,7 @@ def alphas_of(loops: Complex, skew: float) -> Array:
 
 def _over_frequency(loops: MatrixLoop, skew: float) -> tuple[Array, Array, int]:
     """Frequencies, α at each, and unstable poles of the closed loop."""
-    omega, thing = loops.omega_rad_s, loops.spread.estimate
+    omega, thing = loops.omega_rad_s, loops.uncertain.value
     turning = equivalent_loop(loops.of(thing, omega))
     found = loop_metrics(
         omega,
@@ -281,7 +281,7 @@ def _over_frequency(loops: MatrixLoop, skew: float) -> tuple[Array, Array, int]:
 
 def _carried(
     loops: MatrixLoop, omega: Array, alphas: Array, skew: float
-) -> tuple[dict[str, Quantity], list[Finding]]:
+) -> tuple[dict[str, Reading], list[Finding]]:
     """Numbers with their intervals, from the frequencies where the disk is small."""
     low = alphas <= NEAR * np.min(alphas)
     near = low | np.append(low[1:], False) | np.append(False, low[:-1])
@@ -289,22 +289,22 @@ def _carried(
         near = np.ones(len(omega), dtype=bool)
     at = omega[near]
 
-    def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever the spread is of
+    def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever is uncertain
         alpha, place = _least(at, alphas_of(loops.of(thing, at), skew))
         fall, rise = gain_limits(alpha, skew)
         decibels = [np.nan if g in (0.0, np.inf) else 20.0 * np.log10(g) for g in (rise, fall)]
         phase = phase_limit_deg(alpha, skew)
         return np.array([alpha, decibels[0], -decibels[1], phase, place])
 
-    spread = spread_at(loops, at)
-    carried = spread.propagate(all_of)
+    uncertain = uncertain_at(loops, at)
+    carried = uncertain.carried(all_of)
     made = {
-        key: carried.quantity(place, name, unit, "the disk sets no limit")
+        key: carried.number(place, name, unit, "the disk sets no limit")
         for place, (key, name, unit) in enumerate(QUANTITIES)
     }
-    if spread.known:
+    if uncertain.known:
         return made, []
-    return made, [Finding("no-intervals", Light.UNKNOWN, f"no intervals: {spread.reason}")]
+    return made, [Finding("no-intervals", Light.UNKNOWN, f"no intervals: {uncertain.reason}")]
 
 
 def _least(omega: Array, alphas: Array) -> tuple[float, float]:
@@ -321,7 +321,7 @@ def _least(omega: Array, alphas: Array) -> tuple[float, float]:
     return float(alphas[place] * np.exp(0.5 * slope * shift)), float(omega[place] * np.exp(shift))
 
 
-def _guides(made: dict[str, Quantity]) -> list[Finding]:
+def _guides(made: dict[str, Reading]) -> list[Finding]:
     action = "take gain or lag out of the loops"
     found = [guide_finding(made["phase"], PHASE_GUIDE_DEG, "disk-phase-margin", action)]
     for key in ("gain_rise", "gain_fall"):

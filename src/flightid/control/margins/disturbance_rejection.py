@@ -16,7 +16,7 @@ from flightid.control.margins.margins import LoopCurve, drawn_points, measured_u
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.table import Table
-from flightid.uncertainty.quantity import Quantity, quantity_table
+from flightid.uncertainty.estimate import Reading, estimate_table
 
 SCHEMA = "flightid.disturbance_rejection/1"
 Array = NDArray[np.float64]
@@ -39,12 +39,12 @@ class DisturbanceRejection:
     ----------
     name : str
         The loop: output and input.
-    bandwidth : Quantity
+    bandwidth : Estimate
         Lowest frequency at which |S| rises through −3 dB, rad/s: slower disturbances are halved in
         power at least.
-    peak : Quantity
+    peak : Estimate
         Greatest |S|, dB.
-    peak_frequency : Quantity
+    peak_frequency : Estimate
         Where, rad/s.
     crossings_rad_s : tuple of float
         All frequencies at which |S| passes −3 dB.
@@ -61,15 +61,15 @@ class DisturbanceRejection:
     """
 
     name: str
-    bandwidth: Quantity
-    peak: Quantity
-    peak_frequency: Quantity
+    bandwidth: Reading
+    peak: Reading
+    peak_frequency: Reading
     crossings_rad_s: tuple[float, ...]
     curve: LoopCurve = field(repr=False)
     findings: tuple[Finding, ...] = ()
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[Reading, ...]:
         """All numbers with their intervals."""
         return tuple(getattr(self, key) for key, *_ in QUANTITIES)
 
@@ -86,7 +86,7 @@ class DisturbanceRejection:
         Table
         """
         notes = tuple(map(str, self.findings))
-        return quantity_table(f"Disturbance rejection of {self.name}", self.quantities, notes)
+        return estimate_table(f"Disturbance rejection of {self.name}", self.quantities, notes)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""
@@ -187,27 +187,29 @@ def disturbance_rejection(
     )
     omega, metrics = measured_up(loop)
     drawn = drawn_points(loop, omega)
-    sensitivity = 1.0 / (1.0 + loop.of(loop.spread.estimate, drawn))
+    sensitivity = 1.0 / (1.0 + loop.of(loop.uncertain.value, drawn))
 
-    def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever the spread is of
+    def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever is uncertain
         found = loop.metrics(omega, loop.of(thing, omega))
         ratio = 1.0 / ((1.0 + loop.of(thing, drawn)) * sensitivity)
         numbers = [float(getattr(found, name)) for _, _, name, _ in QUANTITIES]
         return np.concatenate([numbers, 20 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))])
 
-    carried = loop.spread.propagate(all_of)
+    carried = loop.uncertain.carried(all_of)
     made = {
-        key: carried.quantity(place, name, unit, NO_BANDWIDTH)
+        key: carried.number(place, name, unit, NO_BANDWIDTH)
         for place, (key, name, _, unit) in enumerate(QUANTITIES)
     }
-    spread = carried.stderr
-    parts = (None, None) if spread is None else np.split(spread[len(QUANTITIES) :], 2)
-    level = -np.log(np.abs(1.0 + loop.of(loop.spread.estimate, omega)))
+    errors = carried.stderr
+    parts = (None, None) if errors is None else np.split(errors[len(QUANTITIES) :], 2)
+    level = -np.log(np.abs(1.0 + loop.of(loop.uncertain.value, omega)))
     level -= np.log(10.0) / 20.0 * DISTURBANCE_LEVEL_DB
     found = [*stability_findings(loop, metrics)]
     found += _guides(made, bandwidth_guide_rad_s, peak_guide_db)
-    if not loop.spread.known:
-        found.append(Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loop.spread.reason}"))
+    if not loop.uncertain.known:
+        found.append(
+            Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loop.uncertain.reason}")
+        )
     return DisturbanceRejection(
         loop.name,
         **made,
@@ -217,7 +219,7 @@ def disturbance_rejection(
     )
 
 
-def _guides(made: dict[str, Quantity], bandwidth: float | None, peak: float) -> list[Finding]:
+def _guides(made: dict[str, Reading], bandwidth: float | None, peak: float) -> list[Finding]:
     found = [
         guide_finding(
             made["peak"], peak, "disturbance-peak", "take gain or lag out", at_least=False

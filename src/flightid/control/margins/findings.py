@@ -10,20 +10,20 @@ from flightid.control.margins.loop_metrics import LoopMetrics
 from flightid.control.margins.loop_source import Loop
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.estimate import Reading
 
 COHERENCE = 0.6
 """Below this a measured response near crossover says little."""
 
 
 def guide_finding(
-    quantity: Quantity, guide: float, code: str, action: str, *, at_least: bool = True
+    quantity: Reading, guide: float, code: str, action: str, *, at_least: bool = True
 ) -> Finding:
     """Whether a number keeps a guide, at the worse end of its interval.
 
     Parameters
     ----------
-    quantity : Quantity
+    quantity : Estimate
         With a value.
     guide : float
         In its unit.
@@ -38,7 +38,7 @@ def guide_finding(
 
     Example
     -------
-    >>> pm = Quantity("phase margin", 50.0, "deg", (43.0, 57.0))
+    >>> pm = Estimate("phase margin", 50.0, "deg", (43.0, 57.0))
     >>> guide_finding(pm, 45.0, "phase-margin", "add lead").light.value
     'amber'
     """
@@ -60,7 +60,7 @@ def guide_finding(
 def margin_findings(
     loop: Loop,
     metrics: LoopMetrics,
-    made: Mapping[str, Quantity],
+    made: Mapping[str, Reading],
     *,
     phase_guide_deg: float,
     gain_guide_db: float,
@@ -72,7 +72,7 @@ def margin_findings(
     loop : Loop
     metrics : LoopMetrics
         Of the estimate.
-    made : mapping of str to Quantity
+    made : mapping of str to Estimate
     phase_guide_deg, gain_guide_db : float
 
     Returns
@@ -114,8 +114,10 @@ def margin_findings(
                     "excite that band better, or fit a model",
                 )
             )
-    if not loop.spread.known:
-        found.append(Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loop.spread.reason}"))
+    if not loop.uncertain.known:
+        found.append(
+            Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loop.uncertain.reason}")
+        )
     if loop.measured:
         found.append(_verdict_of_band(loop))
     return tuple(found)

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.control.margins.loop_grid import Roots, loop_grid, roots_of, whole_grid
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
-from flightid.identification.spread_of import spread_of
+from flightid.identification.uncertain_of import uncertain_of
 from flightid.responses import FrequencyResponse
 from flightid.responses.arithmetic import Known, apply_known, loop_of_sensitivity, open_loop
-from flightid.uncertainty.spread import Spread
+from flightid.uncertainty.uncertain import Uncertain
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -44,7 +44,7 @@ class Loop:
     ----------
     name : str
         Output and input.
-    spread : Spread
+    uncertain : Uncertain
         Of what the loop is computed from.
     omega_rad_s : ndarray, shape (n_f,)
         Frequencies: of the measurement, or chosen for the model.
@@ -61,7 +61,7 @@ class Loop:
     """
 
     name: str
-    spread: Spread[Any]
+    uncertain: Uncertain[Any]
     omega_rad_s: Array
     of: Callable[[Any, Array], Complex]
     unstable_poles: int
@@ -155,7 +155,7 @@ def _measured(
 
     return Loop(
         f"{row} / {column}",
-        spread_of(pair),
+        uncertain_of(pair),
         pair.omega_rad_s,
         of,
         unstable_poles,
@@ -171,8 +171,8 @@ def _modelled(
     band_rad_s: tuple[float, float] | None,
     unstable_poles: int | None,
 ) -> Loop:
-    spread = spread_of(source)
-    model = spread.estimate
+    uncertain = uncertain_of(source)
+    model = uncertain.value
     if not isinstance(model, Responding):
         raise ModelError(
             "the loop has no frequency response",
@@ -198,7 +198,7 @@ def _modelled(
     count = roots.n_unstable if unstable_poles is None else unstable_poles
     name = f"{outputs[row]} / {inputs[column]}"
     closed = closed_count(lambda at: of(model, at), roots, band_rad_s, count)
-    return Loop(name, spread, omega, of, count, None, roots.end_rad_s, closed)
+    return Loop(name, uncertain, omega, of, count, None, roots.end_rad_s, closed)
 
 
 def closed_count(

@@ -15,7 +15,7 @@ from flightid.control.margins.loop_metrics import LoopMetrics
 from flightid.control.margins.loop_source import Controller, Given, Loop, read_loop
 from flightid.findings import Finding
 from flightid.table import Column, Table
-from flightid.uncertainty.quantity import Quantity, quantity_table
+from flightid.uncertainty.estimate import Reading, estimate_table
 
 SCHEMA = "flightid.margins/1"
 Array = NDArray[np.float64]
@@ -98,14 +98,14 @@ class Margins:
     ----------
     name : str
         The loop: output and input.
-    crossover, phase_margin, delay_margin : Quantity
+    crossover, phase_margin, delay_margin : Estimate
         At the crossover with the least phase to spare: rad/s, degrees, s. Margins of an unstable
         loop are negative.
-    gain_margin, phase_crossover : Quantity
+    gain_margin, phase_crossover : Estimate
         How much the gain may rise, dB, and where, rad/s.
-    gain_reduction_margin, gain_reduction_crossing : Quantity
+    gain_reduction_margin, gain_reduction_crossing : Estimate
         How much it may fall, dB, and where, rad/s.
-    modulus_margin, sensitivity_peak : Quantity
+    modulus_margin, sensitivity_peak : Estimate
         Least distance of L from −1, and its inverse.
     crossovers : tuple of Crossing
         All passages of the unit circle.
@@ -125,15 +125,15 @@ class Margins:
     """
 
     name: str
-    crossover: Quantity
-    phase_margin: Quantity
-    delay_margin: Quantity
-    gain_margin: Quantity
-    phase_crossover: Quantity
-    gain_reduction_margin: Quantity
-    gain_reduction_crossing: Quantity
-    modulus_margin: Quantity
-    sensitivity_peak: Quantity
+    crossover: Reading
+    phase_margin: Reading
+    delay_margin: Reading
+    gain_margin: Reading
+    phase_crossover: Reading
+    gain_reduction_margin: Reading
+    gain_reduction_crossing: Reading
+    modulus_margin: Reading
+    sensitivity_peak: Reading
     crossovers: tuple[Crossing, ...]
     phase_crossovers: tuple[Crossing, ...]
     unstable_poles: int
@@ -146,7 +146,7 @@ class Margins:
         return self.unstable_poles == 0
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[Reading, ...]:
         """All numbers with their intervals."""
         return tuple(
             getattr(self, name.replace("-", "_").replace(" ", "_")) for name, *_ in QUANTITIES
@@ -168,7 +168,7 @@ class Margins:
         Table
         """
         notes = tuple(map(str, self.findings))
-        return quantity_table(f"Margins of {self.name}", self.quantities, notes)
+        return estimate_table(f"Margins of {self.name}", self.quantities, notes)
 
     def crossing_table(self) -> Table:
         """Table of every crossing, by frequency.
@@ -288,7 +288,7 @@ def margins(
         unstable_poles=unstable_poles,
     )
     omega, metrics = measured_up(source)
-    estimate = source.of(source.spread.estimate, omega)
+    estimate = source.of(source.uncertain.value, omega)
     quantities, curve = _carried(source, omega)
     rows, logs = estimate[None, :], np.log(omega)
     gains, phases = gain_crossings(logs, rows), phase_crossings(logs, rows)
@@ -325,7 +325,7 @@ def measured_up(loop: Loop) -> tuple[Array, LoopMetrics]:
     -------
     tuple of ndarray, shape (n_f,), and LoopMetrics
     """
-    omega, thing = loop.omega_rad_s, loop.spread.estimate
+    omega, thing = loop.omega_rad_s, loop.uncertain.value
     for ratio in () if loop.measured else ZOOMS:
         values = loop.of(thing, omega)
         found = loop.metrics(omega, values)
@@ -343,22 +343,22 @@ def drawn_points(loop: Loop, omega: Array) -> Array:
     return np.asarray(omega[np.linspace(0, len(omega) - 1, DRAWN_POINTS).astype(int)])
 
 
-def _carried(loop: Loop, omega: Array) -> tuple[list[tuple[Any, Quantity]], LoopCurve]:
+def _carried(loop: Loop, omega: Array) -> tuple[list[tuple[Any, Reading]], LoopCurve]:
     """Every number with its interval, and the curve with its standard errors."""
     names = [name for _, name, _ in QUANTITIES]
     drawn = drawn_points(loop, omega)
-    centre = loop.of(loop.spread.estimate, drawn)
+    centre = loop.of(loop.uncertain.value, drawn)
 
-    def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever the spread is of
+    def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever is uncertain
         values = loop.of(thing, omega)
         found = loop.metrics(omega, values)
         ratio = (values if drawn is omega else loop.of(thing, drawn)) / centre
         curve = [20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))]
         return np.concatenate([[float(getattr(found, name)) for name in names], *curve])
 
-    carried = loop.spread.propagate(all_of)
+    carried = loop.uncertain.carried(all_of)
     quantities = [
-        (each, carried.quantity(place, each[0], each[2], MISSING.get(each[1], "")))
+        (each, carried.number(place, each[0], each[2], MISSING.get(each[1], "")))
         for place, each in enumerate(QUANTITIES)
     ]
     stderr, count = carried.stderr, len(names)

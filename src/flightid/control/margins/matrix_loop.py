@@ -13,11 +13,11 @@ from scipy.linalg import block_diag
 from flightid.control.margins.loop_grid import Roots, loop_grid, roots_of
 from flightid.control.margins.loop_source import Controller, Responding, closed_count, known_values
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
-from flightid.identification.spread_of import spread_of
+from flightid.identification.uncertain_of import uncertain_of
 from flightid.responses import FrequencyResponse
 from flightid.responses.arithmetic import Known
 from flightid.responses.errors.random_error import Points, combined
-from flightid.uncertainty.spread import Spread
+from flightid.uncertainty.uncertain import Uncertain
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -35,7 +35,7 @@ class MatrixLoop:
     ----------
     channels : tuple of str
         Where they are broken, n of them.
-    spread : Spread
+    uncertain : Uncertain
     omega_rad_s : ndarray, shape (n_f,)
     of : callable
         From the thing and frequencies to L, shape (n_f, n, n).
@@ -47,7 +47,7 @@ class MatrixLoop:
     """
 
     channels: tuple[str, ...]
-    spread: Spread[Any]
+    uncertain: Uncertain[Any]
     omega_rad_s: Array
     of: Callable[[Any, Array], Complex]
     unstable_poles: int
@@ -102,8 +102,8 @@ def read_loops(
     if band_rad_s is not None and not 0.0 < band_rad_s[0] < band_rad_s[1] < np.inf:
         raise OptionError("band_rad_s has no meaning", found=band_rad_s, needed="0 < low < high")
     measured = isinstance(source, FrequencyResponse)
-    spread = _unweighed(source) if measured else spread_of(source)
-    thing = spread.estimate
+    uncertain = _unweighed(source) if measured else uncertain_of(source)
+    thing = uncertain.value
     if not measured and not isinstance(thing, Responding):
         raise ModelError(
             "the loop has no frequency response",
@@ -114,7 +114,7 @@ def read_loops(
     known = tuple(thing.outputs), tuple(thing.inputs)
     places = np.ix_([known[0].index(n) for n in rows], [known[1].index(n) for n in columns])
 
-    def of(model: Any, omega: Array) -> Complex:  # noqa: ANN401 — whatever the spread is of
+    def of(model: Any, omega: Array) -> Complex:  # noqa: ANN401 — whatever is uncertain
         values = model.response if measured else model.frequency_response(omega)
         plant = np.moveaxis(np.asarray(values, dtype=np.complex128)[places], -1, 0)
         return plant if controller is None else _joined(plant, controller, omega, rows, columns, at)
@@ -136,7 +136,7 @@ def read_loops(
         if measured
         else closed_count(lambda at_: equivalent_loop(of(thing, at_)), roots, band_rad_s, count)
     )
-    return MatrixLoop(names, spread, omega, of, count, measured, closed)
+    return MatrixLoop(names, uncertain, omega, of, count, measured, closed)
 
 
 def _determinant(loops: Complex) -> Complex:
@@ -150,13 +150,13 @@ def equivalent_loop(loops: Complex) -> Complex:
     return np.asarray(np.where(found == 0.0, 1e-300, found))
 
 
-def _unweighed(response: object) -> Spread[Any]:
-    """A measurement whose covariance is worked out where it is needed, by `spread_at`."""
-    return Spread(np.zeros(0), None, lambda _: response)
+def _unweighed(response: object) -> Uncertain[Any]:
+    """A measurement whose covariance is worked out where it is needed, by `uncertain_at`."""
+    return Uncertain.exact(response)
 
 
-def spread_at(loops: MatrixLoop, omega: Array) -> Spread[Any]:
-    """The spread of what the loops are computed from; of a measurement at some frequencies alone.
+def uncertain_at(loops: MatrixLoop, omega: Array) -> Uncertain[Any]:
+    """What the loops are computed from, with its errors; of a measurement at some frequencies.
 
     Parameters
     ----------
@@ -166,12 +166,12 @@ def spread_at(loops: MatrixLoop, omega: Array) -> Spread[Any]:
 
     Returns
     -------
-    Spread
+    Uncertain
     """
     if not loops.measured:
-        return loops.spread
-    chosen: FrequencyResponse = loops.spread.estimate.select(omega=omega)
-    parts = [spread_of(chosen, output=name) for name in chosen.outputs]
+        return loops.uncertain
+    chosen: FrequencyResponse = loops.uncertain.value.select(omega=omega)
+    parts = [uncertain_of(chosen, output=name) for name in chosen.outputs]
     if len(parts) == 1:
         return parts[0]
     shape = chosen.response.shape
@@ -180,18 +180,18 @@ def spread_at(loops: MatrixLoop, omega: Array) -> Spread[Any]:
         real, imaginary = np.moveaxis(numbers.reshape(shape[0], 2, *shape[1:]), 1, 0)
         return replace(chosen, response=real + 1j * imaginary)
 
-    centre = np.concatenate([part.centre for part in parts])
+    centre = np.concatenate([part.numbers for part in parts])
     unknown = next((part.reason for part in parts if not part.known), None)
     if unknown is not None:
-        return Spread(centre, None, make, None, unknown)
+        return Uncertain(centre, None, make, None, unknown)
     if chosen.errors is None:
         blocks = [np.asarray(part.covariance) for part in parts]
-        return Spread(centre, block_diag(*blocks), make, None, parts[0].reason)
+        return Uncertain(centre, block_diag(*blocks), make, None, parts[0].reason)
     rows = np.split(np.eye(len(centre)), len(parts), axis=1)
     points = [
         Points(k, np.arange(shape[1]), np.arange(shape[2])) for k in range(len(chosen.outputs))
     ]
-    return Spread(centre, combined(chosen.errors, points, rows), make)
+    return Uncertain(centre, combined(chosen.errors, points, rows), make)
 
 
 def _chosen(

@@ -13,11 +13,11 @@ from flightid.conventions import Light
 from flightid.dynamics.continuous import to_continuous
 from flightid.errors import DataError, FlightidError
 from flightid.findings import Finding
-from flightid.identification.spread_of import spread_of
+from flightid.identification.uncertain_of import uncertain_of
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.model import linear_system
-from flightid.uncertainty.spread import Spread
+from flightid.uncertainty.uncertain import Uncertain
 
 CORNER = 2.0
 """Standard deviations from the estimate to the corners that a search begins with."""
@@ -109,13 +109,13 @@ def gather(
     _refuse_red("the fit", source)
     for each in _listed(verification):
         _refuse_red("the verification", each)
-    spread: Spread[Any] = spread_of(source)
+    uncertain: Uncertain[Any] = uncertain_of(source)
     findings: list[Finding] = []
-    if not spread.known:
+    if not uncertain.known:
         if not nominal:
             raise DataError(
                 "gains for a model whose errors are not known would promise nothing",
-                found=spread.reason,
+                found=uncertain.reason,
                 needed="a fit with a covariance",
                 action="fit a measured response or records; or take nominal=True and keep margins",
             )
@@ -123,7 +123,7 @@ def gather(
             Finding(
                 "no-uncertainty",
                 Light.AMBER,
-                f"margins are those of the model alone: {spread.reason}",
+                f"margins are those of the model alone: {uncertain.reason}",
                 "identify the vehicle, and keep more margin until then",
             )
         )
@@ -137,10 +137,10 @@ def gather(
                 "give band_rad_s, so that the crossover stays inside",
             )
         )
-    plants = [_linear(each, sample_time_s) for each in spread.draws(draws + fresh, seed)]
+    plants = [_linear(each, sample_time_s) for each in uncertain.draws(draws + fresh, seed)]
     return Evidence(
-        _linear(spread.estimate, sample_time_s),
-        tuple(_corners(spread, sample_time_s)),
+        _linear(uncertain.value, sample_time_s),
+        tuple(_corners(uncertain, sample_time_s)),
         tuple(plants[:draws]),
         tuple(plants[draws:]),
         band,
@@ -199,9 +199,9 @@ def _linear(source: object, sample_time_s: float) -> LinearSystem:
     return linear_system(source)
 
 
-def _corners(spread: Spread[Any], sample_time_s: float) -> Iterable[LinearSystem]:
+def _corners(uncertain: Uncertain[Any], sample_time_s: float) -> Iterable[LinearSystem]:
     """Corners that make sense; one that does not (a negative delay) is left out."""
-    for pair in _pairs(spread):
+    for pair in _pairs(uncertain):
         for each in pair:
             try:
                 yield _linear(each, sample_time_s)
@@ -209,10 +209,10 @@ def _corners(spread: Spread[Any], sample_time_s: float) -> Iterable[LinearSystem
                 continue
 
 
-def _pairs(spread: Spread[Any]) -> Iterable[tuple[Any, Any]]:
-    if not spread.known:
+def _pairs(uncertain: Uncertain[Any]) -> Iterable[tuple[Any, Any]]:
+    if not uncertain.known:
         return
     try:
-        yield from spread.steps(CORNER)
+        yield from uncertain.steps(CORNER)
     except FlightidError:
         return

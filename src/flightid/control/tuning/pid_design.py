@@ -218,7 +218,7 @@ class PidDesign:
         )
         rows: list[tuple[Cell, ...]] = []
         for each in self.promises:
-            low, high = each.interval95 or (None, None)
+            low, high = each.estimate.interval95 or (None, None)
             rows.append(
                 (
                     *(each.loop, each.name, each.required, each.nominal, low, high, each.worst),

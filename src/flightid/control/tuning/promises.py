@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.tuning.loop_problem import ANGLE, TARGET, Judged, LoopProblem
-from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.uneven import DrawnEnds
 
 Array = NDArray[np.float64]
-EDGES_95 = (2.5, 97.5)
+FEWEST_PLANTS = 3
+"""An interval needs more than the estimate and one other."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -21,11 +23,10 @@ class Promise:
 
     Attributes
     ----------
-    loop, name, unit : str
-    nominal : float or None
-        At the estimate; None where there is no such crossing.
-    interval95 : tuple of float or None
-        Of the middle 95 % of the plants; None where there is one plant, or a crossing is missing.
+    loop, name : str
+    estimate : Estimate
+        Of the estimated plant, with the middle of all plants as its interval; no value where there
+        is no such crossing, no interval where there is one plant, or a crossing is missing.
     worst : float or None
         Of all plants.
     flown, flown_worst : float or None
@@ -37,15 +38,14 @@ class Promise:
 
     Example
     -------
-    >>> Promise("rate loop", "phase margin", "deg", 52.0, (48.0, 56.0), 47.1, 60.0, 55.0, "≥ 45")
+    >>> margin = Estimate("rate loop: phase margin", 52.0, "deg")
+    >>> Promise("rate loop", "phase margin", margin, 47.1, 60.0, 55.0, "≥ 45")
     Promise(rate loop: phase margin 52 deg, worst 47.1)
     """
 
     loop: str
     name: str
-    unit: str
-    nominal: float | None
-    interval95: tuple[float, float] | None
+    estimate: Reading
     worst: float | None
     flown: float | None
     flown_worst: float | None
@@ -59,17 +59,18 @@ class Promise:
         return f"Promise({self.loop}: {self.name} {values[0]}{unit}, worst {values[1]})"
 
     @property
-    def quantity(self) -> Quantity:
-        """Nominal value with its interval."""
-        reason = "" if self.nominal is not None else "no crossing in the band of the loop"
-        return Quantity(
-            f"{self.loop}: {self.name}", self.nominal, self.unit, self.interval95, reason
-        )
+    def unit(self) -> str:
+        """Unit of all its numbers."""
+        return self.estimate.unit
+
+    @property
+    def nominal(self) -> float | None:
+        """Value of the estimated plant."""
+        return self.estimate.value
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""
-        return self.quantity.to_dict() | {
-            "name": f"{self.loop}: {self.name}",
+        return self.estimate.to_dict() | {
             "worst": self.worst,
             "flown": self.flown,
             "flown_worst": self.flown_worst,
@@ -129,9 +130,7 @@ def promises(
             Promise(
                 loop,
                 kind.name,
-                kind.unit,
-                _number(values[0]),
-                _interval(values),
+                _estimate(f"{loop}: {kind.name}", kind.unit, values),
                 _worst(values, kind.more),
                 _number(before[0]) if steady and before is not None else None,
                 _worst(before, kind.more)
@@ -187,12 +186,11 @@ def _noise(problem: LoopProblem, new: Judged, old: Judged | None) -> Promise:
     values = new.noise[0]
     limit = problem.noise_limit
     before = None if old is None or not old.stable[0, 0] else old.noise[0]
+    name = "noise, rms" if known else "noise over gyro noise"
     return Promise(
         "output",
-        "noise, rms" if known else "noise over gyro noise",
-        "1" if known else "1/(rad/s)",
-        _number(values[0]),
-        _interval(values),
+        name,
+        _estimate(f"output: {name}", "1" if known else "1/(rad/s)", values),
         _worst(values, False),
         None if before is None else _number(before[0]),
         None if before is None or old is None or not old.stable.all() else _worst(before, False),
@@ -205,11 +203,14 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _interval(values: Array) -> tuple[float, float] | None:
-    if len(values) < 3 or not np.all(np.isfinite(values)):
-        return None
-    low, high = np.percentile(values, EDGES_95)
-    return float(low), float(high)
+def _estimate(name: str, unit: str, values: Array) -> Reading:
+    """Of the estimated plant, which is the first, with the middle of all plants about it."""
+    value = _number(values[0])
+    if value is None:
+        return Estimate(name, None, unit, None, "no crossing in the band of the loop")
+    if len(values) < FEWEST_PLANTS or not np.all(np.isfinite(values)):
+        return Estimate(name, value, unit)
+    return Estimate(name, value, unit, ends=DrawnEnds(values))
 
 
 def _worst(values: Array, more: bool) -> float | None:

@@ -21,7 +21,7 @@ from flightid.errors import ModelError, OptionError
 from flightid.findings import Finding
 from flightid.identification import Fit
 from flightid.models import StateSpaceModel, TransferFunctionModel
-from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.estimate import Estimate, Reading
 
 ALIKE = 0.3
 """Least common participation of two modes that are taken for the same one."""
@@ -33,7 +33,7 @@ NUMBERS = ("natural frequency", "damping ratio", "real")
 @dataclass(frozen=True)
 class _Condition:
     name: str
-    values: dict[str, Quantity]
+    values: dict[str, Reading]
     modes: Modes
 
 
@@ -125,15 +125,10 @@ def _condition(name: str, source: object) -> _Condition:
             needed="a fit or model of transfer functions or equations",
         )
     if isinstance(source, Fit):
-        values = {
-            key: Quantity(
-                key, p.value, p.unit, p.interval95, "" if p.interval95 else p.reason or p.status
-            )
-            for key, p in source.parameters.items()
-        }
+        values: dict[str, Reading] = {key: p.as_reading() for key, p in source.parameters.items()}
     else:
         values = {
-            key: Quantity(key, p.value, p.unit, None, "the model was not fitted")
+            key: Estimate(key, p.value, p.unit, None, "the model was not fitted")
             for key, p in model.parameters.items()
         }
     return _Condition(name, values, modes(source))
@@ -147,7 +142,7 @@ def _numbers(conditions: Sequence[_Condition]) -> Iterator[ComparedNumber]:
             yield _compared(name, there)
 
 
-def _compared(name: str, there: dict[str, Quantity]) -> ComparedNumber:
+def _compared(name: str, there: dict[str, Reading]) -> ComparedNumber:
     base, *others = there
     ratios = {o: ratio_of(there[o], there[base], f"{name}, {o} over {base}") for o in others}
     chances = {o: chance_of(there[o], there[base]) for o in others}

@@ -3,33 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
-from scipy.stats import norm
+from flightid.uncertainty.estimate import Estimate, Interval, Reading
+from flightid.uncertainty.quantiles import half_width, two_sided_chance
 
-from flightid.uncertainty.quantity import Quantity
-from flightid.uncertainty.spread import NORMAL_95
-
-
-def stderr_of(quantity: Quantity) -> float | None:
-    """Standard error behind an even 95 % interval."""
-    if quantity.interval95 is None:
-        return None
-    return (quantity.interval95[1] - quantity.interval95[0]) / (2.0 * NORMAL_95)
+UNBOUNDED = "the interval of the denominator holds zero: no bound"
 
 
-def ratio_of(above: Quantity, below: Quantity, name: str = "ratio") -> Quantity:
-    """Ratio of two independent estimates with its 95 % interval.
-
-    Parameters
-    ----------
-    above, below : Quantity
-        In the same unit; one without an interval counts as exact where the other has one.
-    name : str
-
-    Returns
-    -------
-    Quantity
-        Without an interval where that of the denominator holds zero.
+@dataclass(frozen=True)
+class RatioEnds:
+    """Ends of a ratio of two independent estimates; none where the denominator may be zero.
 
     Reference
     ---------
@@ -37,34 +21,81 @@ def ratio_of(above: Quantity, below: Quantity, name: str = "ratio") -> Quantity:
 
     Example
     -------
-    >>> ratio_of(Quantity("b", 3.0, "1", (2.8, 3.2)), Quantity("a", 2.0, "1", (1.9, 2.1)))
-    Quantity(ratio = 1.5 (1.379 to 1.629))
+    >>> low, high = RatioEnds(3.0, 0.1, 2.0, 0.05)(0.95)
+    >>> round(low, 3), round(high, 3)
+    (1.381, 1.626)
+    """
+
+    above: float
+    error_above: float
+    below: float
+    error_below: float
+
+    def __call__(self, level: float) -> Interval | None:
+        """Lower and upper end at a level."""
+        wide = half_width(level)
+        apart = self.below**2 - (wide * self.error_below) ** 2
+        if apart <= 0.0:
+            return None
+        middle = self.below * self.above
+        root = math.sqrt(middle**2 - apart * (self.above**2 - (wide * self.error_above) ** 2))
+        low, high = sorted(((middle - root) / apart, (middle + root) / apart))
+        return low, high
+
+
+def even_error(estimate: Reading) -> float | None:
+    """Standard error of a normal distribution with the 95 % interval of an estimate.
+
+    Of Student's distribution with few degrees of freedom it is larger than the estimate's own.
+
+    Example
+    -------
+    >>> even_error(Estimate("a", 2.0, "1", 0.05))
+    0.05
+    """
+    half = estimate.half_width95
+    return None if half is None else half / half_width()
+
+
+def ratio_of(above: Reading, below: Reading, name: str = "ratio") -> Reading:
+    """Ratio of two independent estimates with its 95 % interval.
+
+    Parameters
+    ----------
+    above, below : Estimate
+        In the same unit; one without an interval counts as exact where the other has one.
+    name : str
+
+    Returns
+    -------
+    Estimate
+        Without an interval where that of the denominator holds zero.
+
+    Example
+    -------
+    >>> ratio_of(Estimate("b", 3.0, "1", 0.1), Estimate("a", 2.0, "1", 0.05))
+    Estimate(ratio = 1.5 (1.381 to 1.626))
     """
     a, b = below.value, above.value
     if a is None or b is None:
-        return Quantity(name, None, "1", None, below.reason if a is None else above.reason)
+        return Estimate(name, None, "1", None, below.reason if a is None else above.reason)
     if a == 0.0:
-        return Quantity(name, None, "1", None, "the denominator is zero")
-    errors = stderr_of(below), stderr_of(above)
+        return Estimate(name, None, "1", None, "the denominator is zero")
+    errors = even_error(above), even_error(below)
     if errors == (None, None):
-        return Quantity(name, b / a, "1", None, above.reason or below.reason)
-    first, second = ((NORMAL_95 * (e or 0.0)) ** 2 for e in errors)
-    apart = a * a - first
-    if apart <= 0.0:
-        return Quantity(
-            name, b / a, "1", None, "the interval of the denominator holds zero: no bound"
-        )
-    root = math.sqrt((a * b) ** 2 - apart * (b * b - second))
-    low, high = sorted(((a * b - root) / apart, (a * b + root) / apart))
-    return Quantity(name, b / a, "1", (low, high))
+        return Estimate(name, b / a, "1", None, above.reason or below.reason)
+    ends = RatioEnds(b, errors[0] or 0.0, a, errors[1] or 0.0)
+    if ends(0.95) is None:
+        return Estimate(name, b / a, "1", None, UNBOUNDED)
+    return Estimate(name, b / a, "1", ends=ends)
 
 
-def chance_of(first: Quantity, second: Quantity) -> float | None:
+def chance_of(first: Reading, second: Reading) -> float | None:
     """Two-sided probability of a difference as large as this between equal independent truths.
 
     Parameters
     ----------
-    first, second : Quantity
+    first, second : Estimate
 
     Returns
     -------
@@ -73,17 +104,17 @@ def chance_of(first: Quantity, second: Quantity) -> float | None:
 
     Example
     -------
-    >>> one, other = Quantity("a", 1.0, "1", (0.8, 1.2)), Quantity("b", 1.4, "1", (1.2, 1.6))
+    >>> one, other = Estimate("a", 1.0, "1", 0.1), Estimate("b", 1.4, "1", 0.1)
     >>> round(chance_of(one, other), 4)
-    0.0056
+    0.0047
     """
-    errors = [stderr_of(first), stderr_of(second)]
+    errors = [even_error(first), even_error(second)]
     if first.value is None or second.value is None or errors == [None, None]:
         return None
     total = math.hypot(*(error or 0.0 for error in errors))
     if total == 0.0:
         return None
-    return float(2.0 * norm.sf(abs(first.value - second.value) / total))
+    return two_sided_chance((first.value - second.value) / total)
 
 
 def holm(chances: dict[str, float], level: float = 0.05) -> set[str]:

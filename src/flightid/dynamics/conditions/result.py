@@ -10,7 +10,7 @@ from flightid.dynamics.modes.result import Mode
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.estimate import Reading
 
 SCHEMA = "flightid.condition_comparison/1"
 
@@ -22,23 +22,23 @@ class ComparedNumber:
     Attributes
     ----------
     name : str
-    values : mapping of str to Quantity
+    values : mapping of str to Estimate
         By condition, those that have it.
-    ratios : mapping of str to Quantity
+    ratios : mapping of str to Estimate
         To the first of them, by condition, with Fieller's interval.
     chances : mapping of str to float
         Probability of so large a difference between equal truths.
 
     Example
     -------
-    >>> one = Quantity("Zw", -0.6, "1/s")
+    >>> one = Estimate("Zw", -0.6, "1/s")
     >>> ComparedNumber("Zw", {"hover": one}, {}, {}).name
     'Zw'
     """
 
     name: str
-    values: Mapping[str, Quantity]
-    ratios: Mapping[str, Quantity]
+    values: Mapping[str, Reading]
+    ratios: Mapping[str, Reading]
     chances: Mapping[str, float]
 
     def to_dict(self) -> dict[str, object]:
@@ -200,14 +200,14 @@ class ConditionComparison:
         return self.summary()._repr_html_() + self.modes_table()._repr_html_()
 
 
-def _value(quantity: Quantity | None) -> list[Cell]:
+def _value(quantity: Reading | None) -> list[Cell]:
     if quantity is None:
         return [None, None]
     ends = quantity.interval95
     return [quantity.value, None if ends is None else (ends[1] - ends[0]) / 2.0]
 
 
-def _ratio(ratio: Quantity | None) -> list[Cell]:
+def _ratio(ratio: Reading | None) -> list[Cell]:
     if ratio is None or ratio.value is None:
         return [None, ""]
     ends = ratio.interval95

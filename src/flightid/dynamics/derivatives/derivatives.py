@@ -15,7 +15,7 @@ from flightid.findings import Finding
 from flightid.identification import Fit
 from flightid.models import StateSpaceModel
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.units import convert, same_dimension
 
 Array = NDArray[np.float64]
@@ -44,11 +44,11 @@ class Derivative:
     variable : str
         State, input, or state with ``dot``.
     kind : {"stability", "control", "by a state's rate"}
-    dimensional : Quantity
+    dimensional : Estimate
         In the parameter's unit.
-    si : Quantity
+    si : Estimate
         In SI and radians; an input without dimension stays as it is.
-    coefficient : Quantity or None
+    coefficient : Estimate or None
         Without dimensions, where a normalisation was given that knows it.
     status : str
         ``"free"``, ``"fixed"``, ``"tied"`` or ``"at bound"``.
@@ -66,9 +66,9 @@ class Derivative:
     axis: str
     variable: str
     kind: str
-    dimensional: Quantity
-    si: Quantity
-    coefficient: Quantity | None
+    dimensional: Reading
+    si: Reading
+    coefficient: Reading | None
     status: str
     note: str = ""
 
@@ -305,16 +305,14 @@ def _owners(model: StateSpaceModel) -> list[str]:
     return [states[k] for k in columns]
 
 
-def _value(source: object, model: StateSpaceModel, name: str) -> Quantity:
+def _value(source: object, model: StateSpaceModel, name: str) -> Reading:
     parameter = model.parameters[name]
     if isinstance(source, Fit):
-        fitted = source.parameters[name]
-        reason = fitted.reason or ("" if fitted.interval95 else fitted.status)
-        return Quantity(name, fitted.value, fitted.unit, fitted.interval95, reason)
-    return Quantity(name, parameter.value, parameter.unit, None, "the model was not fitted")
+        return source.parameters[name].as_reading()
+    return Estimate(name, parameter.value, parameter.unit, None, "the model was not fitted")
 
 
-def _in_si(value: Quantity, axis: str, variable: str, model: StateSpaceModel) -> Quantity:
+def _in_si(value: Reading, axis: str, variable: str, model: StateSpaceModel) -> Reading:
     """The derivative in SI; of a state without a letter, as it is."""
     if axis not in WORDS:
         return value
@@ -323,8 +321,8 @@ def _in_si(value: Quantity, axis: str, variable: str, model: StateSpaceModel) ->
         scale = float(convert([1.0], value.unit, unit)[0])
     except UnitError:
         reason = f"its unit {value.unit} is not that of a {WORDS[axis]} per mass or inertia"
-        return Quantity(value.name, None, unit, None, reason)
-    return _scaled(value, value.name, unit, scale)
+        return Estimate(value.name, None, unit, None, reason)
+    return value.scaled(scale, unit=unit)
 
 
 def _si_unit(axis: str, variable: str, model: StateSpaceModel) -> str:
@@ -340,8 +338,8 @@ def _si_unit(axis: str, variable: str, model: StateSpaceModel) -> str:
 
 
 def _coefficient(
-    si: Quantity, axis: str, variable: str, kind: str, normalisation: Normalisation | None
-) -> Quantity | None:
+    si: Reading, axis: str, variable: str, kind: str, normalisation: Normalisation | None
+) -> Reading | None:
     if normalisation is None or axis not in WORDS:
         return None
     factor = normalisation.factor(axis, variable)
@@ -350,17 +348,7 @@ def _coefficient(
     unit = "1"
     if kind == CONTROL and " / (" in si.unit:
         unit = "1/(" + si.unit.rsplit(" / (", 1)[1]
-    return _scaled(si, normalisation.symbol(axis, variable), unit, 1.0 / factor)
-
-
-def _scaled(value: Quantity, name: str, unit: str, scale: float) -> Quantity:
-    if value.value is None:
-        return Quantity(name, None, unit, None, value.reason)
-    interval = None
-    if value.interval95 is not None:
-        ends = sorted(scale * end for end in value.interval95)
-        interval = (ends[0], ends[1])
-    return Quantity(name, scale * value.value, unit, interval, value.reason)
+    return si.scaled(1.0 / factor, name=normalisation.symbol(axis, variable), unit=unit)
 
 
 def _row(each: Derivative) -> tuple[Cell, ...]:

@@ -10,9 +10,9 @@ from flightid.dynamics.handling_qualities.curve import Curve, Pair, smoother_of
 from flightid.dynamics.handling_qualities.result import AttitudeBandwidth
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
-from flightid.identification.spread_of import spread_of
+from flightid.identification.uncertain_of import uncertain_of
 from flightid.responses import FrequencyResponse, PairResponse
-from flightid.uncertainty.spread import Propagated
+from flightid.uncertainty.uncertain import Uncertain, uncertain_numbers
 
 PHASE_MARGIN_DEG = 45.0
 GAIN_MARGIN_DB = 6.0
@@ -115,7 +115,7 @@ def attitude_bandwidth(
         curve = Curve.of(chosen, pair, smoother_of(chosen, pair))
     else:
         data = source
-        curve = Curve.of(spread_of(source).estimate, pair)
+        curve = Curve.of(uncertain_of(source).value, pair)
     values = bandwidth_numbers(curve)
     if not np.all(np.isfinite(values[:2])):
         raise DataError(
@@ -124,7 +124,7 @@ def attitude_bandwidth(
             needed="a phase that passes −135° and −180°",
             action=LATE if curve.degrees[0] <= PHASE_MARGIN_DEG - 180.0 else NO_FALL,
         )
-    errors = _spread(data, pair, values)
+    errors = _errors(data, pair, values)
     nonlinear = _is_nonlinear(values)
     findings = (*_judge(curve, values, nonlinear, response_type), *_coherence(data, pair, values))
     return AttitudeBandwidth(output, input, response_type, errors, curve, nonlinear, findings)
@@ -153,16 +153,16 @@ def bandwidth_numbers(curve: Curve) -> Array:
     return np.array([np.nan if each is None else each for each in found])
 
 
-def _spread(data: object, pair: Pair, values: Array) -> Propagated:
+def _errors(data: object, pair: Pair, values: Array) -> Uncertain[Array]:
     """Covariance of the numbers, about the values of the whole curve."""
     smoother = None
     if isinstance(data, FrequencyResponse):
         data = _thinned(data, pair, values)
         smoother = smoother_of(data, pair)
-    found = spread_of(data, pair.output, pair.input).propagate(
+    found = uncertain_of(data, pair.output, pair.input).carried(
         lambda thing: bandwidth_numbers(Curve.of(thing, pair, smoother))
     )
-    return Propagated(values, found.covariance, found.reason)
+    return uncertain_numbers(values, found.covariance, found.reason)
 
 
 def _thinned(response: FrequencyResponse, pair: Pair, values: Array) -> FrequencyResponse:

@@ -18,7 +18,7 @@ from flightid.findings import Finding
 from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.estimate import Reading
 
 SCHEMA = "flightid.handling_qualities/1"
 ATTITUDES = {"roll": ("phi", "p"), "pitch": ("theta", "q"), "yaw": ("psi", "r")}
@@ -128,7 +128,7 @@ FOR_PILOTS = (
 )
 
 
-def _row(what: str, quantity: Quantity, rating: Rating | None) -> tuple[Cell, ...]:
+def _row(what: str, quantity: Reading, rating: Rating | None) -> tuple[Cell, ...]:
     low, high = quantity.interval95 if quantity.interval95 is not None else (None, None)
     unit = "" if quantity.unit == "1" else quantity.unit
     return (what, quantity.name, quantity.value, low, high, unit, *_level(rating))

@@ -17,12 +17,12 @@ from flightid.findings import Finding
 from flightid.record import Record
 from flightid.responses.spectrum_measures import band_rms, cutoff_frequency
 from flightid.table import Table
-from flightid.uncertainty.quantity import Quantity, quantity_table
+from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
+from flightid.uncertainty.uneven import LogarithmicEnds
 
 SCHEMA = "flightid.pilot_cutoff/1"
 TAPER = 0.1
 """Share of a record in its two cosine ends: steep spectra leak without it."""
-NORMAL_95 = 1.959963984540054
 NEIGHBOURHOOD = 1.6
 """The density at the cut-off is the mean from the cut-off over this to the cut-off times this."""
 FIRST_HARMONICS = 3
@@ -41,9 +41,9 @@ class PilotCutoff:
     ----------
     channel, unit : str
         Control, and its unit.
-    cutoff : Quantity
+    cutoff : Estimate
         Pilot cut-off frequency, rad/s, with its 95 % interval.
-    rms : Quantity
+    rms : Estimate
         Root mean square of the control over the band.
     omega_rad_s, density : ndarray, shape (n_f,)
         One-sided spectrum of all records together, unit² per Hz.
@@ -51,15 +51,15 @@ class PilotCutoff:
 
     Example
     -------
-    >>> PilotCutoff("lat", "1", Quantity("pilot cut-off frequency", 2.0, "rad/s", (1.6, 2.4)),
-    ...             Quantity("rms", 0.1), np.ones(2), np.ones(2))
+    >>> PilotCutoff("lat", "1", Estimate("pilot cut-off frequency", 2.0, "rad/s", 0.2),
+    ...             Estimate("rms", 0.1), np.ones(2), np.ones(2))
     PilotCutoff(lat, 2 (1.6 to 2.4) rad/s)
     """
 
     channel: str
     unit: str
-    cutoff: Quantity
-    rms: Quantity
+    cutoff: Reading
+    rms: Reading
     omega_rad_s: Array
     density: Array
     findings: tuple[Finding, ...] = ()
@@ -71,7 +71,7 @@ class PilotCutoff:
     def summary(self) -> Table:
         """Table of cut-off and root mean square."""
         notes = tuple(map(str, self.findings))
-        return quantity_table(f"Pilot's use of {self.channel}", (self.cutoff, self.rms), notes)
+        return estimate_table(f"Pilot's use of {self.channel}", (self.cutoff, self.rms), notes)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""
@@ -171,8 +171,8 @@ def pilot_cutoff(
     return PilotCutoff(
         channel,
         unit,
-        Quantity("pilot cut-off frequency", cutoff, "rad/s", _interval(cutoff, of_cutoff)),
-        Quantity("root mean square", rms, unit, _interval(rms, of_rms)),
+        _positive("pilot cut-off frequency", cutoff, "rad/s", of_cutoff),
+        _positive("root mean square", rms, unit, of_rms),
         omega,
         density,
         _judge(channel, parts, cutoff, float(omega[-1])),
@@ -246,10 +246,9 @@ def _relative_errors(
     return 0.5 * deviation / (near * cutoff), 0.5 * deviation / float(running[-1])
 
 
-def _interval(value: float, relative: float) -> tuple[float, float]:
-    """95 % interval of what is positive: even on a logarithmic scale."""
-    factor = float(np.exp(NORMAL_95 * relative))
-    return value / factor, value * factor
+def _positive(name: str, value: float, unit: str, relative: float) -> Estimate:
+    """An estimate of what is positive: its interval is even on a logarithmic scale."""
+    return Estimate(name, value, unit, relative * value, ends=LogarithmicEnds(value, relative))
 
 
 def _judge(

@@ -12,7 +12,8 @@ from flightid.conventions import Light
 from flightid.dynamics.handling_qualities.rating_charts import RatingChart
 from flightid.errors import DataError
 from flightid.findings import Finding
-from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.uneven import drawn_estimate
 
 DRAWS = 4000
 DOUBT = 0.025
@@ -81,7 +82,7 @@ class Rating:
         return f"at best {words}" if self.at_best else words
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[Reading, ...]:
         """The chart's quantities with their 95 % intervals."""
         return tuple(
             _quantity(self.chart, name, value, self.samples.get(name))
@@ -186,19 +187,18 @@ def normal_draws(values: ArrayLike, covariance: ArrayLike | None, seed: int = 0)
     return np.asarray(centre[:, None] + factor @ noise)
 
 
-def _quantity(chart: RatingChart, name: str, value: float, drawn: Array | None) -> Quantity:
+def _quantity(chart: RatingChart, name: str, value: float, drawn: Array | None) -> Reading:
     label, unit = chart.labels[name], chart.units[name]
     if not np.isfinite(value):
-        return Quantity(label, None, unit, None, "without end")
+        return Estimate(label, None, unit, None, "without end")
     if drawn is None:
-        return Quantity(label, value, unit, None, "no covariance")
-    low, high = np.quantile(drawn, [DOUBT, 1.0 - DOUBT], method="inverted_cdf")
-    if not (np.isfinite(low) and np.isfinite(high)):
-        return Quantity(label, value, unit, None, "without end within its uncertainty")
-    return Quantity(label, value, unit, (float(low), float(high)))
+        return Estimate(label, value, unit, None, "no covariance")
+    return drawn_estimate(
+        label, value, unit, drawn, "without end within its uncertainty", "inverted_cdf"
+    )
 
 
-def _shown(quantity: Quantity) -> str:
+def _shown(quantity: Reading) -> str:
     if quantity.value is None:
         return quantity.reason
     return f"{quantity.value:.3g}" + (f" {quantity.unit}" if quantity.unit != "1" else "")

@@ -12,8 +12,9 @@ from flightid.dynamics.handling_qualities.rating import Rating, normal_draws, ra
 from flightid.dynamics.handling_qualities.rating_charts import RatingChart
 from flightid.findings import Finding
 from flightid.table import Table
-from flightid.uncertainty.quantity import Quantity, quantity_table
-from flightid.uncertainty.spread import Propagated
+from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
+from flightid.uncertainty.uncertain import LOST, Uncertain
+from flightid.uncertainty.uneven import drawn_estimate
 
 SCHEMA = "flightid.attitude_bandwidth/2"
 PLACES = {"omega_180": 0, "phase": 1, "gain": 2, "delay": 3, "slope": 4}
@@ -30,7 +31,7 @@ class AttitudeBandwidth:
         Attitude (or rate) and control.
     response_type : str
         ``"rate"``: the lesser of both bandwidths counts; ``"attitude"``: that of the phase.
-    spread : Propagated
+    uncertain : Uncertain
         ω_180, phase bandwidth, gain bandwidth (rad/s), phase delay by two points and by the slope
         of the phase (s), with their covariance; NaN where a finding says why.
     curve : Curve
@@ -49,7 +50,7 @@ class AttitudeBandwidth:
     output: str
     input: str
     response_type: str
-    spread: Propagated
+    uncertain: Uncertain[NDArray[np.float64]]
     curve: Curve
     nonlinear: bool = False
     findings: tuple[Finding, ...] = ()
@@ -60,18 +61,18 @@ class AttitudeBandwidth:
         return f"{self.output}/{self.input}"
 
     def _value(self, name: str) -> float | None:
-        value = float(self.spread.values[PLACES[name]])
+        value = float(self.uncertain.numbers[PLACES[name]])
         return value if np.isfinite(value) else None
 
     @property
     def omega_180_rad_s(self) -> float:
         """Where the phase passes −180°, rad/s."""
-        return float(self.spread.values[PLACES["omega_180"]])
+        return float(self.uncertain.numbers[PLACES["omega_180"]])
 
     @property
     def phase_bandwidth_rad_s(self) -> float:
         """Where the phase passes −135°, 45° before instability, rad/s."""
-        return float(self.spread.values[PLACES["phase"]])
+        return float(self.uncertain.numbers[PLACES["phase"]])
 
     @property
     def gain_bandwidth_rad_s(self) -> float | None:
@@ -114,9 +115,9 @@ class AttitudeBandwidth:
             places.append(PLACES["gain"])
         if self.rated_delay_s is not None:
             places.append(PLACES["slope" if self.nonlinear else "delay"])
-        covariance = self.spread.covariance
+        covariance = self.uncertain.covariance
         drawn = normal_draws(
-            self.spread.values[places],
+            self.uncertain.numbers[places],
             None if covariance is None else covariance[np.ix_(places, places)],
         )
         if drawn is None:
@@ -126,21 +127,22 @@ class AttitudeBandwidth:
         return {**found, "phase_delay": drawn[-1]} if late else found
 
     @property
-    def bandwidth(self) -> Quantity:
+    def bandwidth(self) -> Reading:
         """Bandwidth that counts, with the interval of the lesser of both."""
         drawn = self.samples().get("bandwidth")
         if drawn is None:
-            known = self.spread.covariance is not None
-            reason = "not determined within its uncertainty" if known else self.spread.reason
-            return Quantity("bandwidth", self.bandwidth_rad_s, "rad/s", None, reason)
-        low, high = np.quantile(drawn, [0.025, 0.975])
-        return Quantity("bandwidth", self.bandwidth_rad_s, "rad/s", (float(low), float(high)))
+            known = self.uncertain.covariance is not None
+            reason = LOST if known else self.uncertain.reason
+            return Estimate("bandwidth", self.bandwidth_rad_s, "rad/s", None, reason)
+        return drawn_estimate(
+            "bandwidth", self.bandwidth_rad_s, "rad/s", drawn, "without end within its uncertainty"
+        )
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[Reading, ...]:
         """All numbers with their intervals."""
         missing = {finding.code: finding.message for finding in self.findings}
-        made = self.spread.quantity
+        made = self.uncertain.number
         return (
             self.bandwidth,
             made(0, "ω_180", "rad/s"),
@@ -169,7 +171,7 @@ class AttitudeBandwidth:
     def summary(self) -> Table:
         """Table of all values with 95 % intervals."""
         title = f"Attitude bandwidth of {self.name}, {self.response_type} command"
-        return quantity_table(title, self.quantities, tuple(map(str, self.findings)))
+        return estimate_table(title, self.quantities, tuple(map(str, self.findings)))
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""

@@ -16,11 +16,11 @@ from flightid.dynamics.lower_order.structures import DELAY, GAIN, equivalent_mod
 from flightid.errors import DataError, FitError, OptionError, UnknownNameError
 from flightid.findings import Finding
 from flightid.identification import Fit, identify
-from flightid.identification.spread_of import spread_of
+from flightid.identification.uncertain_of import uncertain_of
 from flightid.models import GreyBoxModel, LinearSystem, StateSpaceModel, TransferFunctionModel
 from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
-from flightid.uncertainty.spread import Propagated, Spread
+from flightid.uncertainty.uncertain import Uncertain, uncertain_numbers
 from flightid.validation.verification.muad import Mismatch, mismatch
 
 GAIN_WEIGHT, PHASE_WEIGHT = 1.0, 0.01745
@@ -110,20 +110,20 @@ def lower_order(
         names = _choose(source.outputs, output), _choose(source.inputs, input)
         response = source.select(outputs=names[:1], inputs=names[1:])
         best = _first_fit(task, response, correct_bias=correct_bias)
-        spread = Propagated(_values(best, best.names), best.covariance, UNKNOWN_ERRORS)
+        uncertain = uncertain_numbers(_values(best, best.names), best.covariance, UNKNOWN_ERRORS)
     else:
-        carried = spread_of(source)
-        system = _system(carried.estimate)
+        carried = uncertain_of(source)
+        system = _system(carried.value)
         names = _choose(system.outputs, output), _choose(system.inputs, input)
         response = _response(task, system, *names)
         best = _first_fit(task, response, correct_bias=False)
-        spread = _carried(task, carried, best, *names)
+        uncertain = _carried(task, carried, best, *names)
     found = LowerOrder(
         kind,
         *names,
         best,
         best.names,
-        spread,
+        uncertain,
         response,
         task.band,
         _cost(best),
@@ -270,7 +270,9 @@ def _fit(
     )
 
 
-def _carried(task: _Task, carried: Spread[Any], best: Fit, output: str, control: str) -> Propagated:
+def _carried(
+    task: _Task, carried: Uncertain[Any], best: Fit, output: str, control: str
+) -> Uncertain[Array]:
     """The equivalent system fitted anew to the source one standard error up and down."""
     start = best.model
     assert isinstance(start, TransferFunctionModel)
@@ -283,7 +285,7 @@ def _carried(task: _Task, carried: Spread[Any], best: Fit, output: str, control:
             return np.full(len(best.names), np.nan)
         return _values(moved, best.names)
 
-    return carried.propagate(numbers)
+    return carried.carried(numbers)
 
 
 def _values(fit: Fit, names: Sequence[str]) -> Array:

@@ -17,8 +17,9 @@ from flightid.identification import Fit
 from flightid.models import TransferFunctionModel
 from flightid.responses import FrequencyResponse
 from flightid.table import Table
-from flightid.uncertainty.quantity import Quantity, quantity_table
-from flightid.uncertainty.spread import Propagated
+from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
+from flightid.uncertainty.uncertain import LOST, Uncertain
+from flightid.uncertainty.uneven import drawn_estimate
 from flightid.validation.verification.muad import Mismatch
 
 SCHEMA = "flightid.lower_order/1"
@@ -36,8 +37,8 @@ class LowerOrder:
     fit : Fit
         The equivalent system fitted to the response.
     names : tuple of str
-        Parameters that were fitted, in the order of `spread`.
-    spread : Propagated
+        Parameters that were fitted, in the order of `uncertain`.
+    uncertain : Uncertain
         Their values and covariance.
     response : FrequencyResponse
         What was fitted: measured, or the model's.
@@ -63,7 +64,7 @@ class LowerOrder:
     input: str
     fit: Fit
     names: tuple[str, ...]
-    spread: Propagated
+    uncertain: Uncertain[NDArray[np.float64]]
     response: FrequencyResponse
     band_rad_s: tuple[float, float]
     mismatch_cost: float
@@ -95,7 +96,7 @@ class LowerOrder:
 
     def samples(self) -> dict[str, Array]:
         """Draws of all numbers together; empty without a covariance."""
-        drawn = normal_draws(self.spread.values, self.spread.covariance)
+        drawn = normal_draws(self.uncertain.numbers, self.uncertain.covariance)
         if drawn is None:
             return {}
         fixed = {
@@ -130,7 +131,7 @@ class LowerOrder:
         return found
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[Reading, ...]:
         """Parameters and derived numbers with their 95 % intervals."""
         units = self.model.parameters.units
         notes = {name: each.note for name, each in self.model.parameters.items()}
@@ -138,17 +139,19 @@ class LowerOrder:
         for name in self.model.parameters:
             label = f"{name} ({notes[name]})" if notes[name] else name
             if name in self.names:
-                made.append(self.spread.quantity(self.names.index(name), label, units[name]))
+                made.append(self.uncertain.number(self.names.index(name), label, units[name]))
             else:
                 fixed = self._values()[name]
-                made.append(Quantity(label, fixed, units[name], None, "not fitted"))
+                made.append(Estimate(label, fixed, units[name], None, "not fitted"))
         drawn = self.samples()
         for name, label, unit in DERIVED:
             try:
                 value = self.value(name)
             except KeyError:
                 continue
-            made.append(_derived_quantity(label, value, unit, drawn.get(name), self.spread.reason))
+            made.append(
+                _derived_quantity(label, value, unit, drawn.get(name), self.uncertain.reason)
+            )
         return tuple(made)
 
     def ratings(
@@ -197,7 +200,7 @@ class LowerOrder:
         if inside is not None:
             notes.append(f"{inside:.0f} % inside the envelopes of unnoticed added dynamics.")
         title = f"{structure_of(self.kind).title}: equivalent system of {self.name}"
-        return quantity_table(title, self.quantities, (*notes, *map(str, self.findings)))
+        return estimate_table(title, self.quantities, (*notes, *map(str, self.findings)))
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""
@@ -229,14 +232,9 @@ DERIVED = (
 
 def _derived_quantity(
     label: str, value: float, unit: str, drawn: Array | None, reason: str
-) -> Quantity:
+) -> Reading:
     if not np.isfinite(value):
-        return Quantity(label, None, unit, None, "the spiral is stable and never doubles")
+        return Estimate(label, None, unit, None, "the spiral is stable and never doubles")
     if drawn is None:
-        return Quantity(label, value, unit, None, reason)
-    low, high = np.quantile(drawn, [0.025, 0.975], method="inverted_cdf")
-    if not (np.isfinite(low) and np.isfinite(high)):
-        return Quantity(
-            label, value, unit, None, "not determined everywhere within its uncertainty"
-        )
-    return Quantity(label, value, unit, (float(low), float(high)))
+        return Estimate(label, value, unit, None, reason)
+    return drawn_estimate(label, value, unit, drawn, LOST, "inverted_cdf")

@@ -17,8 +17,8 @@ from flightid.dynamics.modes.state_matrix import StateMatrix, read_states
 from flightid.errors import ModelError
 from flightid.findings import Finding
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty.quantity import Quantity
-from flightid.uncertainty.spread import Propagated
+from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.uncertain import Uncertain
 from flightid.units import convert, same_dimension
 
 SCHEMA = "flightid.approximate_modes/1"
@@ -39,9 +39,9 @@ class ApproximateMode:
     name, formula, source : str
     root : complex
         rad/s.
-    natural_frequency : Quantity
+    natural_frequency : Estimate
         rad/s; of a real root its signed value.
-    damping_ratio : Quantity
+    damping_ratio : Estimate
         None for a real root.
     full : Mode or None
         The full model's; None where it has no such mode.
@@ -60,8 +60,8 @@ class ApproximateMode:
     formula: str
     source: str
     root: complex
-    natural_frequency: Quantity
-    damping_ratio: Quantity
+    natural_frequency: Reading
+    damping_ratio: Reading
     full: Mode | None
     reason: str = ""
 
@@ -285,19 +285,19 @@ def _approximate(read: StateMatrix, rule: Rule, full: Modes) -> ApproximateMode:
         size = abs(root) if rule.pair else root.real
         return [root.real, root.imag, size, -root.real / abs(root) if rule.pair else math.nan]
 
-    found = read.propagate(numbers)
-    root = complex(*found.values[:2])
+    found = read.carried(numbers)
+    root = complex(*found.numbers[:2])
     missing = "the formula gives no such root here"
-    size = found.quantity(2, "natural frequency" if rule.pair else "root", "rad/s", missing)
+    size = found.number(2, "natural frequency" if rule.pair else "root", "rad/s", missing)
     damping = _damping(found, rule, missing)
     mode, reason = _match(rule, root, full, read)
     return ApproximateMode(rule.name, rule.formula, rule.source, root, size, damping, mode, reason)
 
 
-def _damping(found: Propagated, rule: Rule, missing: str) -> Quantity:
+def _damping(found: Uncertain[NDArray[np.float64]], rule: Rule, missing: str) -> Reading:
     if not rule.pair:
-        return Quantity("damping ratio", None, "1", None, "real root")
-    return found.quantity(3, "damping ratio", "1", missing)
+        return Estimate("damping ratio", None, "1", None, "real root")
+    return found.number(3, "damping ratio", "1", missing)
 
 
 def _match(rule: Rule, root: complex, full: Modes, read: StateMatrix) -> tuple[Mode | None, str]:
@@ -327,7 +327,7 @@ def _row(each: ApproximateMode) -> tuple[Cell, ...]:
     return (each.name, *cells, *theirs, each.difference_percent, each.damping_difference)
 
 
-def _half(quantity: Quantity) -> float | None:
+def _half(quantity: Reading) -> float | None:
     if quantity.interval95 is None:
         return None
     return (quantity.interval95[1] - quantity.interval95[0]) / 2.0

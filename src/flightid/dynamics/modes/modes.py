@@ -16,8 +16,9 @@ from flightid.dynamics.modes.result import Mode, Modes, Participation
 from flightid.dynamics.modes.state_matrix import StateMatrix, read_states
 from flightid.findings import Finding
 from flightid.models.sampled.discrete_modes import AT_ORIGIN, NO_COUNTERPART
-from flightid.uncertainty.quantity import Quantity
-from flightid.uncertainty.spread import NORMAL_95
+from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.quantiles import half_width
+from flightid.uncertainty.uneven import turned
 
 Array = NDArray[np.float64]
 UNFITTED = "does not depend on what was fitted"
@@ -156,36 +157,35 @@ def _participations(read: StateMatrix, pair: Eigenpair) -> Iterator[Participatio
             read.system.states[place],
             unit,
             complex(pair.factors[place]),
-            share if involved else Quantity("share", share.value, "1", None, "takes no part"),
-            size if place != lead else Quantity("size", 1.0, unit, None, "one by definition"),
+            share if involved else Estimate("share", share.value, "1", None, "takes no part"),
+            size if place != lead else Estimate("size", 1.0, unit, None, "one by definition"),
             float(np.angle(shape[place])),
         )
 
 
 def _plain(
     name: str, value: float, unit: str, errors: Array | None, place: int, reason: str
-) -> Quantity:
+) -> Reading:
     if errors is None:
-        return Quantity(name, value, unit, None, reason)
-    half = NORMAL_95 * float(errors[place])
-    if half == 0.0:
-        return Quantity(name, value, unit, None, UNFITTED)
-    return Quantity(name, value, unit, (value - half, value + half))
+        return Estimate(name, value, unit, None, reason)
+    stderr = float(errors[place])
+    if stderr == 0.0:
+        return Estimate(name, value, unit, None, UNFITTED)
+    return Estimate(name, value, unit, stderr)
 
 
 class _Numbers:
-    """Quantities of one eigenvalue from its moves along the directions of the spread."""
+    """Quantities of one eigenvalue from its moves along the directions of the uncertainty."""
 
     def __init__(
         self, value: complex | None, moves: NDArray[np.complex128] | None, reason: str
     ) -> None:
         self.value, self.moves, self.reason = value, moves, reason
 
-    def _made(self, name: str, unit: str, value: float | None, moves: Array | None) -> Quantity:
+    def _made(self, name: str, unit: str, value: float | None, moves: Array | None) -> Reading:
         if value is None or moves is None:
-            return Quantity(name, value, unit, None, self.reason)
-        half = NORMAL_95 * float(np.sqrt(np.sum(moves**2)))
-        return Quantity(name, value, unit, (value - half, value + half))
+            return Estimate(name, value, unit, None, self.reason)
+        return Estimate(name, value, unit, float(np.sqrt(np.sum(moves**2))))
 
     def covariance(self) -> Array | None:
         if self.moves is None:
@@ -193,77 +193,70 @@ class _Numbers:
         rows = np.array([self.moves.real, self.moves.imag])
         return np.asarray(rows @ rows.T)
 
-    def real(self) -> Quantity:
+    def real(self) -> Reading:
         value = None if self.value is None else self.value.real
         return self._made("real", "rad/s", value, None if self.moves is None else self.moves.real)
 
-    def imaginary(self) -> Quantity:
+    def imaginary(self) -> Reading:
         if self.value is None:
-            return Quantity("imaginary", None, "rad/s", None, self.reason)
+            return Estimate("imaginary", None, "rad/s", None, self.reason)
         if not self.value.imag:
-            return Quantity("imaginary", 0.0, "rad/s", None, "real eigenvalue")
+            return Estimate("imaginary", 0.0, "rad/s", None, "real eigenvalue")
         moves = None if self.moves is None else self.moves.imag
         return self._made("imaginary", "rad/s", self.value.imag, moves)
 
-    def natural_frequency(self) -> Quantity:
+    def natural_frequency(self) -> Reading:
         name, unit = "natural frequency", "rad/s"
         if self.value is None:
-            return Quantity(name, None, unit, None, self.reason)
+            return Estimate(name, None, unit, None, self.reason)
         size = abs(self.value)
         if self.moves is None or size == 0.0:
-            return Quantity(name, size, unit, None, self.reason or "an integrator")
+            return Estimate(name, size, unit, None, self.reason or "an integrator")
         moves = np.real(np.conj(self.value) * self.moves) / size
-        if not self.value.imag and NORMAL_95 * np.sqrt(np.sum(moves**2)) >= size:
-            return Quantity(name, size, unit, None, UNSIGNED)
+        if not self.value.imag and half_width() * np.sqrt(np.sum(moves**2)) >= size:
+            return Estimate(name, size, unit, None, UNSIGNED)
         return self._made(name, unit, size, moves)
 
-    def damping_ratio(self) -> Quantity:
+    def damping_ratio(self) -> Reading:
         name = "damping ratio"
         if self.value is None or self.value == 0.0:
             reason = "an integrator has no damping" if self.value == 0.0 else self.reason
-            return Quantity(name, None, "1", None, reason)
+            return Estimate(name, None, "1", None, reason)
         size = abs(self.value)
         ratio = -self.value.real / size
         if not self.value.imag:
-            return Quantity(name, ratio, "1", None, "real eigenvalue")
+            return Estimate(name, ratio, "1", None, "real eigenvalue")
         if self.moves is None:
-            return Quantity(name, ratio, "1", None, self.reason)
+            return Estimate(name, ratio, "1", None, self.reason)
         grown = np.real(np.conj(self.value) * self.moves) / size
         return self._made(
             name, "1", ratio, -self.moves.real / size + self.value.real * grown / size**2
         )
 
-    def period(self) -> Quantity:
-        return _turned("period", self.imaginary(), 2.0 * math.pi, "no oscillation")
+    def period(self) -> Reading:
+        return _time("period", self.imaginary(), 2.0 * math.pi, "no oscillation")
 
-    def time_constant(self) -> Quantity:
-        return _turned("time constant", self.real(), -1.0, "no decay")
+    def time_constant(self) -> Reading:
+        return _time("time constant", self.real(), -1.0, "no decay")
 
-    def halving(self) -> tuple[Quantity, Quantity]:
+    def halving(self) -> tuple[Reading, Reading]:
         """Time to half and to double."""
         rate = self.real()
         decays = rate.value is not None and rate.value < 0.0
         grows = rate.value is not None and rate.value > 0.0
-        half = _turned("time to half", rate, -math.log(2.0), "no decay")
-        double = _turned("time to double", rate, math.log(2.0), "no growth")
+        half = _time("time to half", rate, -math.log(2.0), "no decay")
+        double = _time("time to double", rate, math.log(2.0), "no growth")
         return (
-            half if decays else Quantity(half.name, None, "s", None, self.reason or "no decay"),
-            double if grows else Quantity(double.name, None, "s", None, self.reason or "no growth"),
+            half if decays else Estimate(half.name, None, "s", None, self.reason or "no decay"),
+            double if grows else Estimate(double.name, None, "s", None, self.reason or "no growth"),
         )
 
 
-def _turned(name: str, rate: Quantity, factor: float, without: str) -> Quantity:
+def _time(name: str, rate: Reading, factor: float, without: str) -> Reading:
     """A time from a rate, and its interval from the rate's, turned over."""
     if not rate.value:
-        return Quantity(name, None, "s", None, rate.reason if rate.value is None else without)
-    value = factor / rate.value
-    if rate.interval95 is None:
-        return Quantity(name, value, "s", None, rate.reason)
-    low, high = rate.interval95
-    if low <= 0.0 <= high:
-        return Quantity(name, value, "s", None, UNSIGNED)
-    ends = sorted((factor / low, factor / high))
-    return Quantity(name, value, "s", (ends[0], ends[1]))
+        return Estimate(name, None, "s", None, rate.reason if rate.value is None else without)
+    return turned(name, "s", factor, rate, UNSIGNED)
 
 
 def _judge(found: list[Mode]) -> Iterator[Finding]:

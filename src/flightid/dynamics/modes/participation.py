@@ -42,7 +42,7 @@ class Eigenpair:
     factors : ndarray of complex, shape (n,), or None
         Participation factors wᵢ vᵢ, sum one; None for an eigenvalue that is not simple.
     value_moves : ndarray of complex, shape (k,), or None
-        How the eigenvalue moves along each direction of the matrix' spread.
+        How the eigenvalue moves along each direction of the matrix' uncertainty.
     vector_moves, factor_moves : ndarray of complex, shape (k, n), or None
         The same of vector and factors.
     reason : str
@@ -122,8 +122,8 @@ def eigenpairs(a: Array, directions: Array | None = None) -> Iterator[Eigenpair]
     ----------
     a : ndarray, shape (n, n)
     directions : ndarray, shape (k, n, n), optional
-        The matrix' spread: independent moves of one standard error each. First-order moves of a
-        quantity have its variance as the sum of their squares.
+        The matrix' uncertainty: independent moves of one standard error each. First-order moves of
+        a quantity have its variance as the sum of their squares.
 
     Yields
     ------

@@ -12,7 +12,7 @@ from flightid.dynamics.modes.names import NamedMode
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.estimate import Reading
 
 SCHEMA = "flightid.modes/1"
 LEAST_SHOWN = 0.01
@@ -29,16 +29,16 @@ class Participation:
     factor : complex
         Participation factor wᵢ vᵢ: no unit, sum one over the states, the same for any scaling of
         the states.
-    share : Quantity
+    share : Estimate
         Size of the factor over the sum of the sizes.
-    size : Quantity
+    size : Estimate
         Size in the eigenvector, in `unit` for one unit of the mode's leading state.
     phase_rad : float
         Phase in the eigenvector against the leading state, rad.
 
     Example
     -------
-    >>> one = Quantity("share", 1.0)
+    >>> one = Estimate("share", 1.0)
     >>> Participation("q", "rad/s", 1 + 0j, one, one, 0.0)
     Participation(q: 100 %)
     """
@@ -46,8 +46,8 @@ class Participation:
     state: str
     unit: str
     factor: complex
-    share: Quantity
-    size: Quantity
+    share: Reading
+    size: Reading
     phase_rad: float
 
     def __repr__(self) -> str:
@@ -77,15 +77,15 @@ class Mode:
         Eigenvalue of the model's matrix: the same, or z.
     named : NamedMode
         Name, character and parts in words.
-    real, imaginary : Quantity
+    real, imaginary : Estimate
         rad/s.
-    natural_frequency, damping_ratio : Quantity
+    natural_frequency, damping_ratio : Estimate
         rad/s and 1.
-    period : Quantity
+    period : Estimate
         2π over the imaginary part, s.
-    time_constant : Quantity
+    time_constant : Estimate
         −1 over the real part, s; negative for growth.
-    time_to_half, time_to_double : Quantity
+    time_to_half, time_to_double : Estimate
         ln 2 over the size of the real part, s; one of them.
     participations : tuple of Participation
         Largest share first; none for a black box, whose states mean nothing.
@@ -104,14 +104,14 @@ class Mode:
     eigenvalue: complex | None
     root: complex
     named: NamedMode
-    real: Quantity
-    imaginary: Quantity
-    natural_frequency: Quantity
-    damping_ratio: Quantity
-    period: Quantity
-    time_constant: Quantity
-    time_to_half: Quantity
-    time_to_double: Quantity
+    real: Reading
+    imaginary: Reading
+    natural_frequency: Reading
+    damping_ratio: Reading
+    period: Reading
+    time_constant: Reading
+    time_to_half: Reading
+    time_to_double: Reading
     participations: tuple[Participation, ...] = ()
     covariance: NDArray[np.float64] | None = None
     reason: str = ""
@@ -132,7 +132,7 @@ class Mode:
         return str(self.named)
 
     @property
-    def quantities(self) -> tuple[Quantity, ...]:
+    def quantities(self) -> tuple[Reading, ...]:
         """All numbers that are there."""
         every = (
             self.real, self.imaginary, self.natural_frequency, self.damping_ratio, self.period,
@@ -349,11 +349,11 @@ class Modes:
         return self.table()._repr_html_()
 
 
-def _values(quantities: list[Quantity]) -> NDArray[np.float64]:
+def _values(quantities: list[Reading]) -> NDArray[np.float64]:
     return np.array([np.nan if q.value is None else q.value for q in quantities])
 
 
-def _half(quantity: Quantity, factor: float = 1.0) -> float | None:
+def _half(quantity: Reading, factor: float = 1.0) -> float | None:
     if quantity.interval95 is None:
         return None
     return factor * (quantity.interval95[1] - quantity.interval95[0]) / 2.0

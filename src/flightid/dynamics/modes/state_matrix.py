@@ -1,4 +1,4 @@
-"""The state matrix of any linear model with its spread, and what its states are."""
+"""The state matrix of any linear model with its uncertain, and what its states are."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import UnknownNameError
 from flightid.identification import Fit
-from flightid.identification.spread_of import spread_of
+from flightid.identification.uncertain_of import uncertain_of
 from flightid.models import LinearSystem, StateSpaceModel
 from flightid.models.model import linear_system
-from flightid.uncertainty.spread import Propagated
+from flightid.uncertainty.uncertain import Uncertain, uncertain_numbers
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class StateMatrix:
-    """The linear system of a source, with the spread of its matrix A.
+    """The linear system of a source, with the uncertainty of its matrix A.
 
     Attributes
     ----------
@@ -56,8 +56,8 @@ class StateMatrix:
         pairs = zip(self.system.states, self.states, strict=True)
         return {new: kept.get(old, "1") for old, new in pairs}
 
-    def propagate(self, function: Callable[[Array], ArrayLike]) -> Propagated:
-        """Values and covariance of what is computed from A; see `Spread.propagate`.
+    def carried(self, function: Callable[[Array], ArrayLike]) -> Uncertain[NDArray[np.float64]]:
+        """Values and covariance of what is computed from A; see `Uncertain.carried`.
 
         Parameters
         ----------
@@ -67,14 +67,14 @@ class StateMatrix:
         a = np.asarray(self.system.a)
         values = np.atleast_1d(np.asarray(function(a), dtype=np.float64))
         if self.directions is None:
-            return Propagated(values, None, self.reason)
+            return uncertain_numbers(values, None, self.reason)
         ends = [
             np.atleast_1d(np.asarray(function(a + move), dtype=np.float64))
             - np.atleast_1d(np.asarray(function(a - move), dtype=np.float64))
             for move in self.directions
         ]
         slopes = np.array(ends).reshape(len(ends), len(values)) / 2.0
-        return Propagated(values, slopes.T @ slopes)
+        return uncertain_numbers(values, slopes.T @ slopes)
 
 
 def read_states(source: object, states: Mapping[str, str]) -> StateMatrix:
@@ -121,13 +121,13 @@ def read_states(source: object, states: Mapping[str, str]) -> StateMatrix:
 
 def _directions(source: object) -> tuple[Array | None, str]:
     """Moves of A along independent directions of one standard error each, or why there are none."""
-    spread = spread_of(source)
-    if spread.covariance is None:
-        return None, spread.reason
+    uncertain = uncertain_of(source)
+    if uncertain.covariance is None:
+        return None, uncertain.reason
     if isinstance(source, Fit) and isinstance(source.model, StateSpaceModel):
         return _exact_directions(source, source.model), ""
     order = linear_system(source).order
-    slopes = spread.slopes(lambda model: np.asarray(linear_system(model).a).ravel())
+    slopes = uncertain.slopes(lambda model: np.asarray(linear_system(model).a).ravel())
     return slopes.reshape(-1, order, order), ""
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from flightid.errors import ModelError
 from flightid.findings import Finding
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty.quantity import Quantity
+from flightid.uncertainty.estimate import Reading
 
 SCHEMA = "flightid.rotor_physics/1"
 THEORY, GIVEN, FULL = "theory", "given", "full model's mode"
@@ -20,26 +20,26 @@ class RotorFact:
 
     Attributes
     ----------
-    identified : Quantity
+    identified : Estimate
     formula : str
-    expected : Quantity
+    expected : Estimate
         Theory, a measurement on the vehicle, or the full model's mode; None without one.
     expected_from : str
-    ratio : Quantity
+    ratio : Estimate
         Identified over expected.
 
     Example
     -------
     >>> import flightid as fid
     >>> fid.rotor_physics(fid.load_model("r50_hover"), 89.0)["roll flapping frequency"].identified
-    Quantity(roll flapping frequency = 12.88 rad/s)
+    Estimate(roll flapping frequency = 12.88 rad/s)
     """
 
-    identified: Quantity
+    identified: Reading
     formula: str
-    expected: Quantity
+    expected: Reading
     expected_from: str
-    ratio: Quantity
+    ratio: Reading
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""

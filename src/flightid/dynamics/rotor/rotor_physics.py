@@ -15,10 +15,10 @@ from flightid.dynamics.rotor.result import FULL, GIVEN, THEORY, RotorFact, Rotor
 from flightid.errors import ModelError, OptionError
 from flightid.findings import Finding
 from flightid.identification import Fit
-from flightid.identification.parameter_spread import parameter_spread
+from flightid.identification.uncertain_parameters import uncertain_parameters
 from flightid.models import StateSpaceModel
-from flightid.uncertainty.quantity import Quantity
-from flightid.uncertainty.spread import Spread
+from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.uncertain import Uncertain
 
 NAMES: Mapping[str, str] = {
     "rotor time constant": "tau_f",
@@ -102,10 +102,10 @@ def rotor_physics(
     }
     locks = {"rotor": lock_number, "bar": bar_lock_number}
     values = _expected(rotor_speed_rad_s, locks, dict(expected or {}))
-    spread = parameter_spread(source)
+    uncertain = uncertain_parameters(source)
     facts = []
     for item in _formulas(roles, rotor_speed_rad_s):
-        mine = _carried(spread, roles, item)
+        mine = _carried(uncertain, roles, item)
         theirs, where = _reference(item.name, values, source, mine.unit)
         facts.append(RotorFact(mine, item.text, theirs, where, ratio_of(mine, theirs)))
     if not facts:
@@ -184,43 +184,43 @@ def _expected(
 
 
 def _carried(
-    spread: Spread[dict[str, float]], roles: Mapping[str, str], item: _Formula
-) -> Quantity:
+    uncertain: Uncertain[dict[str, float]], roles: Mapping[str, str], item: _Formula
+) -> Reading:
     def value(parameters: dict[str, float]) -> float:
         with np.errstate(invalid="ignore", divide="ignore"):
             return float(item.value(*(np.float64(parameters[roles[role]]) for role in item.needs)))
 
-    found = spread.propagate(value).quantity(
+    found = uncertain.carried(value).number(
         0, item.name, item.unit, "the parameters give no such number"
     )
     if found.interval95 is not None and found.interval95[0] == found.interval95[1]:
-        return Quantity(item.name, found.value, item.unit, None, "its parameters were not fitted")
+        return Estimate(item.name, found.value, item.unit, None, "its parameters were not fitted")
     return found
 
 
 def _reference(
     name: str, values: Mapping[str, tuple[float, str]], source: object, unit: str
-) -> tuple[Quantity, str]:
+) -> tuple[Reading, str]:
     if name in values:
         value, where = values[name]
-        return Quantity(name, value, unit, None, "exact"), where
+        return Estimate(name, value, unit, None, "exact"), where
     axis = name.split(maxsplit=1)[0]
     if axis in FLAPPING and "flapping" in name:
         return _of_mode(axis, name, source)
-    return Quantity(name, None, unit, None, "nothing to hold it against"), ""
+    return Estimate(name, None, unit, None, "nothing to hold it against"), ""
 
 
-def _of_mode(axis: str, name: str, source: object) -> tuple[Quantity, str]:
+def _of_mode(axis: str, name: str, source: object) -> tuple[Reading, str]:
     """Natural frequency or damping of the lightest mode that turns about the axis with flapping.
 
     Its errors are those of the same parameters: the ratio has the identified number's alone.
     """
     found = [m for m in modes(source) if m.is_pair and m.name.startswith(f"{axis}/")]
     if not found:
-        return Quantity(name, None, "1", None, "the full model has no such mode"), ""
+        return Estimate(name, None, "1", None, "the full model has no such mode"), ""
     mode = min(found, key=lambda each: each.damping_ratio.value or 0.0)
     number = mode.natural_frequency if "frequency" in name else mode.damping_ratio
-    return Quantity(name, number.value, number.unit, None, "same fit"), FULL
+    return Estimate(name, number.value, number.unit, None, "same fit"), FULL
 
 
 def _judge(facts: tuple[RotorFact, ...]) -> Iterator[Finding]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
 from flightid.errors import DataError, OptionError
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
@@ -17,6 +17,7 @@ from flightid.models.polynomial.structure import KERNELS
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 from flightid.table import Column, Table
+from flightid.uncertainty.quantiles import half_width
 
 Array = NDArray[np.float64]
 LEVEL = 0.95
@@ -110,7 +111,7 @@ class ImpulseResponse:
                     float(self.values[i, peak]),
                     float(self.time_s[peak]),
                     float(steps[i, -1]),
-                    float(1.96 * errors[i, -1]),
+                    float(half_width() * errors[i, -1]),
                     self.feedback_p.get(name),
                 )
             )
@@ -313,7 +314,7 @@ def _delay(lags: NDArray[np.int64], values: Array, covariance: Array) -> int | N
     """First causal lag outside a band that holds all of them in 95 % of cases without response."""
     causal = lags >= 0
     errors = np.sqrt(np.maximum(np.diag(covariance)[causal], 0.0))
-    limit = norm.ppf(0.5 + 0.5 * LEVEL ** (1.0 / int(np.sum(causal))))
+    limit = half_width(LEVEL ** (1.0 / int(np.sum(causal))))
     outside = np.abs(values[causal]) > limit * errors
     return int(np.argmax(outside)) if np.any(outside) else None
 

@@ -23,7 +23,7 @@ from flightid.identification.filter_error.innovations import (
     InnovationsProblem,
     RecordInnovations,
 )
-from flightid.identification.fit import Fit, FittedParameter
+from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.multistart import DenseEnd, cluster, collect, draw_starts
 from flightid.identification.regression.fit import (
@@ -38,6 +38,7 @@ from flightid.identification.regression.options import FilterErrorOptions
 from flightid.models import StateSpaceModel
 from flightid.record import Record, Step
 from flightid.uncertainty.cramer_rao import inverse_hessian
+from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
 PROCESS_REACH = 12.0
@@ -272,10 +273,10 @@ def _fitted_records(
 
 def _own(
     names: Sequence[str] | Mapping[str, str], values: Sequence[float], units: Mapping[str, str]
-) -> dict[str, FittedParameter]:
+) -> dict[str, Estimate]:
     reason = "estimated beside the parameters, without an interval"
     return {
-        name: FittedParameter(name, units[name], value, "free", reason=reason)
+        name: Estimate(name, value, units[name], None, reason, status="free")
         for name, value in zip(names, values, strict=False)
     }
 

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FitError
-from flightid.identification.fit import FittedParameter
 from flightid.identification.fit_findings import UNKNOWN
 from flightid.identification.frequency_domain.error_model import ErrorModel
 from flightid.identification.frequency_domain.selection import SelectedResponse
@@ -20,10 +19,10 @@ from flightid.uncertainty import (
     cramer_rao,
     estimator_gain,
     insensitivity,
-    interval95,
     null_combination,
 )
 from flightid.uncertainty.cramer_rao import inverse_hessian
+from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
 _DECIBEL = 20.0 / np.log(10.0)
@@ -38,7 +37,7 @@ class Statistics:
 
     Attributes
     ----------
-    parameters : mapping of str to FittedParameter
+    parameters : mapping of str to Estimate
     names : tuple of str
         Order of `covariance` and `correlation`.
     covariance : ndarray or None
@@ -49,7 +48,7 @@ class Statistics:
         Whether errors of different outputs were taken as independent for want of knowledge.
     """
 
-    parameters: Mapping[str, FittedParameter]
+    parameters: Mapping[str, Estimate]
     names: tuple[str, ...]
     covariance: Array | None
     correlation: Array
@@ -149,7 +148,7 @@ def fitted_parameters(
     covariance: Array | None,
     weighted: Array,
     freedom: Array | None = None,
-) -> dict[str, FittedParameter]:
+) -> dict[str, Estimate]:
     """Every parameter with what is known of it.
 
     Parameters
@@ -167,7 +166,7 @@ def fitted_parameters(
 
     Returns
     -------
-    dict of str to FittedParameter
+    dict of str to Estimate
     """
     bounds = dict(zip(names, cramer_rao(weighted), strict=True)) if names else {}
     slack = dict(zip(names, insensitivity(weighted), strict=True)) if names else {}
@@ -177,20 +176,16 @@ def fitted_parameters(
     for name, parameter in fitted.parameters.items():
         value = float(parameter.value or 0.0)
         bound = parameter.free and name not in names
-        stderr = errors.get(name)
-        interval = None
-        if stderr is not None:
-            interval = interval95(value, stderr, degrees_of_freedom=degrees.get(name))
-        result[name] = FittedParameter(
+        result[name] = Estimate(
             name,
-            parameter.unit,
             value,
-            "at bound" if bound else parameter.status,
-            stderr,
-            interval,
-            _percent(bounds.get(name), value),
-            _percent(slack.get(name), value),
+            parameter.unit,
+            errors.get(name),
             _reason(parameter, at_bound=bound, known=covariance is not None, value=value),
+            degrees.get(name),
+            status="at bound" if bound else parameter.status,
+            cramer_rao_percent=_percent(bounds.get(name), value),
+            insensitivity_percent=_percent(slack.get(name), value),
         )
     return result
 

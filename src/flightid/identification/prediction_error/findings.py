@@ -9,11 +9,12 @@ from scipy.stats import chi2
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.identification.fit import FittedParameter, LocalMinimum
+from flightid.identification.fit import LocalMinimum
 from flightid.identification.prediction_error.roots import POLE, ZERO, FittedRoot
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.discrete_modes import polynomial_roots
+from flightid.uncertainty.estimate import Estimate
 
 CONVERGED = {"gradient", "step", "cost", "zero", "regression", "instruments", "kernel"}
 SAMPLES_PER_COEFFICIENT = 10
@@ -24,7 +25,7 @@ SAME_MINIMUM = 1e-4
 def judge_polynomial(
     structure: PolynomialStructure,
     model: PolynomialModel,
-    parameters: Mapping[str, FittedParameter],
+    parameters: Mapping[str, Estimate],
     roots: Sequence[FittedRoot],
     minima: Sequence[LocalMinimum],
     n_samples: int,
@@ -138,7 +139,7 @@ def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[F
 
 
 def _overfit(
-    structure: PolynomialStructure, parameters: Mapping[str, FittedParameter], n_samples: int
+    structure: PolynomialStructure, parameters: Mapping[str, Estimate], n_samples: int
 ) -> list[Finding]:
     found = []
     d = structure.n_parameters
@@ -170,7 +171,7 @@ def _degrees(structure: PolynomialStructure) -> tuple[int, int, int]:
     return structure.na, structure.nc, structure.nd
 
 
-def _covers_zero(parameter: FittedParameter) -> bool:
+def _covers_zero(parameter: Estimate) -> bool:
     if parameter.interval95 is None:
         return False
     return parameter.interval95[0] <= 0.0 <= parameter.interval95[1]

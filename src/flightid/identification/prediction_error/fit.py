@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import DataError, FitError
-from flightid.identification.fit import FittedParameter, LocalMinimum
+from flightid.identification.fit import LocalMinimum
 from flightid.identification.prediction_error.backcast import backcast
 from flightid.identification.prediction_error.findings import judge_polynomial
 from flightid.identification.prediction_error.information_criteria import criteria
@@ -25,7 +25,7 @@ from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
-from flightid.uncertainty import interval95
+from flightid.uncertainty.estimate import Estimate
 from flightid.version import VERSION
 
 Array = NDArray[np.float64]
@@ -260,18 +260,17 @@ def _assemble(
 
 def _parameters(
     structure: PolynomialStructure, model: PolynomialModel, found: _Found
-) -> dict[str, FittedParameter]:
+) -> dict[str, Estimate]:
     made = {}
     units = _units(structure, model)
     for place, (name, value) in enumerate(zip(structure.names, found.theta.tolist(), strict=True)):
         unit = units[place]
         if found.covariance is None:
             reason = "the data do not tell the coefficients apart"
-            made[name] = FittedParameter(name, unit, value, "free", reason=reason)
+            made[name] = Estimate(name, value, unit, None, reason, status="free")
             continue
         stderr = float(np.sqrt(found.covariance[place, place]))
-        interval = interval95(value, stderr, degrees_of_freedom=found.degrees)
-        made[name] = FittedParameter(name, unit, value, "free", stderr, interval)
+        made[name] = Estimate(name, value, unit, stderr, freedom=found.degrees, status="free")
     return made
 
 

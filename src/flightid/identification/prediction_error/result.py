@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.findings import Finding
-from flightid.identification.fit import FittedParameter, LocalMinimum
+from flightid.identification.fit import LocalMinimum
 from flightid.identification.prediction_error.information_criteria import Criteria
 from flightid.identification.prediction_error.roots import POLE, FittedRoot
 from flightid.models.linear.linear_system import LinearSystem
@@ -18,6 +18,8 @@ from flightid.models.polynomial.prediction import PolynomialPrediction
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.quantiles import half_width
 
 SCHEMA = "flightid.polynomial_fit/1"
 
@@ -44,11 +46,11 @@ class PolynomialFit:
         With the estimates, their covariance and the noise variance.
     structure : PolynomialStructure
         What was asked.
-    parameters : mapping of str to FittedParameter
+    parameters : mapping of str to Estimate
         Coefficients by name.
     roots : tuple of FittedRoot
         Poles and zeros with errors, natural frequencies and dampings.
-    gains : mapping of str to FittedParameter
+    gains : mapping of str to Estimate
         Steady gains by ``"output/input"``.
     criteria : Criteria
         Loss, FPE, AIC, AICc, BIC, MDL.
@@ -81,9 +83,9 @@ class PolynomialFit:
 
     model: PolynomialModel
     structure: PolynomialStructure
-    parameters: Mapping[str, FittedParameter]
+    parameters: Mapping[str, Estimate]
     roots: tuple[FittedRoot, ...]
-    gains: Mapping[str, FittedParameter]
+    gains: Mapping[str, Estimate]
     criteria: Criteria
     scores: tuple[FitScore, ...]
     records: tuple[Record, ...]
@@ -201,7 +203,7 @@ def roots_table(roots: Sequence[FittedRoot]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for root in roots:
         errors = root.stderr or (None, None)
-        wide = [None if error is None else 1.96 * error for error in errors]
+        wide = [None if error is None else half_width() * error for error in errors]
         rows.append(
             (
                 root.response, root.kind, root.z.real, wide[0], root.z.imag,
@@ -217,14 +219,12 @@ def roots_table(roots: Sequence[FittedRoot]) -> Table:
     )
 
 
-def _row(item: FittedParameter) -> tuple[Cell, ...]:
+def _row(item: Estimate) -> tuple[Cell, ...]:
     low, high = item.interval95 or (None, None)
     return item.name, item.value, item.unit, item.stderr, low, high, item.reason
 
 
-def _with_half(item: FittedParameter | None) -> tuple[Cell, Cell]:
+def _with_half(item: Estimate | None) -> tuple[Cell, Cell]:
     if item is None:
         return None, None
-    if item.interval95 is None:
-        return item.value, None
-    return item.value, (item.interval95[1] - item.interval95[0]) / 2
+    return item.value, item.half_width95

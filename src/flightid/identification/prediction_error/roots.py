@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.identification.fit import FittedParameter
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.sampled.discrete_modes import discrete_modes, zero_note
-from flightid.uncertainty import interval95
+from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
 POLE, ZERO = "pole", "zero"
@@ -47,7 +46,7 @@ class FittedRoot:
     z : complex
     covariance : ndarray, shape (2, 2), or None
         Of its real and imaginary part.
-    natural_frequency, damping : FittedParameter or None
+    natural_frequency, damping : Estimate or None
         Of a pole with a continuous counterpart, rad/s and 1.
     note : str
         What to know about it.
@@ -64,8 +63,8 @@ class FittedRoot:
     kind: str
     z: complex
     covariance: Array | None
-    natural_frequency: FittedParameter | None
-    damping: FittedParameter | None
+    natural_frequency: Estimate | None
+    damping: Estimate | None
     note: str = ""
     gradient: NDArray[np.complex128] | None = None
 
@@ -201,7 +200,7 @@ def fitted_root(
 
 def propagated(
     name: str, unit: str, value: float, gradient: Array | None, errors: Errors
-) -> FittedParameter:
+) -> Estimate:
     """A function of the coefficients with its first-order interval.
 
     Reference: Ljung, *System Identification*, 2nd ed., eq. 9.56 (Gauss' approximation).
@@ -210,20 +209,13 @@ def propagated(
         reason = (
             "no error to first order" if gradient is None else "the coefficients have no errors"
         )
-        return FittedParameter(name, unit, value, "derived", reason=reason)
+        return Estimate(name, value, unit, None, reason, status="derived")
     variance = float(gradient @ errors.covariance @ gradient)
     stderr = max(variance, 0.0) ** 0.5
-    return FittedParameter(
-        name,
-        unit,
-        value,
-        "derived",
-        stderr,
-        interval95(value, stderr, degrees_of_freedom=errors.degrees),
-    )
+    return Estimate(name, value, unit, stderr, freedom=errors.degrees, status="derived")
 
 
-def fitted_gains(model: PolynomialModel, degrees: int) -> dict[str, FittedParameter]:
+def fitted_gains(model: PolynomialModel, degrees: int) -> dict[str, Estimate]:
     """Steady gains by ``"output/input"`` with intervals; an integrator has none."""
     places = _places(model)
     found = {}

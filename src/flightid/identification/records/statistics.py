@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from flightid.identification.fit import FittedParameter
 from flightid.identification.frequency_domain.estimates import (
     at_bound,
     fitted_parameters,
@@ -24,15 +23,15 @@ from flightid.identification.frequency_domain.estimates import (
 from flightid.identification.records.setup import OwnNumbers, RecordSet
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.uncertainty import correlation as correlation_of
-from flightid.uncertainty import interval95
 from flightid.uncertainty.coloured_residuals import (
     Autoregression,
     Taken,
     noise_models,
 )
+from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
-Own = tuple[dict[str, FittedParameter], dict[str, FittedParameter], dict[str, FittedParameter]]
+Own = tuple[dict[str, Estimate], dict[str, Estimate], dict[str, Estimate]]
 UNDETERMINED = "the record does not tell it apart from the others of its own numbers"
 AT_BOUND = "at bound: the record would move it further"
 _ROUNDING = 1e-9
@@ -44,7 +43,7 @@ class RecordStatistics:
 
     Attributes
     ----------
-    parameters : mapping of str to FittedParameter
+    parameters : mapping of str to Estimate
     names : tuple of str
         Order of `covariance` and `correlation`.
     covariance, correlation : ndarray
@@ -55,7 +54,7 @@ class RecordStatistics:
         Largest ratio of a corrected standard error to that for white residuals.
     """
 
-    parameters: Mapping[str, FittedParameter]
+    parameters: Mapping[str, Estimate]
     names: tuple[str, ...]
     covariance: Array
     correlation: Array
@@ -347,17 +346,16 @@ def _own_numbers(
         for place, name in enumerate(names):
             value, unit = float(values[place]), known.get(name, "1")
             if place not in places:
-                part[name] = FittedParameter(name, unit, value, "fixed", reason="fixed")
+                part[name] = Estimate(name, value, unit, None, "fixed", status="fixed")
                 continue
             number = start + places.index(place)
             error = float(errors[number])
             if np.isnan(error) and numbers.limits and value in numbers.limits[number]:
-                part[name] = FittedParameter(name, unit, value, "at bound", reason=AT_BOUND)
+                part[name] = Estimate(name, value, unit, None, AT_BOUND, status="at bound")
             elif np.isnan(error):
-                part[name] = FittedParameter(name, unit, value, "free", reason=UNDETERMINED)
+                part[name] = Estimate(name, value, unit, None, UNDETERMINED, status="free")
             else:
-                interval = interval95(value, error)
-                part[name] = FittedParameter(name, unit, value, "free", error, interval)
+                part[name] = Estimate(name, value, unit, error, status="free")
         start += len(places)
         found.append(part)
     return found[0], found[2], found[1]

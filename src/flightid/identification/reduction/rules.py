@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from flightid.errors import OptionError
-from flightid.identification.fit import Fit, FittedParameter
+from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
     CORRELATION_GUIDE,
     CRAMER_RAO_GUIDE_PERCENT,
     INSENSITIVITY_GUIDE_PERCENT,
 )
+from flightid.uncertainty.estimate import Estimate
 
 COST_RISE_PERCENT = 2.0
 NEGLIGIBLE_COST_RISE = 0.1
@@ -94,7 +95,7 @@ def choose(fit: Fit, limits: ReductionLimits, keep: Collection[str]) -> Candidat
     return _correlated(fit, limits, keep)
 
 
-def _percent(parameter: FittedParameter, kind: str) -> float:
+def _percent(parameter: Estimate, kind: str) -> float:
     """Percent of the value; an estimate of exactly zero is all uncertainty."""
     value = getattr(parameter, f"{kind}_percent")
     return np.inf if value is None else float(value)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from flightid.conditioning.smoothing import fourier_smooth
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.identification.fit import FittedParameter
 from flightid.identification.regression.sampled_equations import MeasuredMotion
+from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
 DRAWS = 8
@@ -87,7 +87,7 @@ def attenuation(
 
 
 def judge_attenuation(
-    bias: Mapping[str, float], parameters: Mapping[str, FittedParameter]
+    bias: Mapping[str, float], parameters: Mapping[str, Estimate]
 ) -> list[Finding]:
     """One verdict for each parameter that the noise in the states moves noticeably."""
     found = []

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.findings import Finding
-from flightid.identification.fit import FittedParameter
 from flightid.identification.prediction_error.information_criteria import Criteria
 from flightid.identification.prediction_error.result import FitScore, roots_table
 from flightid.identification.prediction_error.roots import POLE, FittedRoot
@@ -20,6 +19,7 @@ from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.record import Record
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty.estimate import Estimate
 
 SCHEMA = "flightid.innovations_fit/1"
 
@@ -38,7 +38,7 @@ class InnovationsFit:
         Singular values and criteria of all candidate orders.
     roots : tuple of FittedRoot
         Poles, shared by all responses, and zeros of each response, with errors.
-    gains : mapping of str to FittedParameter
+    gains : mapping of str to Estimate
         Steady gains by ``"output/input"``.
     covariance : ndarray or None
         Of the entries of A, B, C, (D,) K row by row; singular, since states are free to turn.
@@ -75,7 +75,7 @@ class InnovationsFit:
     structure: SubspaceStructure
     order: OrderChoice
     roots: tuple[FittedRoot, ...]
-    gains: Mapping[str, FittedParameter]
+    gains: Mapping[str, Estimate]
     covariance: NDArray[np.float64] | None
     criteria: Criteria
     scores: Mapping[str, tuple[FitScore, FitScore]]
@@ -171,6 +171,6 @@ class InnovationsFit:
         return self.summary()._repr_html_() + self.roots_table()._repr_html_()
 
 
-def _row(item: FittedParameter) -> tuple[Cell, ...]:
+def _row(item: Estimate) -> tuple[Cell, ...]:
     low, high = item.interval95 or (None, None)
     return item.name, item.value, item.unit, item.stderr, low, high, item.reason

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig
 
-from flightid.identification.fit import FittedParameter
 from flightid.identification.prediction_error.roots import (
     DOUBLE,
     POLE,
@@ -21,6 +20,7 @@ from flightid.identification.prediction_error.roots import (
 )
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.sampled.discrete_modes import discrete_modes
+from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -58,7 +58,7 @@ def innovations_roots(
 
 def innovations_gains(
     model: InnovationsModel, errors: Errors, *, direct: bool
-) -> dict[str, FittedParameter]:
+) -> dict[str, Estimate]:
     """Steady gains C (I - A)⁻¹ B + D with intervals; none with an integrator."""
     a, b, c, _, _ = model.matrices
     values, found = model.gains(), {}

@@ -16,6 +16,7 @@ from flightid.uncertainty.coloured_residuals import (
     autoregression,
     periodogram,
 )
+from flightid.uncertainty.quantiles import half_width
 
 Array = NDArray[np.float64]
 Series = tuple[Array, ...]
@@ -210,7 +211,7 @@ def independence_portmanteau(
 
 def pointwise_factor() -> float:
     """Half-width of the pointwise band in standard errors, 1.96."""
-    return float(stats.norm.ppf(0.5 + 0.5 * LEVEL))
+    return half_width(LEVEL)
 
 
 def simultaneous_factor(n_lags: int) -> float:
@@ -226,7 +227,7 @@ def simultaneous_factor(n_lags: int) -> float:
     >>> round(simultaneous_factor(25), 3)
     3.083
     """
-    return float(stats.norm.ppf(0.5 + 0.5 * LEVEL ** (1.0 / n_lags)))
+    return half_width(LEVEL ** (1.0 / n_lags))
 
 
 def exceedance_limit(n_lags: int) -> int:

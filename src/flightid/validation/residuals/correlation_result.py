@@ -109,7 +109,7 @@ class CorrelationTest:
     standard_error : float
         Of one value for a good model, Bartlett's where input or residual are coloured.
     white_band : float
-        1.96/√N, the band for a white residual.
+        z(0.975)/√N, the 95 % band for a white residual.
     pointwise_band, simultaneous_band : float
         Half-widths that hold one lag, and all judged lags, in 95 % of cases.
     statistic : float

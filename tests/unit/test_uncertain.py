@@ -7,29 +7,30 @@ import pytest
 
 import flightid as fid
 from flightid import errors
-from flightid.identification import spread_of
-from flightid.uncertainty import Quantity, Spread, quantity_table
+from flightid.identification.uncertain_of import uncertain_of
+from flightid.uncertainty.estimate import Estimate, estimate_table
+from flightid.uncertainty.uncertain import Uncertain
 from tests.closeness import assert_close
 
 COVARIANCE = np.array([[0.04, 0.01], [0.01, 0.09]])
 
 
-def _pair() -> Spread[np.ndarray]:
-    return Spread(np.array([2.0, 3.0]), COVARIANCE, lambda numbers: numbers)
+def _pair() -> Uncertain[np.ndarray]:
+    return Uncertain(np.array([2.0, 3.0]), COVARIANCE, lambda numbers: numbers)
 
 
 def test_linear_functions_are_exact() -> None:
-    found = _pair().propagate(lambda x: [x[0] - 2.0 * x[1], x[0] * 5.0])
+    found = _pair().carried(lambda x: [x[0] - 2.0 * x[1], x[0] * 5.0])
     gains = np.array([[1.0, -2.0], [5.0, 0.0]])
     assert found.covariance is not None
     assert_close(found.covariance, gains @ COVARIANCE @ gains.T, rtol=1e-12, why="linear")
-    assert found.interval95 is not None
+    assert found.interval() is not None
     half = 1.959964 * np.sqrt(gains[1] @ COVARIANCE @ gains[1])
-    assert_close(found.interval95[1], [10.0 - half, 10.0 + half], rtol=1e-6, why="normal")
+    assert_close(found.interval()[1], [10.0 - half, 10.0 + half], rtol=1e-6, why="normal")
 
 
 def test_quadratic_functions_keep_the_slope() -> None:
-    found = _pair().propagate(lambda x: x[1] ** 2)
+    found = _pair().carried(lambda x: x[1] ** 2)
     assert found.stderr is not None
     assert_close(found.stderr[0], 6.0 * 0.3, rtol=1e-12, why="central differences of a square")
 
@@ -38,8 +39,8 @@ def test_steps_stay_inside_the_bounds() -> None:
     """A delay known to twice its size still has its error, and no step makes it negative."""
     seen = []
     low, high = np.array([1.95, -np.inf]), np.array([9.0, np.inf])
-    tight = Spread(np.array([2.0, 3.0]), COVARIANCE, lambda x: x, (low, high))
-    found = tight.propagate(lambda x: [seen.append(x[0]) or x[0] + x[1], x[0]])
+    tight = Uncertain(np.array([2.0, 3.0]), COVARIANCE, lambda x: x, (low, high))
+    found = tight.carried(lambda x: [seen.append(x[0]) or x[0] + x[1], x[0]])
     assert min(seen) >= 1.95
     assert found.covariance is not None
     assert_close(found.covariance[0, 0], 0.15, rtol=1e-7, why="0.04 + 2·0.01 + 0.09")
@@ -56,8 +57,8 @@ def test_steps_stay_inside_the_bounds() -> None:
         units=truth.units,
         random_error=np.full((1, 1, 30), 0.1),
     )
-    spread = spread_of(fid.identify(truth, data))
-    late = spread.propagate(lambda model: model.parameters["tau"].value)
+    uncertain = uncertain_of(fid.identify(truth, data))
+    late = uncertain.carried(lambda model: model.parameters["tau"].value)
     assert late.stderr is not None
     assert late.stderr[0] > 0.001
 
@@ -67,37 +68,37 @@ def test_draws_have_the_covariance_and_keep_the_bounds() -> None:
     assert_close(np.cov(drawn.T), COVARIANCE, rtol=0.1, atol=0.003, why="4000 draws")
     assert np.array_equal(np.array(_pair().draws(5, seed=3)), drawn[:5])
     low, high = np.array([1.9, -np.inf]), np.array([2.1, np.inf])
-    tight = Spread(np.array([2.0, 3.0]), COVARIANCE, lambda x: x, (low, high))
+    tight = Uncertain(np.array([2.0, 3.0]), COVARIANCE, lambda x: x, (low, high))
     inside = np.array(tight.draws(300))[:, 0]
     assert inside.min() >= 1.9
     assert inside.max() <= 2.1
-    never = Spread(np.zeros(1), np.eye(1), lambda x: x, (np.full(1, 99.0), np.full(1, 99.0)))
+    never = Uncertain(np.zeros(1), np.eye(1), lambda x: x, (np.full(1, 99.0), np.full(1, 99.0)))
     assert never.draws(1)[0] == 99.0
 
 
 def test_what_is_not_known_says_why() -> None:
-    spread = spread_of(fid.load_model("rate_first_order"))
-    assert not spread.known
-    assert spread.draws(3) == []
-    found = spread.propagate(lambda model: [1.0, np.nan])
-    assert found.interval95 is None
-    assert "without a covariance" in found.quantity(0, "gain").reason
-    assert found.quantity(1, "gain", missing="no crossing") == Quantity(
+    uncertain = uncertain_of(fid.load_model("rate_first_order"))
+    assert not uncertain.known
+    assert uncertain.draws(3) == []
+    found = uncertain.carried(lambda model: [1.0, np.nan])
+    assert found.interval() is None
+    assert "without a covariance" in found.number(0, "gain").reason
+    assert found.number(1, "gain", missing="no crossing") == Estimate(
         "gain", None, "1", None, "no crossing"
     )
-    fades = _pair().propagate(lambda x: x[0] if x[0] > 1.9 else np.nan)
-    assert "within its uncertainty" in fades.quantity(0, "margin").reason
-    table = quantity_table("t", [found.quantity(0, "gain"), fades.quantity(0, "margin", "dB")])
+    fades = _pair().carried(lambda x: x[0] if x[0] > 1.9 else np.nan)
+    assert "within its uncertainty" in fades.number(0, "margin").reason
+    table = estimate_table("t", [found.number(0, "gain"), fades.number(0, "margin", "dB")])
     assert any("margin: not determined everywhere" in note for note in table.notes)
 
 
 def test_then_carries_on() -> None:
     made = _pair().then(lambda x: float(x.sum()))
-    assert made.estimate == 5.0
-    assert made.propagate(lambda value: value).stderr == pytest.approx([np.sqrt(0.15)])
+    assert made.value == 5.0
+    assert made.carried(lambda value: value).stderr == pytest.approx([np.sqrt(0.15)])
 
 
-def test_fits_of_every_kind_have_a_spread() -> None:
+def test_fits_of_every_kind_have_a_covariance() -> None:
     u = np.random.default_rng(0).standard_normal(600)
     truth = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
     record = fid.Record.from_arrays(
@@ -106,12 +107,12 @@ def test_fits_of_every_kind_have_a_spread() -> None:
     noise = 0.1 * np.random.default_rng(1).standard_normal(600)
     record = record.replace({"y": truth.simulate(record) + noise})
     polynomial = fid.identify(fid.PolynomialModel.oe("y", "u", nb=2, nf=2), record)
-    found = spread_of(polynomial).propagate(lambda model: model.gains()["y/u"])
+    found = uncertain_of(polynomial).carried(lambda model: model.gains()["y/u"])
     gain = polynomial.gains["y/u"]
     assert found.stderr is not None
     assert_close(found.stderr[0], gain.stderr, rtol=0.02, why="the fit's own delta method")
     subspace = fid.identify(fid.InnovationsModel.subspace("y", "u", 2), record)
-    found = spread_of(subspace).propagate(lambda model: model.gains()["y/u"])
+    found = uncertain_of(subspace).carried(lambda model: model.gains()["y/u"])
     assert found.stderr is not None
     assert_close(found.stderr[0], subspace.gains["y/u"].stderr, rtol=0.02, why="delta method")
 
@@ -122,15 +123,15 @@ def test_a_response_moves_in_both_parts() -> None:
     given = fid.FrequencyResponse.from_values(
         omega, values, inputs=["u"], outputs=["y"], random_error=np.full((1, 1, 5), 0.1)
     )
-    found = spread_of(given, "y", "u").propagate(lambda r: np.abs(r.response[0, 0]))
+    found = uncertain_of(given, "y", "u").carried(lambda r: np.abs(r.response[0, 0]))
     assert found.stderr is not None
     assert_close(found.stderr, 0.1 * np.abs(values), rtol=0.01, why="relative error")
     bare = fid.FrequencyResponse.from_values(omega, values, inputs=["u"], outputs=["y"])
-    assert "not known" in spread_of(bare).reason
+    assert "not known" in uncertain_of(bare).reason
     two = fid.FrequencyResponse.from_values(
         omega, np.stack([values, values])[:, None], inputs=["u"], outputs=["y", "z"]
     )
     with pytest.raises(errors.OptionError, match="several outputs"):
-        spread_of(two)
+        uncertain_of(two)
     with pytest.raises(errors.OptionError, match="number of draws"):
         _pair().draws(0)

@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from flightid.errors import ModelError
 from flightid.identification.fit import Fit
-from flightid.identification.spread_of import NO_COVARIANCE
+from flightid.identification.uncertain_of import NO_COVARIANCE
 from flightid.models import StateSpaceModel, TransferFunctionModel
-from flightid.uncertainty.spread import Spread
+from flightid.uncertainty.uncertain import Uncertain
 
 
-def parameter_spread(source: object) -> Spread[dict[str, float]]:
+def uncertain_parameters(source: object) -> Uncertain[dict[str, float]]:
     """Values of all parameters by name, with the covariance of those that were fitted.
 
     Parameters
@@ -23,7 +23,7 @@ def parameter_spread(source: object) -> Spread[dict[str, float]]:
 
     Returns
     -------
-    Spread of dict of str to float
+    Uncertain of dict of str to float
 
     Raises
     ------
@@ -33,7 +33,7 @@ def parameter_spread(source: object) -> Spread[dict[str, float]]:
     Example
     -------
     >>> import flightid as fid
-    >>> parameter_spread(fid.load_model("r50_hover")).estimate["Krfb"]
+    >>> uncertain_parameters(fid.load_model("r50_hover")).estimate["Krfb"]
     -8.26
     """
     model = source.model if isinstance(source, Fit) else source
@@ -57,4 +57,4 @@ def parameter_spread(source: object) -> Spread[dict[str, float]]:
     reason = "" if covariance is not None else NO_COVARIANCE
     if isinstance(source, Fit) and covariance is None:
         reason = "the fit knows no errors of its data"
-    return Spread(centre, covariance, make, None, reason)
+    return Uncertain(centre, covariance, make, None, reason)

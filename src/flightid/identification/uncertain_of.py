@@ -1,4 +1,4 @@
-"""The spread of a fit, a model or a measured response."""
+"""A fit, a model or a measured response with what is known of its errors."""
 
 from __future__ import annotations
 
@@ -14,13 +14,15 @@ from flightid.identification.prediction_error.result import PolynomialFit
 from flightid.identification.subspace.result import InnovationsFit
 from flightid.models import GreyBoxModel, InnovationsModel, PolynomialModel
 from flightid.responses import FrequencyResponse
-from flightid.uncertainty.spread import Spread
+from flightid.uncertainty.uncertain import Uncertain
 
 Array = NDArray[np.float64]
 NO_COVARIANCE = "the model is given as numbers, without a covariance"
 
 
-def spread_of(source: object, output: str | None = None, input: str | None = None) -> Spread[Any]:
+def uncertain_of(
+    source: object, output: str | None = None, input: str | None = None
+) -> Uncertain[Any]:
     """The uncertainty of a fit or a measured response, ready to be carried on.
 
     Parameters
@@ -33,7 +35,7 @@ def spread_of(source: object, output: str | None = None, input: str | None = Non
 
     Returns
     -------
-    Spread
+    Uncertain
         Of a model of the same kind, or of a `FrequencyResponse` (real and imaginary parts at all
         its frequencies).
 
@@ -55,14 +57,14 @@ def spread_of(source: object, output: str | None = None, input: str | None = Non
     >>> data = fid.FrequencyResponse.from_values(
     ...     omega, truth.frequency_response(omega), inputs=truth.inputs, outputs=truth.outputs,
     ...     units=truth.units, random_error=np.full((1, 1, 30), 0.02))
-    >>> spread = spread_of(fid.identify(truth, data))
-    >>> spread
-    Spread(3 numbers, covariance known)
-    >>> pole = spread.propagate(lambda model: model.parameters["Lp"].value)
+    >>> uncertain = uncertain_of(fid.identify(truth, data))
+    >>> uncertain
+    Uncertain(3 numbers, covariance known)
+    >>> pole = uncertain.carried(lambda model: model.parameters["Lp"].value)
     >>> bool(0.01 < pole.stderr[0] < 1.0)
     True
     """
-    if isinstance(source, Spread):
+    if isinstance(source, Uncertain):
         return source
     if isinstance(source, Fit):
         return _of_fit(source)
@@ -73,10 +75,10 @@ def spread_of(source: object, output: str | None = None, input: str | None = Non
         return _of_innovations(source)
     if isinstance(source, FrequencyResponse):
         return _of_response(source, output, input)
-    return Spread(np.zeros(0), None, lambda _: source, None, NO_COVARIANCE)
+    return Uncertain.exact(source, NO_COVARIANCE)
 
 
-def _of_fit(fit: Fit) -> Spread[GreyBoxModel]:
+def _of_fit(fit: Fit) -> Uncertain[GreyBoxModel]:
     model, names = fit.model, fit.names
     centre = np.array([fit.parameters[name].value for name in names])
     parameters = [model.parameters[name] for name in names]
@@ -86,10 +88,10 @@ def _of_fit(fit: Fit) -> Spread[GreyBoxModel]:
         return model.with_values(dict(zip(names, map(float, numbers), strict=True)))
 
     reason = "" if fit.covariance is not None else "the fit knows no errors of its data"
-    return Spread(centre, fit.covariance, make, bounds, reason)
+    return Uncertain(centre, fit.covariance, make, bounds, reason)
 
 
-def _of_polynomial(model: PolynomialModel) -> Spread[PolynomialModel]:
+def _of_polynomial(model: PolynomialModel) -> Uncertain[PolynomialModel]:
     structure = model.structure
 
     def make(numbers: Array) -> PolynomialModel:
@@ -105,10 +107,10 @@ def _of_polynomial(model: PolynomialModel) -> Spread[PolynomialModel]:
         )
 
     reason = "" if model.covariance is not None else NO_COVARIANCE
-    return Spread(model.theta, model.covariance, make, None, reason)
+    return Uncertain(model.theta, model.covariance, make, None, reason)
 
 
-def _of_innovations(fit: InnovationsFit) -> Spread[InnovationsModel]:
+def _of_innovations(fit: InnovationsFit) -> Uncertain[InnovationsModel]:
     model = fit.model
     keys = "abcdk" if fit.structure.direct else "abck"
     parts = {key: np.asarray(getattr(model, key)) for key in keys}
@@ -122,12 +124,12 @@ def _of_innovations(fit: InnovationsFit) -> Spread[InnovationsModel]:
 
     centre = np.concatenate([part.ravel() for part in parts.values()])
     reason = "" if fit.covariance is not None else "the fit gave no covariance"
-    return Spread(centre, fit.covariance, make, None, reason)
+    return Uncertain(centre, fit.covariance, make, None, reason)
 
 
 def _of_response(
     response: FrequencyResponse, output: str | None, input: str | None
-) -> Spread[FrequencyResponse]:
+) -> Uncertain[FrequencyResponse]:
     chosen = response.select(
         outputs=None if output is None else [output], inputs=None if input is None else [input]
     )
@@ -146,7 +148,7 @@ def _of_response(
 
     centre = np.concatenate([values.real.ravel(), values.imag.ravel()])
     covariance, reason = _errors(chosen)
-    return Spread(centre, covariance, make, None, reason)
+    return Uncertain(centre, covariance, make, None, reason)
 
 
 def _errors(chosen: FrequencyResponse) -> tuple[Array | None, str]:

@@ -1,0 +1,104 @@
+"""Quantiles behind every printed interval: of the normal distribution and of Student's."""
+
+from __future__ import annotations
+
+import math
+
+from scipy.special import ndtr, ndtri, stdtrit
+
+from flightid.errors import OptionError
+
+LEVEL = 0.95
+"""Level of an interval unless told."""
+
+
+def half_width(level: float = LEVEL, freedom: float | None = None) -> float:
+    """Half the width of a two-sided interval about an estimate, in standard errors.
+
+    Parameters
+    ----------
+    level : float
+        Probability that the interval holds the truth, above 0 and below 1.
+    freedom : float, optional
+        Degrees of freedom of Student's distribution, where the standard error itself is
+        estimated; None or infinite: normal distribution.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    OptionError
+        A level that is no probability, or degrees of freedom that are not positive.
+
+    Reference
+    ---------
+    Student, "The probable error of a mean", *Biometrika* 6 (1908); z(0.975) = 1.95996.
+
+    Example
+    -------
+    >>> round(half_width(), 5), round(half_width(0.95, 10.0), 4)
+    (1.95996, 2.2281)
+    """
+    upper = 0.5 + 0.5 * checked_level(level)
+    if freedom is None or math.isinf(freedom):
+        return float(ndtri(upper))
+    if not freedom > 0.0:
+        raise OptionError("degrees of freedom must be positive", found=freedom, needed="above 0")
+    return float(stdtrit(freedom, upper))
+
+
+def checked_level(level: float) -> float:
+    """The level itself, if it is one.
+
+    Raises
+    ------
+    OptionError
+        A level that is no probability.
+
+    Example
+    -------
+    >>> checked_level(0.9)
+    0.9
+    """
+    if not 0.0 < level < 1.0:
+        raise OptionError(
+            "the level of an interval is a probability", found=level, needed="above 0 and below 1"
+        )
+    return float(level)
+
+
+def tails(level: float = LEVEL) -> tuple[float, float]:
+    """Probabilities below the lower and below the upper end of a two-sided interval.
+
+    Example
+    -------
+    >>> tails(0.95)
+    (0.025, 0.975)
+    """
+    # Rounded, so that a quantile of draws falls on the draw that the level says.
+    outside = round(0.5 * (1.0 - checked_level(level)), 12)
+    return outside, 1.0 - outside
+
+
+def two_sided_chance(deviations: float) -> float:
+    """Probability that a normal error is as large as this, in standard errors, to either side.
+
+    Example
+    -------
+    >>> round(two_sided_chance(1.959964), 3)
+    0.05
+    """
+    return float(2.0 * ndtr(-abs(deviations)))
+
+
+def interval_words(level: float) -> str:
+    """The level for a heading.
+
+    Example
+    -------
+    >>> interval_words(0.95)
+    '95 %'
+    """
+    return f"{100.0 * checked_level(level):.4g} %"

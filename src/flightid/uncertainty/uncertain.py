@@ -1,0 +1,285 @@
+"""A thing that is known with a covariance, which goes on to whatever is computed from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flightid.errors import OptionError
+from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.quantiles import LEVEL, half_width
+
+T = TypeVar("T")
+Made = TypeVar("Made")
+Array = NDArray[np.float64]
+NEGLIGIBLE = 1e-14
+"""Share of the largest eigenvalue of a covariance below which a direction is rounding."""
+INSIDE = 1.0 - 1e-9
+"""Keeps steps off the bounds by more than rounding."""
+TRIES = 100
+"""Draws for each one that has to lie inside the bounds."""
+LOST = "not determined everywhere within its uncertainty"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Uncertain(Generic[T]):
+    """Numbers with their covariance, and the thing that they make.
+
+    A model and the covariance of its parameters; a frequency response and its errors; or plain
+    numbers, as `carried` gives them.
+
+    Attributes
+    ----------
+    numbers : ndarray, shape (n,)
+        As estimated; NaN for one that is not determined.
+    covariance : ndarray, shape (n, n), or None
+        Of `numbers` over repeated flights; None where `reason` says why. NaN in the rows of what
+        an error of one standard deviation makes undetermined.
+    make : callable
+        From numbers to the thing: a model, a system, a response.
+    bounds : tuple of ndarray, shapes (n,)
+        What the numbers may be.
+    reason : str
+        Why there is no covariance; where there is one, what it leaves out.
+
+    Example
+    -------
+    >>> side = Uncertain(np.array([3.0]), np.array([[0.01]]), lambda numbers: float(numbers[0]))
+    >>> area = side.carried(lambda length: length**2)
+    >>> area.number(0, "area", "m^2")
+    Estimate(area = 9 (7.824 to 10.18) m^2)
+    """
+
+    numbers: Array
+    covariance: Array | None
+    make: Callable[[Array], T]
+    bounds: tuple[Array, Array] | None = None
+    reason: str = ""
+
+    @classmethod
+    def exact(cls, thing: T, reason: str = "") -> Uncertain[T]:
+        """A thing of which no errors are known.
+
+        Example
+        -------
+        >>> Uncertain.exact("model", "typed in").known
+        False
+        """
+        return cls(np.zeros(0), None, lambda _: thing, None, reason)
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a covariance."""
+        return self.covariance is not None
+
+    @property
+    def value(self) -> T:
+        """The thing as estimated."""
+        return self.make(self.numbers)
+
+    @property
+    def stderr(self) -> Array | None:
+        """Standard errors of the numbers, shape (n,)."""
+        return None if self.covariance is None else np.sqrt(np.diag(self.covariance))
+
+    def interval(self, level: float = LEVEL) -> Array | None:
+        """Intervals of the numbers, shape (n, 2); None without a covariance."""
+        if self.stderr is None:
+            return None
+        half = half_width(level) * self.stderr
+        return np.column_stack([self.numbers - half, self.numbers + half])
+
+    def number(self, place: int, name: str, unit: str = "1", missing: str = "") -> Reading:
+        """One of the numbers as a printed estimate.
+
+        Parameters
+        ----------
+        place : int
+        name, unit : str
+        missing : str
+            Why the value is missing, where it is.
+        """
+        value = float(self.numbers[place])
+        if not np.isfinite(value):
+            return Estimate(name, None, unit, None, missing or "not determined")
+        if self.stderr is None:
+            return Estimate(name, value, unit, None, self.reason)
+        error = float(self.stderr[place])
+        if not np.isfinite(error):
+            return Estimate(name, value, unit, None, LOST)
+        return Estimate(name, value, unit, error)
+
+    def __repr__(self) -> str:
+        """Size on one line."""
+        n = len(self.numbers)
+        known = "known" if self.known else f"unknown: {self.reason}"
+        return f"Uncertain({n} number{'' if n == 1 else 's'}, covariance {known})"
+
+    @cached_property
+    def directions(self) -> Array:
+        """Independent moves of the numbers by one standard deviation, shape (n_directions, n).
+
+        A number that is not determined has one of its own, which is NaN.
+        """
+        if self.covariance is None or not len(self.numbers):
+            return np.zeros((0, len(self.numbers)))
+        determined = np.isfinite(np.diag(self.covariance))
+        part = self.covariance[np.ix_(determined, determined)]
+        sizes, turned = np.linalg.eigh((part + part.T) / 2.0)
+        kept = sizes > NEGLIGIBLE * max(float(np.max(sizes, initial=0.0)), 0.0)
+        moves = np.zeros((int(np.count_nonzero(kept)), len(self.numbers)))
+        moves[:, determined] = (turned[:, kept] * np.sqrt(sizes[kept])).T
+        lost = np.zeros((int(np.count_nonzero(~determined)), len(self.numbers)))
+        lost[np.arange(len(lost)), np.flatnonzero(~determined)] = np.nan
+        return np.concatenate([moves, lost])
+
+    def steps(self, scale: float = 1.0) -> Iterator[tuple[T, T]]:
+        """Pairs of things one standard deviation up and down each independent direction.
+
+        One that would leave the bounds stops at them.
+        """
+        for direction in self.directions:
+            ends = (self.numbers + scale * direction, self.numbers - scale * direction)
+            if self.bounds is not None:
+                ends = (np.clip(ends[0], *self.bounds), np.clip(ends[1], *self.bounds))
+            yield self.make(ends[0]), self.make(ends[1])
+
+    def slopes(self, function: Callable[[T], ArrayLike]) -> Array:
+        """Moves of a function's values by one standard deviation along each independent direction.
+
+        Central differences over ± one standard deviation; over less where that would leave the
+        bounds, as for a delay known to its own size.
+
+        Parameters
+        ----------
+        function : callable
+            From the thing to k numbers.
+
+        Returns
+        -------
+        ndarray, shape (n_directions, k)
+        """
+        found = []
+        for direction in self.directions:
+            share = self._share_inside(direction)
+            ends = [
+                np.atleast_1d(
+                    np.asarray(function(self.make(self.numbers + sign * share * direction)), float)
+                )
+                for sign in (1.0, -1.0)
+            ]
+            found.append((ends[0] - ends[1]) / (2.0 * share))
+        return np.array(found)
+
+    def _share_inside(self, direction: Array) -> float:
+        """Share of a direction that stays inside the bounds, up and down; one where all does."""
+        if self.bounds is None:
+            return 1.0
+        room = np.minimum(self.bounds[1] - self.numbers, self.numbers - self.bounds[0])
+        moving = direction != 0.0
+        shares = INSIDE * room[moving] / np.abs(direction[moving])
+        return float(np.min(shares, initial=1.0))
+
+    def carried(self, function: Callable[[T], ArrayLike]) -> Uncertain[Array]:
+        """Numbers that are computed from the thing, with their covariance.
+
+        Central differences over ± one standard deviation along the independent directions of the
+        covariance: deterministic, and right in second order too as far as the slope goes.
+
+        Parameters
+        ----------
+        function : callable
+            From the thing to k numbers; NaN for one that is not determined.
+
+        Returns
+        -------
+        Uncertain of ndarray
+
+        Assumes
+        -------
+        A function that is nearly straight over the uncertainty: biased where it is not, for
+        example for a damping ratio known to half its size.
+
+        Reference
+        ---------
+        Julier & Uhlmann, *Proceedings of the IEEE* 92 (2004), eqs. 11–15, with the slopes alone.
+        """
+        values = np.atleast_1d(np.asarray(function(self.value), dtype=np.float64))
+        if not self.known:
+            return uncertain_numbers(values, None, self.reason)
+        slopes = self.slopes(function).reshape(-1, len(values))
+        return uncertain_numbers(values, slopes.T @ slopes)
+
+    def draws(self, count: int, seed: int = 0) -> list[T]:
+        """Things drawn from the normal distribution of the estimate, inside the bounds.
+
+        Parameters
+        ----------
+        count : int
+        seed : int
+
+        Returns
+        -------
+        list
+            Empty where there is no covariance. A draw outside the bounds is drawn again; after
+            many it is moved to them.
+
+        Raises
+        ------
+        OptionError
+            A count below one.
+        """
+        if count < 1:
+            raise OptionError("the number of draws", found=count, needed="1 or more")
+        if not self.known:
+            return []
+        random = np.random.default_rng(seed)
+        return [self.make(self._drawn_inside(random)) for _ in range(count)]
+
+    def _drawn_inside(self, random: np.random.Generator) -> Array:
+        low, high = self.bounds or (np.full(1, -np.inf), np.full(1, np.inf))
+        for _ in range(TRIES):
+            numbers = self.numbers + random.standard_normal(len(self.directions)) @ self.directions
+            if np.all((numbers >= low) & (numbers <= high)):
+                return np.asarray(numbers)
+        return np.asarray(np.clip(numbers, low, high))
+
+    def then(self, function: Callable[[T], Made]) -> Uncertain[Made]:
+        """What is made of the thing, as uncertain as it is: a loop made of a model."""
+        make = self.make
+        return Uncertain(
+            self.numbers,
+            self.covariance,
+            lambda numbers: function(make(numbers)),
+            self.bounds,
+            self.reason,
+        )
+
+
+def uncertain_numbers(
+    numbers: ArrayLike, covariance: Array | None, reason: str = ""
+) -> Uncertain[Array]:
+    """Plain numbers with their covariance.
+
+    Parameters
+    ----------
+    numbers : array_like, shape (n,)
+    covariance : ndarray, shape (n, n), or None
+    reason : str
+        Why there is none.
+
+    Example
+    -------
+    >>> uncertain_numbers([2.0], np.array([[0.25]])).interval(0.95).round(2)
+    array([[1.02, 2.98]])
+    """
+    return Uncertain(np.asarray(numbers, dtype=np.float64), covariance, _same, None, reason)
+
+
+def _same(numbers: Array) -> Array:
+    return numbers
