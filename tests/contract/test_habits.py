@@ -43,6 +43,17 @@ def _panics(text: str) -> list[str]:
     ]
 
 
+def _code_in_comments(text: str) -> list[str]:
+    """Fences of documentation that hold code; text and formulas are opened as such."""
+    found, inside = [], False
+    for number, line in enumerate(text.split("\n"), 1):
+        fence = re.match(r"\s*//[/!]\s*```(\w*)", line)
+        if fence and not inside and fence[1] != "text":
+            found.append(f"{number}: code that no test would run")
+        inside = inside != bool(fence)
+    return found
+
+
 def test_python_sources() -> None:
     offenders = []
     for path in python_files():
@@ -63,6 +74,17 @@ def test_rust_sources_neither_panic_nor_leave_ends_open() -> None:
         found = [*_open_ends(text), *_panics(text)]
         offenders += [f"{path.relative_to(ROOT)}:{line}" for line in found]
     assert not offenders, "\n".join(offenders)
+
+
+def test_rust_comments_hold_no_code_that_nobody_runs() -> None:
+    offenders = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path in rust_files()
+        for line in _code_in_comments(path.read_text("utf-8"))
+    ]
+    assert not offenders, "\n".join(offenders)
+    planted = "//! ```text\n//! a = b\n//! ```\n/// ```\n/// x();\n/// ```\nfn x() {}"
+    assert _code_in_comments(planted) == ["4: code that no test would run"]
 
 
 @pytest.mark.parametrize(
