@@ -248,6 +248,7 @@ def test_tuned_gains_fly_as_promised(tmp_path: Path) -> None:
     assert len(files) >= 2
 
 
+@pytest.mark.nightly
 def test_the_linear_twin_rotor_study_finds_the_published_modes(tmp_path: Path) -> None:
     script = EXAMPLES / "twin_rotor_linear" / "analyse.py"
     run = _script(script, "rig", "--seed", "1", folder=tmp_path)

@@ -43,7 +43,7 @@ band_rad_s = [2.0, 60.0]
 parameters.T_m = { maximum = 0.15 }
 [tune]
 noise_growth = 3.0
-draws = 40
+draws = 12
 angle_loop = false
 """
 
@@ -76,7 +76,7 @@ def test_settings_are_read_and_checked(study: Path) -> None:
     asked = read_settings(study).tune
     assert asked is not None
     assert asked.requirements.noise_growth == 3.0
-    assert asked.draws == 40
+    assert asked.draws == 12
     study.write_text(STUDY + "luck = 1\n", encoding="utf-8")
     with pytest.raises(StudyError, match="there is no key 'luck'"):
         read_settings(study)
