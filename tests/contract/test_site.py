@@ -78,10 +78,15 @@ def test_the_navigation_has_every_page_once() -> None:
     assert [page for page in listed if page in order] == order
 
 
-@pytest.mark.parametrize("page", sorted(DOCS.glob("*.md")), ids=lambda page: page.name)
-def test_links_and_pictures_of_a_page_are_there_on_a_disk_too(page: Path) -> None:
-    for target in re.findall(r"\]\((?!https?://|#)([^)#\s]+)", page.read_text(encoding="utf-8")):
-        assert (DOCS / target).exists(), target
+def test_links_and_pictures_of_texts_are_there_on_a_disk_too() -> None:
+    texts = [*ROOT.glob("*.md"), *DOCS.glob("*.md"), *ROOT.glob("examples/*/README.md")]
+    lost = [
+        f"{text.relative_to(ROOT)}: {target}"
+        for text in texts
+        for target in re.findall(r"\]\((?!https?://|#)([^)#\s]+)", text.read_text("utf-8"))
+        if not (text.parent / target).exists()
+    ]
+    assert not lost
 
 
 def test_links_turn_into_links_between_pages() -> None:

@@ -7,22 +7,27 @@ from pathlib import Path
 
 import pytest
 
-from flightid.vehicles import PilotDoublet, SidRun, fly, write_ardupilot_log
+from flightid.vehicles import Flight, PilotDoublet, SidRun, fly, write_ardupilot_log
 
 STUDY = Path(__file__).parent.parent.parent / "examples" / "quadrotor_rig" / "study.toml"
 
 
 @pytest.fixture(scope="session")
-def demo_output(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder `demo-output` with the log of the demo's study, without the study."""
+def demo_flight() -> Flight:
+    """The flight of the demo's study."""
     plan = tomllib.loads(STUDY.read_text(encoding="utf-8"))["flight"]
-    flight = fly(
+    return fly(
         runs=[SidRun(**row) for row in plan["sweep"]],
         doublets=[PilotDoublet(**row) for row in plan["doublet"]],
         log_every=plan["log_every"],
         seed=plan["seed"],
     )
+
+
+@pytest.fixture(scope="session")
+def demo_output(demo_flight: Flight, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder `demo-output` with the log of that flight, as `make demo` leaves it."""
     folder = tmp_path_factory.mktemp("demo") / "demo-output"
     folder.mkdir()
-    write_ardupilot_log(flight, folder / "flight.bin")
+    write_ardupilot_log(demo_flight, folder / "flight.bin")
     return folder
