@@ -9,6 +9,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, OptionError
+from flightid.logs import channel_map
 from flightid.record import InputShape, read_records
 from flightid.record.chosen_hold import chosen_hold
 from flightid.record.repeats import found_period, found_staircase, period_of
@@ -84,7 +85,7 @@ def test_operations_keep_what_they_leave_true_and_drop_the_rest() -> None:
 def test_simulate_uses_what_the_record_knows_and_says_what_it_used() -> None:
     lag = fid.LinearSystem([[-3.0]], [[3.0]], [[1.0]], [[0.0]], ("u",), ("y",))
     silent, held = _record(), _record(hold="zero")
-    held = silent.with_hold("zero")
+    held = silent.declare(hold="zero")
     by_default, by_record = fid.simulate(lag, silent), fid.simulate(lag, held)
     assert (by_default.hold, by_record.hold) == ("first", "zero")
     told = fid.simulate(lag, silent, hold="zero")
@@ -162,5 +163,5 @@ def test_a_channel_map_may_tell_the_hold(tmp_path: Path) -> None:
     shipped = Path(fid.__file__).parent / "logs" / "channels" / "arducopter.toml"
     path = tmp_path / "held.toml"
     path.write_text('hold = "zero"\n' + shipped.read_text(encoding="utf-8"))
-    assert fid.logs.channel_map(path).hold == "zero"
-    assert fid.logs.channel_map("arducopter").hold is None
+    assert channel_map(path).hold == "zero"
+    assert channel_map("arducopter").hold is None

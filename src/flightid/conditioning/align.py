@@ -12,7 +12,7 @@ from scipy import signal
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
-from flightid.record import InputShape, Record, Step
+from flightid.record import Record, Step
 from flightid.record.interpolation import windowed_sinc
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Estimate
@@ -396,5 +396,5 @@ def align(record: Record, skews_s: Mapping[str, float]) -> Record:
     step_done = Step("conditioning.align", options)
     broken = any(not float(lags.get(name, 0.0)).is_integer() for name in record.inputs)
     # Steps and lines that are moved by part of a sample no longer end at the samples.
-    shape = InputShape(None, record.period_s) if broken and record.hold != "band_limited" else None
+    shape = record.input_shape.without_hold() if broken and record.hold != "band_limited" else None
     return record.replace(samples, time_s=record.time_s[kept], step=step_done, input_shape=shape)

@@ -13,7 +13,7 @@ from scipy import signal
 
 from flightid.conditioning.detrend import chosen_channels
 from flightid.errors import DataError, OptionError
-from flightid.record import InputShape, Record, Step
+from flightid.record import Record, Step
 from flightid.table import Cell
 
 
@@ -157,7 +157,7 @@ def filter_record(
     return record.replace(
         samples,
         step=Step("conditioning.filter_record", options),
-        input_shape=record.input_shape if alike else InputShape(None, record.period_s),
+        input_shape=record.input_shape if alike else record.input_shape.without_hold(),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from flightid.record import InputShape, Interpolation, Record, Step, to_uniform
 
@@ -79,5 +80,5 @@ def _shape_after(
     }
     known = record.input_shape.on_another_base(record.sample_time_s, sample_time_s)
     if known.hold is None and methods == {"band-limited"} and sample_time_s > record.sample_time_s:
-        return InputShape("band_limited", known.period_s)
-    return known if methods <= {"band-limited"} else InputShape(None, known.period_s)
+        return replace(known, hold="band_limited")
+    return known if methods <= {"band-limited"} else known.without_hold()

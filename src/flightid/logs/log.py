@@ -16,6 +16,7 @@ from flightid.logs.self_check import InjectionCheck, check_injection
 from flightid.logs.source import ByteRange, Event, Gap, LogSource, MessageInfo, ParameterChange
 from flightid.logs.to_record import make_record
 from flightid.record import InputHold, InputShape, Record
+from flightid.record.hold import Loop
 from flightid.record.timebase import GapPolicy
 from flightid.table import Column, Table
 
@@ -174,6 +175,7 @@ class Log:
         name: str | None = None,
         hold: InputHold | None = None,
         period_s: float | None = None,
+        loop: Loop | None = None,
     ) -> Record:
         """Make a record: mapped channels in SI units on one uniform time base.
 
@@ -203,6 +205,8 @@ class Log:
             inputs are on their own stamps, else unknown.
         period_s : float, optional
             Time after which the inputs repeat, s.
+        loop : {"open", "closed"}, optional
+            Whether anything moved the inputs after what the outputs did; default: unknown.
 
         Returns
         -------
@@ -229,7 +233,7 @@ class Log:
             gaps,
             max_gap_s,
             name,
-            InputShape(hold, period_s),
+            InputShape(hold, period_s, loop),
         )
 
     def summary(self) -> Table:

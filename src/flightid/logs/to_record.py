@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -111,7 +112,7 @@ def _input_shape(
         return declared
     inputs = [item for item in found if item.channel.role == Role.INPUT]
     own = all(abs(item.interval_s / step_s - 1.0) < OWN_STAMPS for item in inputs)
-    return InputShape(chosen.hold if own else None, declared.period_s)
+    return replace(declared, hold=chosen.hold) if own else declared
 
 
 def _chosen(

@@ -18,7 +18,7 @@ from flightid.record.formats import ColumnTable, FileFormat, csv, file_format, m
 from flightid.record.formats import parquet as parquet_format
 from flightid.record.formats.columns import is_unit
 from flightid.record.history import Step
-from flightid.record.hold import InputHold, InputShape
+from flightid.record.hold import InputHold, InputShape, Loop
 from flightid.record.record import Record
 from flightid.record.stamps import GAP_FACTOR
 from flightid.record.store import RECORD_COLUMN, stored_records
@@ -52,6 +52,7 @@ def read_records(
     record: str | None = RECORD_COLUMN,
     hold: InputHold | None = None,
     period_s: float | None = None,
+    loop: Loop | None = None,
 ) -> list[Record]:
     r"""Read records from CSV, Parquet, MATLAB .mat (level 5 to 7.3) or netCDF.
 
@@ -84,6 +85,9 @@ def read_records(
         what the file says, else unknown.
     period_s : float, optional
         Time after which the inputs repeat exactly, s.
+    loop : {"open", "closed"}, optional
+        Whether anything moved the inputs after what the outputs did; default: what the file says,
+        else unknown.
 
     Returns
     -------
@@ -125,7 +129,7 @@ def read_records(
     if text is not None:
         stored = stored_records(source, text, is_parquet=kind is FileFormat.PARQUET)
         chosen = [_selected(item, roles, units or {}) for item in stored]
-        return [_declared(item, hold, period_s) for item in chosen]
+        return [_declared(item, InputShape(hold, period_s, loop)) for item in chosen]
     table = _table(source, kind)
     stamps = _stamps(table, time, units or {}, sample_time_s)
     wanted = _wanted(table, roles, units or {}, time, record, stamps.size)
@@ -151,22 +155,21 @@ def read_records(
             records.append(_record(grid, samples, wanted, label or source.stem, (*history, *more)))
     if len(records) > 1 and len({item.name for item in records}) == 1:
         records = [item.replace(name=f"{item.name}[{index}]") for index, item in enumerate(records)]
-    return [_declared(item, hold, period_s) for item in records]
+    return [_declared(item, InputShape(hold, period_s, loop)) for item in records]
 
 
-def _declared(record: Record, hold: InputHold | None, period_s: float | None) -> Record:
+def _declared(record: Record, given: InputShape) -> Record:
     """The record with what is declared of its inputs; a file must not say otherwise."""
     known = record.input_shape
-    if hold is not None and known.hold not in (None, hold):
+    if given.hold is not None and known.hold not in (None, given.hold):
         raise OptionError(
             f"the declared hold contradicts the file of record {record.name!r}",
-            found=hold,
+            found=given.hold,
             needed=known.hold,
-            action="leave it out, or replace what the file says with Record.with_hold",
+            action="leave it out, or replace what the file says with Record.declare",
         )
-    if hold is None and period_s is None:
-        return record
-    return record.replace(input_shape=InputShape(hold or known.hold, period_s or known.period_s))
+    shape = known.with_known(given)
+    return record if shape == known else record.replace(input_shape=shape)
 
 
 def _labels(path: Path, kind: FileFormat) -> str | None:

@@ -12,7 +12,7 @@ from flightid.conventions import Role
 from flightid.record.channel import Channel
 from flightid.record.display import one_line, plain_values, summary_table
 from flightid.record.history import Step
-from flightid.record.hold import InputHold, InputShape
+from flightid.record.hold import InputHold, InputShape, Loop
 from flightid.record.unit_change import in_units
 from flightid.record.validation import (
     TIME,
@@ -98,6 +98,7 @@ class Record:
         history: Iterable[Step] = (),
         hold: InputHold | None = None,
         period_s: float | None = None,
+        loop: Loop | None = None,
     ) -> Record:
         """Build a record from stamps and named arrays.
 
@@ -117,8 +118,8 @@ class Record:
             Name of the manoeuvre.
         history : iterable of Step
             What was done before.
-        hold, period_s : optional
-            What inputs do between samples and when they repeat; see `InputShape`.
+        hold, period_s, loop : optional
+            How inputs move between samples, repeat and are fed back; see `InputShape`.
 
         Returns
         -------
@@ -142,8 +143,8 @@ class Record:
         }
         variables = labelled_variables(groups, stamps, units or {}, notes or {}, trim or {})
         dataset = xr.Dataset(variables, coords={TIME: stamps})
-        shape = InputShape(hold, period_s)
-        return cls(dataset, name=name, trim=trim, history=history, input_shape=shape)
+        known = InputShape(hold, period_s, loop)
+        return cls(dataset, name=name, trim=trim, history=history, input_shape=known)
 
     @property
     def name(self) -> str:
@@ -197,7 +198,7 @@ class Record:
 
     @property
     def input_shape(self) -> InputShape:
-        """How the inputs move between samples, and whether they repeat."""
+        """How the inputs move between samples, whether they repeat and were fed back."""
         return self._input_shape
 
     @property
@@ -315,19 +316,23 @@ class Record:
         made._input_shape = input_shape or self._input_shape.on_another_base(*bases)
         return made
 
-    def with_hold(self, hold: InputHold | None, *, period_s: float | None = None) -> Record:
-        """Copy that knows how its inputs move between samples and when they repeat."""
-        step = Step("Record.with_hold", {"hold": hold, "period_s": period_s})
-        return self.replace(step=step, input_shape=InputShape(hold, period_s))
+    def declare(
+        self,
+        *,
+        hold: InputHold | None = None,
+        period_s: float | None = None,
+        loop: Loop | None = None,
+    ) -> Record:
+        """Copy that knows more of its inputs, see `InputShape`; what is left out stays."""
+        shape = self._input_shape.with_known(InputShape(hold, period_s, loop))
+        return self.replace(step=Step("Record.declare", shape.to_dict()), input_shape=shape)
 
     def with_roles(self, **roles: Role | str) -> Record:
         """Copy in which the named channels have other roles."""
         for label in roles:
             self._require(label)
-        channels = [
-            channel.with_role(Role(roles.get(key, channel.role)))
-            for key, channel in self._channels.items()
-        ]
+        present = self._channels.items()
+        channels = [channel.with_role(Role(roles.get(k, channel.role))) for k, channel in present]
         options: dict[str, Cell] = {key: str(role) for key, role in roles.items()}
         return self.replace(channels=channels, step=Step("Record.with_roles", options))
 
@@ -370,11 +375,10 @@ class Record:
         DataError
             Fewer than two samples lie in the span.
         """
-        time_s = self.time_s
-        inside = inside_span(time_s, start_s, stop_s, self._sample_time_s)
+        inside = inside_span(self.time_s, start_s, stop_s, self._sample_time_s)
         samples = {key: self[key][inside] for key in self._channels}
         step = Step("Record.segment", {"start_s": start_s, "stop_s": stop_s})
-        return self.replace(samples, time_s=time_s[inside], step=step, name=name)
+        return self.replace(samples, time_s=self.time_s[inside], step=step, name=name)
 
     def summary(self) -> Table:
         """Table of the channels with unit, role, mean, deviation and range."""

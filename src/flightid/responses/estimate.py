@@ -12,6 +12,7 @@ from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.record.history import Step
+from flightid.record.hold import InputShape, Loop, common_hold, common_loop
 from flightid.responses.errors.linear_estimate import LinearEstimate, WindowedWeights
 from flightid.responses.estimators.local_polynomial import estimate_local_polynomial
 from flightid.responses.estimators.windowed import (
@@ -19,12 +20,13 @@ from flightid.responses.estimators.windowed import (
     windowed_errors,
     windowed_response,
 )
-from flightid.responses.feedback import feedback_findings
+from flightid.responses.feedback import feedback_findings, feedback_of
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.windows.planning import plan_frequencies, plan_windows
-from flightid.responses.windows.samples import gather
+from flightid.responses.windows.samples import Samples, gather
 from flightid.responses.windows.windows import shifts_of
 from flightid.table import Cell
+from flightid.uncertainty.feedback import FeedbackTest
 from flightid.version import VERSION
 
 METHODS = ("composite", "instrument", "local_polynomial")
@@ -43,6 +45,7 @@ def estimate_response(
     overlap: float = 0.5,
     detrend: str = "mean",
     covariance: bool = True,
+    loop: Loop | None = None,
 ) -> FrequencyResponse:
     """Estimate the frequency responses of outputs to inputs from one or several records.
 
@@ -73,6 +76,9 @@ def estimate_response(
     covariance : bool
         Keep what `FrequencyResponse.covariance_at` needs and what a fit needs to take the
         estimator's bias out (the samples and a noise spectrum).
+    loop : {"open", "closed"}, optional
+        Whether anything moved the inputs after what the outputs did; default: what the records
+        know, else a test.
 
     Returns
     -------
@@ -129,16 +135,12 @@ def estimate_response(
     if method == "local_polynomial":
         step = Step("estimate_response", options, VERSION)
         response = estimate_local_polynomial(samples, omega, step, covariance=covariance)
-        loops = feedback_findings(samples, float(omega[-1]))
-        return replace(response, findings=(*response.findings, *loops))
+        return _with_inputs(response, samples, listed, loop)
     plans = plan_windows(window_s, samples, float(omega[-1]), shifts_of(overlap))
     lengths = ", ".join(f"{plan.length * samples.sample_time_s:.6g}" for plan in plans)
     step = Step("estimate_response", options | {"window_s": lengths, "overlap": overlap}, VERSION)
     estimate = estimate_windowed(samples, omega, plans, detrend)
-    response = windowed_response(estimate, method, step)
-    if method == "composite":
-        loops = feedback_findings(samples, float(omega[-1]))
-        response = replace(response, findings=(*response.findings, *loops))
+    response = _with_inputs(windowed_response(estimate, method, step), samples, listed, loop)
     if not covariance:
         return response
     try:
@@ -148,6 +150,23 @@ def estimate_response(
         return replace(response, findings=(*response.findings, missing))
     linear = LinearEstimate.of(samples, WindowedWeights(errors), len(omega))
     return replace(response, errors=errors, linear=linear)
+
+
+def _with_inputs(
+    response: FrequencyResponse, samples: Samples, records: Sequence[Record], loop: Loop | None
+) -> FrequencyResponse:
+    """The response with what is known of its inputs: their hold, and whether they are fed back."""
+    shapes = [record.input_shape for record in records]
+    if response.method.startswith("instrument"):
+        test = FeedbackTest("unknown", "instrument")
+    else:
+        test = feedback_of(samples, float(response.omega_rad_s[-1]), records, loop)
+    return replace(
+        response,
+        findings=(*response.findings, *feedback_findings(test)),
+        loop=test,
+        input_shape=InputShape(common_hold(shapes), loop=common_loop(shapes)),
+    )
 
 
 def _check_options(method: str, detrend: str) -> None:

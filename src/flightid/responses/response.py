@@ -11,11 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.errors import DataError, ShapeError, UnknownNameError
 from flightid.findings import Finding
 from flightid.record.history import Step
+from flightid.record.hold import InputShape
 from flightid.responses.bands import choose_frequencies, nearest
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource, Selected
 from flightid.responses.pair import PairResponse, quotient_unit
 from flightid.table import Column, Table
+from flightid.uncertainty.feedback import FeedbackTest
 from flightid.units import DIMENSIONLESS
 
 SMALL_COVARIANCE = 1 << 25
@@ -62,6 +64,10 @@ class FrequencyResponse:
         What was done.
     errors : CovarianceSource, optional
         What `covariance_at` asks.
+    loop : FeedbackTest, optional
+        Whether a loop was closed, tested or declared; None after arithmetic and where it was given.
+    input_shape : InputShape
+        What the records know of their inputs between samples.
     linear : LinearEstimate, optional
         The estimate as weights on the measured outputs, from which a fit computes its bias; None
         after arithmetic, from a file, and where it was given.
@@ -94,6 +100,8 @@ class FrequencyResponse:
     history: tuple[Step, ...] = ()
     errors: CovarianceSource | None = field(default=None)
     linear: LinearEstimate | None = field(default=None)
+    loop: FeedbackTest | None = None
+    input_shape: InputShape = field(default_factory=InputShape)
 
     def __post_init__(self) -> None:
         sizes = {"o": len(self.outputs), "i": len(self.inputs), "f": len(self.omega_rad_s)}
@@ -336,6 +344,8 @@ class FrequencyResponse:
             "method": self.method,
             "n_windows": list(self.n_windows),
             "window_s": list(self.window_s),
+            "loop": None if self.loop is None else self.loop.to_dict(),
+            "input_shape": self.input_shape.to_dict(),
             "findings": [finding.to_dict() for finding in self.findings],
             "history": [str(step) for step in self.history],
         }

@@ -20,8 +20,10 @@ from flightid.errors import FileFormatError
 from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.record.history import Step
+from flightid.record.hold import InputShape
 from flightid.responses.errors.random_error import Known
 from flightid.responses.response import AXES, FrequencyResponse
+from flightid.uncertainty.feedback import FeedbackTest
 
 SCHEMA = "flightid.frequency_response/1"
 DIMENSIONS = {"o": "output", "i": "input", "f": "omega_rad_s"}
@@ -76,6 +78,8 @@ def to_xarray(response: FrequencyResponse) -> xr.Dataset:
                 "units": dict(response.units),
                 "n_windows": list(response.n_windows),
                 "window_s": list(response.window_s),
+                "loop": None if response.loop is None else response.loop.to_dict(),
+                "input_shape": response.input_shape.to_dict(),
                 "findings": [finding.to_dict() for finding in response.findings],
                 "history": [
                     {"operation": s.operation, "options": dict(s.options), "version": s.version}
@@ -118,6 +122,9 @@ def from_xarray(dataset: xr.Dataset) -> FrequencyResponse:
             window_s=tuple(float(one) for one in about["window_s"]),
             method=str(dataset.attrs["method"]),
             findings=tuple(_finding(one) for one in about["findings"]),
+            # Files of earlier versions do not say.
+            loop=FeedbackTest(**about["loop"]) if about.get("loop") else None,
+            input_shape=InputShape(**about.get("input_shape", {})),
             history=tuple(
                 Step(one["operation"], one["options"], one["version"]) for one in about["history"]
             ),

@@ -9,7 +9,7 @@ import numpy as np
 from flightid import _native
 from flightid.errors import OptionError, UnknownNameError
 from flightid.models.linear.realisation import Matrices
-from flightid.record import InputShape, Record, Step
+from flightid.record import Record, Step
 
 
 def actuator_positions(record: Record, actuators: Mapping[str, float]) -> Record:
@@ -64,7 +64,7 @@ def actuator_positions(record: Record, actuators: Mapping[str, float]) -> Record
         moved,
         step=Step("actuator_positions", {"rad_s": listed}),
         # A lag leaves neither steps nor lines.
-        input_shape=InputShape(None, record.period_s),
+        input_shape=record.input_shape.without_hold(),
     )
 
 

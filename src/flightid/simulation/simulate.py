@@ -14,7 +14,7 @@ from flightid.errors import DataError, ModelError, OptionError, ShapeError
 from flightid.models import LinearModel, LinearSystem, StateSpaceModel
 from flightid.models.linear.hold_equivalent import Hold
 from flightid.models.sampled.recursion import run_recursion
-from flightid.record import Channel, InputHold, InputShape, Record, Step
+from flightid.record import Channel, InputHold, Record, Step
 from flightid.record.chosen_hold import chosen_hold
 from flightid.simulation.noise import (
     NOISE_PARTS,
@@ -255,5 +255,5 @@ def _as_record(
         computed,
         channels=channels,
         step=Step("simulate", options),
-        input_shape=InputShape(hold, data.period_s),
+        input_shape=replace(data.input_shape, hold=hold),
     )

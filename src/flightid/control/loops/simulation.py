@@ -9,7 +9,7 @@ the square of the step.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -23,7 +23,7 @@ from flightid.conventions import Role
 from flightid.errors import OptionError, ShapeError, UnitError
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.state_space.integration_steps import steps_per_sample
-from flightid.record import Channel, InputHold, InputShape, Record, Step
+from flightid.record import Channel, InputHold, Record, Step
 from flightid.record.chosen_hold import chosen_hold
 from flightid.simulation.nonlinear import run_equations
 from flightid.units import canonical
@@ -343,7 +343,7 @@ def _record(
             unit = _channel(data, name).unit if name in data.channels else "1"
         channels.append(Channel(name, unit, Role.OUTPUT, "simulated"))
     step = Step("simulate loops", {"hold": hold, "step_s": clock.step_s})
-    shape = InputShape(hold, data.period_s)
+    shape = replace(data.input_shape, hold=hold)
     return data.replace(computed, channels=channels, step=step, input_shape=shape)
 
 

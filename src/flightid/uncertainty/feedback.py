@@ -1,0 +1,234 @@
+"""One test of whether a loop is closed around a vehicle: does past noise move an input.
+
+An open loop leaves an input independent of the noise of the outputs. The noise is what a long ARX
+model of the outputs leaves: it knows light damping by few numbers, where a pulse response of as
+many lags has not died out. What is new in an input is what its own past does not foretell. Past
+noise that explains a share of what is new says that a loop is closed. Either of the two being white
+is enough for the F distribution, so neither a poor model of the outputs nor a held, swept or
+two-level input raises false alarms. An input that repeats exactly cannot hold any noise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, stats
+
+from flightid.errors import OptionError
+from flightid.record.hold import LOOPS, Loop
+
+Array = NDArray[np.float64]
+LEVEL = 0.01
+"""Share of open loops that are called closed."""
+LARGEST_ORDER = 20
+"""Past samples of every channel in the model of the outputs, and of an input in that of its own."""
+LAGS = 12
+"""Past samples of noise that may move an input."""
+SAMPLES_PER_NUMBER = 10
+FEWEST_FREE = 30
+SMALLEST_NOISE = 1e-8
+"""Share of an output's power below which its noise is rounding, or cannot bias anything."""
+RIDGE = 1e-11
+"""Added to columns of unit length: noise 110 dB below each channel."""
+
+
+@dataclass(frozen=True)
+class FeedbackTest:
+    """Whether a loop was closed around the vehicle, and how that is known.
+
+    Attributes
+    ----------
+    loop : {"open", "closed", "unknown"}
+    source : {"test", "declared", "repeats", "instrument", "no noise", "too short"}
+        How it is known: the test of past noise; the user's word; inputs that repeat exactly, or
+        outputs without noise, which feed nothing back; an estimate by way of an excitation, which a
+        closed loop does not bias; records too short to tell.
+    p_value : float or None
+        Chance of so large a share with the loop open, over all inputs; None without a test.
+    input : str or None
+        Input that past noise explains most.
+    share : float or None
+        Share of what is new in it that past noise explains.
+    lags : int
+        Past samples of noise that were asked.
+
+    Example
+    -------
+    >>> FeedbackTest("open", "declared").is_closed
+    False
+    """
+
+    loop: Literal["open", "closed", "unknown"]
+    source: str
+    p_value: float | None = None
+    input: str | None = None
+    share: float | None = None
+    lags: int = LAGS
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether estimates from these inputs straight to outputs are biased."""
+        return self.loop == "closed" and self.source != "instrument"
+
+    def __str__(self) -> str:
+        """What is known and how, in a sentence."""
+        words = {
+            "declared": f"loop {self.loop}, as declared",
+            "repeats": "loop open: the inputs repeat exactly, so nothing is fed back",
+            "instrument": "estimated by way of the excitation, which a closed loop does not bias",
+            "no noise": "loop open: the outputs hold no noise that could be fed back",
+            "too short": "whether a loop is closed cannot be told: the records are too short",
+        }
+        if self.source in words:
+            return words[self.source]
+        return (
+            f"loop {self.loop}: past noise of the outputs explains "
+            f"{100.0 * (self.share or 0.0):.2g} % of what is new in input {self.input} "
+            f"(p = {self.p_value:.2g})"
+        )
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "loop": self.loop,
+            "source": self.source,
+            "p_value": self.p_value,
+            "input": self.input,
+            "share": self.share,
+            "lags": self.lags,
+        }
+
+
+def declared_loop(loop: str) -> FeedbackTest:
+    """The user's word.
+
+    Raises
+    ------
+    OptionError
+        Another word.
+    """
+    for word in LOOPS:
+        if loop == word:
+            return FeedbackTest(word, "declared")
+    raise OptionError("loop is not known", found=repr(loop), needed="'open' or 'closed'")
+
+
+def find_feedback(
+    inputs: Sequence[Array],
+    outputs: Sequence[Array],
+    names: Sequence[str],
+    *,
+    repeats: bool = False,
+) -> FeedbackTest:
+    """Test records for a closed loop.
+
+    Parameters
+    ----------
+    inputs, outputs : sequence of ndarray, each shape (n_channels, n_samples)
+        One array for each record, means removed.
+    names : sequence of str
+        Of the inputs.
+    repeats : bool
+        The inputs of every record repeat exactly.
+
+    Returns
+    -------
+    FeedbackTest
+        Feedback within the same sample is not seen: it cannot be told from direct feedthrough.
+
+    Reference
+    ---------
+    Granger, "Investigating causal relations by econometric models and cross-spectral methods",
+    *Econometrica* 37 (1969); Haugh, "Checking the independence of two covariance-stationary time
+    series: a univariate residual cross-correlation approach", *J. Am. Statistical Association* 71
+    (1976); Ljung, *System Identification*, 2nd ed., sections 13.4 and 14.4.
+
+    Example
+    -------
+    >>> rng = np.random.default_rng(0)
+    >>> u, e = rng.standard_normal((2, 3000))
+    >>> y = np.convolve(u, [0.0, 0.5, 0.3])[:3000] + e
+    >>> find_feedback([u[None]], [y[None]], ["u"]).loop
+    'open'
+    >>> fed = u - 0.5 * np.concatenate([[0.0], e[:-1]])
+    >>> find_feedback([fed[None]], [y[None]], ["u"]).loop
+    'closed'
+    """
+    if repeats:
+        return FeedbackTest("open", "repeats")
+    n_in, n_out = len(names), len(outputs[0])
+    order = min(LARGEST_ORDER, sum(u.shape[1] for u in inputs) // _needed(n_in, n_out))
+    pairs = [(u, y) for u, y in zip(inputs, outputs, strict=True) if _room(u, order) > 0]
+    free = sum(_room(u, order) for u, _ in pairs) - n_in * order - LAGS * n_out
+    if order < 1 or free < FEWEST_FREE:
+        return FeedbackTest("unknown", "too short")
+    noise = _noise(pairs, order)
+    power = sum(np.sum(y**2, axis=1) for _, y in pairs)
+    noisy = sum(np.sum(e**2, axis=1) for e in noise) > SMALLEST_NOISE * power
+    if not np.any(noisy):
+        return FeedbackTest("open", "no noise")
+    found = _shares(pairs, [e[noisy] for e in noise], order)
+    place = int(np.argmin([p for _, p in found]))
+    share, p_value = found[place]
+    p_value = min(1.0, n_in * p_value)
+    loop: Loop = "closed" if p_value < LEVEL else "open"
+    return FeedbackTest(loop, "test", p_value, names[place], share)
+
+
+def _needed(n_in: int, n_out: int) -> int:
+    """Samples for one more past sample of each channel."""
+    return SAMPLES_PER_NUMBER * (n_in + n_out)
+
+
+def _room(inputs: Array, order: int) -> int:
+    return int(inputs.shape[1]) - order - LAGS
+
+
+def past(rows: Array, first: int, lags: range) -> Array:
+    """Columns of past samples of each row from sample `first` on, (n − first, rows · lags)."""
+    n = rows.shape[1]
+    return np.concatenate([rows[:, first - lag : n - lag] for lag in lags]).T
+
+
+def _noise(pairs: Sequence[tuple[Array, Array]], order: int) -> list[Array]:
+    """What a long ARX model leaves of the outputs of each record, (n_out, n − order)."""
+    own, now = range(1, order + 1), range(order + 1)
+    known = np.vstack([np.hstack([past(y, order, own), past(u, order, now)]) for u, y in pairs])
+    left = _left(known, np.vstack([y[:, order:].T for _, y in pairs]))
+    cuts = np.cumsum([y.shape[1] - order for _, y in pairs])[:-1]
+    return [part.T for part in np.split(left, cuts)]
+
+
+def _shares(
+    pairs: Sequence[tuple[Array, Array]], noise: Sequence[Array], order: int
+) -> list[tuple[float, float]]:
+    """By input: share of what its past leaves that past noise explains, and its F probability."""
+    own = np.vstack([past(u, order + LAGS, range(1, order + 1)) for u, _ in pairs])
+    moved = np.vstack([past(e, LAGS, range(1, LAGS + 1)) for e in noise])
+    targets = np.vstack([u[:, order + LAGS :].T for u, _ in pairs])
+    left = _left(own, np.hstack([targets, moved]))
+    n_in, n_moved = targets.shape[1], moved.shape[1]
+    fresh, moved = left[:, :n_in], left[:, n_in:]
+    rest = _left(moved, fresh)
+    free = len(own) - own.shape[1] - n_moved
+    tiny = np.finfo(float).tiny
+    found = []
+    for k in range(n_in):
+        whole = max(float(fresh[:, k] @ fresh[:, k]), tiny)
+        share = max(0.0, 1.0 - float(rest[:, k] @ rest[:, k]) / whole)
+        f = share / n_moved / max((1.0 - share) / free, tiny)
+        found.append((share, float(stats.f.sf(f, n_moved, free))))
+    return found
+
+
+def _left(known: Array, targets: Array) -> Array:
+    """What least squares on the known columns leave of the targets."""
+    size = np.maximum(np.sqrt(np.sum(known**2, axis=0)), np.finfo(float).tiny)
+    columns = known / size
+    factor = linalg.cho_factor(columns.T @ columns + RIDGE * np.eye(columns.shape[1]))
+    weights = linalg.cho_solve(factor, columns.T @ targets)
+    return np.asarray(targets - columns @ weights)
