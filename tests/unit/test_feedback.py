@@ -1,0 +1,104 @@
+"""One feedback test: what it says of open and closed loops, and who carries its answer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.errors import OptionError
+from flightid.responses.store import from_xarray, to_xarray
+from flightid.uncertainty.feedback import LEVEL, FeedbackTest, find_feedback
+from tests.feedback_flights import DT, flight
+
+
+def _test(kind: str, **options: float) -> FeedbackTest:
+    u, y = flight(kind, **options)  # type: ignore[arg-type]
+    return find_feedback([(u - u.mean())[None]], [(y - y.mean())[None]], ["u"])
+
+
+def _record(kind: str, **options: float) -> fid.Record:
+    u, y = flight(kind, n=1500, seed=3, **options)  # type: ignore[arg-type]
+    return fid.Record.from_arrays(np.arange(u.size) * DT, inputs={"u": u}, outputs={"y": y})
+
+
+@pytest.mark.parametrize("kind", ["white", "held", "repeating prbs", "multistep"])
+def test_open_loops_with_light_damping_are_called_closed_no_more_than_stated(kind: str) -> None:
+    alarms = [
+        _test(kind, n=800, seed=seed, zeta=0.02, pole=0.98 * (seed % 2)).is_closed
+        for seed in range(25)
+    ]
+    # At 1 % nominal, three of 25 has a chance of 2e-3.
+    assert sum(alarms) < 3
+
+
+@pytest.mark.parametrize("kind", ["white", "prbs", "sweep", "held", "multistep"])
+def test_closed_loops_are_found(kind: str) -> None:
+    for seed in range(5):
+        found = _test(kind, n=2000, seed=seed, size=0.3, gain=1.0, integral=1.0, pole=0.9)
+        assert found.is_closed
+        assert found.p_value is not None
+        assert found.p_value < LEVEL
+
+
+def test_noise_free_and_short_records_are_not_called_closed() -> None:
+    assert _test("sweep", n=1200, seed=0, size=0.0).source == "no noise"
+    short = _test("white", n=40, seed=0)
+    assert (short.loop, short.source) == ("unknown", "too short")
+
+
+def test_inputs_that_repeat_exactly_are_open_whatever_else_is_seen() -> None:
+    response = fid.estimate_response(_record("repeating prbs", zeta=0.02), window_s=20.0)
+    assert response.loop is not None
+    assert (response.loop.loop, response.loop.source) == ("open", "repeats")
+
+
+def test_the_input_that_feedback_moves_is_named() -> None:
+    u, y = flight("white", n=3000, seed=1, size=0.3, gain=1.0, integral=1.0, pole=0.9)
+    free = np.random.default_rng(0).standard_normal(u.size)
+    found = find_feedback([np.vstack([free, u])], [np.vstack([y, free])], ["free", "fed"])
+    assert (found.loop, found.input) == ("closed", "fed")
+
+
+def test_several_records_count_as_one_sample() -> None:
+    parts = [flight("white", n=500, seed=s, size=0.5, gain=1.0, pole=0.9) for s in range(8)]
+    one = find_feedback([parts[0][0][None]], [parts[0][1][None]], ["u"])
+    all_of_them = find_feedback([u[None] for u, _ in parts], [y[None] for _, y in parts], ["u"])
+    assert all_of_them.p_value is not None
+    assert one.p_value is not None
+    assert all_of_them.p_value < 0.01 * one.p_value
+
+
+def test_a_response_carries_the_answer_and_a_file_keeps_it() -> None:
+    response = fid.estimate_response(_record("white", size=0.5, gain=1.0, pole=0.9), window_s=10.0)
+    assert response.loop is not None
+    assert response.loop.is_closed
+    assert "loop-closed" in {finding.code for finding in response.findings}
+    again = from_xarray(to_xarray(response))
+    assert (again.loop, again.input_shape) == (response.loop, response.input_shape)
+
+
+def test_a_declared_loop_overrides_the_test() -> None:
+    record = _record("white", size=0.5, gain=1.0, pole=0.9)
+    for response in (
+        fid.estimate_response(record, window_s=10.0, loop="open"),
+        fid.estimate_response(record.declare(loop="open"), window_s=10.0),
+    ):
+        assert str(response.loop) == "loop open, as declared"
+        assert "loop-closed" not in {finding.code for finding in response.findings}
+    closed = fid.estimate_response(_record("white").declare(loop="closed"), window_s=10.0)
+    assert "a loop was closed, as declared" in str(closed.findings[-1])
+    with pytest.raises(OptionError, match="loop is not known"):
+        fid.estimate_response(record, window_s=10.0, loop="half")  # type: ignore[arg-type]
+
+
+def test_an_instrument_needs_no_open_loop() -> None:
+    u, y = flight("white", n=1500, seed=3, size=0.5, gain=1.0, pole=0.9)
+    r = u + 1.0 * np.concatenate([[0.0], y[:-1]])
+    record = fid.Record.from_arrays(
+        np.arange(u.size) * DT, inputs={"u": u}, outputs={"y": y}, excitations={"r": r}
+    )
+    response = fid.estimate_response(record, method="instrument", window_s=10.0)
+    assert response.loop is not None
+    assert response.loop.source == "instrument"
+    assert not response.loop.is_closed
