@@ -13,7 +13,7 @@ from scipy.optimize import minimize_scalar
 import flightid as fid
 from flightid.control.margins.disk_geometry import gain_limits, phase_limit_deg
 from flightid.control.margins.disk_margin import alphas_of
-from flightid.control.margins.matrix_loop import read_loops, spread_at
+from flightid.control.margins.matrix_loop import read_loops, uncertain_at
 from flightid.control.margins.structured_gain import structured_gain
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
 from flightid.responses.errors.random_error import Known
@@ -285,7 +285,7 @@ def test_what_outputs_share_in_their_errors_is_carried():
         response, None, None, controller=None, at="outputs", band_rad_s=None, unstable_poles=None
     )
     omega = response.omega_rad_s[2:6]
-    covariance = spread_at(loops, omega).covariance
+    covariance = uncertain_at(loops, omega).covariance
     own = response.covariance_at(omega)
     half = len(covariance) // 2
     for k in range(2):
