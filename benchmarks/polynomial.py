@@ -144,7 +144,7 @@ def _scan_rows(n: int) -> list[tuple[str, float, float | None, float | None, str
 
 def _fit_row() -> tuple[str, float, float | None, float | None, str]:
     record = flown(2, 2000)
-    structure = fid.PolynomialModel.armax("y", "u", na=3, nb=3, nc=2)
+    structure = fid.PolynomialModel.armax("u", "y", na=3, nb=3, nc=2)
     ours = _seconds(lambda: fid.identify(structure, record))
     name = "one ARMAX(3, 3, 2), N = 2000: statsmodels exact likelihood"
     if importlib.util.find_spec("statsmodels") is None:

@@ -57,7 +57,7 @@ def run() -> Table:
         record = flown(1, n)
         for method in ("moesp", "n4sid", "cva"):
             structure = fid.InnovationsModel.subspace(
-                "y", "u", ORDER, method=method, horizon=HORIZON, offsets="none", refine=False
+                "u", "y", ORDER, method=method, horizon=HORIZON, offsets="none", refine=False
             )
             ours = _seconds(lambda s=structure, r=record: fid.identify(s, r))
             theirs = _seconds(lambda m=method, r=record: _peer(r, m)) if has_peer else None

@@ -51,4 +51,4 @@ def swept(
     phase = BAND[0] * 40.0 / ratio * np.expm1(time_s / 40.0 * ratio)
     moment = 0.03 * np.sin(phase) * np.minimum(1.0, np.minimum(time_s, 40.0 - time_s) / 2.0)
     flown = _flown(model, moment, seed, noise)
-    return fid.estimate_response(flown, omega_rad_s=(*BAND, 30), window_s=window_s)
+    return fid.estimate_response(flown, band_rad_s=BAND, n_omega=30, window_s=window_s)

@@ -226,7 +226,7 @@ def _bandwidths(fit: fid.Fit, closed: fid.ClosedLoop) -> fid.Table:
         for name, source in (("off", fit), ("on", closed.uncertain)):
             try:
                 found = fid.attitude_bandwidth(
-                    source, axis.attitude, stick, output_is=kind, band_rad_s=BAND_RAD_S
+                    source, stick, axis.attitude, output_is=kind, band_rad_s=BAND_RAD_S
                 )
             except FlightidError as error:
                 # An unstable vehicle has no bandwidth: its phase begins below -135 degrees.

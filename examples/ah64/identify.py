@@ -99,7 +99,7 @@ def study(seed: int, *, short: bool = False) -> Results:
         names=["identified", "full-envelope"],
         initial_state="estimate",
         outputs=OUTPUTS,
-        response=response,
+        responses=response,
     )
     return Results(response, coherent, heave, reduction, fit, comparison, augment(fit))
 
@@ -115,19 +115,19 @@ def identified(
         "before inflow": fid.identify(
             _heave().with_fixed(tau_lead=INFLOW_OFF, tau_lag=INFLOW_OFF),
             response,
-            omega_rad_s=BEFORE_RAD_S,
+            band_rad_s=BEFORE_RAD_S,
         ),
-        "after inflow": fid.identify(_heave(), response, omega_rad_s=AFTER_RAD_S),
+        "after inflow": fid.identify(_heave(), response, band_rad_s=AFTER_RAD_S),
     }
     start = candidate(seed).with_responses(*coherent.names)
     start = start.with_values({p: heave["after inflow"].parameters[p].value for p in HEAVE_KEPT})
     # The path of the reduction needs neither intervals nor corrections: the last fit has both.
     plain = replace(response, errors=None, linear=None)
-    rough = fid.identify(start, plain, omega_rad_s=coherent.bands, correct_bias=False)
+    rough = fid.identify(start, plain, band_rad_s=coherent.bands, correct_bias=False)
     reduction = fid.reduce(
         rough, plain, keep=HEAVE_KEPT, maximum_cost_rise_percent=5.0, after_rise="next"
     )
-    fit = fid.identify(reduction.fit.model, response, omega_rad_s=coherent.bands)
+    fit = fid.identify(reduction.fit.model, response, band_rad_s=coherent.bands)
     return response, coherent, heave, reduction, fit
 
 
@@ -143,8 +143,8 @@ def _estimate(flown: list[fid.Record], n_frequencies: int) -> fid.FrequencyRespo
         flown,
         inputs=INPUTS,
         outputs=(*OUTPUTS, "w"),
-        excitation=[f"sweep_{name}" for name in INPUTS],
-        method="instrument",
+        excitations=[f"sweep_{name}" for name in INPUTS],
+        estimator="instrument",
         omega_rad_s=np.geomspace(*AFTER_RAD_S, n_frequencies),
     )
 

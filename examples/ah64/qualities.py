@@ -27,7 +27,7 @@ def main(seed: str = "1") -> None:
         found = fid.handling_qualities(source, axes=AXES, band_rad_s=BAND_RAD_S)
         print(f"{name}: {found!r}")
         print(found.summary(), end="\n\n")
-    roll = fid.lower_order(fit, "p", "lat", kind="roll", band_rad_s=(1.0, 10.0))
+    roll = fid.lower_order(fit, "lat", "p", kind="roll", band_rad_s=(1.0, 10.0))
     print(roll.summary())
 
 

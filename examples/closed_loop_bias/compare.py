@@ -22,10 +22,10 @@ def relative_error(seed: int, method: str) -> np.ndarray:
         flight.record((3.0, 72.0)),
         inputs="tau_phi",
         outputs="p",
-        excitation="excitation" if method == "instrument" else None,
+        excitations="excitation" if method == "instrument" else None,
         omega_rad_s=OMEGA,
         window_s=12.0,
-        method=method,
+        estimator=method,
         covariance=False,
     )
     return response.response[0, 0] / flight.truth("roll").frequency_response(OMEGA) - 1

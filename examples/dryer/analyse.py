@@ -23,12 +23,12 @@ SAMPLE_TIME_S = 0.08
 P = fid.PolynomialModel
 EXPECTED = {
     "OE": (
-        P.oe("temperature", "voltage", nb=2, nf=2, nk=3, initial_state="zero"),
+        P.oe("voltage", "temperature", nb=2, nf=2, nk=3, initial_state="zero"),
         {"b3": 0.06296, "b4": 0.05397, "f1": -1.24108, "f2": 0.36682},
         0.008795,
     ),
     "BJ": (
-        P.bj("temperature", "voltage", nb=2, nc=2, nd=2, nf=2, nk=3, initial_state="zero"),
+        P.bj("voltage", "temperature", nb=2, nc=2, nd=2, nf=2, nk=3, initial_state="zero"),
         {
             "b3": 0.06725, "b4": 0.03981, "f1": -1.31434, "f2": 0.43329,
             "c1": 0.6761, "c2": -0.0169, "d1": -0.2791, "d2": -0.5975,
@@ -36,7 +36,7 @@ EXPECTED = {
         0.0014736,
     ),
     "ARMAX": (
-        P.armax("temperature", "voltage", na=2, nb=2, nc=2, nk=3, initial_state="zero"),
+        P.armax("voltage", "temperature", na=2, nb=2, nc=2, nk=3, initial_state="zero"),
         {
             "a1": -1.30693, "a2": 0.42382, "b3": 0.06706, "b4": 0.04049,
             "c1": -0.33973, "c2": 0.09661,
@@ -52,7 +52,7 @@ SINGULAR_VALUES = (69.8841, 14.9963, 3.6675, 1.9677, 0.3000, 0.2078)
 
 def print_subspace(record: fid.Record) -> None:
     structure = fid.InnovationsModel.subspace(
-        "temperature", "voltage", 4, horizon=15, direct=True, offsets="none", refine=False
+        "voltage", "temperature", 4, horizon=15, direct=True, offsets="none", refine=False
     )
     order = fid.identify(structure, record).order
     print("PO-MOESP singular values")

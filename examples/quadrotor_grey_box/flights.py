@@ -198,7 +198,7 @@ def doublets_of(log: fid.Log) -> list[fid.Record]:
     return [
         log.record(
             names=(*COMMANDS, *RATES),
-            span=(last + start - 1.0, last + start + WATCHED_S - 1.0),
+            span_s=(last + start - 1.0, last + start + WATCHED_S - 1.0),
             name=f"{command} doublet",
         )
         for command, start, _ in DOUBLETS

@@ -78,7 +78,7 @@ def gains(fits: Mapping[str, fid.Fit], *, draws: int, seed: int) -> Gains:
         Of the draws.
     """
     options = {
-        "requirements": fid.TuningRequirements(noise_growth=None), "rate": "raw",
+        "requirements": fid.TuningRequirements(noise_growth=None), "gyro": "raw",
         "band_rad_s": BAND_RAD_S, "draws": draws, "seed": seed,
     }  # fmt: skip
     alone = {

@@ -71,9 +71,10 @@ def in_frequency(name: str, records: Sequence[fid.Record]) -> fid.Fit:
         records,
         inputs=inputs,
         outputs=outputs,
-        excitation=[f"sweep_{each}" for each in inputs],
-        method="instrument",
-        omega_rad_s=(*BAND_RAD_S, 50),
+        excitations=[f"sweep_{each}" for each in inputs],
+        estimator="instrument",
+        band_rad_s=BAND_RAD_S,
+        n_omega=50,
     )
     box = grey_box(name)
     effects = dict(zip([p for p in box.parameters if "t" in p], box.pairs, strict=True))

@@ -62,8 +62,8 @@ def identify(log: fid.Log, axis: str) -> fid.Fit:
     run = next(each for each in log.sid_runs if each.axis == 10 + AXES.index(axis))
     record = log.record(names=[command, rate], sid_run=run)
     response = fid.estimate_response(
-        [record], inputs=[command], outputs=[rate], excitation="excitation", method="instrument",
-        omega_rad_s=(*BAND_RAD_S, 60), window_s=[40, 20],
+        [record], inputs=[command], outputs=[rate], excitations="excitation",
+        estimator="instrument", band_rad_s=BAND_RAD_S, n_omega=60, window_s=[40, 20],
     )  # fmt: skip
     model = fid.load_model(
         YAW_MODEL if axis == "yaw" else "rate_motor_lag", axis=None if axis == "yaw" else axis

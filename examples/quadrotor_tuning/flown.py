@@ -62,7 +62,7 @@ def _margins(
         units={channel: record.channels[channel].unit, "chirp": record.channels[channel].unit},
     )  # fmt: skip
     response = fid.estimate_response(
-        [channels], inputs=["chirp"], outputs=[channel], method="composite",
-        omega_rad_s=(*band, 120), window_s=[40, 20, 10],
+        [channels], inputs=["chirp"], outputs=[channel], estimator="composite",
+        band_rad_s=band, n_omega=120, window_s=[40, 20, 10],
     )  # fmt: skip
-    return fid.margins(response, channel, "chirp", given=given)
+    return fid.margins(response, "chirp", channel, given=given)

@@ -71,7 +71,7 @@ def bandwidths(fit: fid.Fit, closed: fid.ClosedLoop) -> fid.Table:
         for name, source in (("off", fit), ("on", closed.uncertain)):
             try:
                 band = fid.attitude_bandwidth(
-                    source, attitude, stick, band_rad_s=(0.5, 60.0), sign=1 if gain > 0 else -1
+                    source, stick, attitude, band_rad_s=(0.5, 60.0), sign=1 if gain > 0 else -1
                 )
             except FlightidError as error:
                 rows.append((f"{attitude}/{stick}", name, None, None, error.problem))

@@ -54,10 +54,11 @@ def estimate(plan: Plan, records: Sequence[fid.Record]) -> fid.FrequencyResponse
         records,
         inputs=INPUTS,
         outputs=OUTPUTS,
-        excitation=[f"sweep_{name}" for name in INPUTS],
-        method="instrument",
+        excitations=[f"sweep_{name}" for name in INPUTS],
+        estimator="instrument",
         window_s=(longest, longest / 2.0, longest / 5.0),
-        omega_rad_s=(4.0 * np.pi / longest, 26.0, 36),
+        band_rad_s=(4.0 * np.pi / longest, 26.0),
+        n_omega=36,
     )
 
 

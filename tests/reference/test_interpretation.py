@@ -83,7 +83,7 @@ def test_sampling_zeros_are_not_called_non_minimum_phase():
 
 def test_a_fit_brings_intervals_to_every_meaning():
     record = flown(SINGLE, 1, n=600, noise=0.2)
-    fit = fid.identify(fid.InnovationsModel.subspace("y", "u", 2, offsets="none"), record)
+    fit = fid.identify(fid.InnovationsModel.subspace("u", "y", 2, offsets="none"), record)
     found = fid.interpret(fit)
     (mode,) = found.resonances
     low, high = mode.root.natural_frequency.interval95
@@ -116,7 +116,7 @@ def test_time_constants_turn_intervals_over():
     u, e = drawn.standard_normal((2, 400))
     record = fid.Record.from_arrays(np.arange(400) / 10, inputs={"u": u}, outputs={"y": e})
     record = record.replace({"y": truth.simulate(record) + 0.1 * e})
-    fit = fid.identify(P.oe("y", "u", nb=1, nf=1), record)
+    fit = fid.identify(P.oe("u", "y", nb=1, nf=1), record)
     tau = fid.interpret(fit).roots[0].time_constant
     omega = fit.modes[0].natural_frequency
     assert_close(tau.interval95, [1 / omega.interval95[1], 1 / omega.interval95[0]], rtol=1e-12,

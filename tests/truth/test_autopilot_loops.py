@@ -107,8 +107,8 @@ def test_feedback_and_forward_are_the_recursions_own(
     loop = _random_loop(autopilot, axis, rng, per_loop)
     omega = np.geomspace(2.0, 0.95 * np.pi * LOOP_HZ, 9)
     for of, linear in (
-        ("rate", -loop.feedback(omega, hold=False)),
-        ("setpoint", loop.forward(omega, hold=False)),
+        ("rate", -loop.feedback(omega, with_hold=False)),
+        ("setpoint", loop.forward(omega, with_hold=False)),
     ):
         exact = _measured(loop, omega, of=of, per_loop=per_loop)
         why = f"{of} of {loop}: one is the transform of the other"
@@ -118,10 +118,10 @@ def test_feedback_and_forward_are_the_recursions_own(
 def test_hold_and_delay_follow_their_closed_forms() -> None:
     omega = np.array([3.0, 50.0, 400.0])
     loop = replace(axis_loop("arducopter", "roll", loop_rate_hz=LOOP_HZ), computation_delay_s=1e-3)
-    ratio = loop.feedback(omega) / loop.feedback(omega, hold=False)
+    ratio = loop.feedback(omega) / loop.feedback(omega, with_hold=False)
     hold = (1 - np.exp(-1j * omega / LOOP_HZ)) / (1j * omega / LOOP_HZ)
     assert_close(ratio, hold * np.exp(-1j * omega * 1e-3), rtol=1e-12, why="held for one loop")
-    ratio = loop.forward(omega) / loop.forward(omega, hold=False)
+    ratio = loop.forward(omega) / loop.forward(omega, with_hold=False)
     assert_close(ratio, hold * np.exp(-1j * omega * 1e-3), rtol=1e-12, why="same for set-points")
     assert_close(
         loop.angle(omega), 4.5 * np.exp(-1j * omega / LOOP_HZ), rtol=1e-12, why="one loop late"
@@ -135,7 +135,7 @@ def test_continuous_limit_is_the_textbook_pid() -> None:
     s = 1j * omega
     low_pass = {f: 1 / (1 + s / (2 * np.pi * f)) for f in (20.0, 30.0)}
     expected = low_pass[30.0] * (0.135 + 0.135 / s + 0.0036 * s * low_pass[20.0])
-    found = loop.feedback(omega, gyro="filtered", hold=False)
+    found = loop.feedback(omega, gyro="filtered", with_hold=False)
     assert_close(found, expected, rtol=2e-3, why="time steps of 10 µs")
 
 

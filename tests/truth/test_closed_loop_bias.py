@@ -25,10 +25,10 @@ def _errors(method: str) -> NDArray[np.complex128]:
             flight.record((3.0, 72.0)),
             inputs="tau_phi",
             outputs="p",
-            excitation="excitation" if method == "instrument" else None,
+            excitations="excitation" if method == "instrument" else None,
             omega_rad_s=OMEGA,
             window_s=12.0,
-            method=method,
+            estimator=method,
             covariance=False,
         )
         truth = flight.truth("roll").frequency_response(OMEGA)

@@ -92,10 +92,11 @@ def _estimate(records: list[fid.Record]) -> fid.FrequencyResponse:
         records,
         inputs=("lon", "col"),
         outputs=("u", "q", "theta", "w"),
-        excitation=("sweep_lon", "sweep_col"),
-        method="instrument",
+        excitations=("sweep_lon", "sweep_col"),
+        estimator="instrument",
         window_s=(20.0, 10.0, 5.0),
-        omega_rad_s=(0.7, 12.0, 24),
+        band_rad_s=(0.7, 12.0),
+        n_omega=24,
     )
 
 
@@ -104,7 +105,7 @@ def _fit(seed: int) -> fid.Fit:
     kept = fid.coherent_pairs(response)
     start = HOVER.with_values({name: 1.1 * value for name, value in TRUTH.items()})
     return fid.identify(
-        start.with_responses(*kept.names), response, omega_rad_s=kept.bands, hold="first"
+        start.with_responses(*kept.names), response, band_rad_s=kept.bands, hold="first"
     )
 
 
@@ -125,9 +126,10 @@ def test_errors_of_an_output_and_its_late_copy_are_one(method: str) -> None:
         record,
         inputs="u",
         outputs=("late", "y"),
-        excitation="r" if method == "instrument" else None,
-        omega_rad_s=(4.0, 40.0, 9),
-        method=method,
+        excitations="r" if method == "instrument" else None,
+        band_rad_s=(4.0, 40.0),
+        n_omega=9,
+        estimator=method,
     )
     assert response.errors is not None
     places = np.arange(response.n_frequencies)
@@ -168,7 +170,7 @@ def test_a_response_from_a_file_does_not_know_what_outputs_share(tmp_path: Path)
     response = _estimate(_fly(0)).select(outputs=["q", "theta"], inputs=["lon"])
     known = {name: TRUTH[name] for name in ("Mw", "Mcol", "Zw", "Zlon", "Zcol")}
     model = HOVER.with_fixed(**known).with_responses("q/lon", "theta/lon")
-    options = {"omega_rad_s": (0.8, 8.0), "correct_bias": False}
+    options = {"band_rad_s": (0.8, 8.0), "correct_bias": False}
     stored = read_response(write_response(response, tmp_path / "response.nc"))
     fits = [fid.identify(model, each, **options) for each in (response, stored)]
     codes = [{finding.code for finding in fit.findings} for fit in fits]

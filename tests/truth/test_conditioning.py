@@ -73,7 +73,7 @@ def test_filter_agrees_with_scipy() -> None:
     random = np.random.default_rng(0).standard_normal(3000)
     record = Record.from_arrays(TIME_S, outputs={"y": random})
     sections = signal.butter(3, [1, 8], "bandpass", fs=RATE_HZ, output="sos")
-    found = c.filter_record(record, (1.0, 8.0), band="bandpass", order=3)["y"]
+    found = c.filter_record(record, (1.0, 8.0), kind="bandpass", order=3)["y"]
     assert_close(found, signal.sosfiltfilt(sections, random), atol=1e-12, why="same filter")
     taps = signal.firwin(61, 8.0, fs=RATE_HZ)
     found = c.filter_record(record, 8.0, design="fir", order=60, zero_phase=False)["y"]
@@ -85,7 +85,7 @@ def test_constants_pass_or_vanish(band: str) -> None:
     record = Record.from_arrays(TIME_S, outputs={"y": np.full(3000, 4.0)})
     cutoff = 5.0 if band == "highpass" else (5.0, 10.0)
     for zero_phase in (True, False):
-        found = c.filter_record(record, cutoff, band=band, zero_phase=zero_phase)["y"]
+        found = c.filter_record(record, cutoff, kind=band, zero_phase=zero_phase)["y"]
         expected = 0.0 if band == "highpass" else 4.0
         assert_close(found, expected, atol=1e-8, why="no transient from a steady start")
 
@@ -338,7 +338,7 @@ AIR = Record.from_arrays(
         (lambda: c.detrend(BASE, "trim"), DataError, "channel 'p' has no trim value"),
         (lambda: c.detrend(BASE, channels=["x"]), UnknownNameError, "no such channel: found x"),
         (lambda: c.filter_record(BASE, 60.0), OptionError, "does not suit a lowpass filter"),
-        (lambda: c.filter_record(BASE, 5.0, band="notch"), OptionError, "band is not known"),
+        (lambda: c.filter_record(BASE, 5.0, kind="notch"), OptionError, "band is not known"),
         (lambda: c.filter_record(BASE, 5.0, design="x"), OptionError, "filter design is not known"),
         (lambda: c.filter_record(BASE, 5.0, order=13), OptionError, "order is out of range"),
         (
@@ -347,7 +347,7 @@ AIR = Record.from_arrays(
             "order of an FIR filter is not even: found 5",
         ),
         (
-            lambda: c.filter_record(BASE, (8.0, 2.0), band="bandpass"),
+            lambda: c.filter_record(BASE, (8.0, 2.0), kind="bandpass"),
             OptionError,
             "cut-offs are not in order",
         ),

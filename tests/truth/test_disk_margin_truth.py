@@ -280,7 +280,7 @@ def test_what_outputs_share_in_their_errors_is_carried():
         inputs=dict(zip(("u1", "u2"), inputs, strict=True)),
         outputs=dict(zip(("y1", "y2"), outputs, strict=True)),
     )
-    response = fid.estimate_response(record, omega_rad_s=(5.0, 60.0, 8), window_s=4.0)
+    response = fid.estimate_response(record, band_rad_s=(5.0, 60.0), n_omega=8, window_s=4.0)
     loops = read_loops(
         response, None, None, controller=None, at="outputs", band_rad_s=None, unstable_poles=None
     )

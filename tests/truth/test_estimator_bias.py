@@ -29,7 +29,7 @@ START = MODEL.with_values({"Ltphi": 140.0, "Lp": -5.0, "T_m": 0.03, "tau": 0.01}
 WINDOWS = {
     "composite": {},
     "single window": {"window_s": 10.0},
-    "local polynomial": {"method": "local_polynomial"},
+    "local polynomial": {"estimator": "local_polynomial"},
 }
 # How far the uncorrected gain is off at least: the effect that the correction takes out.
 LEAST_BIAS = {"composite": 0.02, "single window": 0.02, "local polynomial": 2e-4}
@@ -53,7 +53,7 @@ def flown(noise: float = 0.0, seed: int = 0) -> fid.Record:
 
 
 def estimated(record: fid.Record, way: str = "composite") -> fid.FrequencyResponse:
-    return fid.estimate_response(record, omega_rad_s=(*BAND, 60), **WINDOWS[way])
+    return fid.estimate_response(record, band_rad_s=BAND, n_omega=60, **WINDOWS[way])
 
 
 def assert_recovered(fit: fid.Fit, truth: dict[str, float], rtol: float, why: str) -> None:
@@ -112,7 +112,7 @@ def loop_flight(noise: float, seed: int = 0) -> fid.Record:
 
 
 def loop_response(record: fid.Record) -> fid.FrequencyResponse:
-    return fid.estimate_response(record, omega_rad_s=(*BAND, 60), method="instrument")
+    return fid.estimate_response(record, band_rad_s=BAND, n_omega=60, estimator="instrument")
 
 
 def test_closed_loop_by_instrument() -> None:
@@ -142,7 +142,7 @@ def test_a_record_may_begin_in_motion_and_out_of_trim() -> None:
         outputs={"p": whole["p"][part] - 0.3},
         units={"p": "rad/s"},
     )
-    response = fid.estimate_response(record, omega_rad_s=(2.0, 8.0, 40))
+    response = fid.estimate_response(record, band_rad_s=(2.0, 8.0), n_omega=40)
     fit = fid.identify(START, response, hold="first")
     # Of the inputs before the first sample, four delayed ones are not known.
     assert_recovered(fit, TRUTH, 2e-3, "initial state and trims are fitted")
@@ -169,12 +169,12 @@ def test_two_inputs_two_outputs_two_records_and_selections() -> None:
         shaped -= np.linspace(0, 1, n) * shaped[:, -1:]
         given = fid.Record.from_arrays(np.arange(n) / 50.0, inputs={"u": shaped[0], "w": shaped[1]})
         records.append(fid.simulate(truth, given))
-    response = fid.estimate_response(records, omega_rad_s=(1.0, 20.0, 60), window_s=8.0)
+    response = fid.estimate_response(records, band_rad_s=(1.0, 20.0), n_omega=60, window_s=8.0)
     start = truth.with_values({"K1": 2.5, "K4": 3.0, "T": 0.2})
     values = {name: float(p.value or 0.0) for name, p in truth.parameters.items()}
     plain = fid.identify(start, response, correct_bias=False, minimum_coherence=None)
     assert abs(plain.parameters["K2"].value / values["K2"] - 1) > 1e-3
-    turned = response.select(outputs=["y", "x"], inputs=["w", "u"], omega=(2.0, 15.0))
+    turned = response.select(outputs=["y", "x"], inputs=["w", "u"], band_rad_s=(2.0, 15.0))
     for data in (response, turned):
         fit = fid.identify(start, data, hold="first", minimum_coherence=None)
         assert_recovered(fit, values, 1e-6, "all pairs of two records")
@@ -182,10 +182,10 @@ def test_two_inputs_two_outputs_two_records_and_selections() -> None:
 
 def test_the_functional_is_the_derivative_of_a_single_window_estimate() -> None:
     record = flown(0.02)
-    response = fid.estimate_response(record, omega_rad_s=(*BAND, 20), window_s=10.0)
+    response = fid.estimate_response(record, band_rad_s=BAND, n_omega=20, window_s=10.0)
     change = np.cumsum(np.random.default_rng(3).standard_normal(record.n_samples))
     moved = record.replace({"p": record["p"] + change})
-    again = fid.estimate_response(moved, omega_rad_s=(*BAND, 20), window_s=10.0)
+    again = fid.estimate_response(moved, band_rad_s=BAND, n_omega=20, window_s=10.0)
     assert response.linear is not None
     found = response.linear.apply([change[None]])
     difference = again.response - response.response
@@ -200,7 +200,7 @@ def test_where_nothing_is_known_the_fit_says_why(tmp_path: Path) -> None:
         "result of arithmetic": add_delay(response, 0.0),
         "read from a file": read_response(write_response(response, tmp_path / "r.nc")),
         "covariance=False": fid.estimate_response(
-            flown(0.001), omega_rad_s=(*BAND, 60), covariance=False
+            flown(0.001), band_rad_s=BAND, n_omega=60, covariance=False
         ),
     }
     for words, data in cases.items():

@@ -42,9 +42,9 @@ def test_intervals_of_flown_sweeps_cover_the_truth() -> None:
             units={"p": "rad/s"},
         )
         response = fid.estimate_response(
-            record, omega_rad_s=(1.5, 50.0, 120), method="local_polynomial"
+            record, band_rad_s=(1.5, 50.0), n_omega=120, estimator="local_polynomial"
         )
-        fit = fid.identify(truth, response, omega_rad_s=(1.5, 45.0))
+        fit = fid.identify(truth, response, band_rad_s=(1.5, 45.0))
         assert fit.intervals_from == "response covariance"
         for name, value in TRUTH.items():
             found = fit.parameters[name]

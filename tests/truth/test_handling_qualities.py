@@ -43,7 +43,7 @@ def measured(tau: float, lag: float, n: int, high: float = 60.0) -> fid.Frequenc
 def test_printed_values(case: tuple[float, float]) -> None:
     crossing, phase, gain, delay = CASES[case]
     for source, digits in ((model(*case), 0.5), (measured(*case, 20000), 0.6)):
-        found = attitude_bandwidth(source, "phi", "lat")
+        found = attitude_bandwidth(source, "lat", "phi")
         why = "printed digits"
         assert_close(found.omega_180_rad_s, crossing, atol=digits * 1e-5, why=why)
         assert_close(found.phase_bandwidth_rad_s, phase, atol=digits * 1e-5, why=why)
@@ -58,7 +58,7 @@ def test_printed_values(case: tuple[float, float]) -> None:
 def test_against_the_equations() -> None:
     tau, lag = 0.07, 0.15
     crossing = brentq(lambda w: w * tau + np.arctan(w * lag) - np.pi / 2, 0.1, 50, xtol=1e-14)
-    found = attitude_bandwidth(model(tau, lag), "phi", "lat")
+    found = attitude_bandwidth(model(tau, lag), "lat", "phi")
     assert_close(found.omega_180_rad_s, crossing, rtol=1e-11, why="the phase equation")
     twice = 2.0 * crossing
     beyond = np.degrees(twice * tau + np.arctan(twice * lag)) - 90.0
@@ -69,7 +69,7 @@ def test_against_the_equations() -> None:
 
 
 def test_points_of_a_flight_are_joined_by_lines() -> None:
-    found = attitude_bandwidth(measured(0.1, 0.3, 40), "phi", "lat")
+    found = attitude_bandwidth(measured(0.1, 0.3, 40), "lat", "phi")
     exact = CASES[(0.1, 0.3)]
     assert_close(found.omega_180_rad_s, exact[0], rtol=5e-3, why="40 points")
     assert found.phase_delay_s is not None
@@ -77,7 +77,7 @@ def test_points_of_a_flight_are_joined_by_lines() -> None:
 
 
 def test_what_the_band_does_not_show_is_said() -> None:
-    short = attitude_bandwidth(measured(0.1, 0.3, 200, high=8.0), "phi", "lat")
+    short = attitude_bandwidth(measured(0.1, 0.3, 200, high=8.0), "lat", "phi")
     assert short.phase_delay_s is None
     assert [finding.code for finding in short.findings] == ["phase-delay"]
     assert short.phase_slope_delay_s is not None
@@ -86,7 +86,7 @@ def test_what_the_band_does_not_show_is_said() -> None:
     assert_close(
         short.phase_slope_delay_s, -slope / 114.6, rtol=2e-3, why="as far as the band goes"
     )
-    late = attitude_bandwidth(model(0.1, 0.3), "phi", "lat", band_rad_s=(2.0, 30.0))
+    late = attitude_bandwidth(model(0.1, 0.3), "lat", "phi", band_rad_s=(2.0, 30.0))
     assert late.gain_bandwidth_rad_s is not None
     rising = fid.FrequencyResponse.from_values(
         np.array([1.0, 2.0, 4.0, 8.0, 16.0]),
@@ -95,14 +95,14 @@ def test_what_the_band_does_not_show_is_said() -> None:
         outputs=["phi"],
         units={"phi": "rad"},
     )
-    flat = attitude_bandwidth(rising, "phi", "lat")
+    flat = attitude_bandwidth(rising, "lat", "phi")
     assert flat.gain_bandwidth_rad_s is None
     assert "gain-bandwidth" in [finding.code for finding in flat.findings]
     assert flat.bandwidth_rad_s == flat.phase_bandwidth_rad_s
     json.dumps(flat.to_dict(), allow_nan=False)
     assert "–" in str(flat.summary())
     assert "<table" in flat._repr_html_()
-    nearer = attitude_bandwidth(measured(0.1, 0.3, 200, high=6.0), "phi", "lat")
+    nearer = attitude_bandwidth(measured(0.1, 0.3, 200, high=6.0), "lat", "phi")
     assert repr(nearer).startswith("AttitudeBandwidth(phi/lat, 2.142 rad/s, phase delay unknown")
     assert "phase-slope" in [finding.code for finding in nearer.findings]
     chart = rating_chart("attitude_bandwidth", axis="yaw", task="other", speed="hover")
@@ -111,23 +111,23 @@ def test_what_the_band_does_not_show_is_said() -> None:
 
 def test_refusals() -> None:
     with pytest.raises(DataError, match="has no bandwidth in the band"):
-        attitude_bandwidth(model(0.1, 0.3), "phi", "lat", band_rad_s=(0.1, 3.0))
+        attitude_bandwidth(model(0.1, 0.3), "lat", "phi", band_rad_s=(0.1, 3.0))
     with pytest.raises(DataError, match="has no bandwidth in the band"):
-        attitude_bandwidth(model(0.1, 0.3, gain=-2.0), "phi", "lat", band_rad_s=(0.1, 3.0))
+        attitude_bandwidth(model(0.1, 0.3, gain=-2.0), "lat", "phi", band_rad_s=(0.1, 3.0))
     with pytest.raises(DataError, match="begin the band lower"):
-        attitude_bandwidth(model(0.1, 0.3), "phi", "lat", band_rad_s=(3.0, 30.0))
+        attitude_bandwidth(model(0.1, 0.3), "lat", "phi", band_rad_s=(3.0, 30.0))
     with pytest.raises(DataError, match="no points in the band"):
-        attitude_bandwidth(measured(0.1, 0.3, 50), "phi", "lat", band_rad_s=(80.0, 90.0))
+        attitude_bandwidth(measured(0.1, 0.3, 50), "lat", "phi", band_rad_s=(80.0, 90.0))
     with pytest.raises(OptionError, match="band_rad_s has no meaning"):
-        attitude_bandwidth(model(0.1, 0.3), "phi", "lat", band_rad_s=(3.0, 1.0))
+        attitude_bandwidth(model(0.1, 0.3), "lat", "phi", band_rad_s=(3.0, 1.0))
     with pytest.raises(UnknownNameError, match="no such channel"):
-        attitude_bandwidth(model(0.1, 0.3), "psi", "lat")
+        attitude_bandwidth(model(0.1, 0.3), "lat", "psi")
     with pytest.raises(OptionError, match="response_type is not known"):
-        attitude_bandwidth(model(0.1, 0.3), "phi", "lat", response_type="acceleration")
+        attitude_bandwidth(model(0.1, 0.3), "lat", "phi", response_type="acceleration")
     with pytest.raises(OptionError, match="output_is is not known"):
-        attitude_bandwidth(model(0.1, 0.3), "phi", "lat", output_is="p")
+        attitude_bandwidth(model(0.1, 0.3), "lat", "phi", output_is="p")
     with pytest.raises(OptionError, match="sign has no meaning"):
-        attitude_bandwidth(model(0.1, 0.3), "phi", "lat", sign=0)
+        attitude_bandwidth(model(0.1, 0.3), "lat", "phi", sign=0)
 
 
 def test_a_rate_is_integrated_and_a_sign_turned() -> None:
@@ -136,23 +136,23 @@ def test_a_rate_is_integrated_and_a_sign_turned() -> None:
     rate = fid.FrequencyResponse.from_values(
         omega, -1j * omega * response.response[0, 0], inputs=["lat"], outputs=["p"]
     )
-    found = attitude_bandwidth(rate, "p", "lat", output_is="rate", sign=-1)
-    plain = attitude_bandwidth(response, "phi", "lat")
+    found = attitude_bandwidth(rate, "lat", "p", output_is="rate", sign=-1)
+    plain = attitude_bandwidth(response, "lat", "phi")
     assert_close(found.uncertain.numbers, plain.uncertain.numbers, rtol=1e-9, why="attitude")
     first = fid.load_model("rate_first_order")
-    as_rate = attitude_bandwidth(first, "p", "tau_phi", output_is="rate")
+    as_rate = attitude_bandwidth(first, "tau_phi", "p", output_is="rate")
     attitude = fid.load_model("attitude_first_order").with_values(
         {name: first.parameters[name].value for name in ("Lp", "Ltphi", "tau")}
     )
-    as_angle = attitude_bandwidth(attitude, "phi", "tau_phi")
+    as_angle = attitude_bandwidth(attitude, "tau_phi", "phi")
     assert_close(as_rate.uncertain.numbers, as_angle.uncertain.numbers, rtol=1e-9, why="p = s phi")
 
 
 def test_a_control_of_the_other_sign_is_told() -> None:
     turned = model(0.1, 0.3, gain=-2.0)
-    wrong = attitude_bandwidth(turned, "phi", "lat")
+    wrong = attitude_bandwidth(turned, "lat", "phi")
     assert "sign-doubtful" in [finding.code for finding in wrong.findings]
-    right = attitude_bandwidth(turned, "phi", "lat", sign=-1)
+    right = attitude_bandwidth(turned, "lat", "phi", sign=-1)
     assert right.findings == ()
     assert_close(right.phase_bandwidth_rad_s, 2.14214, atol=1e-5, why="printed digits")
 
@@ -164,8 +164,8 @@ def test_what_counts_depends_on_the_response_type() -> None:
         (fid.TransferFunction("phi", "lat", "K", ("T*s + 1",), ("s",), "tau"),),
         fid.Parameters(parameters),
     )
-    rate = attitude_bandwidth(flat, "phi", "lat", response_type="rate")
-    attitude = attitude_bandwidth(flat, "phi", "lat", response_type="attitude")
+    rate = attitude_bandwidth(flat, "lat", "phi", response_type="rate")
+    attitude = attitude_bandwidth(flat, "lat", "phi", response_type="attitude")
     gain = rate.gain_bandwidth_rad_s
     assert gain is not None
     level = np.hypot(1.0 / rate.omega_180_rad_s, 0.5) * 10.0**0.3
@@ -180,7 +180,7 @@ def test_what_counts_depends_on_the_response_type() -> None:
 
 def test_slope_of_the_phase_is_the_least_squares_line() -> None:
     tau, lag = 0.1, 0.3
-    found = attitude_bandwidth(model(tau, lag), "phi", "lat")
+    found = attitude_bandwidth(model(tau, lag), "lat", "phi")
     low = found.omega_180_rad_s
     omega = np.linspace(low, 2.0 * low, 20001)
     phase = -90.0 - np.degrees(omega * tau + np.arctan(omega * lag))
@@ -196,7 +196,7 @@ def test_phase_that_is_no_line_is_said_and_its_slope_counts() -> None:
     response = fid.FrequencyResponse.from_values(
         omega, np.exp(1j * phase) / omega, inputs=["lat"], outputs=["phi"]
     )
-    found = attitude_bandwidth(response, "phi", "lat")
+    found = attitude_bandwidth(response, "lat", "phi")
     assert found.nonlinear
     assert found.rated_delay_s == found.phase_slope_delay_s != found.phase_delay_s
     assert "phase-nonlinear" in [finding.code for finding in found.findings]
@@ -217,7 +217,7 @@ def test_smoothing_keeps_parabolas_and_averages_noise() -> None:
     assert 0.1 < middle < 0.5
     without = fid.FrequencyResponse.from_values(omega, 1.0 / omega, inputs=["lat"], outputs=["phi"])
     assert smoother_of(without, pair) is None
-    assert smoother_of(given.select(omega=omega[:4]), pair) is None
+    assert smoother_of(given.select(omega_rad_s=omega[:4]), pair) is None
 
 
 def test_low_coherence_and_several_crossings_are_said() -> None:
@@ -231,7 +231,7 @@ def test_low_coherence_and_several_crossings_are_said() -> None:
         outputs=["phi"],
         coherence=np.where((omega > 4.0) & (omega < 7.0), 0.4, 0.9),
     )
-    codes = [finding.code for finding in attitude_bandwidth(noisy, "phi", "lat").findings]
+    codes = [finding.code for finding in attitude_bandwidth(noisy, "lat", "phi").findings]
     assert {"low-coherence", "several-crossings"} <= set(codes)
     assert "noisy-crossing" not in codes
     uncertain = fid.FrequencyResponse.from_values(
@@ -241,17 +241,17 @@ def test_low_coherence_and_several_crossings_are_said() -> None:
         outputs=["phi"],
         random_error=np.full((1, 1, len(omega)), 0.05),
     )
-    told = attitude_bandwidth(uncertain, "phi", "lat").findings
+    told = attitude_bandwidth(uncertain, "lat", "phi").findings
     assert [finding.code for finding in told] == ["noisy-crossing"]
 
 
 def test_black_box_models_and_systems_are_read_to_nyquist() -> None:
     continuous = fid.load_model("attitude_first_order")
     sampled = continuous.linear_system().sampled(0.002)
-    exact = attitude_bandwidth(continuous, "phi", "tau_phi", band_rad_s=(0.3, 100.0))
-    found = attitude_bandwidth(sampled, "phi", "tau_phi", band_rad_s=(0.3, 1e4))
+    exact = attitude_bandwidth(continuous, "tau_phi", "phi", band_rad_s=(0.3, 100.0))
+    found = attitude_bandwidth(sampled, "tau_phi", "phi", band_rad_s=(0.3, 1e4))
     delayed = continuous.with_values({"tau": continuous.parameters["tau"].value + 0.001})
-    half_sample = attitude_bandwidth(delayed, "phi", "tau_phi", band_rad_s=(0.3, 100.0))
+    half_sample = attitude_bandwidth(delayed, "tau_phi", "phi", band_rad_s=(0.3, 100.0))
     assert found.curve.omega[-1] < np.pi / 0.002
     assert_close(
         found.uncertain.numbers, half_sample.uncertain.numbers, rtol=2e-3, why="half a sample"
@@ -271,14 +271,14 @@ def test_intervals_are_those_of_the_parameters() -> None:
         random_error=np.full((1, 1, 60), 0.02),
     )
     fit = fid.identify(truth, data)
-    found = attitude_bandwidth(fit, "phi", "lat")
+    found = attitude_bandwidth(fit, "lat", "phi")
     names = list(fit.names)
     step = {"tau": 1e-6, "T": 1e-6, "K": 1e-6}
     slope = np.array(
         [
             (
-                attitude_bandwidth(_moved(fit, name, step[name]), "phi", "lat").uncertain.numbers
-                - attitude_bandwidth(_moved(fit, name, -step[name]), "phi", "lat").uncertain.numbers
+                attitude_bandwidth(_moved(fit, name, step[name]), "lat", "phi").uncertain.numbers
+                - attitude_bandwidth(_moved(fit, name, -step[name]), "lat", "phi").uncertain.numbers
             )
             / (2.0 * step[name])
             for name in names
@@ -309,7 +309,7 @@ def test_intervals_of_a_measured_response_are_those_of_its_errors() -> None:
         outputs=["phi"],
         random_error=random_error,
     )
-    found = attitude_bandwidth(given, "phi", "lat")
+    found = attitude_bandwidth(given, "lat", "phi")
     random = np.random.default_rng(3)
     pair = Pair("phi", "lat", 0.1, 100.0)
     smoother = smoother_of(given, pair)

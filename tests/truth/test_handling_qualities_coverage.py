@@ -64,11 +64,11 @@ def flight(seed: int, noise_share: float = NOISE) -> fid.Record:
 
 
 def response_of(record: fid.Record) -> fid.FrequencyResponse:
-    return fid.estimate_response(record, omega_rad_s=(*BAND, 70), window_s=(10.0, 20.0))
+    return fid.estimate_response(record, band_rad_s=BAND, n_omega=70, window_s=(10.0, 20.0))
 
 
 def bandwidth_of(source: object) -> tuple[np.ndarray, np.ndarray]:
-    found = fid.attitude_bandwidth(source, "p", "lat", output_is="rate", band_rad_s=BAND)
+    found = fid.attitude_bandwidth(source, "lat", "p", output_is="rate", band_rad_s=BAND)
     assert found.uncertain.stderr is not None
     return found.uncertain.numbers, found.uncertain.stderr
 
@@ -83,7 +83,7 @@ def equivalent_of(source: object) -> tuple[np.ndarray, np.ndarray]:
 def true_bandwidth() -> np.ndarray:
     return np.array(
         fid.attitude_bandwidth(
-            vehicle(), "p", "lat", output_is="rate", band_rad_s=BAND
+            vehicle(), "lat", "p", output_is="rate", band_rad_s=BAND
         ).uncertain.numbers
     )
 

@@ -15,7 +15,7 @@ def coverage(runs, *, feedback=0.0, n=500):
     """Share of runs whose intervals hold frequency, damping and gain."""
     mode, gain = SINGLE.modes()[0], SINGLE.gains()["y/u"]
     method = "pbsid" if feedback else "moesp"
-    structure = fid.InnovationsModel.subspace("y", "u", 2, method=method, offsets="none")
+    structure = fid.InnovationsModel.subspace("u", "y", 2, method=method, offsets="none")
     inside = {"frequency": [], "damping": [], "gain": []}
     for seed in range(runs):
         record = flown(SINGLE, seed, n=n, noise=0.5, feedback=feedback)

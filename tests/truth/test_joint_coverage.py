@@ -19,7 +19,7 @@ def test_joint_intervals_cover_the_truth(window_s: str | list[float]) -> None:
     for seed in range(FLIGHTS):
         response = swept(truth, 2 * seed, noise=0.3, window_s=window_s)
         record = flight(truth, 2 * seed + 1, noise=0.3)
-        fit = fid.identify(truth, (response, record), omega_rad_s=BAND)
+        fit = fid.identify(truth, (response, record), band_rad_s=BAND)
         alone = fid.identify(truth, record)
         for name in fit.names:
             low, high = fit.parameters[name].interval95

@@ -97,7 +97,7 @@ def test_a_limited_loop_agrees_with_adaptive_integration() -> None:
     found = loop.simulate(steps(2.0, 0.02, 400))
     assert np.max(np.abs(found["a"])) == 1.0
     assert_close(found["y"], wanted.y[0], atol=2e-4, why="second order in steps of 20 ms")
-    fine = loop.simulate(steps(2.0, 0.02, 400), step_s=0.002)
+    fine = loop.simulate(steps(2.0, 0.02, 400), maximum_step_s=0.002)
     assert_close(fine["y"], wanted.y[0], atol=1e-5, why="less at a tenth of the step")
 
 
@@ -116,7 +116,7 @@ def test_an_actuator_with_rate_limit_agrees_with_adaptive_integration() -> None:
     )  # fmt: skip
     found = loop.simulate(steps(r, 0.01, 500))
     assert_close(found["x"], wanted.y[0], atol=1e-3, why="second order in steps of 10 ms")
-    fine = loop.simulate(steps(r, 0.01, 500), step_s=0.001)
+    fine = loop.simulate(steps(r, 0.01, 500), maximum_step_s=0.001)
     assert_close(fine["x"], wanted.y[0], atol=2e-5, why="less at a tenth of the step")
     assert np.max(np.abs(np.diff(found["w"]))) <= 0.005 * (1 + 1e-9)
 
@@ -226,7 +226,7 @@ def test_refuses_runs_without_meaning() -> None:
     with pytest.raises(OptionError, match="hold is not known"):
         loop.simulate(steps(1.0, 0.1), hold="cubic")
     with pytest.raises(OptionError, match="step of the simulation"):
-        loop.simulate(steps(1.0, 0.1), step_s=0.0)
+        loop.simulate(steps(1.0, 0.1), maximum_step_s=0.0)
     with pytest.raises(UnknownNameError, match="a signal to keep is no signal"):
         loop.simulate(steps(1.0, 0.1), outputs=["q"])
     with pytest.raises(OptionError, match="belongs to no one block"):
@@ -245,7 +245,7 @@ def test_refuses_runs_without_meaning() -> None:
             steps(1.0, 0.1 / np.pi)
         )
     with pytest.raises(OptionError, match="the simulation is too long"):
-        loop.simulate(steps(1.0, 1.0), step_s=1e-7)
+        loop.simulate(steps(1.0, 1.0), maximum_step_s=1e-7)
     stiff = fid.connect(
         [L.sum_of("e", "r", "-y"), L.gain("e", "u", 5.0), L.limiter("u", "y", 9.0)], inputs=["r"]
     )

@@ -90,7 +90,7 @@ def test_the_cost_is_the_mismatch() -> None:
 
 def test_short_period_of_the_navion() -> None:
     navion = fid.load_model("short_period")
-    found = fid.lower_order(navion, "q", "elevator", kind="short_period", airspeed_m_s=53.645)
+    found = fid.lower_order(navion, "elevator", "q", kind="short_period", airspeed_m_s=53.645)
     mode = fid.modes(navion).mode("short period")
     assert_close(found.value("omega"), mode.natural_frequency.value, rtol=1e-6, why="its mode")
     assert_close(found.value("zeta"), mode.damping_ratio.value, rtol=1e-6, why="its mode")
@@ -99,7 +99,7 @@ def test_short_period_of_the_navion() -> None:
     a, b, c, d, _ = navion.state_space()
     steady = (d - c @ np.linalg.solve(a, b))[:, 0]
     n_alpha = steady[navion.outputs.index("nz")] / steady[navion.outputs.index("alpha")]
-    exact = fid.lower_order(navion, "q", "elevator", kind="short_period", n_alpha=n_alpha)
+    exact = fid.lower_order(navion, "elevator", "q", kind="short_period", n_alpha=n_alpha)
     assert_close(found.value("n_alpha"), n_alpha, rtol=0.05, why="but for the tail's lift")
     assert_close(
         exact.value("cap"), mode.natural_frequency.value**2 / n_alpha, rtol=1e-6, why="definition"
@@ -107,7 +107,7 @@ def test_short_period_of_the_navion() -> None:
     keys = [rating.chart.key for rating in exact.ratings()]
     assert "control_anticipation" in keys
     assert all(rating.text == "Level 1" for rating in exact.ratings())
-    known = fid.lower_order(navion, "q", "elevator", kind="short_period", t_theta2_s=0.52)
+    known = fid.lower_order(navion, "elevator", "q", kind="short_period", t_theta2_s=0.52)
     assert "inverse_T_theta2" not in known.names
     assert_close(known.value("T_theta2"), 0.52, rtol=1e-9, why="held")
     assert "control_anticipation" not in [rating.chart.key for rating in known.ratings()]
@@ -117,12 +117,12 @@ def test_short_period_of_the_navion() -> None:
 
 def test_what_the_structure_lacks_is_said() -> None:
     lateral = fid.load_model("fixed_wing_lateral")
-    poor = fid.lower_order(lateral, "r", "rudder", kind="yaw")
+    poor = fid.lower_order(lateral, "rudder", "r", kind="yaw")
     assert poor.mismatch_cost > 100.0
     codes = [finding.code for finding in poor.findings]
     assert "equivalent-system-mismatch" in codes
     assert poor.mismatch.findings[0].light.value == "red"
-    better = fid.lower_order(lateral, "r", "rudder", kind="yaw_spiral", band_rad_s=(0.03, 10.0))
+    better = fid.lower_order(lateral, "rudder", "r", kind="yaw_spiral", band_rad_s=(0.03, 10.0))
     assert better.mismatch_cost < 10.0
     spiral = fid.modes(lateral).mode("spiral").real.value
     assert_close(better.value("spiral"), spiral, rtol=0.01, why="the roll mode cancels")
@@ -183,7 +183,7 @@ def test_intervals_of_a_measured_response_are_those_of_its_fit() -> None:
         place = found.names.index(name)
         assert found.uncertain.stderr is not None
         assert_close(found.uncertain.stderr[place], parameter.stderr, rtol=1e-9, why="the same")
-    part = noisy("dutch_roll", 0.02, 3).select(omega=(1.0, 6.0))
+    part = noisy("dutch_roll", 0.02, 3).select(band_rad_s=(1.0, 6.0))
     cut = fid.lower_order(part, kind="dutch_roll")
     assert "equivalent-system-band" in [finding.code for finding in cut.findings]
 
@@ -203,7 +203,7 @@ def test_refusals() -> None:
     with pytest.raises(UnknownNameError, match="there is no such parameter"):
         fid.lower_order(vehicle, kind="roll", fixed={"zeta": 1.0})
     with pytest.raises(UnknownNameError, match="there is no such channel"):
-        fid.lower_order(vehicle, "q", "u", kind="roll")
+        fid.lower_order(vehicle, "u", "q", kind="roll")
     with pytest.raises(OptionError, match="the source has several channels"):
         fid.lower_order(fid.load_model("short_period"), kind="short_period")
     with pytest.raises(DataError, match="too few points for an equivalent system"):

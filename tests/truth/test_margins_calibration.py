@@ -104,7 +104,7 @@ MARGINS = ("crossover", "phase_margin", "gain_margin", "delay_margin")
 def test_a_flight_is_the_loop_it_is_said_to_be():
     record = flight(0)
     found = fid.estimate_response(
-        record, inputs=["e"], outputs=["p"], method="instrument", omega_rad_s=OMEGA
+        record, inputs=["e"], outputs=["p"], estimator="instrument", omega_rad_s=OMEGA
     )
     exact = broken_loop().frequency_response(OMEGA)[0, 0]
     z = np.exp(1j * OMEGA * STEP_S)
@@ -121,7 +121,7 @@ def test_intervals_of_measured_loops_cover():
     direct, inverse = {}, {}
     for seed in range(FLIGHTS):
         record = flight(seed)
-        loop = estimated(record, inputs=["e"], outputs=["p"], method="instrument")
+        loop = estimated(record, inputs=["e"], outputs=["p"], estimator="instrument")
         covered(fid.margins(loop), truth, MARGINS, direct)
         covered(fid.disturbance_rejection(loop), rejected, ("bandwidth",), direct)
         error = estimated(record, inputs=["r"], outputs=["e"])
@@ -142,7 +142,7 @@ def test_intervals_of_fits_cover():
             flight(seed),
             inputs=model.inputs,
             outputs=model.outputs,
-            method="instrument",
+            estimator="instrument",
             omega_rad_s=OMEGA,
         )
         fit = fid.identify(model, response, hold="zero")

@@ -67,7 +67,7 @@ def test_the_controller_flown_again_gives_the_actuators_commands() -> None:
 def estimate(record: fid.Record) -> fid.Fit:
     response = fid.estimate_response(
         fid.open_loop(record, damper()), inputs=["lat"], outputs=["p"],
-        excitation=["lat_stick"], method="instrument", omega_rad_s=np.geomspace(0.5, 15.0, 25),
+        excitations=["lat_stick"], estimator="instrument", omega_rad_s=np.geomspace(0.5, 15.0, 25),
     )  # fmt: skip
     return fid.identify(bare(), response)
 

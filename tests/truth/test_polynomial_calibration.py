@@ -14,12 +14,12 @@ BOX = P("y", ("u",), 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]], c=[1, 0.4], d=[1, 
 OUTPUT_ERROR = P("y", ("u",), 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]])
 REGRESSION = P("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
 CASES = {
-    "arx": (REGRESSION, P.arx("y", "u", na=2, nb=2)),
-    "armax": (ARMAX, P.armax("y", "u", na=2, nb=2, nc=2)),
-    "oe": (OUTPUT_ERROR, P.oe("y", "u", nb=2, nf=2)),
-    "bj": (BOX, P.bj("y", "u", nb=2, nc=1, nd=1, nf=2)),
-    "iv4": (BOX, P.arx("y", "u", na=2, nb=2, method="iv4")),
-    "armax backcast": (ARMAX, P.armax("y", "u", na=2, nb=2, nc=2, backcast=True)),
+    "arx": (REGRESSION, P.arx("u", "y", na=2, nb=2)),
+    "armax": (ARMAX, P.armax("u", "y", na=2, nb=2, nc=2)),
+    "oe": (OUTPUT_ERROR, P.oe("u", "y", nb=2, nf=2)),
+    "bj": (BOX, P.bj("u", "y", nb=2, nc=1, nd=1, nf=2)),
+    "iv4": (BOX, P.arx("u", "y", na=2, nb=2, method="iv4")),
+    "armax backcast": (ARMAX, P.armax("u", "y", na=2, nb=2, nc=2, backcast=True)),
 }
 
 

@@ -10,7 +10,7 @@ from flightid import _native
 from tests.regression_flights import DEVIATIONS, fly, noisy, short_period, values
 
 FLIGHTS = 200
-BAND = {"omega_rad_s": (0.0, 15.0)}
+BAND = {"band_rad_s": (0.0, 15.0)}
 GUSTS = np.array([0.03, 0.15])
 """Deviations of the noise on the derivatives of angle of attack and pitch rate, per √Hz."""
 

@@ -73,9 +73,9 @@ CASES = {
     "two inputs": ({"window_s": 1.2}, 2, False),
     "composite": ({"window_s": [1.6, 0.8]}, 1, False),
     "composite, two inputs": ({"window_s": [1.6, 0.8]}, 2, False),
-    "instrument": ({"window_s": 1.2, "method": "instrument"}, 1, True),
-    "local polynomial": ({"method": "local_polynomial"}, 1, False),
-    "local polynomial, two inputs": ({"method": "local_polynomial"}, 2, False),
+    "instrument": ({"window_s": 1.2, "estimator": "instrument"}, 1, True),
+    "local polynomial": ({"estimator": "local_polynomial"}, 1, False),
+    "local polynomial, two inputs": ({"estimator": "local_polynomial"}, 2, False),
 }
 
 
@@ -106,7 +106,7 @@ def _linear_map(case: str) -> tuple[FrequencyResponse, tuple[np.ndarray, ...]]:
     def estimate(noise: np.ndarray, *, covariance: bool = False) -> FrequencyResponse:
         flown = [_fly(g, v, loop) for g, v in zip(given, noise, strict=True)]
         return estimate_response(
-            flown, omega_rad_s=(12.0, 50.0, 4), covariance=covariance, **options
+            flown, band_rad_s=(12.0, 50.0), n_omega=4, covariance=covariance, **options
         )
 
     response = estimate(base, covariance=True)
@@ -170,15 +170,17 @@ def test_the_noise_spectrum_is_unbiased_and_free_of_leakage() -> None:
 def test_covariance_follows_selection_and_is_refused_when_huge() -> None:
     given = _records(600, 2, 1, False)[0]
     record = _fly(given, np.random.default_rng(0).standard_normal(600), False)
-    response = estimate_response(record, omega_rad_s=(8.0, 40.0, 6), window_s=1.2)
+    response = estimate_response(record, band_rad_s=(8.0, 40.0), n_omega=6, window_s=1.2)
     whole = response.covariance
-    part = response.select(inputs=["u1"], omega=response.omega_rad_s[[1, 4]])
+    part = response.select(inputs=["u1"], omega_rad_s=response.omega_rad_s[[1, 4]])
     rows = [7, 10, 19, 22]
     assert_close(part.covariance[0], whole[0][np.ix_(rows, rows)], rtol=1e-9, why="same errors")
     assert np.linalg.eigvalsh(whole[0]).min() > 0
-    without = estimate_response(record, omega_rad_s=(8.0, 40.0, 6), window_s=1.2, covariance=False)
+    without = estimate_response(
+        record, band_rad_s=(8.0, 40.0), n_omega=6, window_s=1.2, covariance=False
+    )
     assert without.covariance is None
-    fine = estimate_response(record, omega_rad_s=(8.0, 40.0, 2000), window_s=1.2)
+    fine = estimate_response(record, band_rad_s=(8.0, 40.0), n_omega=2000, window_s=1.2)
     with pytest.raises(DataError, match="too large to build"):
         _ = fine.covariance
 
@@ -190,12 +192,12 @@ def test_a_record_too_short_for_a_noise_spectrum_says_so() -> None:
     assert response.errors is None
     assert "no-covariance" in {finding.code for finding in response.findings}
     with pytest.raises(DataError, match="too short for local polynomials"):
-        estimate_response(record, omega_rad_s=[40.0], method="local_polynomial")
+        estimate_response(record, omega_rad_s=[40.0], estimator="local_polynomial")
 
 
 def _loop_over_flights(case: str, kind: str, flights: int) -> tuple[np.ndarray, np.ndarray]:
     options, n_inputs, loop = CASES[case]
-    options = {**options, "omega_rad_s": (6.0, 40.0, 8)}
+    options = {**options, "band_rad_s": (6.0, 40.0), "n_omega": 8}
     if "window_s" in options:
         options["window_s"] = 3.0 * np.asarray(options["window_s"])
     n = 2000

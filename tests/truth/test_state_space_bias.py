@@ -93,7 +93,7 @@ def response(record: fid.Record) -> fid.FrequencyResponse:
         outputs=["q", "theta", "w"],
         omega_rad_s=OMEGA,
         window_s=[20.0, 10.0],
-        method="composite",
+        estimator="composite",
     )
 
 
@@ -103,7 +103,7 @@ def fitted(record: fid.Record, **options: object) -> fid.Fit:
         START,
         response(record),
         hold="zero",
-        omega_rad_s=(0.7, 6.0),
+        band_rad_s=(0.7, 6.0),
         minimum_coherence=None,
         **options,
     )

@@ -46,7 +46,7 @@ def test_worst_margins_hold_for_the_true_plant() -> None:
         )
         assert design.exists
         found = loop_metrics(
-            grid, design.loop.feedback(grid, gyro="filtered", hold=False) * response
+            grid, design.loop.feedback(grid, gyro="filtered", with_hold=False) * response
         )
         worst = {
             name: design.promise("rate loop", name).worst

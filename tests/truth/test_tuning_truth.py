@@ -154,7 +154,7 @@ def test_margins_are_those_of_python_control() -> None:
     truth = rate_truth("roll")
     flown = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
     design = fid.tune_pid(
-        truth.system(), gains=flown, rate="raw", band_rad_s=(0.5, 120.0), nominal=True,
+        truth.system(), gains=flown, gyro="raw", band_rad_s=(0.5, 120.0), nominal=True,
         angle_loop=False,
     )  # fmt: skip
     assert design.exists
@@ -162,7 +162,8 @@ def test_margins_are_those_of_python_control() -> None:
     # The model's delay is taken to hold half a sample already, so python-control is given that.
     shifted = sample_plants([truth.system()], ["p"], ["tau_phi"], STEP_S, hold_in_model=True)
     loop = (
-        design.loop.feedback(omega, gyro="raw", hold=False) * shifted.responses(omega)[0][0, 0, 0]
+        design.loop.feedback(omega, gyro="raw", with_hold=False)
+        * shifted.responses(omega)[0][0, 0, 0]
     )
     gain_margin, phase_margin, *_ = control.stability_margins(control.frd(loop, omega))
     assert_close(

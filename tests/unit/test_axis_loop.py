@@ -65,7 +65,7 @@ def test_old_firmware_has_one_filter_on_the_error() -> None:
 def test_px4_without_gain_k_is_the_old_controller() -> None:
     known = {k: v for k, v in defaults("px4_multicopter", "roll").items() if k[-2:] != "_K"}
     loop = axis_loop("px4_multicopter", "roll", known, loop_rate_hz=250.0)
-    slope = loop.basis(OMEGA, hold=False)[0][2] / loop.gyro_response(OMEGA)
+    slope = loop.basis(OMEGA, with_hold=False)[0][2] / loop.gyro_response(OMEGA)
     exact = (1 - np.exp(-1j * OMEGA / 250.0)) * 250.0
     assert_close(slope, exact, rtol=1e-12, why="difference between loops, no filter")
 

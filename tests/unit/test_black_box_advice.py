@@ -139,20 +139,20 @@ def test_requests_that_cannot_be_met():
 
 def test_residual_tests_take_a_fit_and_count_its_coefficients():
     record = flown(ARMAX, 7, n=1500, noise=0.5)
-    good = fid.identify(P.armax("y", "u", na=2, nb=2, nc=2), record)
+    good = fid.identify(P.armax("u", "y", na=2, nb=2, nc=2), record)
     tests = fid.residual_tests(good)
     assert (tests.fitted_noise, tests.fitted_input) == (4, 2)
     assert [t.verdict.value for t in tests.tests[:2]] == ["pass", "pass"]
     assert tests.tests[0].degrees_of_freedom == 25 - 4
-    poor = fid.identify(P.arx("y", "u", na=1, nb=1), record)
+    poor = fid.identify(P.arx("u", "y", na=1, nb=1), record)
     assert fid.residual_tests(poor).tests[0].verdict.value == "fail"
 
 
 def test_output_error_and_instruments_promise_independence_only():
     record = flown(ARMAX, 8, n=1500, noise=0.5)
     for asked in (
-        P.oe("y", "u", nb=2, nf=2),
-        P.arx("y", "u", na=2, nb=2, method="iv4"),
+        P.oe("u", "y", nb=2, nf=2),
+        P.arx("u", "y", na=2, nb=2, method="iv4"),
     ):
         tests = fid.residual_tests(fid.identify(asked, record))
         assert not tests.tests[0].counts
@@ -167,13 +167,13 @@ def test_residuals_of_two_outputs_are_tested_against_each_other():
     y = lfilter([0.0, 1.0], [1, -0.5], u) + e
     z = lfilter([0.0, 0.3], [1, -0.8], u) + w + 0.5 * np.roll(e, 2)
     record = fid.Record.from_arrays(np.arange(2000) / 10, inputs={"u": u}, outputs={"y": y, "z": z})
-    fits = [fid.identify(P.bj(name, "u", nb=1, nf=1, nc=1, nd=1), record) for name in ("y", "z")]
+    fits = [fid.identify(P.bj("u", name, nb=1, nf=1, nc=1, nd=1), record) for name in ("y", "z")]
     tests = fid.residual_tests(fits)
     # The noise of y reaches z two samples later, never the other way round.
     assert tests.test("ε′ε", "z", "y").verdict.value == "fail"
     assert tests.test("ε′ε", "y", "z").verdict.value == "pass"
     assert fid.residual_tests(fits, outputs=["y"]).outputs == ("y",)
-    other = fid.identify(P.arx("z", "u", na=1, nb=1), flown(P("z", ("u",), 0.1, b=[[1.0]]), 1))
+    other = fid.identify(P.arx("u", "z", na=1, nb=1), flown(P("z", ("u",), 0.1, b=[[1.0]]), 1))
     with pytest.raises(DataError, match="fits of different records"):
         fid.residual_tests([fits[0], other])
 
@@ -187,8 +187,8 @@ def test_fits_with_other_lags_share_their_common_samples():
                  + np.random.default_rng(1).standard_normal(900)},
     )  # fmt: skip
     fits = [
-        fid.identify(P.arx("y", ["u", "v"], na=4, nb=4, nk=[1, 3]), more),
-        fid.identify(P.arx("z", "u", na=1, nb=1), more),
+        fid.identify(P.arx(["u", "v"], "y", na=4, nb=4, nk=[1, 3]), more),
+        fid.identify(P.arx("u", "z", na=1, nb=1), more),
     ]
     tests = fid.residual_tests(fits)
     assert tests.n_samples == 900 - 6
@@ -196,7 +196,7 @@ def test_fits_with_other_lags_share_their_common_samples():
 
 
 def test_the_pole_zero_map_has_ellipses():
-    fit = fid.identify(P.armax("y", "u", na=2, nb=2, nc=2), flown(ARMAX, 11, noise=0.3))
+    fit = fid.identify(P.armax("u", "y", na=2, nb=2, nc=2), flown(ARMAX, 11, noise=0.3))
     figure = plot.pole_zero(fit)
     # The circle, two clouds, an ellipse for each pole of the pair and for the zero.
     assert len(figure.data) == 6

@@ -92,7 +92,7 @@ def test_a_channel_that_ends_early_does_not_cut_the_record(tmp_path: Path) -> No
 
 def test_roles_can_be_changed_and_spans_cut(tmp_path: Path) -> None:
     log = _log(tmp_path, RATE={"ROut": np.sin(T), "R": np.cos(T)})
-    record = log.record(names=["tau_phi", "p", "q"], roles={"q": "other"}, span=(1.0, 3.0))
+    record = log.record(names=["tau_phi", "p", "q"], roles={"q": "other"}, span_s=(1.0, 3.0))
     assert record.outputs == ("p",)
     assert_close([record.time_s[0], record.time_s[-1]], [1.0, 3.0], atol=0.021, why="one sample")
 
@@ -100,9 +100,9 @@ def test_roles_can_be_changed_and_spans_cut(tmp_path: Path) -> None:
 def test_a_span_outside_the_log_is_refused(tmp_path: Path) -> None:
     log = _log(tmp_path, RATE={"ROut": np.sin(T), "R": np.cos(T)})
     with pytest.raises(DataError, match="do not cover the span"):
-        log.record(names=["tau_phi", "p"], span=(1.0, 30.0))
+        log.record(names=["tau_phi", "p"], span_s=(1.0, 30.0))
     with pytest.raises(DataError, match="has no samples in the span"):
-        log.record(names=["tau_phi", "p"], span=(10.0, 30.0))
+        log.record(names=["tau_phi", "p"], span_s=(10.0, 30.0))
 
 
 def test_a_named_channel_that_is_not_logged_is_refused(tmp_path: Path) -> None:
@@ -180,7 +180,7 @@ def test_unknown_names_are_refused() -> None:
 
 def test_quaternions_become_euler_angles(shared_data: Path) -> None:
     log = fid.read_log(shared_data / "logs" / "px4_quad_2016.ulg")
-    record = log.record(span=(115.0, 150.0))
+    record = log.record(span_s=(115.0, 150.0))
     # The estimator's roll is in control_state too, as another quaternion: compare through the rate.
     rate = np.gradient(record["theta"], record.sample_time_s)
     kinematic = record["q"] * np.cos(record["phi"]) - record["r"] * np.sin(record["phi"])

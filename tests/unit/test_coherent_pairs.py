@@ -52,7 +52,7 @@ def test_a_fit_takes_what_it_says() -> None:
         coherence=np.where(OMEGA > 1.0, 0.9, 0.1)[None, None],
     )
     chosen = fid.coherent_pairs(data)
-    fit = fid.identify(model, data, omega_rad_s=chosen.bands)
+    fit = fid.identify(model, data, band_rad_s=chosen.bands)
     assert fit.responses[0].band_rad_s == chosen.bands["p/tau_phi"]
 
 

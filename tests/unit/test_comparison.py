@@ -104,7 +104,7 @@ def test_refusals() -> None:
 
 
 def test_the_envelopes_come_with_a_measured_response() -> None:
-    alone = fid.verify(_lag(2.0), _flown(), response=_response())
+    alone = fid.verify(_lag(2.0), _flown(), responses=_response())
     assert alone.mismatch is not None
     assert alone.mismatch.inside_percent == (100.0,)
     assert "mismatch-envelopes" in {each.code for each in alone.findings}
@@ -115,7 +115,9 @@ def test_the_envelopes_come_with_a_measured_response() -> None:
 
 
 def test_pictures_show_every_model() -> None:
-    both = fid.verify([_lag(2.0), _lag(0.5)], _flown(), names=["near", "far"], response=_response())
+    both = fid.verify(
+        [_lag(2.0), _lag(0.5)], _flown(), names=["near", "far"], responses=_response()
+    )
     names = [trace.name for trace in pictures.comparison(both).data]
     assert names == ["input", "measured", "near", "far"]
     items = {name: each.mismatch for name, each in both.verifications.items()}

@@ -25,7 +25,7 @@ def fly(seed: int, *, offset: float = 0.0, curve: float = 0.0, name: str = "run"
 
 
 def linear_fit() -> fid.PolynomialFit:
-    return fid.identify(fid.PolynomialModel.armax("y", "u", na=2, nb=2, nc=2), fly(0))
+    return fid.identify(fid.PolynomialModel.armax("u", "y", na=2, nb=2, nc=2), fly(0))
 
 
 def test_numbers_are_those_of_the_prediction() -> None:

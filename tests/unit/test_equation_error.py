@@ -65,7 +65,7 @@ def test_delays_and_left_side_factors_are_found(method: str) -> None:
 
 
 def _band(method: str) -> dict[str, tuple[float, float]]:
-    return {} if method == "equation_error" else {"omega_rad_s": (0.0, 20.0)}
+    return {} if method == "equation_error" else {"band_rad_s": (0.0, 20.0)}
 
 
 def test_equation_error_is_numpy_least_squares_on_means_and_derivatives() -> None:
@@ -167,9 +167,9 @@ def test_what_cannot_be_fitted_is_refused_with_a_reason() -> None:
     with pytest.raises(DataError, match="too short"):
         fid.identify(short_period(), flight.segment(0.0, 0.2), method="equation_error")
     with pytest.raises(OptionError, match="band has no meaning"):
-        fid.identify(short_period(), flight, method="fourier_regression", omega_rad_s=(5.0, 1.0))
+        fid.identify(short_period(), flight, method="fourier_regression", band_rad_s=(5.0, 1.0))
     with pytest.raises(DataError, match="too few harmonics"):
-        fid.identify(short_period(), flight, method="fourier_output_error", omega_rad_s=(5.0, 5.5))
+        fid.identify(short_period(), flight, method="fourier_output_error", band_rad_s=(5.0, 5.5))
     with pytest.raises(UnknownNameError, match="process_noise names an unknown state"):
         fid.identify(short_period(), flight, method="filter_error", process_noise=["w"])
     with pytest.raises(ModelError, match="other than linearly"):

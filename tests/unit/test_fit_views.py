@@ -29,7 +29,7 @@ def fit() -> fid.Fit:
         units={"p": "rad/s"},
         random_error=np.full(60, 0.05),
     )
-    return fid.identify(model, data, omega_rad_s=(2.0, 20.0))
+    return fid.identify(model, data, band_rad_s=(2.0, 20.0))
 
 
 def test_figure_shows_data_and_model(fit: fid.Fit) -> None:

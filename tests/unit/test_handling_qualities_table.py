@@ -47,7 +47,7 @@ def test_a_rotorcraft_model_in_one_table() -> None:
     hover = fid.load_model("r50_hover")
     found = fid.handling_qualities(hover, signs={"pitch": -1}, band_rad_s=(1.0, 60.0))
     assert list(found.bandwidths) == ["roll", "pitch", "yaw"]
-    roll = fid.attitude_bandwidth(hover, "phi", "lat", band_rad_s=(1.0, 60.0))
+    roll = fid.attitude_bandwidth(hover, "lat", "phi", band_rad_s=(1.0, 60.0))
     assert_close(
         found.bandwidths["roll"].uncertain.numbers, roll.uncertain.numbers, rtol=1e-12, why="same"
     )
@@ -184,7 +184,7 @@ def test_charts_show_levels_and_the_region_of_the_estimate() -> None:
 
 
 def test_curves_mark_what_was_read() -> None:
-    found = fid.attitude_bandwidth(fitted(), "phi", "tau_phi")
+    found = fid.attitude_bandwidth(fitted(), "tau_phi", "phi")
     figure = bandwidth_curves(found)
     marked = {trace.name.split()[0]: trace for trace in figure.data if trace.mode == "markers"}
     assert marked["ω_180"].x[0] == found.omega_180_rad_s

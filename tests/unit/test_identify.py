@@ -125,13 +125,13 @@ def test_data_that_do_not_fit_the_model() -> None:
     with pytest.raises(DataError, match="has no band to fit"):
         fid.identify(MODEL, data_of(coherence=np.full(len(OMEGA), 0.3)))
     with pytest.raises(DataError, match="too few points to fit"):
-        fid.identify(MODEL, data_of(coherence=np.full(len(OMEGA), 0.3)), omega_rad_s=(1.0, 9.0))
+        fid.identify(MODEL, data_of(coherence=np.full(len(OMEGA), 0.3)), band_rad_s=(1.0, 9.0))
     with pytest.raises(DataError, match="too few points to fit"):
-        fid.identify(MODEL, data_of(), omega_rad_s=(100.0, 200.0))
+        fid.identify(MODEL, data_of(), band_rad_s=(100.0, 200.0))
     weak = fid.identify(
         MODEL,
         data_of(coherence=np.full(len(OMEGA), 0.3)),
-        omega_rad_s=(1.0, 9.0),
+        band_rad_s=(1.0, 9.0),
         minimum_coherence=None,
     )
     assert_close(weak.parameters["Lp"].value, -6.0, rtol=1e-8, why="no noise")
@@ -147,7 +147,7 @@ def test_data_that_do_not_fit_the_model() -> None:
         ({"weight_gain": -1.0}, "weight_gain has no meaning"),
         ({"weight_gain": 0.0, "weight_phase": 0.0}, "both weights are zero"),
         ({"maximum_iterations": 0}, "maximum_iterations is too small"),
-        ({"omega_rad_s": (9.0, 1.0)}, "band of response p/tau_phi has no meaning"),
+        ({"band_rad_s": (9.0, 1.0)}, "band of response p/tau_phi has no meaning"),
     ],
 )
 def test_options_without_meaning(options: dict[str, object], words: str) -> None:
@@ -156,12 +156,12 @@ def test_options_without_meaning(options: dict[str, object], words: str) -> None
 
 
 def test_bands_by_name() -> None:
-    fit = fid.identify(MODEL, data_of(), omega_rad_s={"p/tau_phi": (2.0, 20.0)})
+    fit = fid.identify(MODEL, data_of(), band_rad_s={"p/tau_phi": (2.0, 20.0)})
     low, high = fit.responses[0].band_rad_s
     assert 2.0 <= low < 2.2
     assert 19.0 < high <= 20.0
     with pytest.raises(UnknownNameError, match="a response that the model does not have"):
-        fid.identify(MODEL, data_of(), omega_rad_s={"q/u": (2.0, 20.0)})
+        fid.identify(MODEL, data_of(), band_rad_s={"q/u": (2.0, 20.0)})
 
 
 def test_kinds_without_a_fit_are_refused() -> None:
@@ -190,7 +190,7 @@ def test_guides_are_judged() -> None:
     assert "cost" in codes(wrong)
     assert wrong.findings[-1].light.value in {"amber", "green", "red"}
     narrow = fid.identify(
-        fid.load_model("rate_motor_lag"), data_of(), omega_rad_s=(1.0, 4.0), n_omega=40
+        fid.load_model("rate_motor_lag"), data_of(), band_rad_s=(1.0, 4.0), n_omega=40
     )
     assert {"insensitive", "cramer-rao", "correlated", "at-bound"} & set(codes(narrow))
 
@@ -237,5 +237,5 @@ def test_errors_shared_by_neighbours_widen_intervals() -> None:
     # One window of 4 s resolves 1.6 rad/s: points closer than that count less.
     data = data_of()
     windowed = replace(data, window_s=(4.0,))
-    alone, shared = (fid.identify(MODEL, d, omega_rad_s=(1.0, 8.0)) for d in (data, windowed))
+    alone, shared = (fid.identify(MODEL, d, band_rad_s=(1.0, 8.0)) for d in (data, windowed))
     assert shared.parameters["Lp"].stderr > 1.2 * alone.parameters["Lp"].stderr

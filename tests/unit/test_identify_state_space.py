@@ -130,13 +130,13 @@ def test_data_that_are_no_data() -> None:
     with pytest.raises(UnitError, match="channel r has another unit"):
         fitted(model, responses(units={**UNITS, "r": "deg/s"}))
     with pytest.raises(DataError, match="too few points to fit"):
-        fitted(model, responses(), omega_rad_s={"r/d": (50.0, 90.0)})
+        fitted(model, responses(), band_rad_s={"r/d": (50.0, 90.0)})
     poor = np.ones((2, 2, len(OMEGA)))
     poor[1, 0] = 0.2
     with pytest.raises(DataError, match="response r/a has no band to fit"):
         fitted(model, responses(coherence=poor))
     with pytest.raises(OptionError, match="band of response r/d has no meaning"):
-        fitted(model, responses(), omega_rad_s={"r/d": (9.0, 1.0)})
+        fitted(model, responses(), band_rad_s={"r/d": (9.0, 1.0)})
 
 
 def test_divergence_is_an_error_and_a_step_into_it_is_not() -> None:

@@ -20,7 +20,7 @@ OPEN = ("moesp", "n4sid", "cva")
 
 @pytest.fixture(scope="module")
 def noisy():
-    structure = M.subspace(("y", "z"), ("u", "v"), offsets="none", maximum_order=6)
+    structure = M.subspace(("u", "v"), ("y", "z"), offsets="none", maximum_order=6)
     records = [flown(PAIR, 1, n=600, noise=0.5), flown(PAIR, 2, n=300, noise=0.5)]
     return fid.identify(structure, records)
 
@@ -44,7 +44,7 @@ def test_noise_free_records_give_the_model_back(method, direct):
     d = np.array([[0.3, -0.2], [0.1, 0.4]]) if direct else None
     a, b, c, _, k = PAIR.matrices
     truth = M(PAIR.outputs, PAIR.inputs, 0.1, a, b, c, d, k, units=PAIR.units)
-    structure = M.subspace(("y", "z"), ("u", "v"), method=method, direct=direct, offsets="none")
+    structure = M.subspace(("u", "v"), ("y", "z"), method=method, direct=direct, offsets="none")
     fit = fid.identify(structure, [flown(truth, 1, n=300), flown(truth, 2, n=200)])
     assert fit.model.order == 4
     pulses = truth.pulse_response(30)
@@ -59,7 +59,7 @@ def test_unstable_models_are_found_too():
     a, b, c, _, k = SINGLE.matrices
     truth = M(("y",), ("u",), 0.1, a * 1.1, b, c, None, k)
     fit = fid.identify(
-        M.subspace("y", "u", 2, offsets="none", horizon=8),
+        M.subspace("u", "y", 2, offsets="none", horizon=8),
         [flown(truth, seed, n=80, noise=0.1, warm_up=0) for seed in range(4)],
     )
     assert_close(
@@ -71,7 +71,7 @@ def test_unstable_models_are_found_too():
 def test_order_is_found_and_refinement_lowers_the_loss(noisy):
     assert noisy.order.chosen == noisy.order.gap == noisy.order.smallest_bic == 4
     rough = fid.identify(
-        M.subspace(("y", "z"), ("u", "v"), 4, offsets="none", refine=False, maximum_order=6),
+        M.subspace(("u", "v"), ("y", "z"), 4, offsets="none", refine=False, maximum_order=6),
         noisy.records,
     )
     assert noisy.criteria.loss < rough.criteria.loss
@@ -85,7 +85,7 @@ def test_order_is_found_and_refinement_lowers_the_loss(noisy):
 
 def test_all_methods_end_in_the_same_optimum(noisy):
     for method in ("n4sid", "pbsid"):
-        structure = M.subspace(("y", "z"), ("u", "v"), 4, method=method, offsets="none")
+        structure = M.subspace(("u", "v"), ("y", "z"), 4, method=method, offsets="none")
         fit = fid.identify(structure, noisy.records)
         assert_close(fit.criteria.loss, noisy.criteria.loss, rtol=1e-6, why="one minimum")
 
@@ -96,7 +96,7 @@ def test_predictor_based_estimate_is_unbiased_under_feedback():
     error = {
         method: np.abs(
             fid.identify(
-                M.subspace("y", "u", 2, method=method, **options), record
+                M.subspace("u", "y", 2, method=method, **options), record
             ).model.pulse_response(15)
             - SINGLE.pulse_response(15)
         ).max()
@@ -124,7 +124,7 @@ def test_intervals_hold_the_truth_here(noisy):
 def test_units_scale_gains_and_their_errors_alike():
     record = flown(SINGLE, 1, n=400, noise=0.5)
     other = record.replace({"y": 1000.0 * record["y"]})
-    fits = [fid.identify(M.subspace("y", "u", 2), each) for each in (record, other)]
+    fits = [fid.identify(M.subspace("u", "y", 2), each) for each in (record, other)]
     one, many = (fit.gains["y/u"] for fit in fits)
     assert_close(many.value, 1000.0 * one.value, rtol=1e-6, why="same optimum")
     assert_close(many.stderr, 1000.0 * one.stderr, rtol=1e-4, why="same optimum")
@@ -195,23 +195,23 @@ def test_views_are_complete(noisy):
 )
 def test_options_outside_their_range_are_refused(change, problem):
     with pytest.raises(OptionError, match=problem):
-        M.subspace("y", "u", **change)
+        M.subspace("u", "y", **change)
 
 
 def test_channels_are_checked():
     with pytest.raises(OptionError, match="named twice"):
         M.subspace("y", "y")
     with pytest.raises(OptionError, match="no outputs or no inputs"):
-        M.subspace("y", ())
+        M.subspace((), "y")
 
 
 def test_records_that_cannot_do_are_refused():
     record = flown(SINGLE, 1, n=300, noise=0.1)
-    structure = M.subspace("y", "u")
+    structure = M.subspace("u", "y")
     with pytest.raises(DataError, match="too short for the horizon"):
-        fid.identify(M.subspace("y", "u", horizon=60), record)
+        fid.identify(M.subspace("u", "y", horizon=60), record)
     with pytest.raises(DataError, match="too short for the horizon"):
-        fid.identify(M.subspace("y", "u", horizon=110, method="pbsid"), record)
+        fid.identify(M.subspace("u", "y", horizon=110, method="pbsid"), record)
     sine = record.replace({"u": np.sin(record.time_s)})
     with pytest.raises(DataError, match="not persistently exciting"):
         fid.identify(structure, sine)
@@ -219,9 +219,9 @@ def test_records_that_cannot_do_are_refused():
         fid.identify(structure, record.replace({"u": np.full(300, 2.0)}))
     clean = flown(SINGLE, 1, n=300)
     with pytest.raises(DataError, match="order is larger than the records support"):
-        fid.identify(M.subspace("y", "u", 5, offsets="none"), clean)
+        fid.identify(M.subspace("u", "y", 5, offsets="none"), clean)
     with pytest.raises(DataError, match="not independent"):
-        fid.identify(M.subspace("y", "u", 2, method="pbsid", offsets="none"), clean)
+        fid.identify(M.subspace("u", "y", 2, method="pbsid", offsets="none"), clean)
 
 
 def test_models_that_contradict_themselves_are_refused():

@@ -10,7 +10,7 @@ from flightid.errors import DataError, FitError, OptionError
 from tests.closeness import assert_close
 from tests.joint_flights import BAND, flight, lag, swept
 
-FAST = {"omega_rad_s": BAND, "correct_bias": False}
+FAST = {"band_rad_s": BAND, "correct_bias": False}
 
 
 def _given(
@@ -72,7 +72,7 @@ def test_the_bias_of_the_estimate_is_taken_out() -> None:
     data = (swept(truth, 0, noise=1e-6), flight(truth, 1, noise=1e-3))
     errors = {}
     for corrected in (True, False):
-        fit = fid.identify(truth, data, omega_rad_s=BAND, correct_bias=corrected)
+        fit = fid.identify(truth, data, band_rad_s=BAND, correct_bias=corrected)
         errors[corrected] = abs(fit.parameters["Lp"].value / -5.0 - 1.0)
         assert fit.provenance["estimator_bias"]["applied"] is corrected
     assert errors[True] < 0.1 * errors[False]
@@ -81,7 +81,7 @@ def test_the_bias_of_the_estimate_is_taken_out() -> None:
 def test_the_same_flight_on_both_sides_is_found() -> None:
     truth = lag()
     record = flight(truth, 0)
-    response = fid.estimate_response(record, omega_rad_s=(*BAND, 30))
+    response = fid.estimate_response(record, band_rad_s=BAND, n_omega=30)
     codes = {f.code for f in fid.identify(truth, (response, record), **FAST).findings}
     assert "joint-data-twice" in codes
     codes = {f.code for f in fid.identify(truth, (response, flight(truth, 1)), **FAST).findings}

@@ -127,7 +127,7 @@ def test_what_is_no_loop_is_refused():
     with pytest.raises(ModelError, match="the loop has no frequency response"):
         fid.margins("loop")
     with pytest.raises(UnknownNameError, match="there is no such output"):
-        fid.margins(loop(), "p", "e")
+        fid.margins(loop(), "e", "p")
     two = fid.LinearSystem([[-1.0]], [[1.0, 2.0]], [[1.0]], [[0.0, 0.0]], ("e", "f"), ("y",))
     with pytest.raises(OptionError, match="the loop has several inputs"):
         fid.margins(two)

@@ -182,8 +182,8 @@ def test_black_box_fits_have_intervals_like_their_roots() -> None:
         np.arange(600) / 10, inputs={"u": u}, outputs={"y": np.zeros(600)}
     )
     record = record.replace({"y": truth.simulate(record) + 0.1 * random.standard_normal(600)})
-    polynomial = fid.identify(fid.PolynomialModel.oe("y", "u", nb=2, nf=2), record)
-    innovations = fid.identify(fid.InnovationsModel.subspace("y", "u", order=2), record)
+    polynomial = fid.identify(fid.PolynomialModel.oe("u", "y", nb=2, nf=2), record)
+    innovations = fid.identify(fid.InnovationsModel.subspace("u", "y", order=2), record)
     for fit in (polynomial, innovations):
         mode = fid.modes(fit).modes[0]
         root = next(r for r in fit.modes if abs(r.z - mode.root) < 1e-6)

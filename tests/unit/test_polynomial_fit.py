@@ -22,7 +22,7 @@ def _codes(fit):
 @pytest.mark.parametrize("initial", ["estimate", "zero"])
 def test_arx_recovers_a_noise_free_system_to_machine_precision(initial):
     record = flown(ARMAX, 0, warm_up=0 if initial == "zero" else 300)
-    asked = P.arx("y", "u", na=2, nb=2, offsets="none", initial_state=initial)
+    asked = P.arx("u", "y", na=2, nb=2, offsets="none", initial_state=initial)
     fit = fid.identify(asked, record)
     assert_close(fit.model.theta, [-1.5, 0.7, 1.0, 0.5], atol=1e-13, why="rounding")
 
@@ -30,10 +30,10 @@ def test_arx_recovers_a_noise_free_system_to_machine_precision(initial):
 @pytest.mark.parametrize(
     "asked",
     [
-        P.armax("y", "u", na=2, nb=2, nc=2, offsets="none"),
-        P.oe("y", "u", nb=2, nf=2, offsets="none"),
-        P.bj("y", "u", nb=2, nf=2, nc=1, nd=1, offsets="none"),
-        P.arx("y", "u", na=2, nb=2, offsets="none", method="iv4"),
+        P.armax("u", "y", na=2, nb=2, nc=2, offsets="none"),
+        P.oe("u", "y", nb=2, nf=2, offsets="none"),
+        P.bj("u", "y", nb=2, nf=2, nc=1, nd=1, offsets="none"),
+        P.arx("u", "y", na=2, nb=2, offsets="none", method="iv4"),
     ],
     ids=lambda structure: f"{structure.kind} {structure.method}",
 )
@@ -45,7 +45,7 @@ def test_every_structure_recovers_the_noise_free_plant(asked):
 
 
 def test_two_inputs_with_their_own_denominators_and_delays_are_recovered():
-    asked = P.oe("y", ["u", "v"], nb=[2, 3], nf=[2, 1], nk=[1, 3], offsets="none")
+    asked = P.oe(["u", "v"], "y", nb=[2, 3], nf=[2, 1], nk=[1, 3], offsets="none")
     fit = fid.identify(asked, flown(TWO_INPUTS, 3))
     wanted = [1.0, 0.5, 0.3, -0.2, 0.1, -1.5, 0.7, -0.6]
     assert_close(fit.model.theta, wanted, atol=1e-9, why="rounding through the iteration")
@@ -57,7 +57,7 @@ def test_two_inputs_with_their_own_denominators_and_delays_are_recovered():
 @pytest.mark.parametrize("past", ["estimate", "zero", "backcast"])
 def test_box_jenkins_with_noise_lies_within_its_errors(past):
     start = {"backcast": True} if past == "backcast" else {"initial_state": past}
-    asked = P.bj("y", ["u", "v"], nb=[2, 3], nf=[2, 1], nk=[1, 3], nc=1, nd=1, **start)
+    asked = P.bj(["u", "v"], "y", nb=[2, 3], nf=[2, 1], nk=[1, 3], nc=1, nd=1, **start)
     warm_up = 0 if past == "zero" else 300
     records = [flown(TWO_INPUTS, s, n=1500, noise=0.2, warm_up=warm_up) for s in (4, 5)]
     fit = fid.identify(asked, records)
@@ -70,7 +70,7 @@ def test_box_jenkins_with_noise_lies_within_its_errors(past):
 
 def test_the_minimum_has_no_gradient_and_the_errors_belong_to_it():
     record = flown(ARMAX, 6, n=500, noise=0.5)
-    fit = fid.identify(P.armax("y", "u", na=2, nb=2, nc=2, initial_state="zero"), record)
+    fit = fid.identify(P.armax("u", "y", na=2, nb=2, nc=2, initial_state="zero"), record)
 
     def loss(theta):
         model = P.from_theta(fit.structure, theta, 0.1)
@@ -88,7 +88,7 @@ def test_the_minimum_has_no_gradient_and_the_errors_belong_to_it():
 def test_wrong_delay_and_right_delay_are_told_apart_by_the_loss():
     record = flown(TWO_INPUTS, 7, noise=0.1)
     losses = [
-        fid.identify(P.arx("y", ["u", "v"], na=4, nb=4, nk=[1, k]), record).criteria.loss
+        fid.identify(P.arx(["u", "v"], "y", na=4, nb=4, nk=[1, k]), record).criteria.loss
         for k in (1, 3, 5)
     ]
     assert losses[1] < losses[2]
@@ -100,7 +100,7 @@ def test_regularised_arx_is_closer_to_the_truth_than_least_squares():
     truth = ARMAX.frequency_response(omega)
 
     def fits(**options):
-        return [fid.identify(P.arx("y", "u", na=15, nb=15, **options), r) for r in records]
+        return [fid.identify(P.arx("u", "y", na=15, nb=15, **options), r) for r in records]
 
     def miss(found):
         return sum(np.linalg.norm(fit.model.frequency_response(omega) - truth) for fit in found)
@@ -117,8 +117,8 @@ def test_regularised_arx_is_closer_to_the_truth_than_least_squares():
 def test_instruments_are_consistent_where_least_squares_is_not():
     truth = P("y", ("u",), 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]], d=[1, -0.9])
     records = [flown(truth, seed, n=3000, noise=0.5) for seed in (9, 10)]
-    plain = fid.identify(P.arx("y", "u", na=2, nb=2), records)
-    fit = fid.identify(P.arx("y", "u", na=2, nb=2, method="iv4"), records)
+    plain = fid.identify(P.arx("u", "y", na=2, nb=2), records)
+    fit = fid.identify(P.arx("u", "y", na=2, nb=2, method="iv4"), records)
     errors = np.array([p.stderr for p in fit.parameters.values()])
     wanted = np.array([-1.5, 0.7, 1.0, 0.5])
     assert np.all(np.abs(fit.model.theta - wanted) < 4.0 * errors)
@@ -126,23 +126,23 @@ def test_instruments_are_consistent_where_least_squares_is_not():
 
 
 def test_a_pole_that_a_zero_cancels_is_named():
-    fit = fid.identify(P.armax("y", "u", na=3, nb=3, nc=2), flown(ARMAX, 11, n=800, noise=0.3))
+    fit = fid.identify(P.armax("u", "y", na=3, nb=3, nc=2), flown(ARMAX, 11, n=800, noise=0.3))
     assert "pole-zero-cancellation" in _codes(fit)
-    good = fid.identify(P.armax("y", "u", na=2, nb=2, nc=2), flown(ARMAX, 11, n=800, noise=0.3))
+    good = fid.identify(P.armax("u", "y", na=2, nb=2, nc=2), flown(ARMAX, 11, n=800, noise=0.3))
     assert not _codes(good) & {"pole-zero-cancellation", "overfit", "not-converged"}
-    over = fid.identify(P.armax("y", "u", na=2, nb=2, nc=4), flown(ARMAX, 11, n=800, noise=0.3))
+    over = fid.identify(P.armax("u", "y", na=2, nb=2, nc=4), flown(ARMAX, 11, n=800, noise=0.3))
     assert "overfit" in _codes(over)
 
 
 def test_noise_zeros_at_the_circle_are_named_and_kept_inside():
     truth = P("y", ("u",), 0.1, a=[1, -0.5], b=[[1.0]], c=[1, -1.0])
     fit = fid.identify(
-        P.armax("y", "u", na=1, nb=1, nc=1, initial_state="zero"),
+        P.armax("u", "y", na=1, nb=1, nc=1, initial_state="zero"),
         flown(truth, 12, n=300, noise=0.5, warm_up=0),
     )
     assert abs(fit.model.c[1]) < 1.0
     flipped = P("y", ("u",), 0.1, a=[1, -0.5], b=[[1.0]], c=[1, -2.0])
-    fit = fid.identify(P.armax("y", "u", na=1, nb=1, nc=1), flown(flipped, 12, n=900, noise=0.5))
+    fit = fid.identify(P.armax("u", "y", na=1, nb=1, nc=1), flown(flipped, 12, n=900, noise=0.5))
     # A zero outside has the same spectrum as its reflection.
     assert_close(fit.model.c[1], -0.5, atol=0.15, why="900 samples")
 
@@ -150,19 +150,19 @@ def test_noise_zeros_at_the_circle_are_named_and_kept_inside():
 def test_an_unstable_plant_is_legal_and_can_be_held_stable():
     truth = P("y", ("u",), 0.1, a=[1, -1.005], b=[[1.0]])
     record = flown(truth, 13, n=300, noise=0.3, warm_up=0)
-    fit = fid.identify(P.arx("y", "u", na=1, nb=1, offsets="none"), record)
+    fit = fid.identify(P.arx("u", "y", na=1, nb=1, offsets="none"), record)
     assert fit.model.a[1] < -1.0
     assert "unstable-model" in _codes(fit)
-    held = fid.identify(P.arx("y", "u", na=1, nb=1, offsets="none", enforce_stability=True), record)
+    held = fid.identify(P.arx("u", "y", na=1, nb=1, offsets="none", enforce_stability=True), record)
     assert held.model.a[1] > -1.0
     assert "stability-enforced" in _codes(held)
     with pytest.raises(FitError, match="cannot be run backwards"):
-        fid.identify(P.arx("y", "u", na=1, nb=1, offsets="none", backcast=True), record)
+        fid.identify(P.arx("u", "y", na=1, nb=1, offsets="none", backcast=True), record)
 
 
 def test_roots_gains_and_modes_carry_intervals():
     fit = fid.identify(
-        P.armax("y", "u", na=2, nb=2, nc=2), [flown(ARMAX, s, n=1500, noise=0.5) for s in (14, 15)]
+        P.armax("u", "y", na=2, nb=2, nc=2), [flown(ARMAX, s, n=1500, noise=0.5) for s in (14, 15)]
     )
     (mode,) = fit.modes
     truth = ARMAX.modes()["y/u"][0]
@@ -183,7 +183,7 @@ def test_roots_gains_and_modes_carry_intervals():
 
 
 def test_a_fit_states_horizon_and_initial_state_and_keeps_everything_plain():
-    fit = fid.identify(P.armax("y", "u", na=2, nb=2, nc=1), flown(ARMAX, 16, noise=0.2, offset=3.0))
+    fit = fid.identify(P.armax("u", "y", na=2, nb=2, nc=1), flown(ARMAX, 16, noise=0.2, offset=3.0))
     text = fit.summary().to_text()
     assert "one step ahead from an estimated state" in text
     assert "free run from an estimated state" in text
@@ -199,7 +199,7 @@ def test_a_fit_states_horizon_and_initial_state_and_keeps_everything_plain():
 
 
 def test_starts_are_systematic_first_then_random_and_reproducible():
-    asked = P.armax("y", "u", na=2, nb=2, nc=3, starts=6, seed=5)
+    asked = P.armax("u", "y", na=2, nb=2, nc=3, starts=6, seed=5)
     data = gather_channels([flown(ARMAX, 18, noise=0.5)], "y", ("u",), "mean")
     one, two = polynomial_starts(asked, data), polynomial_starts(asked, data)
     assert one.shape == (6, 7)
@@ -210,14 +210,14 @@ def test_starts_are_systematic_first_then_random_and_reproducible():
 
 
 def test_few_iterations_are_reported():
-    asked = P.armax("y", "u", na=2, nb=2, nc=2, maximum_iterations=1, starts=1)
+    asked = P.armax("u", "y", na=2, nb=2, nc=2, maximum_iterations=1, starts=1)
     fit = fid.identify(asked, flown(ARMAX, 19, noise=0.5))
     assert "not-converged" in _codes(fit)
 
 
 def test_time_series_without_input():
     truth = P("y", (), 0.1, a=[1, -1.2, 0.5], c=[1, 0.4])
-    fit = fid.identify(P.armax("y", (), na=2, nb=0, nc=1), flown(truth, 20, n=3000, noise=1.0))
+    fit = fid.identify(P.armax((), "y", na=2, nb=0, nc=1), flown(truth, 20, n=3000, noise=1.0))
     errors = np.array([p.stderr for p in fit.parameters.values()])
     assert np.all(np.abs(fit.model.theta - truth.theta) < 4.0 * errors)
 
@@ -225,7 +225,7 @@ def test_time_series_without_input():
 def test_data_that_cannot_be_fitted():
     record = flown(ARMAX, 21)
     constant = record.replace({"u": np.full(400, 2.5)})
-    asked = P.arx("y", "u", na=2, nb=2)
+    asked = P.arx("u", "y", na=2, nb=2)
     with pytest.raises(DataError, match="channel 'u' is constant"):
         fid.identify(asked, constant)
     with pytest.raises(DataError, match="too few samples for the orders"):
@@ -239,10 +239,10 @@ def test_data_that_cannot_be_fitted():
         units={"y": "rad"},
     )
     with pytest.raises(DataError, match=r"b1\[v\] is a combination"):
-        fid.identify(P.arx("y", ["u", "v"], na=2, nb=2), twice)
+        fid.identify(P.arx(["u", "v"], "y", na=2, nb=2), twice)
     tone = record.replace({"u": np.sin(0.5 * np.arange(400))})
     with pytest.raises(DataError, match="cannot tell the coefficients apart"):
-        fid.identify(P.arx("y", "u", na=0, nb=4, offsets="none"), tone)
+        fid.identify(P.arx("u", "y", na=0, nb=4, offsets="none"), tone)
     other = fid.Record.from_arrays(
         np.arange(400) / 20, inputs={"u": record["u"]}, outputs={"y": record["y"]},
         units={"y": "rad"},
@@ -260,25 +260,25 @@ def test_instruments_that_fail_say_so():
     record = flown(ARMAX, 22)
     twice = record.replace({"u": np.sin(0.5 * np.arange(400))})
     with pytest.raises(DataError, match="apart"):
-        fid.identify(P.arx("y", "u", na=3, nb=4, method="iv4", offsets="none"), twice)
+        fid.identify(P.arx("u", "y", na=3, nb=4, method="iv4", offsets="none"), twice)
 
 
 @pytest.mark.parametrize(
     ("make", "words"),
     [
-        (lambda: P.arx("y", "u", na=-1, nb=2), "na is outside"),
-        (lambda: P.arx("y", "u", na=0, nb=0), "no coefficients"),
-        (lambda: P.arx("y", ["u", "y"], na=1, nb=1), "named twice"),
-        (lambda: P.arx("y", ["u", "v"], na=1, nb=[1]), "nb does not fit"),
-        (lambda: P.oe("y", "u", nb=0, nf=2), "denominator alone"),
-        (lambda: P.armax("y", "u", na=1, nb=1, nc=1, method="iv4"), "belong to ARX"),
-        (lambda: P.arx("y", "u", na=1, nb=1, kernel="tc", method="iv4"), "stands alone"),
-        (lambda: P.arx("y", "u", na=1, nb=1, initial_state="guess"), "unknown initial"),
+        (lambda: P.arx("u", "y", na=-1, nb=2), "na is outside"),
+        (lambda: P.arx("u", "y", na=0, nb=0), "no coefficients"),
+        (lambda: P.arx(["u", "y"], "y", na=1, nb=1), "named twice"),
+        (lambda: P.arx(["u", "v"], "y", na=1, nb=[1]), "nb does not fit"),
+        (lambda: P.oe("u", "y", nb=0, nf=2), "denominator alone"),
+        (lambda: P.armax("u", "y", na=1, nb=1, nc=1, method="iv4"), "belong to ARX"),
+        (lambda: P.arx("u", "y", na=1, nb=1, kernel="tc", method="iv4"), "stands alone"),
+        (lambda: P.arx("u", "y", na=1, nb=1, initial_state="guess"), "unknown initial"),
         (
-            lambda: P.arx("y", "u", na=1, nb=1, initial_state="zero", backcast=True),
+            lambda: P.arx("u", "y", na=1, nb=1, initial_state="zero", backcast=True),
             "backcast estimates the initial state",
         ),
-        (lambda: P.arx("y", "u", na=1, nb=1, starts=0), "starts is too small"),
+        (lambda: P.arx("u", "y", na=1, nb=1, starts=0), "starts is too small"),
     ],
 )
 def test_structures_outside_their_range(make, words):
@@ -288,9 +288,9 @@ def test_structures_outside_their_range(make, words):
 
 def test_kernels_too_need_samples():
     with pytest.raises(DataError, match="too few samples for the orders"):
-        fid.identify(P.arx("y", "u", na=20, nb=20, kernel="tc"), flown(ARMAX, 23, n=60))
+        fid.identify(P.arx("u", "y", na=20, nb=20, kernel="tc"), flown(ARMAX, 23, n=60))
 
 
 def test_frequency_domain_options_are_refused():
     with pytest.raises(OptionError, match="no such option"):
-        fid.identify(P.arx("y", "u", na=1, nb=1), flown(ARMAX, 24), starts=3)
+        fid.identify(P.arx("u", "y", na=1, nb=1), flown(ARMAX, 24), starts=3)

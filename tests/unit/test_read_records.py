@@ -72,7 +72,7 @@ def test_a_gap_in_time_or_a_record_column_makes_several_records(tmp_path: Path) 
     found = read_records(_csv(tmp_path, text), outputs=["p"])
     assert [(r.name, r.n_samples) for r in found] == [("a", 10), ("b", 10)]
     with pytest.raises(DataError, match="not uniform"):
-        read_records(_csv(tmp_path, text), outputs=["p"], record=None)
+        read_records(_csv(tmp_path, text), outputs=["p"], record_column=None)
 
 
 def test_jittered_stamps_need_a_stated_grid(tmp_path: Path) -> None:
@@ -277,7 +277,7 @@ def test_shared_records_are_readable(shared_data: Path) -> None:
         folder / "trex550_hover_forward.csv",
         ["d_lat", "d_lon", "d_ped", "d_col"],
         {"p": "p_radps", "q": "q_radps", "r": "r_radps"},
-        time="t_s",
+        time_column="t_s",
         units={"p": "rad/s", "q": "rad/s", "r": "rad/s"},
     )
     assert_close(heli.sample_rate_hz, 100.0, rtol=1e-9, why="100 Hz")

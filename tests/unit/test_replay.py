@@ -69,7 +69,7 @@ def test_a_span_in_the_middle_starts_from_the_logged_state(log: Log) -> None:
 
 def test_wrong_gains_are_found_out(log: Log) -> None:
     loop = axis_loop_of(log, "roll").with_gains(ATC_RAT_RLL_P=0.12, ATC_RAT_RLL_D=0.0024)
-    found = replay(log, "roll", loop=loop)
+    found = replay(log, "roll", controller=loop)
     codes = {finding.code: finding.message for finding in found.findings}
     assert found.light in ("amber", "red")
     assert "ATC_RAT_RLL_P (by 0.33" in codes["gains-contradicted"]
@@ -78,7 +78,7 @@ def test_wrong_gains_are_found_out(log: Log) -> None:
 
 
 def test_a_wrong_integral_gain_shows_in_its_own_term(log: Log) -> None:
-    found = replay(log, "roll", loop=axis_loop_of(log, "roll").with_gains(ATC_RAT_RLL_I=0.18))
+    found = replay(log, "roll", controller=axis_loop_of(log, "roll").with_gains(ATC_RAT_RLL_I=0.18))
     assert found["I"].rms_error > 0.2 * found["I"].rms_logged
     assert found["P"].largest_error < 1e-6
 
@@ -221,7 +221,7 @@ def test_what_a_log_lacks_is_named(tmp_path: Path) -> None:
         axis_loop_of(log, "roll")
     loop = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
     with pytest.raises(errors.DataError, match="no PIDR"):
-        replay(log, "roll", loop=loop)
+        replay(log, "roll", controller=loop)
 
 
 def test_a_log_of_an_unknown_vehicle_is_refused(tmp_path: Path) -> None:

@@ -116,7 +116,7 @@ def test_measured_quotient_and_product() -> None:
     with pytest.raises(DataError, match="not in series"):
         arithmetic.multiply(p, p)
     with pytest.raises(DataError, match="different frequencies"):
-        arithmetic.divide(p, a.select(omega=(1.0, 4.0)))
+        arithmetic.divide(p, a.select(band_rad_s=(1.0, 4.0)))
 
 
 def test_refusals() -> None:
@@ -156,14 +156,14 @@ def test_files_lose_nothing(tmp_path: Path) -> None:
     record = Record.from_arrays(
         np.arange(1500) * 0.02, inputs={"a": u[0], "b": u[1]}, outputs={"y": y}, units={"y": "deg"}
     )
-    response = estimate_response(record, omega_rad_s=(3.0, 100.0, 9), window_s=[4.0, 2.0])
+    response = estimate_response(record, band_rad_s=(3.0, 100.0), n_omega=9, window_s=[4.0, 2.0])
     back = read_response(write_response(response, tmp_path / "h.nc"))
     assert back.to_dict() == response.to_dict()
     assert np.array_equal(back.covariance, response.covariance)
-    part = back.select(inputs=["b"], omega=(5.0, 50.0))
+    part = back.select(inputs=["b"], band_rad_s=(5.0, 50.0))
     assert_close(
         part.covariance,
-        response.select(inputs=["b"], omega=(5.0, 50.0)).covariance,
+        response.select(inputs=["b"], band_rad_s=(5.0, 50.0)).covariance,
         rtol=1e-9,
         why="same errors",
     )

@@ -33,7 +33,7 @@ def _flight(*, noise: float, closed: bool, n: int = 12000, seed: int = 0) -> Rec
     )
 
 
-BAND = (3.0, 60.0, 20)
+BAND = (3.0, 60.0)
 
 
 def _truth(omega: np.ndarray) -> np.ndarray:
@@ -43,8 +43,10 @@ def _truth(omega: np.ndarray) -> np.ndarray:
 
 def test_instrument_removes_the_bias_of_feedback() -> None:
     record = _flight(noise=0.6, closed=True)
-    direct = estimate_response(record, omega_rad_s=BAND, window_s=4.0)
-    ours = estimate_response(record, omega_rad_s=BAND, window_s=4.0, method="instrument")
+    direct = estimate_response(record, band_rad_s=BAND, n_omega=20, window_s=4.0)
+    ours = estimate_response(
+        record, band_rad_s=BAND, n_omega=20, window_s=4.0, estimator="instrument"
+    )
     truth = _truth(ours.omega_rad_s)
     spread = np.sqrt(np.diag(ours.covariance[0]))
     error = np.concatenate([(ours.response[0, 0] - truth).real, (ours.response[0, 0] - truth).imag])
@@ -58,7 +60,7 @@ def test_instrument_removes_the_bias_of_feedback() -> None:
 @pytest.mark.parametrize("noise", [0.0, 0.01, 0.3])
 def test_an_open_loop_gives_no_alarm(noise: float) -> None:
     response = estimate_response(
-        _flight(noise=noise, closed=False, n=6000), omega_rad_s=BAND, window_s=4.0
+        _flight(noise=noise, closed=False, n=6000), band_rad_s=BAND, n_omega=20, window_s=4.0
     )
     assert "loop-closed" not in {finding.code for finding in response.findings}
 
@@ -67,23 +69,23 @@ def test_instrument_needs_excitations() -> None:
     record = _flight(noise=0.1, closed=True, n=2000)
     bare = record.select(["u", "y"])
     with pytest.raises(DataError, match="no excitation channel"):
-        estimate_response(bare, method="instrument")
+        estimate_response(bare, estimator="instrument")
     with pytest.raises(DataError, match="fewer excitations than inputs"):
         estimate_response(
             record,
             inputs=["u", "r"],
             outputs="y",
-            excitation="r",
-            method="instrument",
+            excitations="r",
+            estimator="instrument",
             window_s=2.0,
         )
 
 
 def test_instrument_of_an_open_loop_is_the_direct_estimate() -> None:
     record = _flight(noise=0.1, closed=False, n=4000)
-    options = {"omega_rad_s": BAND, "window_s": [8.0, 4.0]}
+    options = {"band_rad_s": BAND, "n_omega": 20, "window_s": [8.0, 4.0]}
     direct = estimate_response(record, **options)
-    ours = estimate_response(record, method="instrument", **options)
+    ours = estimate_response(record, estimator="instrument", **options)
     assert_close(ours.response, direct.response, rtol=1e-8, why="r is u")
     assert_close(ours.coherence, direct.coherence, rtol=1e-6, why="r is u")
     assert_close(ours.random_error, direct.random_error, rtol=1e-5, why="r is u")
@@ -101,7 +103,7 @@ def test_local_polynomials_leave_no_leakage() -> None:
     omega = np.linspace(15.0, 40.0, 12)
     z = np.exp(1j * omega * DT)
     truth = 0.2 * z / (z - pole) / (z - pole.conjugate())
-    local = estimate_response(record, omega_rad_s=omega, method="local_polynomial")
+    local = estimate_response(record, omega_rad_s=omega, estimator="local_polynomial")
     windows = estimate_response(record, omega_rad_s=omega, window_s=5.0)
     error_local = np.abs(local.response[0, 0] / truth - 1).max()
     error_windows = np.abs(windows.response[0, 0] / truth - 1).max()
@@ -119,18 +121,20 @@ def test_local_polynomials_of_two_records_and_two_inputs() -> None:
         records.append(
             Record.from_arrays(np.arange(n) * DT, inputs={"a": u[0], "b": u[1]}, outputs={"y": y})
         )
-    response = estimate_response(records, omega_rad_s=BAND, method="local_polynomial")
+    response = estimate_response(records, band_rad_s=BAND, n_omega=20, estimator="local_polynomial")
     truth = np.array([_truth(response.omega_rad_s), np.full(20, 0.5)])
     assert_close(response.response[0], truth, atol=0.03, why="noise of 0.02")
     twin = [record.replace({"b": 2 * record["a"]}) for record in records]
     with pytest.raises(DataError, match="cannot be told apart"):
-        estimate_response(twin, omega_rad_s=BAND, method="local_polynomial")
+        estimate_response(twin, band_rad_s=BAND, n_omega=20, estimator="local_polynomial")
 
 
 def test_robot_arm_shows_its_resonances(shared_data: Path) -> None:
     u, y = np.loadtxt(shared_data / "records" / "robot_arm.csv", delimiter=",", skiprows=1).T
     record = Record.from_arrays(np.arange(1024.0), inputs={"torque": u}, outputs={"a": y})
-    response = estimate_response(record, omega_rad_s=(0.1, 2.0, 200), window_s=[200.0, 100.0])
+    response = estimate_response(
+        record, band_rad_s=(0.1, 2.0), n_omega=200, window_s=[200.0, 100.0]
+    )
     pair = response.pair("a", "torque")
     peak = pair.omega_rad_s[np.argmax(np.abs(pair.response))]
     assert 0.2 < peak < 1.0
@@ -147,7 +151,7 @@ def test_a_weakly_excited_helicopter_is_not_over_claimed(shared_data: Path) -> N
         inputs={name: columns[name] for name in ("d_lat", "d_lon")},
         outputs={name: columns[name] for name in ("p_radps", "q_radps")},
     )
-    response = estimate_response(record, omega_rad_s=(0.8, 12.0, 40), window_s=[16.0, 8.0])
+    response = estimate_response(record, band_rad_s=(0.8, 12.0), n_omega=40, window_s=[16.0, 8.0])
     assert response.coherence.mean() < 0.5
     assert response.coherence.max() < 0.99
     rows = response.summary().rows
@@ -155,7 +159,9 @@ def test_a_weakly_excited_helicopter_is_not_over_claimed(shared_data: Path) -> N
 
 
 def test_picture_names_axes_and_pairs() -> None:
-    response = estimate_response(_flight(noise=0.1, closed=False, n=3000), omega_rad_s=BAND)
+    response = estimate_response(
+        _flight(noise=0.1, closed=False, n=3000), band_rad_s=BAND, n_omega=20
+    )
     figure = response_figure(response)
     assert "y / u" in {trace.name for trace in figure.data}
     assert "coherence" in str(figure.layout.yaxis3.title.text)
@@ -176,7 +182,7 @@ def test_command(tmp_path: Path) -> None:
         "--band",
         "3",
         "60",
-        "--points",
+        "--n-omega",
         "20",
         "--window",
         "6",

@@ -21,7 +21,7 @@ def test_shared_work_changes_nothing(method: str) -> None:
         inputs=dict(zip("ab", u, strict=True)),
         outputs=dict(zip("xy", y, strict=True)),
     )
-    response = fid.estimate_response(record, omega_rad_s=(1.0, 40.0, 12), method=method)
+    response = fid.estimate_response(record, band_rad_s=(1.0, 40.0), n_omega=12, estimator=method)
     turned = response.select(outputs=["y", "x"], inputs=["b", "a"])
     assert turned.errors is not None
     wanted = [

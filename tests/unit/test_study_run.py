@@ -42,7 +42,7 @@ sid_axis = 10
 name = "doublet"
 span_s = [61.0, 66.0]
 [response]
-method = "instrument"
+estimator = "instrument"
 compare = ["composite"]
 [reduce]
 [[model]]

@@ -26,7 +26,7 @@ sid_axis = 10
 name = "doublet"
 span_s = [70, 80]
 [response]
-method = "instrument"
+estimator = "instrument"
 compare = ["composite"]
 [fit]
 starts = 3
@@ -89,7 +89,7 @@ def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> 
         ("[fit]", "[fits]", "top level: there is no key 'fits'"),
         ("starts = 3", "starts = 0", "needed a whole number from 1 on"),
         ("starts = 3", "starts = 2.5", "needed a whole number from 1 on"),
-        ('method = "instrument"', 'method = "magic"', "needed one of 'composite'"),
+        ('estimator = "instrument"', 'estimator = "magic"', "needed one of 'composite'"),
         ('compare = ["composite"]', 'compare = ["magic"]', "compare does not fit"),
         ('compare = ["composite"]', "compare = [1]", "a list of different texts"),
         ("span_s = [70, 80]", "span_s = [80, 70]", "the first below the second"),
@@ -112,8 +112,8 @@ def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> 
         ("maximum_cramer_rao", "maximum_cramer_raw", "Next: write 'maximum_cramer_rao_percent'"),
         ("_percent = 30", '_percent = 30\nafter_rise = "hope"', "needed one of 'stop', 'next'"),
         ("[reduce]\nmaximum_cramer_rao_percent = 30", "", "there is no key 'keep'"),
-        ("seed = 7", "seed = 7\nwindows_s = []", "[fit]: there is no key 'windows_s'"),
-        ('compare = ["composite"]', "windows_s = []", "needed a list of one or more numbers"),
+        ("seed = 7", "seed = 7\nwindow_s = []", "[fit]: there is no key 'window_s'"),
+        ('compare = ["composite"]', "window_s = []", "needed a list of one or more numbers"),
     ],
 )
 def test_each_fault_is_named(tmp_path: Path, old: str, new: str, said: str) -> None:

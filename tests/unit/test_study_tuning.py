@@ -31,9 +31,9 @@ leave_after_s = 75.0
 name = "sweep"
 sid_axis = 10
 [response]
-method = "instrument"
-windows_s = [20]
-n_frequencies = 40
+estimator = "instrument"
+window_s = [20]
+n_omega = 40
 [[model]]
 name = "Roll rate"
 template = "rate_motor_lag"

@@ -90,7 +90,7 @@ def tuning() -> fid.Tuning:
         {"roll": _FIXED, "pitch": _FIXED},
         gains=_loops("roll", "pitch"),
         requirements=NEED,
-        rate="raw",
+        gyro="raw",
         band_rad_s=(0.5, 100.0),
         nominal=True,
     )
@@ -114,7 +114,7 @@ def test_coupled_axes_are_stable_together_by_their_poles(tuning: fid.Tuning) -> 
 
 def test_coupling_costs_what_designing_alone_does_not_see(tuning: fid.Tuning) -> None:
     plant, alone = _coupled(0.4), _coupled(0.0)
-    options = {"requirements": NEED, "rate": "raw", "band_rad_s": (0.5, 100.0), "nominal": True}
+    options = {"requirements": NEED, "gyro": "raw", "band_rad_s": (0.5, 100.0), "nominal": True}
     single = fid.tune_pid(plant, gains=_loops("roll")["roll"], **options)
     free = fid.tune_pid(alone, gains=_loops("roll")["roll"], **options)
     assert any(finding.code == "couplings" for finding in single.findings)
@@ -131,7 +131,7 @@ def test_flown_gains_are_judged_with_the_other_axes_flown_gains(tuning: fid.Tuni
         {"roll": _FIXED, "pitch": _FIXED},
         gains=_loops("roll", "pitch"),
         requirements={"roll": NEED, "pitch": dataclasses.replace(NEED, crossover_rad_s=6.0)},
-        rate="raw", band_rad_s=(0.5, 100.0), nominal=True,
+        gyro="raw", band_rad_s=(0.5, 100.0), nominal=True,
     )  # fmt: skip
     assert slow["pitch"].gains["ATC_RAT_PIT_P"] < 0.7 * tuning["pitch"].gains["ATC_RAT_PIT_P"]
     moved = False

@@ -72,8 +72,8 @@ def command(
                 records,
                 inputs=model.inputs,
                 outputs=model.outputs,
-                omega_rad_s=None if band is None else (*band, 100),
-                method=method,
+                band_rad_s=band,
+                estimator=method,
             )
         advance()
         fit = flightid.identify(model, data, starts=starts, seed=seed)
@@ -96,7 +96,7 @@ def _records(
 
     names = [*model.inputs, *model.outputs]
     if file.suffix.lower() in LOGS:
-        return [flightid.read_log(file).record(names=names, span=span, sid_run=sid_run)]
+        return [flightid.read_log(file).record(names=names, span_s=span, sid_run=sid_run)]
     if span is not None or sid_run is not None:
         raise click.UsageError("--span and --run belong to logs")
     return flightid.read_records(file, inputs=model.inputs, outputs=model.outputs)

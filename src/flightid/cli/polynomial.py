@@ -83,7 +83,7 @@ def command(
         found = flightid.scan_orders(
             records,
             unseen,
-            output=name,
+            outputs=name,
             inputs=names,
             kind=kind,
             na=ranges["na"],
@@ -102,8 +102,8 @@ def command(
     wanted = used.get(kind, ("nb", "nc", "nd", "nf"))
     orders = {key: 2 if given[key] is None else given[key] or 0 for key in wanted}
     structure = flightid.PolynomialModel.general(
-        name,
         names,
+        name,
         na=orders.get("na", 0),
         nb=orders.get("nb", 0),
         nc=orders.get("nc", 0),

@@ -21,13 +21,18 @@ LOGS = {".bin", ".log", ".ulg"}
 @click.argument("files", type=click.Path(exists=True, path_type=Path), nargs=-1, required=True)
 @click.option("--input", "inputs", multiple=True, help="Input channel; may be repeated.")
 @click.option("--output", "outputs", multiple=True, help="Output channel; may be repeated.")
-@click.option("--excitation", multiple=True, help="Injected signal, for --method instrument.")
+@click.option(
+    "--excitation",
+    "excitations",
+    multiple=True,
+    help="Injected signal, for --estimator instrument.",
+)
 @click.option("--band", type=float, nargs=2, help="Lowest and highest frequency, rad/s.")
-@click.option("--points", type=click.IntRange(2, 10000), default=100, show_default=True)
+@click.option("--n-omega", type=click.IntRange(2, 10000), default=100, show_default=True)
 @click.option("--window", type=float, multiple=True, help="Window length, s; may be repeated.")
 @click.option("--overlap", type=float, default=0.5, show_default=True)
 @click.option(
-    "--method",
+    "--estimator",
     type=click.Choice(("composite", "instrument", "local_polynomial")),
     default="composite",
     show_default=True,
@@ -42,12 +47,12 @@ def command(
     files: tuple[Path, ...],
     inputs: tuple[str, ...],
     outputs: tuple[str, ...],
-    excitation: tuple[str, ...],
+    excitations: tuple[str, ...],
     band: tuple[float, float] | None,
-    points: int,
+    n_omega: int,
     window: tuple[float, ...],
     overlap: float,
-    method: str,
+    estimator: str,
     span: tuple[float, float] | None,
     sweep: int | None,
     time: str,
@@ -65,16 +70,17 @@ def command(
 
     records: list[Record] = []
     for file in track(files, "Reading"):
-        records += _read(file, inputs, outputs, excitation, span, sweep, time)
+        records += _read(file, inputs, outputs, excitations, span, sweep, time)
     with progress(None, "Estimating"):
         response = estimate_response(
             records,
             inputs=inputs or None,
             outputs=outputs or None,
-            excitation=excitation or None,
-            omega_rad_s=None if band is None else (*band, points),
+            excitations=excitations or None,
+            band_rad_s=band,
+            n_omega=n_omega,
             window_s=window or "auto",
-            method=method,
+            estimator=estimator,
             overlap=overlap,
         )
     emit(response, as_json=as_json)
@@ -89,7 +95,7 @@ def _read(
     file: Path,
     inputs: tuple[str, ...],
     outputs: tuple[str, ...],
-    excitation: tuple[str, ...],
+    excitations: tuple[str, ...],
     span: tuple[float, float] | None,
     sweep: int | None,
     time: str,
@@ -97,15 +103,15 @@ def _read(
     if file.suffix.lower() in LOGS:
         from flightid.logs import read_log
 
-        return [read_log(file).record(span=span, sid_run=sweep)]
+        return [read_log(file).record(span_s=span, sid_run=sweep)]
     from flightid.record.read import read_records
 
     records = read_records(
         file,
         inputs or None,
         outputs or None,
-        excitations=excitation or None,
-        time=time,
+        excitations=excitations or None,
+        time_column=time,
     )
     return records if span is None else [record.segment(*span) for record in records]
 

@@ -176,7 +176,7 @@ def _driving(
     found: list[Record] = []
     for file in files:
         if file.suffix.lower() in LOGS:
-            found.append(read_log(file).record(names=list(inputs), span=span))
+            found.append(read_log(file).record(names=list(inputs), span_s=span))
         elif span is not None:
             raise click.UsageError("--span belongs to logs")
         else:

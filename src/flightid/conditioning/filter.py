@@ -69,7 +69,7 @@ def filter_record(
     record: Record,
     cutoff_hz: float | tuple[float, float],
     *,
-    band: Band = "lowpass",
+    kind: Band = "lowpass",
     design: FilterDesign | str = FilterDesign.BUTTERWORTH,
     order: int = 4,
     zero_phase: bool = True,
@@ -91,7 +91,7 @@ def filter_record(
         Data.
     cutoff_hz : float or (float, float)
         Cut-off frequency, Hz; two for ``"bandpass"`` and ``"bandstop"``.
-    band : {"lowpass", "highpass", "bandpass", "bandstop"}
+    kind : {"lowpass", "highpass", "bandpass", "bandstop"}
         What passes.
     design : FilterDesign
         ``"butterworth"`` or ``"fir"``.
@@ -129,7 +129,7 @@ def filter_record(
     >>> bool(np.max(np.abs(smooth["p"] - record["p"])) < 1e-3)
     True
     """
-    made = _design(record.sample_rate_hz, cutoff_hz, band, design, order)
+    made = _design(record.sample_rate_hz, cutoff_hz, kind, design, order)
     length = order + 1 if made.taps is not None else 3 * (2 * len(np.asarray(made.sections)) + 1)
     if record.n_samples <= length:
         raise DataError(
@@ -142,14 +142,14 @@ def filter_record(
     samples = {name: made.apply(record[name], zero_phase=zero_phase) for name in names}
     low, high = cutoff_hz if isinstance(cutoff_hz, tuple) else (cutoff_hz, None)
     options: dict[str, Cell] = {
-        "band": band,
+        "band": kind,
         "cutoff_hz": low,
         "upper_cutoff_hz": high,
         "design": str(FilterDesign(design)),
         "order": order,
         "zero_phase": zero_phase,
         "channels": "all" if channels is None else ", ".join(names),
-        "delay_s": 0.0 if zero_phase else _delay_s(made, record, band, low, high),
+        "delay_s": 0.0 if zero_phase else _delay_s(made, record, kind, low, high),
     }
     # Inputs and outputs filtered alike keep the sampled relation that their hold made; an input
     # filtered by itself no longer moves as it did.

@@ -23,14 +23,14 @@ ROUNDING = 1e-9
 
 
 def to_continuous(
-    model: PolynomialModel | InnovationsModel | PolynomialFit | InnovationsFit,
+    source: PolynomialModel | InnovationsModel | PolynomialFit | InnovationsFit,
     hold: str = "zero",
 ) -> LinearSystem:
     """Continuous-time system whose samples are those of a discrete model.
 
     Parameters
     ----------
-    model : PolynomialModel, InnovationsModel or a fit of one
+    source : PolynomialModel, InnovationsModel or a fit of one
         Its response to the inputs is converted; the noise model has no hold and is left out.
     hold : {"zero", "first", "tustin"}
         Inputs are steps or straight lines between samples (exact), or the bilinear rule, which
@@ -62,7 +62,7 @@ def to_continuous(
     -5.0
     """
     _require_hold(hold)
-    discrete = model.model if isinstance(model, PolynomialFit | InnovationsFit) else model
+    discrete = source.model if isinstance(source, PolynomialFit | InnovationsFit) else source
     if isinstance(discrete, PolynomialModel):
         outputs: tuple[str, ...] = (discrete.output,)
         matrices = discrete.state_space()[:4]
@@ -78,12 +78,12 @@ def to_continuous(
     return LinearSystem(*found, discrete.inputs, outputs, lags * step)
 
 
-def to_discrete(model: LinearModel, sample_time_s: float, hold: str = "zero") -> InnovationsModel:
+def to_discrete(source: LinearModel, sample_time_s: float, hold: str = "zero") -> InnovationsModel:
     """Discrete model of a continuous one, without noise model.
 
     Parameters
     ----------
-    model : LinearSystem, TransferFunctionModel or another linear model
+    source : LinearSystem, TransferFunctionModel or another linear model
     sample_time_s : float
         Sample time T, s.
     hold : {"zero", "first", "tustin"}
@@ -114,7 +114,7 @@ def to_discrete(model: LinearModel, sample_time_s: float, hold: str = "zero") ->
     _require_hold(hold)
     if not sample_time_s > 0:
         raise DataError("the sample time is not positive", found=sample_time_s, needed="seconds")
-    system = linear_system(model)
+    system = linear_system(source)
     if hold == "tustin":
         a, b, c, d, delays_s = system.state_space()
         parts = _to_tustin(a, b, c, d, sample_time_s)

@@ -183,13 +183,13 @@ class Interpretation:
 
 
 def interpret(
-    model: PolynomialModel | InnovationsModel | PolynomialFit | InnovationsFit,
+    source: PolynomialModel | InnovationsModel | PolynomialFit | InnovationsFit,
 ) -> Interpretation:
     """Say what a black-box model tells about the vehicle.
 
     Parameters
     ----------
-    model : PolynomialModel, InnovationsModel or a fit of one
+    source : PolynomialModel, InnovationsModel or a fit of one
         A fit brings intervals.
 
     Returns
@@ -217,7 +217,7 @@ def interpret(
     >>> [round(item.frequency_hz, 3) for item in interpret(rig).resonances]
     [0.335]
     """
-    discrete = model.model if isinstance(model, PolynomialFit | InnovationsFit) else model
+    discrete = source.model if isinstance(source, PolynomialFit | InnovationsFit) else source
     if not isinstance(discrete, PolynomialModel | InnovationsModel):
         raise ModelError(
             "only discrete black-box models are interpreted",
@@ -225,13 +225,13 @@ def interpret(
             needed="PolynomialModel, InnovationsModel or a fit of one",
             action="for a state-space model of known physics see flightid.modes",
         )
-    if isinstance(model, PolynomialFit | InnovationsFit):
-        roots = model.roots
-    elif isinstance(model, PolynomialModel):
-        roots = fitted_roots(model, 1)
+    if isinstance(source, PolynomialFit | InnovationsFit):
+        roots = source.roots
+    elif isinstance(source, PolynomialModel):
+        roots = fitted_roots(source, 1)
     else:
-        errors = Errors(model.sample_time_s, None, 1)
-        roots = innovations_roots(model, errors, direct=True)
+        errors = Errors(source.sample_time_s, None, 1)
+        roots = innovations_roots(source, errors, direct=True)
     step = discrete.sample_time_s
     made = tuple(InterpretedRoot(root, _character(root, step), _decay(root)) for root in roots)
     return Interpretation(discrete.name, step, _transfers(discrete), made, tuple(_judge(made)))

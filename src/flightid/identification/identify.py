@@ -171,7 +171,7 @@ def identify(
     method: str | None = ...,
     starts: int = ...,
     seed: int = ...,
-    omega_rad_s: Bands = ...,
+    band_rad_s: Bands = ...,
     n_omega: int = ...,
     minimum_coherence: float | None = ...,
     weight_gain: float = ...,
@@ -199,7 +199,7 @@ def identify(
     loss_limit: float = ...,
     hold: str = ...,
     start_from: str = ...,
-    omega_rad_s: tuple[float, float] | None = ...,
+    band_rad_s: tuple[float, float] | None = ...,
     half_width: int = ...,
     process_noise: Sequence[str] | None = ...,
     maximum_iterations: int = ...,
@@ -214,7 +214,7 @@ def identify(
     method: str | None = ...,
     starts: int = ...,
     seed: int = ...,
-    omega_rad_s: Bands = ...,
+    band_rad_s: Bands = ...,
     n_omega: int = ...,
     minimum_coherence: float | None = ...,
     correct_bias: bool = ...,
@@ -279,7 +279,7 @@ def identify(
         (steps), as for `flightid.simulate`. Responses, for the correction of bias:
         "band_limited" (default: smooth, filtered before they were sampled), "first" or "zero".
         "zero" takes the output hold's half sample out of the model's delay.
-    omega_rad_s : tuple of float, or mapping of str to tuple, optional
+    band_rad_s : tuple of float, or mapping of str to tuple, optional
         Responses: band (low, high), rad/s, of all or by name ``"output/input"``; default: for each
         response its widest band with `minimum_coherence`.
         Fourier methods on records: band of the harmonics; default: to two fifths of Nyquist.

@@ -134,7 +134,8 @@ def _response(
             kept,
             inputs=inputs,
             outputs=[axis.rate for axis in axes],
-            omega_rad_s=(low, high, 60),
+            band_rad_s=(low, high),
+            n_omega=60,
             window_s=[window, window / 2] if high > 4 * low else [window],
             covariance=False,
         ), ""

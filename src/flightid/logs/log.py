@@ -166,7 +166,7 @@ class Log:
         channels: ChannelMap | str | Path | None = None,
         *,
         names: Iterable[str] | None = None,
-        span: tuple[float, float] | None = None,
+        span_s: tuple[float, float] | None = None,
         sid_run: SidRun | int | None = None,
         sample_rate_hz: float | None = None,
         roles: Mapping[str, Role | str] | None = None,
@@ -185,7 +185,7 @@ class Log:
             Channel map, a shipped one by name or a TOML file; default: by kind and vehicle.
         names : iterable of str, optional
             Channels wanted; each must be there. Default: all of the map that the log holds.
-        span : (float, float), optional
+        span_s : (float, float), optional
             First and last instant on the autopilot's clock, s; default: all, or the chirp of
             `sid_run`.
         sid_run : SidRun or int, optional
@@ -226,7 +226,7 @@ class Log:
             self,
             channels,
             names,
-            span,
+            span_s,
             sid_run,
             sample_rate_hz,
             roles,

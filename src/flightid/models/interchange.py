@@ -134,7 +134,7 @@ def from_control(
             inputs=inputs,
             outputs=outputs,
             units=units,
-            method="python-control",
+            estimator="python-control",
         )
     if isinstance(system, library.TransferFunction):
         system = _realised(library, system)

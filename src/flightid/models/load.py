@@ -42,12 +42,12 @@ def library_names() -> list[str]:
     return sorted(entry.name[:-5] for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
-def load_model(source: str | Path, *, axis: str | None = None) -> Model:
+def load_model(path: str | Path, *, axis: str | None = None) -> Model:
     """Load a model from a TOML file, or one of the library by its name.
 
     Parameters
     ----------
-    source : str or Path
+    path : str or Path
         Path of a ``.toml`` file, or a name such as ``"rate_first_order"``; the axis may follow the
         name, as in ``"rate_first_order_pitch"``.
     axis : str, optional
@@ -75,9 +75,9 @@ def load_model(source: str | Path, *, axis: str | None = None) -> Model:
     >>> print(model)
     q/tau_theta = Mttheta / (s - Mq) * exp(-(tau) s)
     """
-    name = str(source)
-    if isinstance(source, Path) or name.endswith(".toml"):
-        return _build(_parse(_read(Path(source)), name), axis, name)
+    name = str(path)
+    if isinstance(path, Path) or name.endswith(".toml"):
+        return _build(_parse(_read(Path(path)), name), axis, name)
     if not _LIBRARY_NAME.fullmatch(name):
         raise UnknownNameError(
             "there is no such library model",

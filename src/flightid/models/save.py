@@ -15,12 +15,12 @@ from flightid.models.model import Model
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def write_model(model: Model, path: str | Path) -> Path:
+def write_model(source: Model, path: str | Path) -> Path:
     """Write a model to a TOML file; `load_model` gives the same model back.
 
     Parameters
     ----------
-    model : Model
+    source : Model
         Of any kind, with all its numbers; of a fit its ``model``, of a NARX fit its ``equation``.
     path : str or Path
         File ending in ``.toml``; its folder must exist. It is written whole or not at all.
@@ -52,7 +52,7 @@ def write_model(model: Model, path: str | Path) -> Path:
     """
     if Path(path).suffix != ".toml":
         raise ModelError("a model is written as TOML", found=str(path), needed="a name in .toml")
-    return write_atomically(path, model_as_toml(model))
+    return write_atomically(path, model_as_toml(source))
 
 
 def model_as_toml(model: Model) -> str:

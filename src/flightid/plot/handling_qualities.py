@@ -114,7 +114,7 @@ def lower_order_curves(found: LowerOrder) -> go.Figure:
     plotly.graph_objects.Figure
     """
     pair = found.response.pair(found.output, found.input)
-    measured = found.response.method != "model"
+    measured = found.response.estimator != "model"
     low, high = found.band_rad_s
     inside = (pair.omega_rad_s >= 0.999 * low) & (pair.omega_rad_s <= 1.001 * high)
     omega = pair.omega_rad_s[inside]

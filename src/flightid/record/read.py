@@ -45,11 +45,11 @@ def read_records(
     *,
     excitations: Names | None = None,
     others: Names | None = None,
-    time: str = "time",
+    time_column: str = "time",
     units: Mapping[str, str] | None = None,
     sample_time_s: float | None = None,
     resample_to_s: float | None = None,
-    record: str | None = RECORD_COLUMN,
+    record_column: str | None = RECORD_COLUMN,
     hold: InputHold | None = None,
     period_s: float | None = None,
     loop: Loop | None = None,
@@ -57,11 +57,11 @@ def read_records(
     r"""Read records from CSV, Parquet, MATLAB .mat (level 5 to 7.3) or netCDF.
 
     A file that `write_records` made comes back as it was; naming channels then selects and
-    assigns roles. In any other file the time is the column `time`, or `sample_time_s` is stated;
-    neither is guessed. Rows fall into several records where the column `record` changes or where
-    the time has a gap (a spacing above 2.5 median spacings). Units come from headings such as
-    ``p [rad/s]``, from a second row of units in CSV, or from the file's metadata; `units` declares
-    them and must not contradict the file. Values are not converted.
+    assigns roles. In any other file the time is the column `time_column`, or `sample_time_s` is
+    stated; neither is guessed. Rows fall into several records where the column `record_column`
+    changes or where the time has a gap (a spacing above 2.5 median spacings). Units come from
+    headings such as ``p [rad/s]``, from a second row of units in CSV, or from the file's metadata;
+    `units` declares them and must not contradict the file. Values are not converted.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def read_records(
     inputs, outputs, excitations, others : names or mapping of str to str, optional
         Columns by role; a mapping gives new names, channel to column. With none of the four,
         every numeric column becomes a channel of role "other".
-    time : str
+    time_column : str
         Column of the time stamps; in s unless the file or `units` says otherwise.
     units : mapping of str to str, optional
         Unit by channel name, or by the name of the time column.
@@ -78,7 +78,7 @@ def read_records(
         Sample time of a file without time column, s; the first sample is at 0 s.
     resample_to_s : float, optional
         Sample time, s, of a new uniform grid; for stamps that are not uniform.
-    record : str, optional
+    record_column : str, optional
         Column that tells manoeuvres apart, used if it is there; None: there is none.
     hold : {"zero", "first", "band_limited"}, optional
         What the inputs of the records do between samples: steps, straight lines, smooth. Default:
@@ -131,8 +131,8 @@ def read_records(
         chosen = [_selected(item, roles, units or {}) for item in stored]
         return [_declared(item, InputShape(hold, period_s, loop)) for item in chosen]
     table = _table(source, kind)
-    stamps = _stamps(table, time, units or {}, sample_time_s)
-    wanted = _wanted(table, roles, units or {}, time, record, stamps.size)
+    stamps = _stamps(table, time_column, units or {}, sample_time_s)
+    wanted = _wanted(table, roles, units or {}, time_column, record_column, stamps.size)
     columns = {item.channel.name: table.column(item.column) for item in wanted}
     for item in wanted:
         if columns[item.channel.name].size != stamps.size:
@@ -144,12 +144,12 @@ def read_records(
     options: dict[str, Cell] = {
         "file": source.name,
         "sha256": sha256_of_file(source),
-        "time": time if sample_time_s is None else None,
+        "time": time_column if sample_time_s is None else None,
         "sample_time_s": sample_time_s,
     }
     history = (Step("read_records", options, VERSION),)
     records: list[Record] = []
-    for part, label in _manoeuvres(table, record, stamps, split_gaps=resample_to_s is None):
+    for part, label in _manoeuvres(table, record_column, stamps, split_gaps=resample_to_s is None):
         pieces = _piece(stamps[part], {k: v[part] for k, v in columns.items()}, resample_to_s)
         for grid, samples, more in pieces:
             records.append(_record(grid, samples, wanted, label or source.stem, (*history, *more)))

@@ -330,9 +330,9 @@ def _mapped(
         output_spectrum=None,
         errors=None if response.errors is None else MappedErrors(response.errors, slope),
         linear=None,
-        method=f"{response.method}, arithmetic"
-        if not response.method.endswith("arithmetic")
-        else response.method,
+        estimator=f"{response.estimator}, arithmetic"
+        if not response.estimator.endswith("arithmetic")
+        else response.estimator,
     )
 
 

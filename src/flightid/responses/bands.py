@@ -44,20 +44,26 @@ def nearest(grid: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[n
     return np.asarray(np.argmin(distance, axis=1))
 
 
-def choose_frequencies(grid: NDArray[np.float64], omega: ArrayLike | None) -> NDArray[np.intp]:
-    """Indices of the grid frequencies that a band, a log spacing or a list of frequencies means.
+def choose_frequencies(
+    grid: NDArray[np.float64],
+    omega_rad_s: ArrayLike | None,
+    band_rad_s: tuple[float, float] | None,
+    n_omega: int | None,
+) -> NDArray[np.intp]:
+    """Indices of the grid frequencies that a band, a log spacing in it or a list means.
 
     Raises
     ------
     DataError
         No frequency lies in the band, or one is not positive.
     """
-    if omega is None:
+    if omega_rad_s is None and band_rad_s is None:
         return np.arange(len(grid))
-    values = np.atleast_1d(np.asarray(omega, dtype=np.float64))
+    given = band_rad_s if omega_rad_s is None else omega_rad_s
+    values = np.atleast_1d(np.asarray(given, dtype=np.float64))
     if np.any(values <= 0.0) or not np.all(np.isfinite(values)):
-        raise DataError("frequencies must be positive", found=omega, needed="rad/s above zero")
-    if not (isinstance(omega, tuple) and len(omega) in (2, 3)):
+        raise DataError("frequencies must be positive", found=given, needed="rad/s above zero")
+    if omega_rad_s is not None:
         return np.unique(nearest(grid, values))
     inside = np.flatnonzero((grid >= values[0] * (1 - 1e-9)) & (grid <= values[1] * (1 + 1e-9)))
     if not inside.size:
@@ -66,7 +72,6 @@ def choose_frequencies(grid: NDArray[np.float64], omega: ArrayLike | None) -> ND
             found=f"{values[0]:.4g} to {values[1]:.4g} rad/s",
             needed=f"a part of {grid[0]:.4g} to {grid[-1]:.4g} rad/s",
         )
-    if len(omega) == 2:
+    if n_omega is None:
         return inside
-    wanted = np.geomspace(values[0], values[1], int(values[2]))
-    return np.unique(inside[nearest(grid[inside], wanted)])
+    return np.unique(inside[nearest(grid[inside], np.geomspace(values[0], values[1], n_omega))])

@@ -133,7 +133,7 @@ class CoherentPairs:
 
 
 def coherent_pairs(
-    response: FrequencyResponse,
+    responses: FrequencyResponse,
     *,
     minimum_coherence: float = 0.6,
     minimum_decades: float = 0.3,
@@ -146,7 +146,7 @@ def coherent_pairs(
 
     Parameters
     ----------
-    response : FrequencyResponse
+    responses : FrequencyResponse
         Measured responses of all outputs to all inputs.
     minimum_coherence : float
         Coherence γ² from which a frequency counts, 0 to 1.
@@ -183,9 +183,9 @@ def coherent_pairs(
             needed="a coherence between 0 and 1, and decades above 0",
         )
     judged = tuple(
-        _judged(response.pair(output, source), minimum_coherence, minimum_decades)
-        for output in response.outputs
-        for source in response.inputs
+        _judged(responses.pair(output, source), minimum_coherence, minimum_decades)
+        for output in responses.outputs
+        for source in responses.inputs
     )
     return CoherentPairs(judged, minimum_coherence, minimum_decades)
 

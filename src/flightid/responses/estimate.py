@@ -24,12 +24,12 @@ from flightid.responses.feedback import feedback_findings, feedback_of
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.windows.planning import plan_frequencies, plan_windows
 from flightid.responses.windows.samples import Samples, gather
-from flightid.responses.windows.windows import shifts_of
+from flightid.responses.windows.windows import DEFAULT_FREQUENCIES, shifts_of
 from flightid.table import Cell
 from flightid.uncertainty.feedback import FeedbackTest
 from flightid.version import VERSION
 
-METHODS = ("composite", "instrument", "local_polynomial")
+ESTIMATORS = ("composite", "instrument", "local_polynomial")
 DETRENDS = ("none", "mean", "line")
 
 
@@ -38,10 +38,12 @@ def estimate_response(
     *,
     inputs: Iterable[str] | str | None = None,
     outputs: Iterable[str] | str | None = None,
-    excitation: Iterable[str] | str | None = None,
+    excitations: Iterable[str] | str | None = None,
+    band_rad_s: tuple[float, float] | None = None,
+    n_omega: int = DEFAULT_FREQUENCIES,
     omega_rad_s: ArrayLike | None = None,
     window_s: str | float | Sequence[float] = "auto",
-    method: str = "composite",
+    estimator: str = "composite",
     overlap: float = 0.5,
     detrend: str = "mean",
     covariance: bool = True,
@@ -58,15 +60,19 @@ def estimate_response(
         Manoeuvres of one vehicle in one condition, at one sample time.
     inputs, outputs : iterable of str, optional
         Channel names; default: the channels with these roles.
-    omega_rad_s : tuple (low, high, n) or array_like, optional
-        n log-spaced frequencies, or the frequencies themselves, rad/s. Default: 100 from two
-        cycles in the longest window to a fifth of the sampling rate.
+    band_rad_s : (float, float), optional
+        Lowest and highest frequency, rad/s. Default: from two cycles in the longest window to a
+        fifth of the sampling rate.
+    n_omega : int
+        Number of log-spaced frequencies in the band.
+    omega_rad_s : array_like, optional
+        The frequencies themselves, rad/s, in place of a band.
     window_s : "auto", float or sequence of float
         Window lengths, s; rounded to an even number of whole hops.
-    excitation : str or iterable of str, optional
+    excitations : str or iterable of str, optional
         Channels of injected signals that are independent of the noise; needed by "instrument".
         Default for that method: the channels with the role excitation.
-    method : {"composite", "instrument", "local_polynomial"}
+    estimator : {"composite", "instrument", "local_polynomial"}
         "composite": directly from inputs to outputs. "instrument": for records with a loop closed,
         by way of the excitation. "local_polynomial": without windows, for short records.
     overlap : float
@@ -113,26 +119,26 @@ def estimate_response(
     >>> u = np.random.default_rng(0).standard_normal(4000)
     >>> y = 2.0 * np.concatenate([[0.0], u[:-1]])
     >>> record = fid.Record.from_arrays(np.arange(4000) / 100, inputs={"u": u}, outputs={"y": y})
-    >>> response = fid.estimate_response(record, omega_rad_s=(2.0, 50.0, 20))
+    >>> response = fid.estimate_response(record, band_rad_s=(2.0, 50.0), n_omega=20)
     >>> bool(np.all(np.abs(np.abs(response.response) - 2.0) < 0.05))
     True
     """
-    _check_options(method, detrend)
+    _check_options(estimator, detrend)
     listed = [records] if isinstance(records, Record) else list(records)
-    if method == "instrument" and excitation is None and listed:
-        excitation = listed[0].excitations
-    used = excitation if method == "instrument" else None
+    if estimator == "instrument" and excitations is None and listed:
+        excitations = listed[0].excitations
+    used = excitations if estimator == "instrument" else None
     samples = gather(listed, inputs, outputs, used, keep_mean=detrend == "none")
-    if method == "instrument" and not samples.excitations:
+    if estimator == "instrument" and not samples.excitations:
         raise DataError(
             "no excitation channel",
             found=f"channels {', '.join(listed[0].channels)}",
-            needed="a channel with the role excitation, or names in excitation",
-            action="log the injected signal, or use method='composite' and mind its bias",
+            needed="a channel with the role excitation, or names in excitations",
+            action="log the injected signal, or use estimator='composite' and mind its bias",
         )
-    omega = plan_frequencies(omega_rad_s, samples)
-    options: dict[str, Cell] = {"method": method, "detrend": detrend}
-    if method == "local_polynomial":
+    omega = plan_frequencies(omega_rad_s, band_rad_s, n_omega, samples)
+    options: dict[str, Cell] = {"estimator": estimator, "detrend": detrend}
+    if estimator == "local_polynomial":
         step = Step("estimate_response", options, VERSION)
         response = estimate_local_polynomial(samples, omega, step, covariance=covariance)
         return _with_inputs(response, samples, listed, loop)
@@ -140,7 +146,7 @@ def estimate_response(
     lengths = ", ".join(f"{plan.length * samples.sample_time_s:.6g}" for plan in plans)
     step = Step("estimate_response", options | {"window_s": lengths, "overlap": overlap}, VERSION)
     estimate = estimate_windowed(samples, omega, plans, detrend)
-    response = _with_inputs(windowed_response(estimate, method, step), samples, listed, loop)
+    response = _with_inputs(windowed_response(estimate, estimator, step), samples, listed, loop)
     if not covariance:
         return response
     try:
@@ -157,7 +163,7 @@ def _with_inputs(
 ) -> FrequencyResponse:
     """The response with what is known of its inputs: their hold, and whether they are fed back."""
     shapes = [record.input_shape for record in records]
-    if response.method.startswith("instrument"):
+    if response.estimator.startswith("instrument"):
         test = FeedbackTest("unknown", "instrument")
     else:
         test = feedback_of(samples, float(response.omega_rad_s[-1]), records, loop)
@@ -169,7 +175,7 @@ def _with_inputs(
     )
 
 
-def _check_options(method: str, detrend: str) -> None:
-    for name, value, known in (("method", method, METHODS), ("detrend", detrend, DETRENDS)):
+def _check_options(estimator: str, detrend: str) -> None:
+    for name, value, known in (("estimator", estimator, ESTIMATORS), ("detrend", detrend, DETRENDS)):
         if value not in known:
             raise OptionError(name, found=repr(value), needed="one of " + ", ".join(known))

@@ -152,5 +152,5 @@ def open_loops(
         output_spectrum=None,
         errors=errors,
         linear=None,
-        method=f"{response.method.removesuffix(', loops opened')}, loops opened",
+        estimator=f"{response.estimator.removesuffix(', loops opened')}, loops opened",
     )

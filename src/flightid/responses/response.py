@@ -56,7 +56,7 @@ class FrequencyResponse:
         Number of independent windows that the random error rests on.
     window_s : tuple of float
         Window lengths, s.
-    method : str
+    estimator : str
         How it was estimated.
     findings : tuple of Finding
         What to know before it is used.
@@ -95,7 +95,7 @@ class FrequencyResponse:
     output_spectrum: NDArray[np.float64] | None = None
     n_windows: tuple[int, ...] = ()
     window_s: tuple[float, ...] = ()
-    method: str = "given"
+    estimator: str = "given"
     findings: tuple[Finding, ...] = ()
     history: tuple[Step, ...] = ()
     errors: CovarianceSource | None = field(default=None)
@@ -132,7 +132,7 @@ class FrequencyResponse:
         coherence: ArrayLike | None = None,
         random_error: ArrayLike | None = None,
         errors: CovarianceSource | None = None,
-        method: str = "given",
+        estimator: str = "given",
     ) -> FrequencyResponse:
         """Response from known values: a published table, a model, another tool's export.
 
@@ -149,7 +149,7 @@ class FrequencyResponse:
         coherence, random_error : array_like, optional
             In the shape of `response`; default 1 and 0.
         errors : CovarianceSource, optional
-        method : str
+        estimator : str
 
         Returns
         -------
@@ -180,7 +180,7 @@ class FrequencyResponse:
             else np.reshape(random_error, shape),
             n_independent=np.ones(shape),
             errors=errors,
-            method=method,
+            estimator=estimator,
         )
 
     @property
@@ -233,7 +233,7 @@ class FrequencyResponse:
         if self.errors is None:
             raise DataError(
                 "the errors of this response are not known",
-                found=f"method {self.method!r} without covariance",
+                found=f"estimator {self.estimator!r} without covariance",
                 needed="a response estimated with covariance=True",
             )
         chosen = nearest(self.omega_rad_s, np.atleast_1d(np.asarray(omega_rad_s, dtype=float)))
@@ -262,19 +262,24 @@ class FrequencyResponse:
     def select(
         self,
         *,
-        outputs: Iterable[str] | None = None,
         inputs: Iterable[str] | None = None,
-        omega: ArrayLike | None = None,
+        outputs: Iterable[str] | None = None,
+        band_rad_s: tuple[float, float] | None = None,
+        n_omega: int | None = None,
+        omega_rad_s: ArrayLike | None = None,
     ) -> FrequencyResponse:
         """Copy with some outputs, inputs or frequencies; errors and spectra follow.
 
         Parameters
         ----------
-        outputs, inputs : iterable of str, optional
+        inputs, outputs : iterable of str, optional
             Names to keep, in this order.
-        omega : tuple of (low, high) or (low, high, n), or array_like, optional
-            A band, rad/s; with n, the n frequencies of this response nearest to a log spacing of
-            the band; an array takes the nearest frequencies of this response.
+        band_rad_s : (float, float), optional
+            Lowest and highest frequency to keep, rad/s.
+        n_omega : int, optional
+            Keep of the band the frequencies nearest to so many log-spaced ones.
+        omega_rad_s : array_like, optional
+            Keep the frequencies nearest to these, rad/s, in place of a band.
 
         Returns
         -------
@@ -289,7 +294,7 @@ class FrequencyResponse:
         """
         rows = [self._index("output", name) for name in (outputs or self.outputs)]
         columns = [self._index("input", name) for name in (inputs or self.inputs)]
-        chosen = choose_frequencies(self.omega_rad_s, omega)
+        chosen = choose_frequencies(self.omega_rad_s, omega_rad_s, band_rad_s, n_omega)
         axes = {"o": np.array(rows), "i": np.array(columns), "f": chosen}
         changes = {
             name: getattr(self, name)[np.ix_(*(axes[axis] for axis in letters))]
@@ -341,7 +346,7 @@ class FrequencyResponse:
             "inputs": list(self.inputs),
             "outputs": list(self.outputs),
             "units": dict(self.units),
-            "method": self.method,
+            "estimator": self.estimator,
             "n_windows": list(self.n_windows),
             "window_s": list(self.window_s),
             "loop": None if self.loop is None else self.loop.to_dict(),

@@ -72,7 +72,7 @@ def to_xarray(response: FrequencyResponse) -> xr.Dataset:
     }
     attributes = {
         "schema": SCHEMA,
-        "method": response.method,
+        "estimator": response.estimator,
         "about": json.dumps(
             {
                 "units": dict(response.units),
@@ -120,7 +120,7 @@ def from_xarray(dataset: xr.Dataset) -> FrequencyResponse:
             units={str(key): str(value) for key, value in about["units"].items()},
             n_windows=tuple(int(one) for one in about["n_windows"]),
             window_s=tuple(float(one) for one in about["window_s"]),
-            method=str(dataset.attrs["method"]),
+            estimator=str(dataset.attrs["estimator"]),
             findings=tuple(_finding(one) for one in about["findings"]),
             # Files of earlier versions do not say.
             loop=FeedbackTest(**about["loop"]) if about.get("loop") else None,

@@ -27,8 +27,8 @@ from flightid.simulation.nonlinear import run_equations, start_of
 
 
 def simulate(
-    model: LinearModel,
-    data: Record,
+    source: LinearModel,
+    record: Record,
     *,
     hold: Hold | None = None,
     initial_state: ArrayLike | Mapping[str, float] | None = None,
@@ -53,11 +53,11 @@ def simulate(
 
     Parameters
     ----------
-    model : LinearModel
+    source : LinearModel
         Anything with ``inputs``, ``outputs`` and ``state_space()`` returning A, B, C, D and the
         delay of each input in s: a `LinearSystem`, a transfer-function model; or a nonlinear
         `StateSpaceModel`.
-    data : Record
+    record : Record
         Holds the inputs by name, in the model's units.
     hold : {"first", "zero"}, optional
         What the inputs do between samples. Default: what the record knows, else "first"; the
@@ -111,36 +111,36 @@ def simulate(
     >>> bool(np.allclose(simulate(lag, record)["y"], 1 - np.exp(-time_s)))
     True
     """
-    if not isinstance(model, LinearModel):
+    if not isinstance(source, LinearModel):
         raise ModelError(
             "the model cannot be simulated",
-            found=type(model).__name__,
+            found=type(source).__name__,
             needed="an object with inputs, outputs and state_space()",
         )
-    between = chosen_hold(data, hold).hold
-    names, outputs = tuple(model.inputs), tuple(model.outputs)
-    driven = data.matrix(names) + _biases(input_bias, names)
+    between = chosen_hold(record, hold).hold
+    names, outputs = tuple(source.inputs), tuple(source.outputs)
+    driven = record.matrix(names) + _biases(input_bias, names)
     first = between == "first"
-    if isinstance(model, StateSpaceModel) and not model.is_linear:
-        computed = _run_nonlinear(model, driven, data, first, initial_state, substeps, noise)
+    if isinstance(source, StateSpaceModel) and not source.is_linear:
+        computed = _run_nonlinear(source, driven, record, first, initial_state, substeps, noise)
     else:
         if substeps is not None:
             raise OptionError(
                 "a linear model has no substeps: its discretisation is exact", found=substeps
             )
-        computed = _run_linear(model, driven, data.sample_time_s, initial_state, first)
+        computed = _run_linear(source, driven, record.sample_time_s, initial_state, first)
         if noise is not None and noise.moves:
             computed = computed + linear_disturbance(
-                model, noise, data.sample_time_s, data.n_samples
+                source, noise, record.sample_time_s, record.n_samples
             )
     if noise is not None:
-        computed = computed + noise.on_sensors(outputs, data.n_samples)
+        computed = computed + noise.on_sensors(outputs, record.n_samples)
     computed = computed + _biases(output_bias, outputs)
     made = dict(zip(outputs, computed, strict=True))
-    made_record = _as_record(data, names, made, units, between, noise)
-    if isinstance(model, LinearSystem) and model.is_discrete:
+    made_record = _as_record(record, names, made, units, between, noise)
+    if isinstance(source, LinearSystem) and source.is_discrete:
         # A sampled system reads its inputs at their samples alone.
-        return made_record.replace(input_shape=data.input_shape)
+        return made_record.replace(input_shape=record.input_shape)
     return made_record
 
 

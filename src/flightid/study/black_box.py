@@ -148,7 +148,8 @@ def identify_black_box(settings: BlackBoxSettings, records: Mapping[str, Record]
         gate,
         inputs=settings.inputs,
         outputs=[settings.output],
-        omega_rad_s=(*settings.band_rad_s, N_FREQUENCIES),
+        band_rad_s=settings.band_rad_s,
+        n_omega=N_FREQUENCIES,
     )
     coherent = coherent_pairs(
         response,
@@ -198,10 +199,10 @@ def _polynomial(
 ) -> tuple[OrderScan | None, PolynomialFit]:
     if not settings.is_scanned:
         orders: dict[str, Any] = {name: values[0] for name, values in settings.orders.items()}
-        asked = PolynomialModel.general(settings.output, inputs, **orders, **settings.options)
+        asked = PolynomialModel.general(inputs, settings.output, **orders, **settings.options)
         return None, identify(asked, flown)
     tried: dict[str, Any] = {"kind": settings.structure, **settings.orders, **settings.options}
-    scan = scan_orders(flown, unseen, output=settings.output, inputs=inputs, **tried)
+    scan = scan_orders(flown, unseen, outputs=settings.output, inputs=inputs, **tried)
     chosen = _chosen(scan, settings.choose)
     fit = scan.best if chosen == scan.trials[0].structure else identify(chosen, flown)
     return scan, fit

@@ -206,9 +206,9 @@ def _options(study: Study) -> dict[str, Cell]:
     options: dict[str, Cell] = {"fit": settings.method}
     if not settings.on_records:
         options |= {
-            "estimator": response.method,
-            "frequencies in a model's band": response.n_frequencies,
-            "windows [s]": ", ".join(f"{value:g}" for value in response.windows_s) or "chosen",
+            "estimator": response.estimator,
+            "frequencies in a model's band": response.n_omega,
+            "windows [s]": ", ".join(f"{value:g}" for value in response.window_s) or "chosen",
             "least coherence": response.minimum_coherence,
         }
     options |= {

@@ -112,7 +112,7 @@ def load_record(file: RecordFile, roles: Mapping[str, Role]) -> Record:
         file.path,
         inputs=named(Role.INPUT),
         outputs=named(Role.OUTPUT),
-        time=file.time,
+        time_column=file.time,
         units={key: unit for key, unit in file.units.items() if key in roles},
         sample_time_s=file.sample_time_s,
         resample_to_s=file.resample_to_s,

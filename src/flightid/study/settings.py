@@ -23,7 +23,7 @@ from flightid.study.references import require_references
 from flightid.study.tuning import TuneSettings, read_tune
 
 MAXIMUM_BYTES = 1 << 20
-METHODS = ("composite", "local_polynomial", "instrument")
+ESTIMATORS = ("composite", "local_polynomial", "instrument")
 FITS = ("frequency_domain", "output_error")
 
 
@@ -101,22 +101,22 @@ class ResponseSettings:
 
     Attributes
     ----------
-    method : str
+    estimator : str
         Estimator whose result is fitted.
     compare : tuple of str
         Estimators shown beside it.
-    n_frequencies : int
+    n_omega : int
         Frequencies in each model's band, spaced evenly in the logarithm.
-    windows_s : tuple of float
+    window_s : tuple of float
         Window lengths, s; empty: chosen by the estimator.
     minimum_coherence : float
         Frequencies below it take no part in a fit.
     """
 
-    method: str = "composite"
+    estimator: str = "composite"
     compare: tuple[str, ...] = ()
-    n_frequencies: int = 60
-    windows_s: tuple[float, ...] = ()
+    n_omega: int = 60
+    window_s: tuple[float, ...] = ()
     minimum_coherence: float = 0.6
 
 
@@ -328,16 +328,16 @@ def _segment(reader: TableReader) -> Segment:
 
 def _response(reader: TableReader) -> ResponseSettings:
     usual = ResponseSettings()
-    method = reader.choice("method", METHODS, usual.method)
+    estimator = reader.choice("estimator", ESTIMATORS, usual.estimator)
     compare = reader.names("compare", ())
     for word in compare:
-        if word not in METHODS:
-            raise reader.error("compare", "does not fit", found=word, needed=", ".join(METHODS))
+        if word not in ESTIMATORS:
+            raise reader.error("compare", "does not fit", found=word, needed=", ".join(ESTIMATORS))
     made = ResponseSettings(
-        method,
+        estimator,
         compare,
-        reader.integer("n_frequencies", usual.n_frequencies, minimum=5),
-        reader.numbers("windows_s", ()),
+        reader.integer("n_omega", usual.n_omega, minimum=5),
+        reader.numbers("window_s", ()),
         reader.positive("minimum_coherence", usual.minimum_coherence),
     )
     reader.finish()

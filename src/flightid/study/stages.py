@@ -203,7 +203,7 @@ def _cut(log: Log, segment: Segment, settings: Settings, roles: Mapping[str, Rol
     return log.record(
         settings.channel_map,
         names=list(roles),
-        span=segment.span_s,
+        span_s=segment.span_s,
         sid_run=None if segment.sid_axis is None else sid_run(log, segment),
         sample_rate_hz=settings.sample_rate_hz,
         roles=roles,
@@ -240,16 +240,17 @@ def estimate(
     if settings.on_records or band is None:
         return {}
     return {
-        method: estimate_response(
+        estimator: estimate_response(
             [records[name] for name in task.settings.identify],
             inputs=task.model.inputs,
             outputs=task.model.outputs,
-            excitation=EXCITATION if method == "instrument" else None,
-            omega_rad_s=(*band, chosen.n_frequencies),
-            window_s=list(chosen.windows_s) or "auto",
-            method=method,
+            excitations=EXCITATION if estimator == "instrument" else None,
+            band_rad_s=band,
+            n_omega=chosen.n_omega,
+            window_s=list(chosen.window_s) or "auto",
+            estimator=estimator,
         )
-        for method in dict.fromkeys((chosen.method, *chosen.compare))
+        for estimator in dict.fromkeys((chosen.estimator, *chosen.compare))
     }
 
 

@@ -27,14 +27,14 @@ class TuneSettings:
     Attributes
     ----------
     requirements : TuningRequirements
-    rate : {"filtered", "raw"}
+    gyro : {"filtered", "raw"}
         Which rate the models end at.
     angle_loop : bool
     draws, seed : int
     """
 
     requirements: TuningRequirements = field(default_factory=TuningRequirements)
-    rate: Gyro = "filtered"
+    gyro: Gyro = "filtered"
     angle_loop: bool = True
     draws: int = DRAWS
     seed: int = 0
@@ -56,10 +56,10 @@ def read_tune(reader: TableReader) -> TuneSettings:
             given[each.name] = reader.maybe(reader.positive, each.name)
     asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
     asked["objective"] = reader.choice("objective", OBJECTIVES, usual.requirements.objective)
-    rate = reader.choice("rate", ("filtered", "raw"), usual.rate)
+    gyro = reader.choice("gyro", ("filtered", "raw"), usual.gyro)
     made = TuneSettings(
         TuningRequirements(**asked),
-        "raw" if rate == "raw" else "filtered",
+        "raw" if gyro == "raw" else "filtered",
         reader.flag("angle_loop", usual.angle_loop),
         reader.integer("draws", usual.draws, minimum=1),
         reader.integer("seed", usual.seed),
@@ -111,7 +111,7 @@ def tune_models(
         fits,
         gains={axis: axis_loop_of(log, axis) for axis in fits},
         requirements=settings.requirements,
-        rate=settings.rate,
+        gyro=settings.gyro,
         angle_loop=settings.angle_loop,
         verifications=checks,
         draws=settings.draws,

@@ -93,7 +93,9 @@ class Flight:
         """Time in which a run's chirp is not silent, s."""
         return run.start_s + 1.0, run.start_s + 1.0 + run.record_s
 
-    def record(self, span: tuple[float, float] | None = None, *, gyro: Gyro = "filtered") -> Record:
+    def record(
+        self, span_s: tuple[float, float] | None = None, *, gyro: Gyro = "filtered"
+    ) -> Record:
         """Record of a span with canonical channel names.
 
         Inputs ``tau_phi``, ``tau_theta``, ``tau_psi`` (what the mixer got), outputs ``p``, ``q``,
@@ -102,7 +104,7 @@ class Flight:
 
         Parameters
         ----------
-        span : tuple of float, optional
+        span_s : tuple of float, optional
             First and last time, s; the whole flight when left out.
         gyro : {"filtered", "mean", "raw"}
             Which gyro signal the outputs are.
@@ -117,11 +119,11 @@ class Flight:
             The span holds fewer than two rows.
         """
         time_s = self.time_s
-        first, last = span or (time_s[0], time_s[-1])
+        first, last = span_s or (time_s[0], time_s[-1])
         half = 0.5 * self.log_every / self.autopilot.loop_rate_hz
         keep = np.flatnonzero((time_s >= first - half) & (time_s <= last + half))
         if keep.size < 2:
-            raise OptionError("the span is empty", found=span, needed="two rows or more")
+            raise OptionError("the span is empty", found=span_s, needed="two rows or more")
         part = slice(int(keep[0]), int(keep[-1]) + 1)
         outputs = {
             rate: self[_PREFIX[gyro] + letter][part]

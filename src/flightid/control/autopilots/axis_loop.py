@@ -200,7 +200,7 @@ class AxisLoop(ABC):
         return replace(self, unmodelled=self.unmodelled + notes)
 
     def feedback(
-        self, omega_rad_s: ArrayLike, *, gyro: Gyro = "raw", hold: bool = True
+        self, omega_rad_s: ArrayLike, *, gyro: Gyro = "raw", with_hold: bool = True
     ) -> Response:
         """From measured rate to output, positive for negative feedback.
 
@@ -211,7 +211,7 @@ class AxisLoop(ABC):
         gyro : {"raw", "filtered"}
             Where the loop is entered: ahead of the gyro filters, or behind them for a plant that
             was identified from the filtered rate.
-        hold : bool
+        with_hold : bool
             Whether the output is held for a loop and delayed by `computation_delay_s`; False for a
             plant that holds both already, as one identified from logged outputs does.
 
@@ -220,13 +220,13 @@ class AxisLoop(ABC):
         ndarray of complex, shape (n_f,)
             `output_unit` per rad/s.
         """
-        terms, names = self.basis(omega_rad_s, gyro=gyro, hold=hold)
+        terms, names = self.basis(omega_rad_s, gyro=gyro, with_hold=with_hold)
         gains = self.gains
         return np.asarray(np.array([gains[name] for name in names]) @ terms)
 
-    def forward(self, omega_rad_s: ArrayLike, *, hold: bool = True) -> Response:
+    def forward(self, omega_rad_s: ArrayLike, *, with_hold: bool = True) -> Response:
         """From rate set-point to output, target filter and feed-forward included."""
-        terms, names = self.forward_basis(omega_rad_s, hold=hold)
+        terms, names = self.forward_basis(omega_rad_s, with_hold=with_hold)
         gains = self.gains
         return np.asarray(np.array([gains[name] for name in names]) @ terms)
 
@@ -237,19 +237,21 @@ class AxisLoop(ABC):
         return np.asarray(self.angle_gain_1_s * delay)
 
     def basis(
-        self, omega_rad_s: ArrayLike, *, gyro: Gyro = "raw", hold: bool = True
+        self, omega_rad_s: ArrayLike, *, gyro: Gyro = "raw", with_hold: bool = True
     ) -> tuple[Response, tuple[str, ...]]:
         """Feedback per unit of each gain in which it is linear: shape (n_terms, n_f), and names."""
         omega = _frequencies(omega_rad_s)
         common = self.gyro_response(omega) if gyro == "raw" else np.ones(omega.size, complex)
-        return self._shared(self._feedback_terms(omega), common, omega, hold)
+        return self._shared(self._feedback_terms(omega), common, omega, with_hold)
 
     def forward_basis(
-        self, omega_rad_s: ArrayLike, *, hold: bool = True
+        self, omega_rad_s: ArrayLike, *, with_hold: bool = True
     ) -> tuple[Response, tuple[str, ...]]:
         """Path from the rate set-point per unit of each gain: shape (n_terms, n_f), and names."""
         omega = _frequencies(omega_rad_s)
-        return self._shared(self._forward_terms(omega), np.ones(omega.size, complex), omega, hold)
+        return self._shared(
+            self._forward_terms(omega), np.ones(omega.size, complex), omega, with_hold
+        )
 
     def gyro_response(self, omega_rad_s: ArrayLike) -> Response:
         """Filters between the gyro's samples and the rate that the controller takes."""

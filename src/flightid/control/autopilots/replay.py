@@ -57,7 +57,7 @@ def replay(
     log: Log,
     axis: str,
     *,
-    loop: AxisLoop | None = None,
+    controller: AxisLoop | None = None,
     span_s: tuple[float, float] | None = None,
 ) -> Replay:
     """Run a controller on a log's own set-point and rate, and compare its output with the log's.
@@ -73,7 +73,7 @@ def replay(
         A log with the controller's set-point, rate and output or terms.
     axis : {"roll", "pitch", "yaw"}
         Axis.
-    loop : AxisLoop, optional
+    controller : AxisLoop, optional
         Controller; default: the one that the log was flown with (`axis_loop_of`).
     span_s : (float, float), optional
         First and last instant, on the autopilot's clock, s; default: all.
@@ -109,7 +109,7 @@ def replay(
     >>> found.exact, found["output"].largest_error < 1e-6, found.setpoint_lag_s
     (True, True, 0.0025)
     """
-    controller = loop or axis_loop_of(log, axis)
+    controller = controller or axis_loop_of(log, axis)
     signals = read_signals(log, controller, span_s)
     running = controller
     if signals.filtered_target and isinstance(controller, ArduPilotLoop):

@@ -27,7 +27,7 @@ def open_loop(
     controller: object,
     *,
     logged: Logged = "stick",
-    step_s: float | None = None,
+    maximum_step_s: float | None = None,
 ) -> Data:
     """Take a known controller out of a record or a response of the augmented vehicle.
 
@@ -37,7 +37,7 @@ def open_loop(
     Of a record the controller is flown again through what was measured, limits and all. Each input
     becomes what the bare vehicle was given, stick and controller together; the stick is kept as
     excitation ``"<input>_stick"``, the controller's share as ``"<input>_controller"``. Fit the bare
-    vehicle with the sticks as instruments (``excitation=``, ``method="instrument"``), since the
+    vehicle with the sticks as instruments (``excitations=``, ``estimator="instrument"``), since the
     controller feeds gusts and noise back into its own inputs.
 
     Of a response from the sticks all loops are opened at once: H = T (1 + V + F T)⁻¹, with its
@@ -52,7 +52,7 @@ def open_loop(
         As for `close_loop`.
     logged : {"stick", "total"}
         What a record's input channels hold: sticks, or what reached the actuators.
-    step_s : float, optional
+    maximum_step_s : float, optional
         Step of the controller's simulation, s; the record's samples when left out.
 
     Returns
@@ -104,7 +104,7 @@ def open_loop(
             )
         return _of_response(data, controller)
     if isinstance(data, Record):
-        return _of_record(data, controller, logged, step_s)
+        return _of_record(data, controller, logged, maximum_step_s)
     raise DataError("no loop can be opened in this", found=type(data).__name__,
                     needed="a Record or a FrequencyResponse")  # fmt: skip
 
@@ -131,7 +131,7 @@ def _of_record(data: Record, controller: object, logged: Logged, step_s: float |
     run = connect([*adding, *sums], inputs=outside, name="controller")
     source = _with_logged(data, logs)
     kept = [*other.values(), *(f"{n}_controller" for n in moved)]
-    flown = run.simulate(source, outputs=kept, step_s=step_s)
+    flown = run.simulate(source, outputs=kept, maximum_step_s=step_s)
     sticks = {n: data[n] if logged == "stick" else flown[n] for n in moved}
     totals = {n: flown[other[n]] if logged == "stick" else data[n] for n in moved}
     shares = {f"{n}_controller": flown[f"{n}_controller"] for n in moved}

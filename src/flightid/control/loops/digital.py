@@ -15,7 +15,7 @@ from flightid.models.linear.linear_system import LinearSystem
 def sampled(
     block: Block,
     sample_time_s: float,
-    method: Literal["tustin", "zero", "first"] = "tustin",
+    hold: Literal["tustin", "zero", "first"] = "tustin",
     *,
     prewarp_rad_s: float | None = None,
 ) -> Block:
@@ -27,7 +27,7 @@ def sampled(
         Linear and continuous.
     sample_time_s : float
         T, s.
-    method : {"tustin", "zero", "first"}
+    hold : {"tustin", "zero", "first"}
         Trapezoidal rule; or exact for inputs that are steps or straight lines between samples.
     prewarp_rad_s : float, optional
         Where the trapezoidal rule keeps the response exactly, rad/s.
@@ -57,10 +57,10 @@ def sampled(
     if not isinstance(part, LinearSystem) or part.is_discrete:
         raise ModelError("this block cannot be sampled", found=f"{block!r}: {block}",
                          needed="a linear continuous block")  # fmt: skip
-    if method not in ("tustin", "zero", "first"):
-        raise OptionError("the method is not known", found=method, needed="tustin, zero or first")
-    if method != "tustin":
-        return replace(block, part=part.sampled(sample_time_s, method))
+    if hold not in ("tustin", "zero", "first"):
+        raise OptionError("the method is not known", found=hold, needed="tustin, zero or first")
+    if hold != "tustin":
+        return replace(block, part=part.sampled(sample_time_s, hold))
     step = sample_time_s
     if prewarp_rad_s is not None:
         if not 0.0 < prewarp_rad_s < np.pi / sample_time_s:

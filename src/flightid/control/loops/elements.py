@@ -59,12 +59,12 @@ def gain(
     return static("gain", names_in, names_out, matrix, units=units)
 
 
-def sum_of(output: str, *terms: str, units: Mapping[str, str] | None = None) -> Block:
+def sum_of(outputs: str, *terms: str, units: Mapping[str, str] | None = None) -> Block:
     """Block that adds signals: ``sum_of("e", "r", "-y")`` is e = r − y.
 
     Parameters
     ----------
-    output : str
+    outputs : str
         Signal.
     *terms : str
         Signals; one that is subtracted has a minus before its name.
@@ -92,16 +92,16 @@ def sum_of(output: str, *terms: str, units: Mapping[str, str] | None = None) -> 
     names = tuple(term.lstrip("+-") for term in terms)
     if not names or len(set(names)) < len(names):
         raise OptionError(
-            f"the terms of sum {output!r}", found=", ".join(terms) or "none",
+            f"the terms of sum {outputs!r}", found=", ".join(terms) or "none",
             needed="one or more, each once",
         )  # fmt: skip
     signs = np.array([[-1.0 if term.startswith("-") else 1.0 for term in terms]])
-    return static("sum", names, (output,), signs, units=units, alike=True)
+    return static("sum", names, (outputs,), signs, units=units, alike=True)
 
 
 def delay(
-    input: str,
-    output: str,
+    inputs: str,
+    outputs: str,
     delay_s: float,
     *,
     units: Mapping[str, str] | None = None,
@@ -110,7 +110,7 @@ def delay(
 
     Parameters
     ----------
-    input, output : str
+    inputs, outputs : str
         Signals.
     delay_s : float
         τ, s.
@@ -135,12 +135,12 @@ def delay(
     >>> print(delay("u", "u_late", 0.02))
     gain 1, delay 0.02 s
     """
-    return static("delay", (input,), (output,), np.eye(1), (delay_s,), units=units, alike=True)
+    return static("delay", (inputs,), (outputs,), np.eye(1), (delay_s,), units=units, alike=True)
 
 
 def limiter(
-    input: str,
-    output: str,
+    inputs: str,
+    outputs: str,
     high: float,
     low: float | None = None,
     *,
@@ -150,7 +150,7 @@ def limiter(
 
     Parameters
     ----------
-    input, output : str
+    inputs, outputs : str
         Signals.
     high : float
         Largest value, in the signal's unit.
@@ -181,13 +181,13 @@ def limiter(
     if not (np.isfinite(high) and np.isfinite(bottom) and bottom < high):
         raise OptionError("the limits have no meaning", found=f"{bottom} to {high}",
                           needed="two numbers, the lower one first")  # fmt: skip
-    return Block("limiter", (input,), (output,), Limits(float(bottom), float(high)),
+    return Block("limiter", (inputs,), (outputs,), Limits(float(bottom), float(high)),
                  units or {}, alike=True)  # fmt: skip
 
 
 def rate_limiter(
-    input: str,
-    output: str,
+    inputs: str,
+    outputs: str,
     rate_per_s: float,
     *,
     units: Mapping[str, str] | None = None,
@@ -196,7 +196,7 @@ def rate_limiter(
 
     Parameters
     ----------
-    input, output : str
+    inputs, outputs : str
         Signals.
     rate_per_s : float
         Largest rate either way, in the signal's unit per s.
@@ -224,13 +224,13 @@ def rate_limiter(
     """
     if not (np.isfinite(rate_per_s) and rate_per_s > 0.0):
         raise OptionError("the rate limit has no meaning", found=rate_per_s, needed="above zero")
-    return Block("rate limiter", (input,), (output,), RateLimit(float(rate_per_s)),
+    return Block("rate limiter", (inputs,), (outputs,), RateLimit(float(rate_per_s)),
                  units or {}, alike=True)  # fmt: skip
 
 
 def sample_and_hold(
-    input: str,
-    output: str,
+    inputs: str,
+    outputs: str,
     sample_time_s: float,
     computation_delay_s: float = 0.0,
     *,
@@ -244,7 +244,7 @@ def sample_and_hold(
 
     Parameters
     ----------
-    input, output : str
+    inputs, outputs : str
         Signals.
     sample_time_s : float
         T, s.
@@ -277,7 +277,7 @@ def sample_and_hold(
         raise OptionError("the computation delay has no meaning", found=computation_delay_s,
                           needed="0 s or more")  # fmt: skip
     held = Hold(float(sample_time_s), float(computation_delay_s))
-    return Block("sample and hold", (input,), (output,), held, units or {}, alike=True)
+    return Block("sample and hold", (inputs,), (outputs,), held, units or {}, alike=True)
 
 
 def system(source: object, *, rename: Mapping[str, str] | None = None, name: str = "") -> Block:

@@ -17,8 +17,8 @@ BUTTERWORTH = float(np.sqrt(0.5))
 
 
 def low_pass(
-    input: str,
-    output: str,
+    inputs: str,
+    outputs: str,
     corner_rad_s: float,
     order: Literal[1, 2] = 1,
     *,
@@ -29,7 +29,7 @@ def low_pass(
 
     Parameters
     ----------
-    input, output : str
+    inputs, outputs : str
         Signals.
     corner_rad_s : float
         ω, rad/s.
@@ -58,12 +58,12 @@ def low_pass(
     2
     """
     below = _denominator(corner_rad_s, order, damping)
-    return _filter("low-pass", (input,), output, [[below[-1]]], below, units)
+    return _filter("low-pass", (inputs,), outputs, [[below[-1]]], below, units)
 
 
 def high_pass(
-    input: str,
-    output: str,
+    inputs: str,
+    outputs: str,
     corner_rad_s: float,
     order: Literal[1, 2] = 1,
     *,
@@ -74,7 +74,7 @@ def high_pass(
 
     Parameters
     ----------
-    input, output : str
+    inputs, outputs : str
         Signals.
     corner_rad_s : float
         ω, rad/s.
@@ -103,12 +103,12 @@ def high_pass(
     Block(high-pass: [q] to [q_fast])
     """
     below = _denominator(corner_rad_s, order, damping)
-    return _filter("high-pass", (input,), output, [[1.0, *[0.0] * order]], below, units)
+    return _filter("high-pass", (inputs,), outputs, [[1.0, *[0.0] * order]], below, units)
 
 
 def washout(
-    input: str,
-    output: str,
+    inputs: str,
+    outputs: str,
     corner_rad_s: float,
     *,
     units: Units = None,
@@ -117,7 +117,7 @@ def washout(
 
     Parameters
     ----------
-    input, output : str
+    inputs, outputs : str
         Signals.
     corner_rad_s : float
         ω, rad/s: one over the washout time.
@@ -142,12 +142,12 @@ def washout(
     >>> washout("r", "r_washed", 0.5)
     Block(washout: [r] to [r_washed])
     """
-    return replace(high_pass(input, output, corner_rad_s, units=units), name="washout")
+    return replace(high_pass(inputs, outputs, corner_rad_s, units=units), name="washout")
 
 
 def notch(
-    input: str,
-    output: str,
+    inputs: str,
+    outputs: str,
     centre_rad_s: float,
     *,
     damping: float = 0.5,
@@ -158,7 +158,7 @@ def notch(
 
     Parameters
     ----------
-    input, output : str
+    inputs, outputs : str
         Signals.
     centre_rad_s : float
         ω, rad/s.
@@ -191,13 +191,13 @@ def notch(
         raise OptionError("the depth of a notch", found=depth, needed="0 up to below 1")
     below = _denominator(centre_rad_s, 2, damping)
     above = [below[0], depth * below[1], below[2]]
-    return _filter("notch", (input,), output, [above], below, units)
+    return _filter("notch", (inputs,), outputs, [above], below, units)
 
 
 def complementary(
     slow: str,
     fast: str,
-    output: str,
+    outputs: str,
     corner_rad_s: float,
     order: Literal[1, 2] = 1,
     *,
@@ -211,7 +211,7 @@ def complementary(
 
     Parameters
     ----------
-    slow, fast, output : str
+    slow, fast, outputs : str
         Signals: for example the attitude of an accelerometer, the gyro's, and what comes out.
     corner_rad_s : float
         ω, rad/s.
@@ -248,13 +248,13 @@ def complementary(
     rest = [1.0, *[0.0] * order]
     if fast_is == "rate":
         rest = [0.0, *rest[:-1]]
-    found = _filter("complementary", (slow, fast), output, [passed, rest], below, units)
+    found = _filter("complementary", (slow, fast), outputs, [passed, rest], below, units)
     return replace(found, alike=fast_is == "same")
 
 
 def lead_lag(
-    input: str,
-    output: str,
+    inputs: str,
+    outputs: str,
     lead_s: float,
     lag_s: float,
     *,
@@ -264,7 +264,7 @@ def lead_lag(
 
     Parameters
     ----------
-    input, output : str
+    inputs, outputs : str
         Signals.
     lead_s, lag_s : float
         T₁ from zero up, T₂ above zero, s.
@@ -292,7 +292,7 @@ def lead_lag(
     if not (np.isfinite(lead_s) and lead_s >= 0.0 and np.isfinite(lag_s) and lag_s > 0.0):
         raise OptionError("the times of a lead-lag", found=f"{lead_s} s and {lag_s} s",
                           needed="a lead from 0 s up and a lag above 0 s")  # fmt: skip
-    return _filter("lead-lag", (input,), output, [[lead_s, 1.0]], [lag_s, 1.0], units)
+    return _filter("lead-lag", (inputs,), outputs, [[lead_s, 1.0]], [lag_s, 1.0], units)
 
 
 def _denominator(corner: float, order: int, damping: float) -> list[float]:

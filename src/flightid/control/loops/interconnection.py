@@ -282,11 +282,11 @@ class Interconnection:
 
     def simulate(
         self,
-        data: Record,
+        record: Record,
         *,
         outputs: Sequence[str] | None = None,
         hold: InputHold | None = None,
-        step_s: float | None = None,
+        maximum_step_s: float | None = None,
         initial_state: Mapping[str, ArrayLike] | None = None,
     ) -> Record:
         """Run through the inputs of a record, limits, delays and holds included.
@@ -295,13 +295,13 @@ class Interconnection:
 
         Parameters
         ----------
-        data : Record
+        record : Record
             Holds the inputs by name, departures from trim; before its first sample all is at rest.
         outputs : sequence of str, optional
             Signals to keep; `outputs` when left out.
         hold : {"first", "zero"}, optional
             What inputs do between samples; default: what the record knows, else "first".
-        step_s : float, optional
+        maximum_step_s : float, optional
             Largest step, s; the record's samples when left out, less where delays or holds need it.
         initial_state : mapping of str to array_like, optional
             States of a block by its name.
@@ -314,7 +314,12 @@ class Interconnection:
         kept = tuple(self.outputs if outputs is None else outputs)
         self.wiring.require(kept, "a signal to keep")
         return simulate_connection(
-            self.wiring, data, kept, hold=hold, step_s=step_s, initial_state=initial_state or {}
+            self.wiring,
+            record,
+            kept,
+            hold=hold,
+            step_s=maximum_step_s,
+            initial_state=initial_state or {},
         )
 
     def _require_given(self, signal: str) -> None:

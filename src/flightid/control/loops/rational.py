@@ -16,8 +16,8 @@ Units = Mapping[str, str] | None
 
 
 def transfer(
-    input: str,
-    output: str,
+    inputs: str,
+    outputs: str,
     numerator: ArrayLike,
     denominator: ArrayLike,
     *,
@@ -29,7 +29,7 @@ def transfer(
 
     Parameters
     ----------
-    input, output : str
+    inputs, outputs : str
         Signals.
     numerator, denominator : array_like, shapes (n,), (m,)
         Coefficients, highest power first.
@@ -60,8 +60,8 @@ def transfer(
     """
     above = [np.atleast_1d(np.asarray(numerator, dtype=np.float64))]
     below = np.atleast_1d(np.asarray(denominator, dtype=np.float64))
-    system = observer_form((input,), output, above, below, delay_s, sample_time_s)
-    return Block("transfer function", (input,), (output,), system, units or {})
+    system = observer_form((inputs,), outputs, above, below, delay_s, sample_time_s)
+    return Block("transfer function", (inputs,), (outputs,), system, units or {})
 
 
 def observer_form(

@@ -134,9 +134,9 @@ class DiskMargin:
 
 
 def disk_margin(
-    loop: object,
-    outputs: Sequence[str] | str | None = None,
+    source: object,
     inputs: Sequence[str] | str | None = None,
+    outputs: Sequence[str] | str | None = None,
     *,
     controller: Controller | None = None,
     at: At = "outputs",
@@ -152,11 +152,11 @@ def disk_margin(
 
     Parameters
     ----------
-    loop : Fit, model, LinearSystem, connection, or FrequencyResponse
+    source : Fit, model, LinearSystem, connection, or FrequencyResponse
         Broken loops, as many back as out, for negative feedback; or the plant where `controller`
         is given.
-    outputs, inputs : str or sequence of str, optional
-        Channels of `loop`; left out: the controller's, or all.
+    inputs, outputs : str or sequence of str, optional
+        Channels of `source`; left out: the controller's, or all.
     controller : model, optional
         From plant outputs to plant inputs, for negative feedback: u = −K y. For one loop also a
         function of s = jω, values, or a number.
@@ -208,7 +208,7 @@ def disk_margin(
     if not np.isfinite(skew):
         raise OptionError("skew is not finite", found=skew, needed="a number, 0 for balance")
     loops = read_loops(
-        loop,
+        source,
         [outputs] if isinstance(outputs, str) else outputs,
         [inputs] if isinstance(inputs, str) else inputs,
         controller=controller,

@@ -104,8 +104,8 @@ class DisturbanceRejection:
 
 def disturbance_rejection(
     source: object,
-    output: str | None = None,
-    input: str | None = None,
+    inputs: str | None = None,
+    outputs: str | None = None,
     *,
     controller: Controller | None = None,
     given: Given = "broken",
@@ -125,7 +125,7 @@ def disturbance_rejection(
     ----------
     source : Fit, model, LinearSystem, connection broken at a signal, or FrequencyResponse
         The broken loop, or the plant where `controller` is given.
-    output, input : str, optional
+    inputs, outputs : str, optional
         Which pair; may be left out where there is one only.
     controller : model, callable of s = jω, array_like, shape (n_f,), or number, optional
         Known part by which the response is multiplied.
@@ -178,8 +178,8 @@ def disturbance_rejection(
     """
     loop = read_loop(
         source,
-        output,
-        input,
+        outputs,
+        inputs,
         controller=controller,
         given=given,
         band_rad_s=band_rad_s,

@@ -136,7 +136,7 @@ def _measured(
 ) -> Loop:
     row = response.outputs[_place("output", output, response.outputs)]
     column = response.inputs[_place("input", input, response.inputs)]
-    pair = response.select(outputs=[row], inputs=[column], omega=band_rad_s)
+    pair = response.select(inputs=[column], outputs=[row], band_rad_s=band_rad_s)
     if pair.n_frequencies < 3:
         raise DataError(
             "too few frequencies to find margins", found=pair.n_frequencies, needed="three or more"

@@ -202,9 +202,9 @@ class Margins:
 
 
 def margins(
-    loop: object,
-    output: str | None = None,
-    input: str | None = None,
+    source: object,
+    inputs: str | None = None,
+    outputs: str | None = None,
     *,
     controller: Controller | None = None,
     given: Given = "broken",
@@ -220,9 +220,9 @@ def margins(
 
     Parameters
     ----------
-    loop : Fit, model, LinearSystem, connection broken at a signal, or FrequencyResponse
+    source : Fit, model, LinearSystem, connection broken at a signal, or FrequencyResponse
         The broken loop itself, or the plant where `controller` is given.
-    output, input : str, optional
+    inputs, outputs : str, optional
         Which pair; may be left out where there is one only.
     controller : model, callable of s = jω, array_like, shape (n_f,), or number, optional
         Known part by which the response is multiplied. A model's unstable poles are counted; a
@@ -262,7 +262,7 @@ def margins(
     are biased where a margin hangs on two crossings that change places, and leave out what a model
     lacks. The sensitivity peak of a noisy measurement is biased upwards: it is the highest of many
     points. A measurement should begin below and end above the crossings; joint input and output
-    with a known excitation (``estimate_response(method="instrument")`` from error to feedback)
+    with a known excitation (``estimate_response(estimator="instrument")`` from error to feedback)
     gives L of a flown loop without the bias of a direct estimate.
 
     Reference
@@ -278,31 +278,31 @@ def margins(
     >>> round(found.phase_margin.value, 2), round(found.gain_margin.value, 2)
     (67.08, 11.88)
     """
-    source = read_loop(
-        loop,
-        output,
-        input,
+    loop = read_loop(
+        source,
+        outputs,
+        inputs,
         controller=controller,
         given=given,
         band_rad_s=band_rad_s,
         unstable_poles=unstable_poles,
     )
-    omega, metrics = measured_up(source)
-    estimate = source.of(source.uncertain.value, omega)
-    quantities, curve = _carried(source, omega)
+    omega, metrics = measured_up(loop)
+    estimate = loop.of(loop.uncertain.value, omega)
+    quantities, curve = _carried(loop, omega)
     rows, logs = estimate[None, :], np.log(omega)
     gains, phases = gain_crossings(logs, rows), phase_crossings(logs, rows)
     phases = phases.kept(np.abs(phases.value) < np.log(10.0) / 20.0 * FAR_DB)
     made = {name.replace("-", "_").replace(" ", "_"): each for (name, *_), each in quantities}
     findings = margin_findings(
-        source,
+        loop,
         metrics,
         made,
         phase_guide_deg=phase_guide_deg,
         gain_guide_db=gain_guide_db,
     )
     return Margins(
-        source.name,
+        loop.name,
         **made,
         crossovers=tuple(map(Crossing, gains.omega.tolist(), np.degrees(gains.value).tolist())),
         phase_crossovers=tuple(

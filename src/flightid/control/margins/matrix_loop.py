@@ -123,7 +123,9 @@ def read_loops(
     if measured:
         omega = thing.omega_rad_s
         if band_rad_s is not None:
-            raise OptionError("a measurement has its own band", needed="response.select(omega=…)")
+            raise OptionError(
+                "a measurement has its own band", needed="response.select(band_rad_s=…)"
+            )
     else:
         omega = loop_grid(lambda at_: _determinant(of(thing, at_)), roots, band_rad_s)
         if band_rad_s is None:
@@ -170,7 +172,7 @@ def uncertain_at(loops: MatrixLoop, omega: Array) -> Uncertain[Any]:
     """
     if not loops.measured:
         return loops.uncertain
-    chosen: FrequencyResponse = loops.uncertain.value.select(omega=omega)
+    chosen: FrequencyResponse = loops.uncertain.value.select(omega_rad_s=omega)
     parts = [uncertain_of(chosen, output=name) for name in chosen.outputs]
     if len(parts) == 1:
         return parts[0]

@@ -101,12 +101,12 @@ class ControllerPaths:
 
     def feedback(self, omega_rad_s: Array) -> Complex:
         """Rate to output with the opposite sign, for each gain alone: (n_gains, n_f)."""
-        terms, names = self.loop.basis(omega_rad_s, gyro=self.gyro, hold=False)
+        terms, names = self.loop.basis(omega_rad_s, gyro=self.gyro, with_hold=False)
         return self._chosen(terms, names) * self._late(omega_rad_s)
 
     def forward(self, omega_rad_s: Array) -> Complex:
         """Rate set-point to output: for each gain alone, then feed-forward as flown."""
-        terms, names = self.loop.forward_basis(omega_rad_s, hold=False)
+        terms, names = self.loop.forward_basis(omega_rad_s, with_hold=False)
         gains = self.loop.gains
         moving = {self.loop.names[role] for role in RATE_ROLES if role in self.loop.names}
         rest = sum(

@@ -43,7 +43,7 @@ def tune(
     gains: GainsOfAxes,
     autopilot: str = "arducopter",
     requirements: TuningRequirements | Mapping[str, TuningRequirements] | None = None,
-    rate: Gyro = "filtered",
+    gyro: Gyro = "filtered",
     angle_loop: bool = True,
     signs: Mapping[str, int] | None = None,
     band_rad_s: Band | None = None,
@@ -68,7 +68,7 @@ def tune(
     autopilot : str
         Of parameters given by name; a log tells its autopilot.
     requirements : TuningRequirements, or a mapping of them by axis, optional
-    rate, angle_loop, band_rad_s, draws, seed, nominal : optional
+    gyro, angle_loop, band_rad_s, draws, seed, nominal : optional
         As for `flightid.tune_pid`.
     signs : mapping of str to int, optional
         −1 for an axis whose rate answers the command the other way round.
@@ -111,7 +111,7 @@ def tune(
             "axes to tune", found=", ".join(unknown) or "none", needed=", ".join(CHANNELS)
         )
     loops = {axis: flown_loop(gains, autopilot, axis) for axis in fits}
-    shared = {"rate": rate, "band_rad_s": band_rad_s, "draws": draws, "seed": seed}
+    shared = {"gyro": gyro, "band_rad_s": band_rad_s, "draws": draws, "seed": seed}
     designs: dict[str, PidDesign] = {}
     together: list[Together] = []
     for axes in _groups(fits):
@@ -136,7 +136,7 @@ def tune(
             [CHANNELS[axis][1] for axis in axes],
             [CHANNELS[axis][0] for axis in axes],
             needs[0],
-            rate,
+            gyro,
             angle_loop and all(map(has_angle_loop, flown)),
             turned,
             None,

@@ -48,10 +48,10 @@ def tune_pid(
     gains: Gains,
     autopilot: str = "arducopter",
     axis: str = "roll",
-    input: str | None = None,
-    output: str | None = None,
+    inputs: str | None = None,
+    outputs: str | None = None,
     requirements: TuningRequirements | None = None,
-    rate: Gyro = "filtered",
+    gyro: Gyro = "filtered",
     angle_loop: bool = True,
     sign: int = 1,
     band_rad_s: Band | None = None,
@@ -78,10 +78,10 @@ def tune_pid(
         by name.
     autopilot, axis : str
         Of parameters given by name; a log tells its autopilot.
-    input, output : str, optional
+    inputs, outputs : str, optional
         Channels of the model; by default those of the axis.
     requirements : TuningRequirements, optional
-    rate : {"filtered", "raw"}
+    gyro : {"filtered", "raw"}
         Which rate the model ends at: behind the autopilot's gyro filters, as RATE and
         vehicle_angular_velocity log it, or ahead of them.
     angle_loop : bool
@@ -142,7 +142,7 @@ def tune_pid(
     """
     flown = flown_loop(gains, autopilot, axis)
     usual = CHANNELS[flown.axis]
-    channels = ([output or usual[1]], [input or usual[0]])
+    channels = ([outputs or usual[1]], [inputs or usual[0]])
     need = requirements or TuningRequirements()
     step = 1.0 / flown.loop_rate_hz
     evidence = gather(
@@ -160,7 +160,7 @@ def tune_pid(
         [flown],
         *channels,
         need,
-        rate,
+        gyro,
         angle_loop and has_angle_loop(flown),
         [sign],
         _noise(gyro_noise, step),

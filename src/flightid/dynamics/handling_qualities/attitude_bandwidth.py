@@ -37,8 +37,8 @@ Array = NDArray[np.float64]
 
 def attitude_bandwidth(
     source: object,
-    output: str,
-    input: str,
+    inputs: str,
+    outputs: str,
     *,
     band_rad_s: tuple[float, float] = (0.1, 100.0),
     response_type: str = "rate",
@@ -56,7 +56,7 @@ def attitude_bandwidth(
         Measured points with known errors are smoothed by local parabolas over a third of their
         frequency, and joined by straight lines of dB and degrees over log frequency; a model is
         evaluated where it is needed. Fits and measured responses give intervals.
-    output, input : str
+    inputs, outputs : str
         Attitude and control.
     band_rad_s : tuple of float
         Band to look in, rad/s; of a measured response, what lies in it.
@@ -98,11 +98,11 @@ def attitude_bandwidth(
     -------
     >>> import flightid as fid
     >>> model = fid.load_model("attitude_first_order", axis="roll")
-    >>> found = attitude_bandwidth(model, model.outputs[0], model.inputs[0])
+    >>> found = attitude_bandwidth(model, model.inputs[0], model.outputs[0])
     >>> found.phase_bandwidth_rad_s < found.omega_180_rad_s
     True
     """
-    pair = _pair(output, input, band_rad_s, output_is, sign)
+    pair = _pair(outputs, inputs, band_rad_s, output_is, sign)
     for name, given, known in (
         ("response_type", response_type, RESPONSE_TYPES),
         ("output_is", output_is, OUTPUTS),
@@ -110,7 +110,7 @@ def attitude_bandwidth(
         if given not in known:
             raise OptionError(f"{name} is not known", found=given, needed=" or ".join(known))
     if isinstance(source, FrequencyResponse):
-        chosen = source.select(outputs=[output], inputs=[input])
+        chosen = source.select(outputs=[outputs], inputs=[inputs])
         data: object = chosen
         curve = Curve.of(chosen, pair, smoother_of(chosen, pair))
     else:
@@ -119,7 +119,7 @@ def attitude_bandwidth(
     values = bandwidth_numbers(curve)
     if not np.all(np.isfinite(values[:2])):
         raise DataError(
-            f"{output}/{input} has no bandwidth in the band",
+            f"{outputs}/{inputs} has no bandwidth in the band",
             found=f"phase from {curve.degrees[0]:.0f}° to {curve.degrees[-1]:.0f}°",
             needed="a phase that passes −135° and −180°",
             action=LATE if curve.degrees[0] <= PHASE_MARGIN_DEG - 180.0 else NO_FALL,
@@ -127,7 +127,7 @@ def attitude_bandwidth(
     errors = _errors(data, pair, values)
     nonlinear = _is_nonlinear(values)
     findings = (*_judge(curve, values, nonlinear, response_type), *_coherence(data, pair, values))
-    return AttitudeBandwidth(output, input, response_type, errors, curve, nonlinear, findings)
+    return AttitudeBandwidth(outputs, inputs, response_type, errors, curve, nonlinear, findings)
 
 
 def _pair(output: str, control: str, band: tuple[float, float], output_is: str, sign: int) -> Pair:
@@ -179,7 +179,7 @@ def _thinned(response: FrequencyResponse, pair: Pair, values: Array) -> Frequenc
     )
     # The lowest points only say on which branch the phase begins.
     few = below[:: max(1, len(below) // 20)]
-    return response.select(omega=omega[np.concatenate([few, keep])])
+    return response.select(omega_rad_s=omega[np.concatenate([few, keep])])
 
 
 def _is_nonlinear(values: Array) -> bool:

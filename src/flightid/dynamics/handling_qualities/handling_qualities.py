@@ -235,8 +235,8 @@ def handling_qualities(
         try:
             found = attitude_bandwidth(
                 source,
-                output,
                 control,
+                output,
                 band_rad_s=band_rad_s,
                 response_type=response_type,
                 output_is="rate" if output == ATTITUDES[axis][1] else "attitude",

@@ -43,7 +43,7 @@ class AttitudeBandwidth:
     Example
     -------
     >>> import flightid as fid
-    >>> fid.attitude_bandwidth(fid.load_model("attitude_first_order"), "phi", "tau_phi")
+    >>> fid.attitude_bandwidth(fid.load_model("attitude_first_order"), "tau_phi", "phi")
     AttitudeBandwidth(phi/tau_phi, 2.693 rad/s, phase delay 0.01492 s)
     """
 

@@ -33,8 +33,8 @@ Array = NDArray[np.float64]
 
 def lower_order(
     source: object,
-    output: str | None = None,
-    input: str | None = None,
+    inputs: str | None = None,
+    outputs: str | None = None,
     *,
     kind: str,
     band_rad_s: tuple[float, float] = (0.1, 10.0),
@@ -52,7 +52,7 @@ def lower_order(
     source : Fit, FrequencyResponse, model, LinearSystem, or a black-box fit
         High-order system. Intervals come from the covariance of a fit's parameters, each of which
         moves the equivalent system, or from the errors of a measured response.
-    output, input : str, optional
+    inputs, outputs : str, optional
         Pair; left out where the source has one.
     kind : str
         ``"short_period"`` (q), ``"pitch_attitude"`` (θ), ``"roll"`` (p), ``"roll_attitude"`` (φ),
@@ -107,14 +107,14 @@ def lower_order(
     """
     task = _Task(kind, _band(band_rad_s, n_omega), n_omega, _known(kind, fixed, t_theta2_s))
     if isinstance(source, FrequencyResponse):
-        names = _choose(source.outputs, output), _choose(source.inputs, input)
+        names = _choose(source.outputs, outputs), _choose(source.inputs, inputs)
         response = source.select(outputs=names[:1], inputs=names[1:])
         best = _first_fit(task, response, correct_bias=correct_bias)
         uncertain = uncertain_numbers(_values(best, best.names), best.covariance, UNKNOWN_ERRORS)
     else:
         carried = uncertain_of(source)
         system = _system(carried.value)
-        names = _choose(system.outputs, output), _choose(system.inputs, input)
+        names = _choose(system.outputs, outputs), _choose(system.inputs, inputs)
         response = _response(task, system, *names)
         best = _first_fit(task, response, correct_bias=False)
         uncertain = _carried(task, carried, best, *names)
@@ -212,7 +212,7 @@ def _response(
         )
     units = {name: thing.units.get(name, "1") for name in (output, control)}
     return FrequencyResponse.from_values(
-        omega, values, inputs=[control], outputs=[output], units=units, method="model"
+        omega, values, inputs=[control], outputs=[output], units=units, estimator="model"
     )
 
 
@@ -261,7 +261,7 @@ def _fit(
     return identify(
         start,
         response,
-        omega_rad_s=band,
+        band_rad_s=band,
         n_omega=task.n_omega,
         minimum_coherence=LOW_COHERENCE,
         weight_gain=GAIN_WEIGHT,
@@ -307,7 +307,7 @@ def _cost(fit: Fit) -> float:
 
 
 def _envelopes(fit: Fit, response: FrequencyResponse, band: tuple[float, float]) -> Mismatch:
-    return mismatch(fit.model, response.select(omega=(0.999 * band[0], 1.001 * band[1])))
+    return mismatch(fit.model, response.select(band_rad_s=(0.999 * band[0], 1.001 * band[1])))
 
 
 def _judge(found: LowerOrder) -> tuple[Finding, ...]:

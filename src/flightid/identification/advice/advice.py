@@ -106,8 +106,8 @@ class Advice:
 def advise(
     records: Record | Sequence[Record],
     *,
-    output: str | None = None,
     inputs: Sequence[str] | None = None,
+    outputs: str | None = None,
     n_lags: int = 40,
 ) -> Advice:
     """Judge records before a black-box fit: excitation, delay, feedback, sampling, offsets.
@@ -115,7 +115,7 @@ def advise(
     Parameters
     ----------
     records : Record or sequence of Record
-    output : str, optional
+    outputs : str, optional
         Default: the only output.
     inputs : sequence of str, optional
         Default: all inputs.
@@ -149,11 +149,11 @@ def advise(
     listed = [records] if isinstance(records, Record) else list(records)
     if not listed:
         raise DataError("there is no record", needed="one or more")
-    if output is None and len(listed[0].outputs) != 1:
+    if outputs is None and len(listed[0].outputs) != 1:
         raise OptionError(
             "the output is not said", found=", ".join(listed[0].outputs), needed="output='…'"
         )
-    name = listed[0].outputs[0] if output is None else output
+    name = listed[0].outputs[0] if outputs is None else outputs
     names = tuple(listed[0].inputs if inputs is None else inputs)
     data = gather_channels(listed, name, names, "mean")
     data.require_change()
@@ -164,7 +164,7 @@ def advise(
     reason = ""
     try:
         response = impulse_response(
-            listed, output=name, inputs=names, n_lags=n_lags, negative_lags=FEEDBACK_LAGS
+            listed, outputs=name, inputs=names, n_lags=n_lags, negative_lags=FEEDBACK_LAGS
         )
     except DataError as error:
         reason = str(error)

@@ -147,8 +147,8 @@ class ImpulseResponse:
 def impulse_response(
     records: Record | Sequence[Record],
     *,
-    output: str | None = None,
     inputs: Sequence[str] | None = None,
+    outputs: str | None = None,
     n_lags: int = 40,
     negative_lags: int = 0,
     kernel: str | None = None,
@@ -162,7 +162,7 @@ def impulse_response(
     Parameters
     ----------
     records : Record or sequence of Record
-    output : str, optional
+    outputs : str, optional
         Default: the only output.
     inputs : sequence of str, optional
         Default: all inputs.
@@ -207,11 +207,11 @@ def impulse_response(
     listed = [records] if isinstance(records, Record) else list(records)
     if not listed:
         raise DataError("there is no record", needed="one or more")
-    if output is None and len(listed[0].outputs) != 1:
+    if outputs is None and len(listed[0].outputs) != 1:
         raise OptionError(
             "the output is not said", found=", ".join(listed[0].outputs), needed="output='…'"
         )
-    name = listed[0].outputs[0] if output is None else output
+    name = listed[0].outputs[0] if outputs is None else outputs
     names = tuple(listed[0].inputs if inputs is None else inputs)
     _require(names, n_lags, negative_lags, kernel)
     data = _shifted(gather_channels(listed, name, names, offsets), negative_lags)

@@ -33,9 +33,9 @@ def why_unknown(data: FrequencyResponse) -> str:
     """
     if data.linear is not None:
         return ""
-    if data.method.endswith("arithmetic"):
+    if data.estimator.endswith("arithmetic"):
         return "the response is a result of arithmetic"
-    if data.method == "given":
+    if data.estimator == "given":
         return "the response was given as values"
     return "the response was read from a file or estimated with covariance=False"
 

@@ -65,7 +65,7 @@ class Options:
 
     starts: int = 1
     seed: int = 0
-    omega_rad_s: Bands = None
+    band_rad_s: Bands = None
     n_omega: int = 20
     minimum_coherence: float | None = 0.6
     weight_gain: float = 1.0
@@ -150,7 +150,7 @@ def select_by(
     return select_points(
         data,
         model.response_names,
-        bands=options.omega_rad_s,
+        bands=options.band_rad_s,
         n_omega=options.n_omega,
         minimum_coherence=options.minimum_coherence,
         weight_gain=options.weight_gain,
@@ -348,7 +348,7 @@ def _provenance(data: FrequencyResponse, options: Options) -> dict[str, object]:
     digest = hashlib.sha256()
     for array in (data.omega_rad_s, data.response, data.coherence, data.random_error):
         digest.update(np.ascontiguousarray(array).tobytes())
-    bands = options.omega_rad_s
+    bands = options.band_rad_s
     return {
         "method": "frequency domain",
         "flightid": VERSION,
@@ -357,7 +357,7 @@ def _provenance(data: FrequencyResponse, options: Options) -> dict[str, object]:
         "options": {
             "starts": options.starts,
             "seed": options.seed,
-            "omega_rad_s": dict(bands) if isinstance(bands, dict) else bands,
+            "band_rad_s": dict(bands) if isinstance(bands, dict) else bands,
             "n_omega": options.n_omega,
             "minimum_coherence": options.minimum_coherence,
             "weight_gain": options.weight_gain,

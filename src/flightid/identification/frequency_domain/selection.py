@@ -162,7 +162,7 @@ def _places(
                 f"response {name} has no band to fit",
                 found=f"coherence of at most {pair.coherence.max():.2f}",
                 needed=f"neighbouring frequencies with at least {minimum_coherence}",
-                action="give omega_rad_s and a lower minimum_coherence, or leave the response out",
+                action="give band_rad_s and a lower minimum_coherence, or leave the response out",
             )
         band = found
     low, high = band
@@ -183,7 +183,7 @@ def _places(
             found=f"{len(usable)} between {low:.4g} and {high:.4g} rad/s"
             + ("" if minimum_coherence is None else f" with coherence ≥ {minimum_coherence:g}"),
             needed=f"at least {MINIMUM_POINTS}",
-            action="widen omega_rad_s, lower minimum_coherence, or leave the response out",
+            action="widen band_rad_s, lower minimum_coherence, or leave the response out",
         )
     wanted = np.geomspace(grid[usable[0]], grid[usable[-1]], n_omega)
     return np.asarray(usable[np.unique(nearest(grid[usable], wanted))])

@@ -56,7 +56,7 @@ Array = NDArray[np.float64]
 class JointOptions(RecordOptions):
     """Options of a joint fit: those of records, and points of the response; see `identify`."""
 
-    omega_rad_s: Bands = None
+    band_rad_s: Bands = None
     n_omega: int = 20
     minimum_coherence: float | None = 0.6
     correct_bias: bool = True
@@ -65,7 +65,7 @@ class JointOptions(RecordOptions):
     def of_responses(self) -> Options:
         """The part that concerns the responses."""
         return Options(
-            omega_rad_s=self.omega_rad_s,
+            band_rad_s=self.band_rad_s,
             n_omega=self.n_omega,
             minimum_coherence=self.minimum_coherence,
             cost="likelihood",

@@ -94,15 +94,14 @@ class NarxFit:
         return self.equation.predict(record, horizon)
 
     def residuals(
-        self, data: Record | Sequence[Record], horizon: int | str = 1
+        self, records: Record | Sequence[Record], horizon: int | str = 1
     ) -> tuple[Record, ...]:
         """Records with the prediction errors in place of the output, for `residual_tests`.
 
         The samples that start the lags are cut off.
         """
-        records = (data,) if isinstance(data, Record) else data
         found = []
-        for record in records:
+        for record in (records,) if isinstance(records, Record) else records:
             run = self.predict(record, horizon)
             errors = record.replace({self.model.output: run.measured - run.predicted})
             first = record.time_s[run.start]

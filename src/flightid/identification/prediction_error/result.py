@@ -74,7 +74,7 @@ class PolynomialFit:
     >>> record = fid.Record.from_arrays(np.arange(500) / 10, inputs={"u": u},
     ...                                 outputs={"y": np.zeros(500)})
     >>> record = record.replace({"y": truth.simulate(record)})
-    >>> fit = fid.identify(fid.PolynomialModel.arx("y", "u", na=2, nb=2, offsets="none"), record)
+    >>> fit = fid.identify(fid.PolynomialModel.arx("u", "y", na=2, nb=2, offsets="none"), record)
     >>> fit
     PolynomialFit(ARX, 4 coefficients, 498 samples, free-run fit 100.0 %)
     >>> [round(p.value, 9) for p in fit.parameters.values()]

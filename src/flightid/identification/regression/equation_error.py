@@ -80,7 +80,7 @@ def fit_fourier_regression(
     """Fit by least squares on Fourier integrals of the equations; see `flightid.identify`."""
 
     def operator(motion: MeasuredMotion) -> Operator:
-        return FourierRows(motion, options.omega_rad_s)
+        return FourierRows(motion, options.band_rad_s)
 
     problem, start, limits = _problem(model, data, options, operator)
     omegas = [each.grid.omega_rad_s for each in problem.operators if isinstance(each, FourierRows)]

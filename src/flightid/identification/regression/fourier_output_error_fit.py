@@ -39,7 +39,7 @@ def fit_fourier_output_error(
     """Fit outputs at the harmonics of the records; see `flightid.identify`."""
     records = check_records(model, data)
     transformed = tuple(
-        TransformedRecord.of(record, model, options.omega_rad_s) for record in records
+        TransformedRecord.of(record, model, options.band_rad_s) for record in records
     )
     problem = FourierOutputError(model, transformed, options.hold)
     omegas = [each.grid.omega_rad_s for each in transformed]

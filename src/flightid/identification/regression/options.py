@@ -50,7 +50,7 @@ class EquationErrorOptions(RegressionOptions):
 class FourierOptions(RegressionOptions):
     """Options of equation error in the frequency domain."""
 
-    omega_rad_s: Band | None = None
+    band_rad_s: Band | None = None
 
 
 @dataclass(frozen=True)

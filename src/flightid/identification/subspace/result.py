@@ -64,7 +64,7 @@ class InnovationsFit:
     >>> record = fid.Record.from_arrays(np.arange(400) / 10, inputs={"u": u},
     ...                                 outputs={"y": np.zeros(400)})
     >>> record = record.replace({"y": truth.simulate(record)[0]})
-    >>> fit = fid.identify(fid.InnovationsModel.subspace("y", "u", offsets="none"), record)
+    >>> fit = fid.identify(fid.InnovationsModel.subspace("u", "y", offsets="none"), record)
     >>> fit
     InnovationsFit(moesp, 2 states, 400 samples, free-run fit y 100.0 %)
     >>> fit.modes[0]

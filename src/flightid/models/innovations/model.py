@@ -53,8 +53,8 @@ class InnovationsModel(InnovationsForm):
 
     @staticmethod
     def subspace(
-        outputs: str | Sequence[str],
         inputs: str | Sequence[str],
+        outputs: str | Sequence[str],
         order: int | None = None,
         **options: Unpack[SubspaceOptions],
     ) -> SubspaceStructure:
@@ -62,7 +62,7 @@ class InnovationsModel(InnovationsForm):
 
         Parameters
         ----------
-        outputs, inputs : str or sequence of str
+        inputs, outputs : str or sequence of str
         order : int, optional
             Number of states; default: chosen from the singular values.
         **options

@@ -275,7 +275,7 @@ class LinearSystem(Rational):
         return replace(self, a=a, b=b, c=c, d=d, delays_s=(), states=(*self.states, *late))
 
     def select(
-        self, *, outputs: Iterable[str] | None = None, inputs: Iterable[str] | None = None
+        self, *, inputs: Iterable[str] | None = None, outputs: Iterable[str] | None = None
     ) -> Self:
         """The system with some outputs and inputs, in this order, and all states.
 

@@ -19,8 +19,8 @@ class StructureMakers:
 
     @staticmethod
     def general(
-        output: str,
         inputs: str | Sequence[str],
+        outputs: str,
         *,
         na: int = 0,
         nb: Orders = 0,
@@ -34,7 +34,7 @@ class StructureMakers:
 
         Parameters
         ----------
-        output : str
+        outputs : str
         inputs : str or sequence of str
         na, nb, nc, nd, nf, nk : int, or for nb, nf, nk a sequence with one for each input
             Orders; nb counts coefficients, nk samples of delay.
@@ -48,12 +48,12 @@ class StructureMakers:
         names = (inputs,) if isinstance(inputs, str) else tuple(inputs)
         n = len(names)
         b, f, k = per_input(nb, n), per_input(nf, n), per_input(nk, n)
-        return PolynomialStructure(output, names, na, b, nc, nd, f, k, **options)
+        return PolynomialStructure(outputs, names, na, b, nc, nd, f, k, **options)
 
     @staticmethod
     def arx(
-        output: str,
         inputs: str | Sequence[str],
+        outputs: str,
         *,
         na: int,
         nb: Orders,
@@ -61,12 +61,12 @@ class StructureMakers:
         **options: Unpack[PolynomialOptions],
     ) -> PolynomialStructure:
         """Structure A y = B u + e."""
-        return StructureMakers.general(output, inputs, na=na, nb=nb, nk=nk, **options)
+        return StructureMakers.general(inputs, outputs, na=na, nb=nb, nk=nk, **options)
 
     @staticmethod
     def armax(
-        output: str,
         inputs: str | Sequence[str],
+        outputs: str,
         *,
         na: int,
         nb: Orders,
@@ -75,12 +75,12 @@ class StructureMakers:
         **options: Unpack[PolynomialOptions],
     ) -> PolynomialStructure:
         """Structure A y = B u + C e."""
-        return StructureMakers.general(output, inputs, na=na, nb=nb, nc=nc, nk=nk, **options)
+        return StructureMakers.general(inputs, outputs, na=na, nb=nb, nc=nc, nk=nk, **options)
 
     @staticmethod
     def oe(
-        output: str,
         inputs: str | Sequence[str],
+        outputs: str,
         *,
         nb: Orders,
         nf: Orders,
@@ -88,12 +88,12 @@ class StructureMakers:
         **options: Unpack[PolynomialOptions],
     ) -> PolynomialStructure:
         """Structure y = (B/F) u + e."""
-        return StructureMakers.general(output, inputs, nb=nb, nf=nf, nk=nk, **options)
+        return StructureMakers.general(inputs, outputs, nb=nb, nf=nf, nk=nk, **options)
 
     @staticmethod
     def bj(
-        output: str,
         inputs: str | Sequence[str],
+        outputs: str,
         *,
         nb: Orders,
         nc: int,
@@ -103,4 +103,6 @@ class StructureMakers:
         **options: Unpack[PolynomialOptions],
     ) -> PolynomialStructure:
         """Structure y = (B/F) u + (C/D) e."""
-        return StructureMakers.general(output, inputs, nb=nb, nc=nc, nd=nd, nf=nf, nk=nk, **options)
+        return StructureMakers.general(
+            inputs, outputs, nb=nb, nc=nc, nd=nd, nf=nf, nk=nk, **options
+        )

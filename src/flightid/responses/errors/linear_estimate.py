@@ -154,7 +154,7 @@ class LinearEstimate:
     >>> u = np.random.default_rng(0).standard_normal(2000)
     >>> record = fid.Record.from_arrays(np.arange(2000) / 100, inputs={"u": u},
     ...                                 outputs={"y": np.convolve(u, [0.5, 0.5])[:2000]})
-    >>> response = fid.estimate_response(record, omega_rad_s=(2.0, 50.0, 5))
+    >>> response = fid.estimate_response(record, band_rad_s=(2.0, 50.0), n_omega=5)
     >>> again = response.linear.apply([record.matrix(["y"])])
     >>> bool(np.allclose(again, response.response, rtol=0.01))
     True

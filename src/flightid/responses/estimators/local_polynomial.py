@@ -98,7 +98,7 @@ def _response(
         input_spectrum=spectrum[:n_in, :n_in],
         cross_spectrum=spectrum[:n_in, n_in:].transpose(1, 0, 2),
         output_spectrum=outputs,
-        method="local_polynomial",
+        estimator="local_polynomial",
         findings=tuple(correlation_findings(samples.inputs, spectrum[:n_in, :n_in])),
         history=(*samples.history, step),
         errors=LocalErrors(tuple(fits), NoiseSpectrum.of_matrices(omega, residuals))

@@ -92,7 +92,7 @@ def windowed_errors(estimate: Windowed) -> WindowedErrors:
     return WindowedErrors(windows, samples.sample_time_s, estimate.composite.sensitivity, noise)
 
 
-def windowed_response(estimate: Windowed, method: str, step: Step) -> FrequencyResponse:
+def windowed_response(estimate: Windowed, estimator: str, step: Step) -> FrequencyResponse:
     """The frequency response without its covariance."""
     samples, composite = estimate.samples, estimate.composite
     n_in, n_out = len(samples.inputs), len(samples.outputs)
@@ -121,7 +121,7 @@ def windowed_response(estimate: Windowed, method: str, step: Step) -> FrequencyR
         output_spectrum=np.real(np.einsum("iif->if", spectrum[outputs, outputs])),
         n_windows=tuple(one.n_windows for one in estimate.spectra),
         window_s=window_s,
-        method=method,
+        estimator=estimator,
         findings=(
             *band_findings(estimate.omega, window_s[0], samples.sample_time_s),
             *correlation_findings(samples.inputs, spectrum[:n_in, :n_in]),

@@ -21,25 +21,38 @@ from flightid.responses.windows.windows import (
 )
 
 
-def plan_frequencies(given: ArrayLike | None, samples: Samples) -> NDArray[np.float64]:
+def plan_frequencies(
+    omega_rad_s: ArrayLike | None,
+    band_rad_s: tuple[float, float] | None,
+    n_omega: int,
+    samples: Samples,
+) -> NDArray[np.float64]:
     """Frequencies of the estimate, rad/s, increasing.
 
     Raises
     ------
     OptionError
-        A frequency at or beyond the Nyquist frequency, or at or below zero.
+        A frequency at or beyond the Nyquist frequency, or at or below zero; a band beside
+        frequencies.
     """
-    if given is None:
-        return default_frequencies(longest_window(samples.durations_s), samples.sample_time_s)
-    if isinstance(given, tuple) and len(given) == 3 and isinstance(given[2], int | np.integer):
-        low, high, count = float(given[0]), float(given[1]), int(given[2])
-        if not 0.0 < low < high or count < 2:
+    if n_omega < 2:
+        raise OptionError("n_omega is too small", found=n_omega, needed="two frequencies or more")
+    if omega_rad_s is not None and band_rad_s is not None:
+        raise OptionError(
+            "band_rad_s and omega_rad_s were both given", needed="a band, or the frequencies"
+        )
+    if omega_rad_s is not None:
+        omega = np.unique(np.atleast_1d(np.asarray(omega_rad_s, dtype=np.float64)))
+    elif band_rad_s is not None:
+        low, high = map(float, band_rad_s)
+        if not 0.0 < low < high:
             raise OptionError(
-                "frequency band", found=given, needed="(low, high, n) with 0 < low < high, n > 1"
+                "band_rad_s is no band", found=band_rad_s, needed="(low, high), 0 < low < high"
             )
-        omega = np.geomspace(low, high, count)
+        omega = np.geomspace(low, high, n_omega)
     else:
-        omega = np.unique(np.atleast_1d(np.asarray(given, dtype=np.float64)))
+        longest_s = longest_window(samples.durations_s)
+        return default_frequencies(longest_s, samples.sample_time_s, n_omega)
     nyquist = math.pi / samples.sample_time_s
     if not omega.size or not np.all(np.isfinite(omega)) or omega[0] <= 0.0 or omega[-1] >= nyquist:
         raise OptionError(

@@ -108,7 +108,9 @@ def longest_window(durations_s: Sequence[float]) -> float:
     return min(max(durations_s) / 2.0, math.fsum(durations_s) / WINDOWS_IN_RECORDS)
 
 
-def default_frequencies(longest_s: float, sample_time_s: float) -> NDArray[np.float64]:
+def default_frequencies(
+    longest_s: float, sample_time_s: float, n_omega: int
+) -> NDArray[np.float64]:
     """Log-spaced, rad/s: from two cycles in the longest window to a fifth of the sampling rate."""
     low = CYCLES_AT_LOWEST * 2.0 * math.pi / longest_s
     high = HIGHEST_FRACTION * 2.0 * math.pi / sample_time_s
@@ -118,4 +120,4 @@ def default_frequencies(longest_s: float, sample_time_s: float) -> NDArray[np.fl
             found=f"a longest window of {longest_s:.3g} s at {1 / sample_time_s:.4g} Hz",
             needed=f"more than {CYCLES_AT_LOWEST / HIGHEST_FRACTION:.0f} samples in it",
         )
-    return np.geomspace(low, high, DEFAULT_FREQUENCIES)
+    return np.geomspace(low, high, n_omega)

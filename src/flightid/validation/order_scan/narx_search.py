@@ -108,7 +108,7 @@ class NarxSearch:
 
 def search_narx(
     model: NarxStructure,
-    training: Record | Sequence[Record],
+    records: Record | Sequence[Record],
     validation: Record | Sequence[Record],
     *,
     lags: Sequence[tuple[int, int]] = (),
@@ -123,7 +123,7 @@ def search_narx(
     ----------
     model : NarxStructure
         What all trials share.
-    training, validation : Record or sequence of Record
+    records, validation : Record or sequence of Record
     lags : sequence of (int, int)
         Pairs (output_lags, input_lags); default: the model's own.
     widths : sequence of float
@@ -174,7 +174,7 @@ def search_narx(
     ]
     start = max(lag.lag for trial in models for lag in trial.lags)
     trials = [
-        _trial(trial, training, unseen, start) for trial in track(models, "NARX lags and widths")
+        _trial(trial, records, unseen, start) for trial in track(models, "NARX lags and widths")
     ]
     if all(trial.fit is None for trial in trials):
         raise FitError(

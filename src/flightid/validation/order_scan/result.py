@@ -25,7 +25,7 @@ class OrderTrial:
 
     Example
     -------
-    >>> asked = PolynomialModel.arx("y", "u", na=1, nb=1)
+    >>> asked = PolynomialModel.arx("u", "y", na=1, nb=1)
     >>> OrderTrial(asked, None, None, None, None, "collinear regressors").note
     'collinear regressors'
     """

@@ -34,8 +34,8 @@ def scan_orders(
     records: Record | Sequence[Record],
     validation: Record | Sequence[Record],
     *,
-    output: str | None = None,
     inputs: Sequence[str] | None = None,
+    outputs: str | None = None,
     kind: str = "armax",
     na: Range = range(1, 5),
     nb: Range = range(1, 5),
@@ -57,7 +57,7 @@ def scan_orders(
     ----------
     records, validation : Record or sequence of Record
         Records of the fits and of the free runs.
-    output : str, optional
+    outputs : str, optional
         Default: the only output.
     inputs : sequence of str, optional
         Default: all inputs.
@@ -108,7 +108,7 @@ def scan_orders(
     unseen = [validation] if isinstance(validation, Record) else list(validation)
     if not fitted or not unseen:
         raise OptionError("a scan needs records to fit and records to validate on")
-    name, names = _channels(fitted[0], output, inputs)
+    name, names = _channels(fitted[0], outputs, inputs)
     orders = {"na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}
     structures = _structures(kind, name, names, orders, options)
     offsets = structures[0].offsets
@@ -179,7 +179,7 @@ def _structures(
     made = []
     for values in product(*choices):
         chosen = dict(zip(used[kind], values, strict=True))
-        made.append(PolynomialModel.general(output, inputs, **chosen, **options))
+        made.append(PolynomialModel.general(inputs, output, **chosen, **options))
     return made
 
 

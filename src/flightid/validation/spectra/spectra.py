@@ -13,7 +13,7 @@ from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
-from flightid.responses.windows.windows import longest_window, overlap_factor, shifts_of
+from flightid.responses.windows.windows import DEFAULT_FREQUENCIES, longest_window, overlap_factor, shifts_of
 from flightid.validation.residuals.correlation import LEVEL
 from flightid.validation.spectra.result import Peak, ResidualSpectra, SpectrumComparison
 from flightid.validation.verification.result import Verification
@@ -32,6 +32,8 @@ def residual_spectra(
     inputs: Iterable[str] | None = None,
     *,
     outputs: Iterable[str] | None = None,
+    band_rad_s: tuple[float, float] | None = None,
+    n_omega: int = DEFAULT_FREQUENCIES,
     omega_rad_s: ArrayLike | None = None,
     window_s: float | None = None,
 ) -> ResidualSpectra:
@@ -46,7 +48,7 @@ def residual_spectra(
         Measured minus free run, or records whose outputs are residuals.
     inputs, outputs : iterable of str, optional
         Channels; default: by role, and those that were verified.
-    omega_rad_s : tuple (low, high, n) or array_like, optional
+    band_rad_s, n_omega, omega_rad_s : optional
         Frequencies, as for `flightid.estimate_response`.
     window_s : float, optional
         Window, s; default: half of the automatic longest, about ten in all records.
@@ -80,7 +82,9 @@ def residual_spectra(
     True
     """
     records = _residual_records(residuals)
-    response = _estimate(records, inputs, outputs, omega_rad_s, window_s)
+    response = _estimate(
+        records, inputs, outputs, window_s, omega_rad_s, band_rad_s=band_rad_s, n_omega=n_omega
+    )
     density, low, high = _with_bounds(response)
     n_effective = response.n_independent[:, :1, :] / overlap_factor(shifts_of(OVERLAP)) ** 2
     free = np.maximum(n_effective - len(response.inputs), 1.0)
@@ -105,6 +109,8 @@ def compare_spectra(
     predicted: Record | None = None,
     *,
     outputs: Iterable[str] | None = None,
+    band_rad_s: tuple[float, float] | None = None,
+    n_omega: int = DEFAULT_FREQUENCIES,
     omega_rad_s: ArrayLike | None = None,
     window_s: float | None = None,
 ) -> SpectrumComparison:
@@ -118,7 +124,7 @@ def compare_spectra(
         Predicted outputs under the same names; needed with a record.
     outputs : iterable of str, optional
         Outputs to compare; default: all.
-    omega_rad_s, window_s : optional
+    band_rad_s, n_omega, omega_rad_s, window_s : optional
         As for `residual_spectra`.
 
     Returns
@@ -163,8 +169,10 @@ def compare_spectra(
         flown, made = (measured,), (predicted,) if predicted is not None else ()
         names = measured.outputs if outputs is None else tuple(outputs)
         driven = measured.inputs
-    one = _estimate(flown, driven, names, omega_rad_s, window_s)
-    two = _estimate(made, driven, names, one.omega_rad_s, window_s)
+    one = _estimate(
+        flown, driven, names, window_s, omega_rad_s, band_rad_s=band_rad_s, n_omega=n_omega
+    )
+    two = _estimate(made, driven, names, window_s, one.omega_rad_s)
     density, low, high = _with_bounds(one)
     model, model_low, model_high = _with_bounds(two)
     peaks = []
@@ -195,14 +203,19 @@ def _estimate(
     records: Sequence[Record],
     inputs: Iterable[str] | None,
     outputs: Iterable[str] | None,
-    omega_rad_s: ArrayLike | None,
     window_s: float | None,
+    omega_rad_s: ArrayLike | None,
+    *,
+    band_rad_s: tuple[float, float] | None = None,
+    n_omega: int = DEFAULT_FREQUENCIES,
 ) -> FrequencyResponse:
     length = window_s or 0.5 * longest_window([record.duration_s for record in records])
     return estimate_response(
         records,
         inputs=inputs,
         outputs=outputs,
+        band_rad_s=band_rad_s,
+        n_omega=n_omega,
         omega_rad_s=omega_rad_s,
         window_s=[length],
         overlap=OVERLAP,

@@ -78,7 +78,7 @@ def cross_validate(
     ...     record = fid.Record.from_arrays(np.arange(300) / 10, inputs={"u": u},
     ...                                     outputs={"y": np.zeros(300)})
     ...     return record.replace({"y": truth.simulate(record)})
-    >>> fit = fid.identify(fid.PolynomialModel.arx("y", "u", na=2, nb=2), fly(0))
+    >>> fit = fid.identify(fid.PolynomialModel.arx("u", "y", na=2, nb=2), fly(0))
     >>> cross_validate(fit, fly(1)).runs[0].theil < 0.01
     True
     """

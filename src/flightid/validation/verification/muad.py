@@ -193,7 +193,7 @@ class Mismatch:
 
 
 def mismatch(
-    model: object, response: FrequencyResponse, *, minimum_coherence: float = 0.6
+    source: object, responses: FrequencyResponse, *, minimum_coherence: float = 0.6
 ) -> Mismatch:
     """Compare a model's frequency response with a measured one inside the envelopes.
 
@@ -202,9 +202,9 @@ def mismatch(
 
     Parameters
     ----------
-    model : Fit or model
+    source : Fit or model
         A fit, or anything with inputs, outputs and state_space() or frequency_response().
-    response : FrequencyResponse
+    responses : FrequencyResponse
         Measured; pairs that the model does not have, or does not fit, are left out.
     minimum_coherence : float
         Frequencies with less are neither judged nor drawn.
@@ -236,23 +236,23 @@ def mismatch(
     >>> mismatch(lag, late).findings[0].light.value
     'red'
     """
-    inner = getattr(model, "model", model)
+    inner = getattr(source, "model", source)
     inputs = tuple(getattr(inner, "inputs", ()))
     outputs = tuple(getattr(inner, "outputs", ()))
     chosen = getattr(inner, "response_names", None)
     pairs = [
         (y, u)
-        for y in response.outputs
-        for u in response.inputs
+        for y in responses.outputs
+        for u in responses.inputs
         if y in outputs and u in inputs and (chosen is None or f"{y}/{u}" in chosen)
     ]
-    computed = _model_response(inner, response.omega_rad_s)
+    computed = _model_response(inner, responses.omega_rad_s)
     kept, ratios, judged = [], [], []
     for y, u in pairs:
         own = computed[outputs.index(y), inputs.index(u)]
         if not np.any(own):
             continue
-        measured = response.pair(y, u)
+        measured = responses.pair(y, u)
         if np.any(measured.response == 0):
             raise DataError(f"the measured response {y}/{u} is zero at a frequency")
         kept.append(f"{y}/{u}")
@@ -262,12 +262,12 @@ def mismatch(
         raise DataError(
             "model and measurement share no response",
             found=f"model {', '.join(outputs)} over {', '.join(inputs)}",
-            needed=f"{', '.join(response.outputs)} over {', '.join(response.inputs)}",
+            needed=f"{', '.join(responses.outputs)} over {', '.join(responses.inputs)}",
         )
     ratio = np.array(ratios)
     draft = Mismatch(
         tuple(kept),
-        muad_envelopes(response.omega_rad_s),
+        muad_envelopes(responses.omega_rad_s),
         _decibel(ratio),
         np.degrees(np.angle(ratio)),
         np.array(judged),

@@ -41,7 +41,7 @@ def verify(  # type: ignore[overload-overlap]  # a list is an object too
     output_bias: bool | None = ...,
     outputs: Sequence[str] | None = ...,
     hold: Hold = ...,
-    response: FrequencyResponse | None = ...,
+    responses: FrequencyResponse | None = ...,
 ) -> Comparison: ...
 
 
@@ -58,7 +58,7 @@ def verify(
     output_bias: bool | None = ...,
     outputs: Sequence[str] | None = ...,
     hold: Hold = ...,
-    response: FrequencyResponse | None = ...,
+    responses: FrequencyResponse | None = ...,
 ) -> Verification: ...
 
 
@@ -74,7 +74,7 @@ def verify(
     output_bias: bool | None = None,
     outputs: Sequence[str] | None = None,
     hold: Hold = "first",
-    response: FrequencyResponse | None = None,
+    responses: FrequencyResponse | None = None,
 ) -> Verification | Comparison:
     """Predict records with a model, or with several of any kinds side by side, and judge it.
 
@@ -115,7 +115,7 @@ def verify(
         Outputs to compare; default: those of the models that every record holds.
     hold : {"first", "zero"}
         What inputs do between samples, as for `flightid.simulate`.
-    response : FrequencyResponse, optional
+    responses : FrequencyResponse, optional
         Measured responses: the models are judged against them too, inside the envelopes of
         maximum unnoticed added dynamics (see `flightid.validation.mismatch`).
 
@@ -182,7 +182,7 @@ def verify(
     for each, (model, _), request, made in zip(
         several, models, requests, _scored_alike(runs), strict=True
     ):
-        seen = None if response is None else mismatch(model, response)
+        seen = None if responses is None else mismatch(model, responses)
         judged = judge(tuple(made), chosen, request, seen)
         beside = baseline_findings(each, made, request)
         results.append(replace(judged, findings=(*judged.findings, *beside)))
