@@ -105,13 +105,13 @@ def test_result_shows_itself_and_its_horizon() -> None:
     text = str(result.summary())
     assert "Free run over the whole record on measured inputs alone" in text
     assert "from rest at trim" in text
-    assert "state biases and reference shifts solved for" in text
+    assert "state biases and output biases solved for" in text
     plain = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert plain["schema"] == "flightid.verification/1"
     assert plain["outputs"]["p"]["unit"] == "rad/s"
     assert "<table>" in result._repr_html_()
     assert {finding.light for finding in result.findings} == {Light.GREEN}
-    assert result.predicted.history[-1].operation == "verify"
+    assert result.predicted.history[-1].operation == "predict"
 
 
 def test_lights_follow_the_guides() -> None:
@@ -143,7 +143,7 @@ def test_refusals() -> None:
     record = _record()
     with pytest.raises(OptionError, match="nothing to verify on"):
         fid.verify(LAG, [])
-    with pytest.raises(OptionError, match="initial_state is not known"):
+    with pytest.raises(OptionError, match="unknown initial state"):
         fid.verify(LAG, record, initial_state="guess")  # type: ignore[arg-type]
     with pytest.raises(OptionError, match="hold is not known"):
         fid.verify(LAG, record, hold="second")  # type: ignore[arg-type]
@@ -157,7 +157,7 @@ def test_refusals() -> None:
         fid.verify(LAG, record.select(["p"]))
     with pytest.raises(UnitError, match="channel 'p' has another unit"):
         fid.verify(_WithUnits(), record.to_units(p="deg/s"))
-    with pytest.raises(DataError, match="is constant"):
+    with pytest.raises(DataError, match="does not change"):
         fid.verify(LAG, record.replace({"p": 0 * TIME_S + 1.0}))
 
 

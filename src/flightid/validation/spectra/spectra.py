@@ -13,7 +13,12 @@ from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
-from flightid.responses.windows.windows import DEFAULT_FREQUENCIES, longest_window, overlap_factor, shifts_of
+from flightid.responses.windows.windows import (
+    DEFAULT_FREQUENCIES,
+    longest_window,
+    overlap_factor,
+    shifts_of,
+)
 from flightid.validation.residuals.correlation import LEVEL
 from flightid.validation.spectra.result import Peak, ResidualSpectra, SpectrumComparison
 from flightid.validation.verification.result import Verification
