@@ -98,7 +98,7 @@ def test_an_instrument_needs_no_open_loop() -> None:
     record = fid.Record.from_arrays(
         np.arange(u.size) * DT, inputs={"u": u}, outputs={"y": y}, excitations={"r": r}
     )
-    response = fid.estimate_response(record, method="instrument", window_s=10.0)
+    response = fid.estimate_response(record, estimator="instrument", window_s=10.0)
     assert response.loop is not None
     assert response.loop.source == "instrument"
     assert not response.loop.is_closed

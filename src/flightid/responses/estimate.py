@@ -176,6 +176,9 @@ def _with_inputs(
 
 
 def _check_options(estimator: str, detrend: str) -> None:
-    for name, value, known in (("estimator", estimator, ESTIMATORS), ("detrend", detrend, DETRENDS)):
+    for name, value, known in (
+        ("estimator", estimator, ESTIMATORS),
+        ("detrend", detrend, DETRENDS),
+    ):
         if value not in known:
             raise OptionError(name, found=repr(value), needed="one of " + ", ".join(known))

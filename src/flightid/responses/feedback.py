@@ -74,6 +74,6 @@ def feedback_findings(test: FeedbackTest) -> tuple[Finding, ...]:
             Light.AMBER,
             f"{seen}, and the direct estimate tends to minus the inverse of the controller where "
             "output noise dominates",
-            "use method='instrument' with the injected excitation, or fly with the loop open",
+            "use estimator='instrument' with the injected excitation, or fly with the loop open",
         ),
     )
