@@ -15,6 +15,8 @@ import flightid
 from tests.contract.source import ROOT
 
 sys.path.insert(0, str(ROOT / "tools"))
+from gallery_pictures import COMMANDS, SHOTS
+from pictures import MAXIMUM_BYTES
 from reference_groups import GROUPS
 from site_pages import api_page, shown_texts, turned
 
@@ -98,6 +100,20 @@ def test_links_turn_into_links_between_pages() -> None:
     assert from_example == "[a](../study.md)"
     assert turned("[a](../ah64/flights.py)", "examples/r50.md", texts) == "a"
     assert turned("[a](https://x.org/y)", "tasks.md", texts) == "[a](https://x.org/y)"
+
+
+def test_the_gallery_can_be_drawn_again() -> None:
+    for example, commands in COMMANDS.items():
+        folder = ROOT / "examples" / example
+        for command in commands:
+            files = [word for word in command.split() if word.endswith((".py", ".toml"))]
+            assert files, command
+            assert all((folder / file).is_file() for file in files), f"{example}: {command}"
+    assert {shot.example for shot in SHOTS} == set(COMMANDS)
+    gallery = (DOCS / "gallery.md").read_text(encoding="utf-8")
+    for shot in SHOTS:
+        assert f"pictures/{shot.picture}" in gallery
+        assert 0 < (DOCS / "pictures" / shot.picture).stat().st_size <= MAXIMUM_BYTES
 
 
 @pytest.mark.slow
