@@ -37,7 +37,15 @@ GROUPS = {
     "inspect": Group(
         "Inspect and plan",
         "inspection.md",
-        ("inspect_log", "Inspection", "advise", "Advice", "excitation"),
+        (
+            "inspect_log",
+            "Inspection",
+            "advise",
+            "Advice",
+            "feedback_test",
+            "FeedbackTest",
+            "excitation",
+        ),
     ),
     "responses": Group(
         "Responses",

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from flightid.dynamics.rotor.result import RotorPhysics
     from flightid.dynamics.rotor.rotor_physics import rotor_physics
     from flightid.errors import FlightidError
+    from flightid.evidence import FeedbackTest, feedback_test
     from flightid.export import Exported
     from flightid.export.to_file import export
     from flightid.findings import Finding
@@ -226,6 +227,8 @@ _HOMES = {
     "to_scipy": "flightid.models",
     "read_system": "flightid.models",
     "write_system": "flightid.models",
+    "FeedbackTest": "flightid.evidence",
+    "feedback_test": "flightid.evidence",
     "Exported": "flightid.export",
     "Noise": "flightid.simulation.noise",
     "export": "flightid.export.to_file",
@@ -258,6 +261,7 @@ __all__ = [
     "DisturbanceRejection",
     "Estimate",
     "Exported",
+    "FeedbackTest",
     "Finding",
     "Fit",
     "FittedRecord",
@@ -323,6 +327,7 @@ __all__ = [
     "estimate_response",
     "excitation",
     "export",
+    "feedback_test",
     "from_control",
     "from_scipy",
     "handling_qualities",

@@ -67,7 +67,7 @@ def test_advice_on_a_good_record():
     assert _codes(advice) == {"delay"}
     assert "excitation order 50" in repr(advice)
     assert advice.to_dict()["schema"] == "flightid.advice/1"
-    assert "feedback p" in advice.summary().to_text()
+    assert "Loop open: past noise of the outputs" in advice.summary().to_text()
 
 
 def test_advice_sees_poor_related_silent_and_fast_channels():
@@ -104,6 +104,8 @@ def test_feedback_is_seen_and_its_absence_too():
         record = fid.Record.from_arrays(np.arange(3000) / 10, inputs={"u": u}, outputs={"y": y})
         found.append("feedback" in _codes(fid.advise(record)))
     assert found == [False, True]
+    assert "feedback" not in _codes(fid.advise(record, loop="open"))
+    assert "feedback" in _codes(fid.advise(record.declare(loop="closed")))
 
 
 def test_advice_on_a_short_record_says_what_it_left_out():

@@ -164,12 +164,16 @@ def test_three_levels_are_testable() -> None:
 def test_closed_loops_judge_only_past_inputs() -> None:
     e, u = _pair(6)
     fed_back = u + 0.8 * np.concatenate([np.zeros(2), e[:-2]])
-    opened = fid.residual_tests(e, fed_back, horizon=STEP)
+    opened = fid.residual_tests(e, fed_back, horizon=STEP, loop="open")
     assert opened.test("uε", "e1", "u1").verdict == "fail"
     assert any("declare loop='closed'" in finding.action for finding in opened.findings)
     closed = fid.residual_tests(e, fed_back, horizon=STEP, loop="closed")
+    found = fid.residual_tests(e, fed_back, horizon=STEP)
+    assert (found.loop, found.feedback.source) == ("closed", "test")
+    assert "loop closed: past noise of the outputs" in found.summary().to_text()
     test = closed.test("uε", "e1", "u1")
     assert test.verdict == "pass"
+    assert np.array_equal(test.values, found.test("uε", "e1", "u1").values)
     assert test.lags[test.judged].min() == 0
     at_once = u + 0.8 * e
     assert fid.residual_tests(e, at_once, horizon=STEP, loop="closed").test(

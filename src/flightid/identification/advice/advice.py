@@ -11,10 +11,12 @@ from scipy.linalg import toeplitz
 
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
+from flightid.evidence import FeedbackTest, feedback_test
 from flightid.findings import Finding
 from flightid.identification.advice.impulse_response import ImpulseResponse, impulse_response
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
+from flightid.record.hold import Loop
 from flightid.table import Column, Table
 
 Array = NDArray[np.float64]
@@ -23,8 +25,8 @@ SMALLEST_SHARE = 1e-6
 POOR_ORDER = 10
 ALIKE, RELATED = 0.95, 0.5
 SLOW = 0.999
-FEEDBACK_P = 0.01
-FEEDBACK_LAGS = 10
+LAGS_BEFORE = 10
+"""Lags before the pulse take what feedback brings, so that delays are not read from it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -40,12 +42,14 @@ class Advice:
         Order of persistent excitation of each input, at most 50: how many coefficients of B and A
         together it can tell apart.
     response : ImpulseResponse or None
-        With the delays and the test for feedback; None where the records are too short for it.
+        With the delays; None where the records are too short for it.
+    feedback : FeedbackTest
+        Whether a loop was closed, tested or declared.
     findings : tuple of Finding
 
     Example
     -------
-    >>> Advice("y", ("u",), 500, 1, {"u": 2}, None, ())
+    >>> Advice("y", ("u",), 500, 1, {"u": 2}, None, FeedbackTest("open", "declared"))
     Advice('y' from u, 500 samples in 1 record, excitation order 2)
     """
 
@@ -55,6 +59,7 @@ class Advice:
     n_records: int
     excitation_orders: Mapping[str, int]
     response: ImpulseResponse | None
+    feedback: FeedbackTest
     findings: tuple[Finding, ...] = field(default=())
 
     @property
@@ -68,14 +73,13 @@ class Advice:
             Column("input"),
             Column("excitation order"),
             Column("delay", "samples"),
-            Column("feedback p", digits=3),
         )
-        p = {} if self.response is None else self.response.feedback_p
         rows = tuple(
-            (name, self.excitation_orders[name], self.delays.get(name), p.get(name))
-            for name in self.inputs
+            (name, self.excitation_orders[name], self.delays.get(name)) for name in self.inputs
         )
-        return Table(repr(self), columns, rows, tuple(map(str, self.findings)))
+        loop = str(self.feedback)
+        notes = (f"{loop[0].upper()}{loop[1:]}.", *map(str, self.findings))
+        return Table(repr(self), columns, rows, notes)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""
@@ -87,6 +91,7 @@ class Advice:
             "n_records": self.n_records,
             "excitation_orders": dict(self.excitation_orders),
             "response": None if self.response is None else self.response.to_dict(),
+            "feedback": self.feedback.to_dict(),
             "findings": [finding.to_dict() for finding in self.findings],
         }
 
@@ -109,6 +114,7 @@ def advise(
     inputs: Sequence[str] | None = None,
     outputs: str | None = None,
     n_lags: int = 40,
+    loop: Loop | None = None,
 ) -> Advice:
     """Judge records before a black-box fit: excitation, delay, feedback, sampling, offsets.
 
@@ -120,7 +126,10 @@ def advise(
     inputs : sequence of str, optional
         Default: all inputs.
     n_lags : int
-        Lags of the pulse response behind delay and feedback.
+        Lags of the pulse response behind the delay.
+    loop : {"open", "closed"}, optional
+        Whether anything moved the inputs after what the outputs did; default: what the records
+        know, else a test.
 
     Returns
     -------
@@ -164,18 +173,20 @@ def advise(
     reason = ""
     try:
         response = impulse_response(
-            listed, outputs=name, inputs=names, n_lags=n_lags, negative_lags=FEEDBACK_LAGS
+            listed, outputs=name, inputs=names, n_lags=n_lags, negative_lags=LAGS_BEFORE
         )
     except DataError as error:
         reason = str(error)
+    feedback = feedback_test(listed, inputs=names, outputs=(name,), loop=loop)
     findings = (
         *_excitation(orders),
         *_related(names, data),
         *_responses(response, reason),
+        *_feedback(feedback),
         *_sampling(name, data),
         *_levels(names, data),
     )
-    return Advice(name, names, data.output.size, len(listed), orders, response, findings)
+    return Advice(name, names, data.output.size, len(listed), orders, response, feedback, findings)
 
 
 def excitation_order(row: Array, data: SampledChannels) -> int:
@@ -233,7 +244,7 @@ def _responses(response: ImpulseResponse | None, reason: str) -> list[Finding]:
             Finding(
                 "no-pulse-response",
                 Light.AMBER,
-                f"delay and feedback are not judged: {reason}",
+                f"delays are not judged: {reason}",
                 "use a richer input or longer records, or give fewer lags",
             )
         ]
@@ -257,17 +268,20 @@ def _responses(response: ImpulseResponse | None, reason: str) -> list[Finding]:
                     f"({delay * response.sample_time_s:.4g} s): nk = {delay}",
                 )
             )
-    for name, p in response.feedback_p.items():
-        if p < FEEDBACK_P:
-            found.append(
-                Finding(
-                    "feedback",
-                    Light.AMBER,
-                    f"{name!r} answers {response.output!r} (p = {p:.2g}): a loop was closed",
-                    "fit a noise model (ARMAX, BJ); do not use OE, IV4 or the pulse response",
-                )
-            )
     return found
+
+
+def _feedback(test: FeedbackTest) -> list[Finding]:
+    if not test.is_closed:
+        return []
+    return [
+        Finding(
+            "feedback",
+            Light.AMBER,
+            str(test),
+            "fit a noise model (ARMAX, BJ); do not use OE, IV4 or the pulse response",
+        )
+    ]
 
 
 def _sampling(name: str, data: SampledChannels) -> list[Finding]:

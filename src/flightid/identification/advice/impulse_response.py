@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
-from scipy.stats import chi2
 
 from flightid.errors import DataError, OptionError
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
@@ -45,8 +44,6 @@ class ImpulseResponse:
         Samples that were fitted.
     delays : mapping of str to int or None
         First lag from 0 on that chance does not explain, by input; None where no lag stands out.
-    feedback_p : mapping of str to float
-        Chance of so large a response before the pulse without feedback, by input.
     units : mapping of str to str
 
     Example
@@ -64,7 +61,6 @@ class ImpulseResponse:
     kernel: str | None
     n_samples: int
     delays: Mapping[str, int | None]
-    feedback_p: Mapping[str, float]
     units: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -87,7 +83,7 @@ class ImpulseResponse:
         return values, np.sqrt(np.maximum(variance, 0.0))
 
     def summary(self) -> Table:
-        """Table by input: delay, largest response, final step value, feedback."""
+        """Table by input: delay, largest response, final step value."""
         columns = (
             Column("input"),
             Column("delay", "samples"),
@@ -96,7 +92,6 @@ class ImpulseResponse:
             Column("at", "s"),
             Column("step at the end"),
             Column("± step"),
-            Column("feedback p", digits=3),
         )
         steps, errors = self.step()
         rows = []
@@ -112,7 +107,6 @@ class ImpulseResponse:
                     float(self.time_s[peak]),
                     float(steps[i, -1]),
                     float(half_width() * errors[i, -1]),
-                    self.feedback_p.get(name),
                 )
             )
         return Table(
@@ -132,7 +126,6 @@ class ImpulseResponse:
             "kernel": self.kernel,
             "n_samples": self.n_samples,
             "delays": dict(self.delays),
-            "feedback_p": dict(self.feedback_p),
         }
 
     def __repr__(self) -> str:
@@ -169,7 +162,7 @@ def impulse_response(
     n_lags : int
         Lags from 0 on; the response should have died out by then.
     negative_lags : int
-        Lags before 0, for the test for feedback.
+        Lags before 0, which take what feedback brings.
     kernel : {"tc", "dc"}, optional
         Decaying prior for few or poor data; not with negative lags.
     offsets : {"mean", "trim", "none"}
@@ -241,11 +234,6 @@ def impulse_response(
         kernel,
         rows,
         {name: _delay(lags, v, c) for name, v, c in zip(names, values, blocks, strict=True)},
-        {
-            name: _feedback(v[:negative_lags], c[:negative_lags, :negative_lags])
-            for name, v, c in zip(names, values, blocks, strict=True)
-            if negative_lags
-        },
         data.units,
     )
 
@@ -317,8 +305,3 @@ def _delay(lags: NDArray[np.int64], values: Array, covariance: Array) -> int | N
     limit = half_width(LEVEL ** (1.0 / int(np.sum(causal))))
     outside = np.abs(values[causal]) > limit * errors
     return int(np.argmax(outside)) if np.any(outside) else None
-
-
-def _feedback(values: Array, covariance: Array) -> float:
-    statistic = float(values @ np.linalg.solve(covariance, values))
-    return float(chi2.sf(statistic, values.size))

@@ -10,6 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
+from flightid.identification import Fit
+from flightid.record import Record
+from flightid.record.hold import common_loop
+from flightid.record.repeats import found_period
+from flightid.uncertainty.feedback import FeedbackTest, declared_loop, find_feedback
 from flightid.validation.residuals.correlation import (
     Series,
     centred,
@@ -50,7 +55,7 @@ def residual_tests(
     *,
     outputs: Iterable[str] | None = None,
     horizon: Horizon | str | None = None,
-    loop: Loop | str = Loop.OPEN,
+    loop: Loop | str | None = None,
     maximum_lag: int = 25,
     fitted_noise: int | None = None,
     fitted_input: int | None = None,
@@ -80,9 +85,10 @@ def residual_tests(
         Channels of records to test; default: all outputs.
     horizon : {"one step ahead", "free run"}
         Which predictor made the residuals; a fit or verification knows.
-    loop : {"open", "closed", "closed within the sample"}
-        Whether residuals reach the inputs. Closed: lags τ ≥ 0 are judged; within the sample
-        (u(t) already holds y(t)): τ ≥ 1.
+    loop : {"open", "closed", "closed within the sample"}, optional
+        Whether residuals reach the inputs; default: what records know, else tested on residuals
+        and inputs. Closed: lags τ ≥ 0 are judged; within the sample (u(t) already holds y(t)):
+        τ ≥ 1.
     maximum_lag : int
         Largest lag, samples.
     fitted_noise, fitted_input : int
@@ -124,7 +130,8 @@ def residual_tests(
     )
     fitted_noise = data.fitted_noise if fitted_noise is None else fitted_noise
     fitted_input = data.fitted_input if fitted_input is None else fitted_input
-    setup = _Setup(data, _choice(Loop, loop), maximum_lag, fitted_noise, fitted_input)
+    how, feedback = _loop(data, loop or _known_loop(residuals))
+    setup = _Setup(data, how, maximum_lag, fitted_noise, fitted_input)
     _require_lags(setup)
     tests = tuple(
         setup.test(kind, output, name)
@@ -144,7 +151,32 @@ def residual_tests(
         fitted_noise,
         fitted_input,
         residual_findings(tests),
+        feedback,
     )
+
+
+def _known_loop(residuals: Residuals) -> str | None:
+    """What the records behind residuals know of their loop."""
+    if isinstance(residuals, Fit):
+        records = [each.measured for each in residuals.records]
+    else:
+        listed = residuals if isinstance(residuals, list | tuple) else [residuals]
+        records = [each for each in listed if isinstance(each, Record)]
+    return common_loop([each.input_shape for each in records])
+
+
+def _loop(data: ResidualData, declared: Loop | str | None) -> tuple[Loop, FeedbackTest]:
+    """What is declared; else whether past residuals move what is new in the inputs."""
+    if declared is not None:
+        chosen = _choice(Loop, declared)
+        return chosen, declared_loop("open" if chosen is Loop.OPEN else "closed")
+    if not data.inputs:
+        return Loop.OPEN, declared_loop("open")
+    inputs = [np.vstack(rows) for rows in zip(*map(centred, data.inputs.values()), strict=True)]
+    left = [np.vstack(rows) for rows in zip(*map(centred, data.residuals.values()), strict=True)]
+    repeats = all(found_period(rows) is not None for rows in inputs)
+    found = find_feedback(inputs, left, tuple(data.inputs), repeats=repeats)
+    return (Loop.CLOSED if found.is_closed else Loop.OPEN), found
 
 
 def _kinds(data: ResidualData, output: str) -> list[tuple[Kind, str | None]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty.feedback import FeedbackTest
 from flightid.validation.residuals.correlation_result import (
     CorrelationTest,
     Horizon,
@@ -36,7 +37,7 @@ class ResidualTests:
     predictor : str
         The same in one sentence, with what was solved for.
     loop : Loop
-        Whether residuals reach the inputs, as declared.
+        Whether residuals reach the inputs.
     maximum_lag : int
         Largest lag, samples.
     n_samples, n_records : int
@@ -45,6 +46,8 @@ class ResidualTests:
         Parameters fitted to these samples, taken off the degrees of freedom.
     findings : tuple of Finding
         Verdicts.
+    feedback : FeedbackTest
+        How the loop is known: declared or tested.
 
     Example
     -------
@@ -67,7 +70,8 @@ class ResidualTests:
     n_records: int
     fitted_noise: int
     fitted_input: int
-    findings: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...]
+    feedback: FeedbackTest
 
     def test(self, kind: Kind | str, output: str, input: str | None = None) -> CorrelationTest:
         """One test by its function and channels.
@@ -123,7 +127,7 @@ class ResidualTests:
             )
             for item in self.tests
         ]
-        lags = f"Lags to {self.maximum_lag} samples; loop {self.loop}, as declared."
+        lags = f"Lags to {self.maximum_lag} samples; {self.feedback}."
         reasons = dict.fromkeys(
             f"{item.kind}: {item.reason}." for item in self.tests if item.reason
         )
@@ -139,6 +143,7 @@ class ResidualTests:
             "horizon": str(self.horizon),
             "predictor": self.predictor,
             "loop": str(self.loop),
+            "feedback": self.feedback.to_dict(),
             "rule": RULE,
             "maximum_lag": self.maximum_lag,
             "n_samples": self.n_samples,
