@@ -28,8 +28,8 @@ from flightid.conditioning.kinematics import (
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.record import Record, Step
 from flightid.table import Cell
-from flightid.uncertainty.coloured_residuals import corrected_covariance
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.residual_covariance import Block, residual_covariance
 from flightid.units import require_match
 
 Array = NDArray[np.float64]
@@ -133,16 +133,20 @@ def check_consistency(
     theta, prediction, deviations = OutputError(model, observed).fit(theta)
     residuals = observed - prediction.values
     noise = model.input_noise(theta)
-    white, covariance, freedom = corrected_covariance(
-        prediction.slopes, residuals, deviations, noise
+    block = Block.of(
+        prediction.slopes / deviations[:, None, None],
+        np.zeros((*residuals.shape, 0)),
+        residuals / deviations[:, None],
     )
-    spread = np.sqrt(np.diag(white))
+    known = residual_covariance([block], noise=(noise, 1.0 / deviations))
+    deviation = np.sqrt(np.diag(known.covariance))
+    white = np.sqrt(np.diag(known.white))
     found = {
         name: Estimate(
             name, float(value), _unit(name), float(error), freedom=float(degrees), status="free"
         )
         for name, value, error, degrees in zip(
-            parameters, theta, np.sqrt(np.diag(covariance)), freedom, strict=True
+            parameters, theta, deviation, known.freedom, strict=True
         )
     }
     rms = {name: float(np.sqrt(np.mean(r**2))) for name, r in zip(measured, residuals, strict=True)}
@@ -150,10 +154,10 @@ def check_consistency(
         name: 100 * (1 - rms[name] / float(np.std(values))) if np.std(values) > 0 else None
         for name, values in measured.items()
     }
-    correlation = white / np.outer(spread, spread)
+    correlation = known.white / np.outer(white, white)
     return KinematicConsistency(
         found,
-        covariance,
+        known.covariance,
         correlation,
         dict(zip(measured, prediction.values, strict=True)),
         rms,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, cast
@@ -164,7 +165,7 @@ class Estimate(Generic[Number_co]):
             "value": self.value,
             "unit": self.unit,
             "stderr": self.stderr,
-            "freedom": self.freedom,
+            "freedom": None if self.freedom == math.inf else self.freedom,
             "interval95": None if ends is None else list(ends),
             "reason": self.reason,
         }

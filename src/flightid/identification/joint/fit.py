@@ -44,10 +44,10 @@ from flightid.identification.output_error.fit import (
 from flightid.identification.records.findings import judge_channels
 from flightid.identification.records.options import RecordOptions
 from flightid.identification.records.setup import RecordSet, prepare_records
-from flightid.identification.records.statistics import Beside
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
+from flightid.uncertainty.residual_covariance import Beside
 
 Array = NDArray[np.float64]
 

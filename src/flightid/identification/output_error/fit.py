@@ -33,7 +33,6 @@ from flightid.identification.records.findings import judge_channels, judge_fit
 from flightid.identification.records.options import RecordOptions
 from flightid.identification.records.setup import OwnNumbers, RecordSet, prepare_records
 from flightid.identification.records.statistics import (
-    Beside,
     RecordStatistics,
     record_statistics,
 )
@@ -42,6 +41,7 @@ from flightid.identification.regression.fourier_output_error_fit import fit_four
 from flightid.identification.regression.options import FourierOutputErrorOptions
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Channel, Record, Step
+from flightid.uncertainty.residual_covariance import Beside
 from flightid.version import VERSION
 
 Array = NDArray[np.float64]
@@ -314,7 +314,7 @@ def _assemble(
         *judge_search(groups, best.cost + _NEAR * prepared.n_samples * len(fitted.outputs)),
         *judge_parameters(found.parameters),
         *judge_correlation(found.names, found.correlation),
-        *judge_fit(costs, found.inflation),
+        *judge_fit(costs, found.colour),
     )
     return Fit(
         model=fitted,

@@ -10,6 +10,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.identification.records.setup import RecordSet
+from flightid.uncertainty.residual_covariance import LARGEST_RATIO, colour_findings
 
 GOOD_PERCENT, POOR_PERCENT = 10.0, 40.0
 COLOURED = 1.5
@@ -58,8 +59,11 @@ def judge_channels(prepared: RecordSet) -> list[Finding]:
     ]
 
 
-def judge_fit(costs: Mapping[str, float], inflation: float) -> list[Finding]:
-    """Verdicts on what the model explains, and on the colour of the residuals."""
+def judge_fit(costs: Mapping[str, float], colour: tuple[float, float]) -> list[Finding]:
+    """Verdicts on what the model explains, and on the colour of the residuals.
+
+    `colour` is the smallest and the largest ratio of a standard error to that for white residuals.
+    """
     found = []
     for name, cost in costs.items():
         light = (
@@ -79,12 +83,13 @@ def judge_fit(costs: Mapping[str, float], inflation: float) -> list[Finding]:
                 else "look at the residuals: add dynamics, check signs and units, or it is noise",
             )
         )
-    if inflation > COLOURED:
+    found += colour_findings(*colour)
+    if COLOURED < colour[1] <= LARGEST_RATIO:
         found.append(
             Finding(
                 "residuals-coloured",
                 Light.AMBER,
-                f"residuals are coloured: standard errors are up to {inflation:.2g} times those of "
+                f"residuals are coloured: standard errors are up to {colour[1]:.2g} times those of "
                 "white residuals, and the intervals allow for it",
                 "run residual_tests: where inputs still predict them, dynamics are missing",
             )

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from flightid.errors import OptionError
 from flightid.identification.fit import Fit
 from flightid.identification.regression.attenuation import attenuation, judge_attenuation
-from flightid.identification.regression.coloured_regression import coloured_covariance
 from flightid.identification.regression.compared_equations import compared_costs, compared_records
 from flightid.identification.regression.equation_operators import FourierRows, LocalMeans, Operator
 from flightid.identification.regression.equation_regression import EquationRegression
@@ -46,6 +45,7 @@ from flightid.identification.regression.weights import (
 )
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
+from flightid.uncertainty.residual_covariance import Block, residual_covariance
 
 Array = NDArray[np.float64]
 
@@ -68,10 +68,21 @@ def fit_equation_error(
     ]
     require_seen(inner, stack([slopes for _, slopes in weighed]))
     constants = [_constants(each[0].shape, options.output_bias) for each in weighed]
-    covariance, freedom, inflation = coloured_covariance(weighed, constants)
+    coloured = residual_covariance(
+        [_block(*each, basis) for each, basis in zip(weighed, constants, strict=True)]
+    )
     jacobian = stack([slopes for _, slopes in weighed])
-    known = Knowledge(jacobian, covariance, freedom, "coloured residuals", inflation)
+    known = Knowledge(
+        jacobian, coloured.covariance, coloured.freedom, "coloured residuals", coloured.colour
+    )
     return _finish("equation error", problem, data, options, settled, limits, inner, known)
+
+
+def _block(residuals: Array, slopes: Array, constants: Array) -> Block:
+    """One record whose constants are out of residuals and slopes; they follow `constants`."""
+    n, k = slopes.shape[2], constants.shape[1]
+    flat = np.ascontiguousarray(slopes.reshape(-1, n))
+    return Block(flat, np.zeros((k, n)), constants, np.eye(k), residuals)
 
 
 def fit_fourier_regression(

@@ -68,15 +68,15 @@ class Knowledge:
         Degrees of freedom of the variances.
     source : str
         Where the intervals come from.
-    inflation : float
-        Largest ratio of a standard error to that for white residuals.
+    colour : tuple of float
+        Smallest and largest ratio of a standard error to that for white residuals.
     """
 
     jacobian: Array
     covariance: Array
     freedom: Array
     source: str
-    inflation: float = 1.0
+    colour: tuple[float, float] = (1.0, 1.0)
 
 
 def check_records(model: StateSpaceModel, data: Record | Sequence[Record]) -> tuple[Record, ...]:
@@ -168,7 +168,7 @@ def assemble(
             *judge_search(groups),
             *judge_parameters(parameters),
             *judge_correlation(names, correlation),
-            *judge_fit(costs, known.inflation),
+            *judge_fit(costs, known.colour),
         ),
         provenance={**_provenance(method, fitted, records, options), **(extra or {})},
         records=tuple(fitted_records),

@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from scipy import fft, linalg, signal, stats
 
 from flightid.errors import DataError, OptionError, ShapeError
-from flightid.uncertainty.coloured_residuals import (
+from flightid.uncertainty.quantiles import half_width
+from flightid.uncertainty.residual_noise import (
     LARGEST_ORDER,
     autoregression,
     periodogram,
 )
-from flightid.uncertainty.quantiles import half_width
 
 Array = NDArray[np.float64]
 Series = tuple[Array, ...]

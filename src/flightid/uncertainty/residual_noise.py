@@ -1,31 +1,29 @@
-"""Covariance of least-squares estimates whose residuals are coloured.
+"""Noise in the residuals of a fit: an autoregressive model of each output, stable by construction.
 
-The usual inverse information assumes white residuals. Residuals of flight data are not: sensors and
-filters colour them, and gyro noise integrates to a random walk, which is not stationary. Here the
-walk goes its own way to the covariance (`input_noise.py`), and what else an output's residual holds
-gets an autoregressive model (order by the Bayesian information criterion), whose autocovariance
-stands for the noise in ``D [sum_ij s_i R(i - j) s_j'] D``. Sample autocovariances alone would give
-too little: the fit has already taken out of the residuals what lies along the sensitivities. How
-much that is, draws from the model tell.
+The order is chosen by the Bayesian information criterion. Sample autocovariances alone would give
+too little: the fit has already taken out of the residuals what lies along the sensitivities. What
+it took of noise like the model's is given back, in rounds. The power so restored is no sample
+spectrum any more and may be negative in places; it is cut off there, so that its autocovariance is
+one, the recursion over the orders meets no reflection of one or more, and the model cannot grow.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, linalg, signal
 
-from flightid.uncertainty.input_noise import InputNoise
-
 Array = NDArray[np.float64]
 LARGEST_ORDER = 20
 SEPARATIONS = 20
 RESTORATIONS = 2
-DRAWS = 32
-"""Draws of random walks."""
+TONE = 1.0 - 1e-9
+"""Reflection above which a residual predicts itself to rounding, as a pure tone does."""
+LEAST_FREEDOM = 1.0
+"""Below it Student's distribution has no mean, and its interval no meaning."""
 
 
 @dataclass(frozen=True)
@@ -80,9 +78,15 @@ class Autoregression:
         if order:
             innovation = float(self.lags[0] - self.weights @ self.lags[1 : order + 1])
             ones = np.ones(order)
-            spread = linalg.solve_toeplitz(self.lags[:order], ones) @ ones * innovation / self.n
-            share += 4.0 * max(float(spread), 0.0) / (1.0 - float(self.weights.sum())) ** 2
-        return 2.0 / share
+            try:
+                known = float(linalg.solve_toeplitz(self.lags[:order], ones) @ ones)
+            except np.linalg.LinAlgError:
+                return LEAST_FREEDOM
+            short = (1.0 - float(self.weights.sum())) ** 2
+            if not short > 0.0:
+                return LEAST_FREEDOM
+            share += 4.0 * max(known * innovation / self.n, 0.0) / short
+        return max(2.0 / share, LEAST_FREEDOM)
 
     def spectrum(self) -> Array:
         """Spectrum at the frequencies of `periodogram`."""
@@ -126,18 +130,31 @@ def autoregression(
     >>> autoregression(periodogram(white), 4000).autocovariance(3).round(1)
     array([1., 0., 0.])
     """
-    largest = min(LARGEST_ORDER, n // 20)
     length = _length(n) if length is None else length
-    lags = _lags(power, length, largest)
-    model = Autoregression(lags, _weights(lags, n), n, length)
+    model = _fitted(power, n, length)
     if known is None:
         return model
     for _ in range(SEPARATIONS):
         own = model.spectrum()
         share = own / np.maximum(own + known, np.finfo(float).tiny)
-        lags = _lags(share**2 * power + share * known, length, largest)
-        model = Autoregression(lags, _weights(lags, n), n, length)
+        model = _fitted(share**2 * power + share * known, n, length)
     return model
+
+
+def _fitted(power: Array, n: int, length: int) -> Autoregression:
+    """Stable autoregression of a periodogram.
+
+    A periodogram that a fit's share was given back to can be negative somewhere: then it is no
+    power, its autocovariance is no autocovariance, and the recursion meets a reflection above one.
+    What is negative is cut off there; of a power all reflections are below one.
+    """
+    largest = min(LARGEST_ORDER, n // 20)
+    lags = _lags(power, length, largest)
+    weights, sound = _weights(lags, n)
+    if not sound:
+        lags = _lags(np.maximum(power, 0.0), length, largest)
+        weights, _ = _weights(lags, n)
+    return Autoregression(lags, weights, n, length)
 
 
 def periodogram(columns: Array, length: int | None = None) -> Array:
@@ -171,8 +188,11 @@ def _lags(power: Array, length: int, largest: int) -> Array:
     return np.asarray(fft.irfft(power, length)[: largest + 1])
 
 
-def _weights(sample: Array, n: int) -> Array:
-    """Weights of the best autoregression by Levinson's recursion over the orders."""
+def _weights(sample: Array, n: int) -> tuple[Array, bool]:
+    """Weights of the best autoregression by Levinson's recursion over the orders.
+
+    And whether the sample is an autocovariance: a reflection of one or more says that it is none.
+    """
     trial = best = np.empty(0)
     innovation = float(sample[0])
     criterion = n * np.log(innovation) if innovation > 0 else -np.inf
@@ -181,108 +201,16 @@ def _weights(sample: Array, n: int) -> Array:
         if not innovation > 1e-12 * sample[0]:
             break
         reflection = float(sample[order] - trial @ sample[order - 1 : 0 : -1]) / innovation
+        if abs(reflection) >= 1.0:
+            return best, False
+        if abs(reflection) > TONE:
+            break
         trial = np.concatenate((trial - reflection * trial[::-1], [reflection]))
         innovation *= 1 - reflection**2
         worth = n * np.log(max(innovation, 1e-300)) + order * np.log(n)
         if worth < criterion:
             criterion, best = worth, trial
-    return best
-
-
-def corrected_covariance(
-    slopes: Array, residuals: Array, deviations: Array, noise: InputNoise | None = None
-) -> tuple[Array, Array, Array]:
-    """Covariance for white residuals, the one corrected for their colour, and its freedom.
-
-    Parameters
-    ----------
-    slopes : ndarray, shape (n_outputs, n, n_parameters)
-        Derivatives of the outputs by the parameters.
-    residuals : ndarray, shape (n_outputs, n)
-        Residuals.
-    deviations : ndarray, shape (n_outputs,)
-        Standard deviations by which the fit weighed the outputs.
-    noise : InputNoise, optional
-        Noise of the inputs; None where the inputs are exact.
-
-    Returns
-    -------
-    white, corrected : ndarray, shape (n_parameters, n_parameters)
-    freedom : ndarray, shape (n_parameters,)
-        Degrees of freedom of the corrected variances: noise models of one record are themselves
-        estimates. The noise of the inputs, seen at many frequencies, counts as known.
-
-    Reference
-    ---------
-    Morelli & Klein (1997), Accuracy of aerodynamic model parameters estimated from flight test
-    data, J. Guidance, Control and Dynamics 20(1), eqs. 19-25; Satterthwaite (1946), An approximate
-    distribution of estimates of variance components, Biometrics Bulletin 2(6), eq. 17.
-
-    Example
-    -------
-    >>> slopes = np.ones((1, 400, 1))
-    >>> residuals = np.random.default_rng(1).standard_normal((1, 400))
-    >>> white, corrected, freedom = corrected_covariance(slopes, residuals, np.ones(1))
-    >>> float(white[0, 0])
-    0.0025
-    """
-    weighed = slopes / deviations[:, None, None] ** 2
-    information = np.einsum("onp,onq->pq", slopes, weighed, optimize=True)
-    # Columns differ by many orders of magnitude: scale them before inverting.
-    size = np.sqrt(np.diag(information))
-    inverse = np.linalg.inv(information / np.outer(size, size)) / np.outer(size, size)
-    projection = _Projection(slopes, weighed, inverse)
-    walks = None if noise is None else projection.walks(noise)
-    total = np.zeros_like(information)
-    doubt = np.zeros(len(information))
-    models = projection.models(residuals, deviations, walks)
-    for scaled, model in zip(weighed, models, strict=True):
-        part = inverse @ (scaled.T @ model.product(scaled)) @ inverse
-        total += part
-        doubt += np.diag(part) ** 2 / model.freedom()
-    if noise is not None:
-        paths = noise.transposed(weighed)
-        total += inverse @ np.einsum("sjp,sjq->pq", paths, paths, optimize=True) @ inverse
-    tiny = np.finfo(float).tiny
-    return inverse, total, np.diag(total) ** 2 / np.maximum(doubt, tiny)
-
-
-@dataclass(frozen=True)
-class _Projection:
-    """What the fit leaves of noise in the residuals.
-
-    Draws come from a fixed seed: the same record gives the same intervals.
-    """
-
-    slopes: Array
-    weighed: Array
-    inverse: Array
-
-    def left(self, noise: Array) -> Array:
-        """Noise of the outputs (n_outputs, n, n_draws) less the share that the fit takes."""
-        taken = self.inverse @ np.einsum("onp,ond->pd", self.weighed, noise, optimize=True)
-        return np.asarray(noise - self.slopes @ taken)
-
-    def walks(self, noise: InputNoise) -> Array:
-        """Mean periodogram of each residual's random walk."""
-        n = self.slopes.shape[1]
-        draws = np.random.default_rng(0).standard_normal((n - 1, noise.steps.shape[2], DRAWS))
-        return np.array([periodogram(walk) for walk in self.left(noise.outputs_of(draws))])
-
-    def models(
-        self, residuals: Array, deviations: Array, walks: Array | None
-    ) -> list[Autoregression]:
-        """Models of the outputs' own noise."""
-        white = self.slopes / deviations[:, None, None]
-        taken = Taken(np.zeros((*white.shape[:2], 0)), white @ np.linalg.cholesky(self.inverse))
-        size = deviations[:, None]
-        models = noise_models(
-            [residuals / size], [taken], None if walks is None else walks / size**2
-        )
-        return [
-            replace(model, lags=model.lags * deviation**2)
-            for model, deviation in zip(models, deviations, strict=True)
-        ]
+    return best, bool(sample[0] >= 0.0)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,309 @@
+"""Covariance of least-squares estimates whose residuals are coloured: one for all methods.
+
+The usual inverse information assumes white residuals. Residuals of flight data are not: sensors,
+filters and what the model lacks colour them. The noise of each whitened output gets a model
+(`residual_noise.py`), whose autocovariance R stands between the sensitivities s and the inverse D
+of the information: ``D [sum_ij s_i R(i - j) s_j'] D``. Numbers that belong to one record (initial
+states, biases) are taken out of the sensitivities by orthogonal projection, so that the parameters
+that all records share meet in one small matrix.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.uncertainty.input_noise import InputNoise
+from flightid.uncertainty.residual_noise import Autoregression, Taken, noise_models, periodogram
+
+Array = NDArray[np.float64]
+ROUNDING = 1e-9
+"""Share of the variance for white residuals below which there is rounding alone."""
+DRAWS = 32
+"""Draws of random walks."""
+LARGEST_RATIO, SMALLEST_RATIO = 50.0, 0.02
+"""Ratios of coloured over white standard errors beyond which neither can be believed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """One record, whitened across outputs; rows are outputs after outputs.
+
+    Attributes
+    ----------
+    projected : ndarray, shape (n_rows, n)
+        Sensitivities with the record's own numbers taken out.
+    shared_on_own : ndarray, shape (n_own, n)
+        What was taken out.
+    basis, triangle : ndarray, shapes (n_rows, n_own) and (n_own, n_own)
+        Orthonormal basis and triangle of the own numbers' sensitivities.
+    residual : ndarray, shape (n_outputs, n_samples)
+    """
+
+    projected: Array
+    shared_on_own: Array
+    basis: Array
+    triangle: Array
+    residual: Array
+
+    @classmethod
+    def of(cls, shared: Array, own: Array, residual: Array) -> Block:
+        """From sensitivities by shared parameters and by own numbers, (n_outputs, n_samples, k)."""
+        rows = residual.size
+        shared, own = shared.reshape(rows, -1), own.reshape(rows, -1)
+        basis, triangle = np.linalg.qr(own)
+        on_own = basis.T @ shared
+        return cls(shared - basis @ on_own, on_own, basis, triangle, residual)
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Residuals of unit variance, fitted together with the records, and what they answer to.
+
+    Attributes
+    ----------
+    slopes : ndarray, shape (n_residuals, n)
+        Derivatives by the parameters, the data being as they are.
+    total : ndarray, shape (n_residuals, n)
+        The same with data that follow the parameters, as corrected points do.
+    """
+
+    slopes: Array
+    total: Array
+
+    def of(self, parameters: NDArray[np.bool_]) -> Beside:
+        """Columns of some parameters."""
+        return Beside(self.slopes[:, parameters], self.total[:, parameters])
+
+
+@dataclass(frozen=True, eq=False)
+class ResidualCovariance:
+    """What is known of estimates whose residuals are coloured.
+
+    Attributes
+    ----------
+    covariance, white : ndarray, shape (n, n)
+        Of the shared parameters, for residuals of the colour found and for white ones.
+    freedom : ndarray, shape (n,)
+        Degrees of freedom of each variance: noise models are themselves estimates.
+    own, crossed : tuple of ndarray
+        By record, shapes (n_own, n_own) and (n_own, n): of each record's own numbers, and between
+        these and the parameters.
+    orders : tuple of int
+        Of the outputs' noise models.
+    """
+
+    covariance: Array
+    white: Array
+    freedom: Array
+    own: tuple[Array, ...]
+    crossed: tuple[Array, ...]
+    orders: tuple[int, ...]
+
+    @property
+    def ratios(self) -> Array:
+        """Standard errors over those for white residuals, shape (n,)."""
+        return np.sqrt(np.diag(self.covariance) / np.diag(self.white))
+
+    @property
+    def colour(self) -> tuple[float, float]:
+        """Smallest and largest of `ratios`; one without parameters."""
+        ratios = self.ratios if self.white.size else np.ones(1)
+        return float(np.min(ratios)), float(np.max(ratios))
+
+    @property
+    def assumed(self) -> str:
+        """What the covariance assumes, in words."""
+        orders = ", ".join(map(str, self.orders))
+        return f"autoregressive noise of each whitened output, order {orders}"
+
+
+def colour_findings(smallest: float, largest: float) -> list[Finding]:
+    """Red where the colour of the residuals changes standard errors beyond belief.
+
+    Parameters
+    ----------
+    smallest, largest : float
+        Ratio of standard errors to those for white residuals, over all parameters.
+
+    Example
+    -------
+    >>> colour_findings(0.9, 1.7)
+    []
+    """
+    if smallest >= SMALLEST_RATIO and largest <= LARGEST_RATIO:
+        return []
+    ratio = largest if largest > LARGEST_RATIO else smallest
+    return [
+        Finding(
+            "colour-absurd",
+            Light.RED,
+            f"the colour of the residuals makes standard errors {ratio:.2g} times those of white "
+            "residuals: neither can be believed",
+            "take longer records; look for drifts, pure tones or constant outputs in the residuals",
+        )
+    ]
+
+
+def residual_covariance(
+    blocks: Sequence[Block],
+    beside: Beside | None = None,
+    noise: tuple[InputNoise, Array] | None = None,
+) -> ResidualCovariance:
+    """Covariance of estimates by the colour of their residuals.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        By record.
+    beside : Beside, optional
+        Residuals beside the records.
+    noise : tuple of InputNoise and ndarray (n_outputs,), optional
+        Noise of the inputs, which reaches the outputs as random walks, and what whitens the
+        outputs; of one record alone.
+
+    Returns
+    -------
+    ResidualCovariance
+        Positive and finite, whatever the residuals are.
+
+    Assumes
+    -------
+    Noise of each whitened output that is stationary and independent of the others'. Too small
+    where records differ from each other by more than their noise.
+
+    Reference
+    ---------
+    Morelli & Klein (1997), Accuracy of aerodynamic model parameters estimated from flight test
+    data, J. Guidance, Control and Dynamics 20(1), eqs. 19-25; Satterthwaite (1946), An approximate
+    distribution of estimates of variance components, Biometrics Bulletin 2(6), eq. 17; the
+    elimination: Golub & Pereyra (1973), SIAM J. Numerical Analysis 10.
+
+    Example
+    -------
+    >>> residual = np.random.default_rng(1).standard_normal((1, 400))
+    >>> block = Block.of(np.ones((1, 400, 1)), np.ones((1, 400, 0)), residual)
+    >>> found = residual_covariance([block])
+    >>> round(float(found.white[0, 0]), 4), found.orders
+    (0.0025, (0,))
+    """
+    triangle = triangle_of(blocks, None if beside is None else beside.slopes)
+    root = _inverse_root(triangle)
+    turned = _gain(root, beside)
+    taken = []
+    for block in blocks:
+        parts = (block.basis, block.projected @ root)
+        taken.append(Taken(*(part.reshape(*block.residual.shape, -1) for part in parts)))
+    walks = None if noise is None else _walks(taken[0], *noise)
+    models = noise_models([block.residual for block in blocks], taken, walks)
+    answers = [_answers(models, block) for block in blocks]
+    sizes = [block.basis.shape[1] for block in blocks]
+    heard = sum(each[:, m:, m:] for each, m in zip(answers, sizes, strict=True))
+    variances = turned @ heard @ turned.T
+    shared = np.asarray(variances.sum(axis=0))
+    if beside is not None:
+        brought = beside.slopes @ turned.T
+        shared = shared + brought.T @ brought
+    if noise is not None:
+        brought = _of_walks(blocks[0], *noise) @ turned.T
+        shared = shared + brought.T @ brought
+    own, crossed = [], []
+    for block, each, m in zip(blocks, answers, sizes, strict=True):
+        # Own numbers answer the record's own noise and, through the parameters, everybody's.
+        heard_here = each.sum(axis=0)
+        back = np.linalg.inv(block.triangle)
+        through = back @ block.shared_on_own
+        gain = np.vstack([np.zeros((m, len(turned))), turned.T])
+        direct = np.vstack([back.T, -turned.T @ through.T])
+        others = shared - gain.T @ heard_here @ gain
+        found = direct.T @ heard_here @ direct + through @ others @ through.T
+        own.append(_lifted(found, back @ back.T))
+        crossed.append(direct.T @ heard_here @ gain - through @ others)
+    white = np.asarray(root @ root.T)
+    return ResidualCovariance(
+        _lifted(shared, white),
+        white,
+        _freedom(shared, variances, models),
+        tuple(own),
+        tuple(crossed),
+        tuple(model.weights.size for model in models),
+    )
+
+
+def triangle_of(blocks: Sequence[Block], beside: Array | None = None) -> Array:
+    """Triangle of the sensitivities of all records, and of what is fitted beside them."""
+    parts = [np.asarray(np.linalg.qr(block.projected, mode="r")) for block in blocks]
+    if beside is not None:
+        parts.append(beside)
+    return np.asarray(np.linalg.qr(np.vstack(parts), mode="r"))
+
+
+def _inverse_root(triangle: Array) -> Array:
+    """R⁻¹ of a triangle: R⁻¹R⁻ᵀ is the covariance for white residuals of unit variance."""
+    size = np.linalg.norm(triangle, axis=0)
+    return np.asarray(solve_triangular(triangle / size, np.eye(len(size))) / size[:, None])
+
+
+def _answers(models: Sequence[Autoregression], block: Block) -> Array:
+    """[basis, projected]ᵀ Ω [basis, projected] for the noise of each output of one record."""
+    directions = np.hstack([block.basis, block.projected])
+    parts = directions.reshape(len(models), -1, directions.shape[1])
+    return np.array(
+        [part.T @ model.product(part) for model, part in zip(models, parts, strict=True)]
+    )
+
+
+def _gain(root: Array, beside: Beside | None) -> Array:
+    """What turns a gradient into a change of the estimates, from the root R⁻¹ of the information.
+
+    Where data follow the parameters, the equations that the estimates solve bend less than the
+    cost does, and the gain is larger than the inverse of the information.
+    """
+    if beside is None:
+        return np.asarray(root @ root.T)
+    follows = (beside.slopes @ root).T @ ((beside.slopes - beside.total) @ root)
+    return np.asarray(root @ np.linalg.solve(np.eye(len(root)) - follows, root.T))
+
+
+def _walks(taken: Taken, noise: InputNoise, whitener: Array) -> Array:
+    """Mean periodogram of what a fit leaves of each output's random walk.
+
+    Draws come from a fixed seed: the same record gives the same intervals.
+    """
+    directions = taken.shared
+    n = directions.shape[1]
+    draws = np.random.default_rng(0).standard_normal((n - 1, noise.steps.shape[2], DRAWS))
+    walks = noise.outputs_of(draws) * whitener[:, None, None]
+    along = np.einsum("onp,ond->pd", directions, walks, optimize=True)
+    return np.array([periodogram(walk) for walk in walks - directions @ along])
+
+
+def _of_walks(block: Block, noise: InputNoise, whitener: Array) -> Array:
+    """Gradients that unit noise of each input and step makes, shape (n_noises, n)."""
+    sensitivities = block.projected.reshape(*block.residual.shape, -1)
+    paths = noise.transposed(sensitivities * whitener[:, None, None])
+    return np.asarray(paths.reshape(-1, paths.shape[2]))
+
+
+def _freedom(shared: Array, variances: Array, models: Sequence[Autoregression]) -> Array:
+    diagonals = np.diagonal(variances, axis1=1, axis2=2)
+    doubt = sum(
+        variance**2 / model.freedom() for variance, model in zip(diagonals, models, strict=True)
+    )
+    # Errors that are known leave no doubt, nor does a residual that vanishes.
+    doubtful = doubt > 0.0
+    return np.asarray(
+        np.where(doubtful, np.diag(shared) ** 2 / np.where(doubtful, doubt, 1.0), np.inf)
+    )
+
+
+def _lifted(covariance: Array, plain: Array) -> Array:
+    """Of data without noise, rounding alone is left, and that may be negative."""
+    lift = np.maximum(ROUNDING * np.diag(plain) - np.diag(covariance), 0.0)
+    return np.asarray(covariance + np.diag(lift))
