@@ -18,6 +18,7 @@ from tests.closeness import assert_close
 RATE_HZ = 100.0
 TIME_S = np.arange(3000) / RATE_HZ
 MIDDLE = slice(500, -500)
+BAND = (np.pi, 16.0 * np.pi)
 
 
 def _sine(frequency_hz: float) -> Record:
@@ -108,7 +109,7 @@ def _skewed(lag: float, seed: int, noise: float, n: int = 6000) -> Record:
 @pytest.mark.parametrize("lag", [0.0, 0.25, 3.37, -7.81, 20.0])
 def test_skew_is_found_to_a_hundredth_of_a_sample_and_removed(lag: float) -> None:
     record = _skewed(lag, 3, 0.0)
-    estimate = c.estimate_skew(record, "a", "b", band_hz=(0.5, 8.0), window_s=4.0)
+    estimate = c.estimate_skew(record, "a", "b", band_rad_s=BAND, window_s=4.0)
     assert_close(estimate.skew_s * RATE_HZ, lag, atol=1e-3, why="a thousandth of a sample")
     aligned = c.align(record, {"b": estimate.skew_s})
     assert_close(
@@ -125,7 +126,7 @@ def test_skew_is_found_to_a_hundredth_of_a_sample_and_removed(lag: float) -> Non
 def test_skew_interval_covers_the_truth() -> None:
     inside = 0
     for seed in range(40):
-        estimate = c.estimate_skew(_skewed(3.37, seed, 0.3), "a", "b", band_hz=(0.5, 8), window_s=4)
+        estimate = c.estimate_skew(_skewed(3.37, seed, 0.3), "a", "b", band_rad_s=BAND, window_s=4)
         low, high = estimate.lag.interval95
         inside += low <= 0.0337 <= high
     # 40 flights at 95 %: 35 or fewer has a chance of 5 in 1000.
@@ -135,7 +136,7 @@ def test_skew_interval_covers_the_truth() -> None:
 @pytest.mark.slow
 def test_skew_interval_is_calibrated() -> None:
     draws = [
-        c.estimate_skew(_skewed(3.37, seed, 0.3), "a", "b", band_hz=(0.5, 8), window_s=4)
+        c.estimate_skew(_skewed(3.37, seed, 0.3), "a", "b", band_rad_s=BAND, window_s=4)
         for seed in range(1000)
     ]
     covered = np.mean([d.lag.interval95[0] <= 0.0337 <= d.lag.interval95[1] for d in draws])
@@ -144,7 +145,7 @@ def test_skew_interval_is_calibrated() -> None:
 
 def test_reversed_and_unrelated_channels_are_named() -> None:
     record = c.flip_sign(_skewed(2.0, 1, 0.0), ["b"])
-    estimate = c.estimate_skew(record, "a", "b", band_hz=(0.5, 8.0), window_s=4.0)
+    estimate = c.estimate_skew(record, "a", "b", band_rad_s=BAND, window_s=4.0)
     assert_close(estimate.skew_s, 0.02, atol=1e-5, why="the sign does not disturb")
     assert [f.code for f in estimate.findings] == ["sign-reversed"]
     random = np.random.default_rng(5)
@@ -153,7 +154,7 @@ def test_reversed_and_unrelated_channels_are_named() -> None:
     )
     assert "skew-coherence-low" in {f.code for f in c.estimate_skew(record, "a", "b").findings}
     estimate = c.estimate_skew(
-        _skewed(20.0, 1, 0.0), "a", "b", largest_s=0.2, band_hz=(0.5, 8), window_s=4
+        _skewed(20.0, 1, 0.0), "a", "b", largest_s=0.2, band_rad_s=BAND, window_s=4
     )
     assert [f.code for f in estimate.findings] == ["skew-at-limit"]
 
@@ -363,7 +364,7 @@ AIR = Record.from_arrays(
             "window or search range do not suit",
         ),
         (
-            lambda: c.estimate_skew(BASE, "p", "q", band_hz=(0.01, 0.02)),
+            lambda: c.estimate_skew(BASE, "p", "q", band_rad_s=(0.06, 0.12)),
             OptionError,
             "the band holds too few frequencies",
         ),

@@ -41,8 +41,8 @@ class Skew:
         Of `channel` behind `reference`, s; negative where it leads.
     coherence : float
         Mean squared coherence over the band, as the fit weighed it.
-    band_hz : (float, float)
-        Band used, Hz.
+    band_rad_s : (float, float)
+        Band used, rad/s.
     sample_time_s : float
         Sample time of the record, s.
     findings : tuple of Finding
@@ -50,7 +50,7 @@ class Skew:
 
     Example
     -------
-    >>> Skew("p", "phi_dot", Estimate("skew", 0.012, "s", 0.001), 0.98, (0.1, 5.0), 0.01)
+    >>> Skew("p", "phi_dot", Estimate("skew", 0.012, "s", 0.001), 0.98, (0.6, 31.4), 0.01)
     Skew('phi_dot' behind 'p': 0.012 (0.01004 to 0.01396) s, coherence 0.98)
     """
 
@@ -58,7 +58,7 @@ class Skew:
     channel: str
     lag: Estimate
     coherence: float
-    band_hz: tuple[float, float]
+    band_rad_s: tuple[float, float]
     sample_time_s: float
     findings: tuple[Finding, ...] = ()
 
@@ -98,7 +98,7 @@ class Skew:
             "channel": self.channel,
             "lag": self.lag.to_dict(),
             "coherence": self.coherence,
-            "band_hz": list(self.band_hz),
+            "band_rad_s": list(self.band_rad_s),
             "sample_time_s": self.sample_time_s,
             "findings": [finding.to_dict() for finding in self.findings],
         }
@@ -119,7 +119,7 @@ def estimate_skew(
     reference: str,
     channel: str,
     *,
-    band_hz: tuple[float, float] | None = None,
+    band_rad_s: tuple[float, float] | None = None,
     window_s: float | None = None,
     largest_s: float = 0.5,
 ) -> Skew:
@@ -140,8 +140,8 @@ def estimate_skew(
         Data.
     reference, channel : str
         Channels of one unit.
-    band_hz : (float, float), optional
-        Band to use, Hz; default: from two cycles a window to 40 % of the sampling rate.
+    band_rad_s : (float, float), optional
+        Band to use, rad/s; default: from two cycles a window to 40 % of the sampling rate.
     window_s : float, optional
         Window length, s; default: an eighth of the record.
     largest_s : float
@@ -175,13 +175,15 @@ def estimate_skew(
     >>> wave -= np.linspace(wave[0], wave[-1], 4000)
     >>> late = np.interp(time_s - 0.035, time_s, wave)
     >>> record = Record.from_arrays(time_s, outputs={"a": wave, "b": late})
-    >>> round(estimate_skew(record, "a", "b", band_hz=(0.2, 5.0)).skew_s, 3)
+    >>> round(estimate_skew(record, "a", "b", band_rad_s=(1.0, 30.0)).skew_s, 3)
     0.035
     """
     require_match(record.unit(channel), record.unit(reference), subject=f"channel {channel}")
     step = record.sample_time_s
     length = record.n_samples // 8 if window_s is None else round(window_s / step)
-    low, high = band_hz or (2 / (length * step) if length else 0.0, 0.4 / step)
+    low, high = (2 / (length * step) if length else 0.0, 0.4 / step)
+    if band_rad_s is not None:
+        low, high = (float(omega) / (2.0 * np.pi) for omega in band_rad_s)
     if not 16 <= length <= record.n_samples // 2 or not 0 < largest_s < length * step / 2:
         raise OptionError(
             "window or search range do not suit the record",
@@ -207,7 +209,7 @@ def estimate_skew(
         channel,
         Estimate("skew", skew * step, "s", slope.stderr * step),
         slope.coherence,
-        (low, high),
+        (2.0 * np.pi * low, 2.0 * np.pi * high),
         step,
         _findings(sign, slope, channel, reference, skew * step, largest_s),
     )
@@ -256,7 +258,7 @@ def _phase_slope(
             "the band holds too few frequencies",
             found=f"{np.count_nonzero(used)}",
             needed="at least 3",
-            action="widen band_hz or lengthen window_s",
+            action="widen band_rad_s or lengthen window_s",
         )
     frequency, cross = frequency[used], cross[used]
     coherence = np.clip(np.abs(cross) ** 2 / (power * other)[used], 1e-12, 1 - 1e-12)
