@@ -136,6 +136,7 @@ pub fn run(orders: &Orders, p: &Polynomials, samples: &Samples<'_>, memory: &[f6
         }
         let mut response = vec![0.0; n];
         add_product(1.0, &p.b[i], orders.delays[i], input, &mut response);
+        // What the unknown past adds to the first samples is remembered by the filter after it.
         add_past(&mut response, memory, used, of_inputs[i]);
         used += of_inputs[i];
         divide(&p.f[i], &mut response);
@@ -212,6 +213,7 @@ impl Derivatives {
             made.push(with_d(response), 1, orders.f[i], 1.0);
             last.push(Some(i));
         }
+        // Each recursion waits for its own last sample: three side by side fill the wait.
         for group in made.signals.chunks_mut(3) {
             match group {
                 [x, y, z] => divide_together(&p.c, [x, y, z]),
@@ -260,7 +262,9 @@ pub struct Past {
     n_unknowns: usize,
 }
 
+/// Below this share of its largest value an impulse response is over.
 const FORGOTTEN: f64 = 1e-14;
+/// Below this share of its length a direction counts as a combination of those before it.
 const DEPENDENT: f64 = 1e-9;
 
 impl Past {
@@ -301,6 +305,7 @@ impl Past {
     fn orthogonalise(&mut self, mut column: Vec<f64>, unknown: usize) {
         let before = norm(&column);
         let mut coordinates = vec![0.0; self.directions.len() + 1];
+        // Once leaves rounding errors along nearly parallel directions; twice is enough.
         for _ in 0..2 {
             for (direction, coordinate) in self.directions.iter().zip(&mut coordinates) {
                 let shared = direction.len().min(column.len());

@@ -169,6 +169,8 @@ impl<'a> Search<'a> {
         for j in 0..self.x.len() {
             let column = self.column(j);
             let (length, slope) = (norm(column), dot(column, &self.point.projected));
+            // Scales never shrink (Moré): a column that fades for a while does not let its variable
+            // loose.
             self.scale[j] = self.scale[j].max(length);
             self.gradient[j] = slope;
         }
@@ -191,12 +193,14 @@ impl<'a> Search<'a> {
         }
         let size = self.cost.sqrt();
         let mut any = false;
+        // What eliminated numbers would still take is slope as well.
         if self.point.beside.sqrt() > options.gradient_tolerance * size {
             return None;
         }
         for j in (0..self.x.len()).filter(|&j| !self.is_held(j)) {
             any = true;
             let length = norm(self.column(j));
+            // The cosine between residuals and column: free of units.
             if length > 0.0 && self.gradient[j].abs() > options.gradient_tolerance * length * size {
                 return None;
             }
@@ -231,6 +235,7 @@ impl<'a> Search<'a> {
         let ratio = reduction / predicted;
         let flat = reduction.max(predicted) <= options.cost_tolerance * self.cost;
         std::mem::swap(&mut self.x, &mut self.trial);
+        // Nielsen: the better the prediction, the less damping, within these factors.
         self.damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 10.0, 2.0);
         self.damping = self.damping.max(1e-20);
         self.growth = 2.0;
@@ -254,6 +259,7 @@ impl<'a> Search<'a> {
         if small {
             return Some(if self.damping < 1.0 { Termination::Step } else { Termination::Stalled });
         }
+        // Refusals in a row raise the damping ever faster.
         self.damping *= self.growth;
         self.growth *= 2.0;
         (self.damping > 1e20).then_some(Termination::Stalled)
@@ -310,6 +316,7 @@ impl<'a> Search<'a> {
         }
         let rhs = &mut work[f * m..];
         for (row, entry) in rhs.iter_mut().enumerate().take(n) {
+            // Variables stopped at a bound move what is left to it; the free ones answer.
             let moved: f64 = (0..n)
                 .filter(|j| !free.contains(j))
                 .map(|j| self.point.triangle[j * n + row] * self.delta[j])

@@ -11,52 +11,10 @@ use rayon::prelude::*;
 use crate::error::CoreError;
 use crate::fits::least_squares::{Minimum, Options, Problem};
 use crate::fits::levenberg_marquardt::minimise;
+use crate::frequency_domain::response_model::ResponseModel;
 
 const DECIBEL: f64 = 20.0 / std::f64::consts::LN_10;
 const DEGREE: f64 = 180.0 / std::f64::consts::PI;
-
-/// A model that gives responses and the gradient of their logarithm.
-pub trait ResponseModel {
-    /// Number of responses.
-    fn n_responses(&self) -> usize;
-    /// Number of parameters that vary.
-    fn n_free(&self) -> usize;
-    /// Take new values of the free parameters.
-    ///
-    /// # Errors
-    /// Where the model has no meaning at these values.
-    fn prepare(&mut self, free: &[f64], with_gradient: bool) -> Result<(), CoreError>;
-    /// H(jω) of one response; the gradient of log H (n_free) is written where asked for.
-    fn response(
-        &self,
-        response: usize,
-        omega: f64,
-        gradient: Option<&mut [Complex64]>,
-    ) -> Complex64;
-    /// H(jω) of one response at several frequencies; the gradients of log H (n_omega × n_free) are
-    /// written where asked for.
-    fn responses(
-        &self,
-        response: usize,
-        omega: &[f64],
-        values: &mut [Complex64],
-        gradients: Option<&mut [Complex64]>,
-    ) {
-        match gradients {
-            Some(gradients) if self.n_free() > 0 => {
-                let rows = gradients.chunks_exact_mut(self.n_free());
-                for ((value, &each), row) in values.iter_mut().zip(omega).zip(rows) {
-                    *value = self.response(response, each, Some(row));
-                }
-            }
-            _ => {
-                for (value, &each) in values.iter_mut().zip(omega) {
-                    *value = self.response(response, each, None);
-                }
-            }
-        }
-    }
-}
 
 /// One measured response on the frequencies of the fit.
 #[derive(Debug, Clone)]

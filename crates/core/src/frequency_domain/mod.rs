@@ -1,6 +1,7 @@
 //! Models as frequency responses, and their fit to measured ones.
 
 pub mod frequency_fit;
+pub mod response_model;
 pub mod state_space_response;
 pub mod transfer;
 pub mod transfer_polynomials;

@@ -9,7 +9,7 @@
 use num_complex::Complex64;
 
 use crate::error::CoreError;
-use crate::frequency_domain::frequency_fit::ResponseModel;
+use crate::frequency_domain::response_model::ResponseModel;
 use crate::numerics::complex_lanes::{LANES, Lanes};
 use crate::numerics::complex_lu::ComplexLu;
 use crate::numerics::sparse_lu::{Block, Factors, Plan};
@@ -134,6 +134,7 @@ impl<'a> FreeStateSpace<'a> {
     fn update_plan(&mut self) {
         let n = self.tape.n_states();
         let is_used = |row: usize, column: usize| self.entry(row, column) != (0.0, 0.0);
+        // Entries stay once seen, so that a parameter through zero plans nothing anew.
         let mut known = vec![false; n * n];
         if let Some(plan) = &self.plan {
             plan.entries().iter().for_each(|&(row, column)| known[row * n + column] = true);
@@ -145,6 +146,7 @@ impl<'a> FreeStateSpace<'a> {
             .filter(|&k| known[k] || is_used(k / n, k % n))
             .map(|k| (k / n, k % n))
             .collect();
+        // One frequency stands for all; `Plan::factor` judges its pivots at each.
         let middle = self.omega[self.omega.len() / 2];
         let typical: Vec<Complex64> =
             entries.iter().map(|&(row, column)| self.dynamic(row, column, middle)).collect();
@@ -266,6 +268,7 @@ impl<'a> FreeStateSpace<'a> {
         if let Some(gradient) = gradient {
             let mut adjoints =
                 gather(&self.adjoints, self.outputs.len(), Self::place(&self.outputs, output));
+            // ∂ log H = ∂H / H: dividing Λ here divides every entry's share.
             let inverse = value.inverse();
             adjoints.iter_mut().for_each(|each| *each = each.times(&inverse));
             self.add_entries(pair, &omega, &states, &adjoints, &inverse, gradient);
@@ -312,6 +315,7 @@ impl<'a> FreeStateSpace<'a> {
             }
         }
         let n_free = self.free.len();
+        // log H holds −jωτ as a summand.
         for (slope, late) in gradient.iter_mut().zip(&self.delay_slopes[input * n_free..]) {
             (0..LANES).for_each(|lane| slope.im[lane] -= omega[lane] * late);
         }
@@ -339,6 +343,7 @@ impl ResponseModel for FreeStateSpace<'_> {
         }
         if with_gradient && !self.has_adjoints {
             let (point, values) = (self.point, &self.values);
+            // Constant where the model is bilinear: found once for the whole search.
             if self.sensitivities.is_empty() || !self.tape.is_bilinear() {
                 self.sensitivities = self.tape.sensitivities(point, values, &self.free)?;
             }

@@ -10,7 +10,7 @@ use std::ops::Range;
 use num_complex::Complex64;
 
 use crate::error::CoreError;
-use crate::frequency_domain::frequency_fit::ResponseModel;
+use crate::frequency_domain::response_model::ResponseModel;
 use crate::language::expression::Expression;
 use crate::language::laplace_polynomial;
 use crate::tape::expression_tape::{Registers, Tape};

@@ -96,6 +96,7 @@ impl Plan {
             slot[row * n + column] = place;
             value[row * n + column] = number;
         }
+        // Rows have units of their own: entries are compared as shares of their row's largest.
         let scale: Vec<f64> = (0..n)
             .map(|row| value[row * n..(row + 1) * n].iter().map(|v| size(*v)).fold(0.0, f64::max))
             .collect();
@@ -118,6 +119,7 @@ impl Plan {
             for &i in &under {
                 let factor = value[at(i, column)] / value[at(row, column)];
                 for &j in &beside {
+                    // Fill: a place that held nothing gets a slot after those of the entries.
                     if slot[at(i, j)] == usize::MAX {
                         slot[at(i, j)] = n_slots;
                         n_slots += 1;
@@ -161,6 +163,8 @@ impl Plan {
             }
             for &(_, place, ratio) in &step.lower {
                 let multiplier = slots[place].times(&inverse);
+                // As planned no scaled multiplier is above 1 / THRESHOLD; a large one says that
+                // this frequency is unlike the planned one, and its digits would be lost.
                 if multiplier.size() * ratio > LARGEST_MULTIPLIER {
                     return false;
                 }
@@ -236,6 +240,7 @@ fn choose(
                 continue;
             }
             let width = columns.iter().filter(|&&j| used(i, j)).count();
+            // Markowitz: at most so many places are filled.
             let fill = (height - 1) * (width - 1);
             let better = best
                 .is_none_or(|(_, (least, most))| fill < least || (fill == least && share > most));

@@ -258,6 +258,7 @@ impl RecordPass {
                     cost += weights.twice_loss(row[0]);
                     let weight = weights.weight(row[0]);
                     if weight < 1.0 {
+                        // As a factor of the row, so that products of rows carry the weight once.
                         let root = weight.sqrt();
                         row.iter_mut().for_each(|entry| *entry *= root);
                     }

@@ -75,6 +75,7 @@ impl OdeModel {
         let mass = pick(0, n, 0..n);
         let rates = Program::new(&tape, &[residuals.clone(), registers(&mass)].concat(), n_moving);
         let factors = Program::new(&tape, &registers(&mass), n_moving);
+        // M depends on ẋ: the equations are not linear in it.
         if (0..n).any(|state| factors.uses(state)) {
             let problem = "a state derivative does not enter its equation linearly".to_string();
             return Err(CoreError::Expression { position: 0, problem });
@@ -171,6 +172,7 @@ fn split(tape: &Tape, n_moving: usize, height: usize) -> Result<(Tape, Tape), Co
     }
     let mut is_leaf = vec![false; tape.operations.len()];
     for register in (0..tape.operations.len()).filter(|&r| needed[r] && moves[r]) {
+        // What moves reads it and it does not move: a leaf.
         tape.operations[register]
             .arguments()
             .filter(|&a| !moves[a])

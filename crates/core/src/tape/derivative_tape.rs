@@ -68,6 +68,7 @@ impl Tape {
     /// # Errors
     /// `Expression` where the tape would be too long.
     pub(crate) fn differentiated(&self) -> Result<(Tape, Vec<Entry>), CoreError> {
+        // Going on after the tape itself, formulas share what its values have computed already.
         let mut assembler = Assembler::resume(self.operations.clone());
         let needed = self.needed(&self.outputs);
         let mut gradients: Vec<Gradient> = vec![Vec::new(); self.operations.len()];
@@ -157,6 +158,7 @@ fn chosen(
     left: &Gradient,
     right: &Gradient,
 ) -> Result<Gradient, CoreError> {
+    // The test has none: at its switch the value may jump, and no formula sees that.
     let zero = assembler.constant(0.0)?;
     let mut inputs: Vec<usize> = left.iter().chain(right).map(|entry| entry.0).collect();
     inputs.sort_unstable();
@@ -308,6 +310,7 @@ fn power_slopes(
             Some(0.0) => None,
             Some(number) => {
                 let less = to.constant(number - 1.0)?;
+                // No call of a power for the most common exponents.
                 let reduced = match number {
                     1.0 => to.constant(1.0)?,
                     2.0 => base,

@@ -43,6 +43,8 @@ impl BoundarySystem<'_> {
             self.fill(row, &mut matrix[row * size..(row + 1) * size]);
         }
         for k in 0..size {
+            // Column k reaches fewer than 2n rows below its diagonal, and a row swapped up from
+            // there fewer than 4n columns to the right.
             let last = (k + 2 * n).min(size);
             let stop = (k + 4 * n).min(size);
             let size_of = |row: usize| matrix[row * size + k].abs();

@@ -91,6 +91,7 @@ fn line(near: [f64; 3], corner: f64, part: f64, parts: f64, hold: Hold, sample_s
     let inside = (0.0..1.0).contains(&place);
     let [before, centre, after] = near;
     // Value at the ends and its derivative by the corner, with mean and slope of what the corner adds.
+    // ∫f and 12 ∫(t − ½) f: the line of these has the area and the first moment of f.
     let (ends, ends_slope, step, mean, slope, mean_rate, slope_rate);
     match hold {
         Hold::Zero => {

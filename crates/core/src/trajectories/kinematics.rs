@@ -87,6 +87,7 @@ fn stage(
     for (row, out) in change.iter_mut().enumerate() {
         *out = [0.0; COLUMNS];
         for (weight, source) in here.by_state[row].iter().zip(s) {
+            // More than half of ∂ẋ/∂x is zero at any attitude.
             if *weight != 0.0 {
                 for (value, derivative) in out.iter_mut().zip(source) {
                     *value += weight * derivative;
@@ -94,6 +95,7 @@ fn stage(
             }
         }
         for (j, weight) in here.by_input[row].iter().enumerate() {
+            // An offset moves the input by one, a relative gain by the input itself.
             out[N + j] += weight;
             out[2 * N + j] += weight * input[j];
         }

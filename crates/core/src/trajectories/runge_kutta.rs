@@ -114,6 +114,8 @@ impl Setting {
         self.step_s = course.sample_s / course.substeps as f64;
         self.held.resize_with(ode.n_inputs, HeldInput::default);
         if self.followed.as_ref() != Some(&self.delays) {
+            // Unset meanwhile: a delay that is refused must not leave half of the inputs as
+            // followed.
             self.followed = None;
             for (input, held) in self.held.iter_mut().enumerate() {
                 let samples = &course.inputs[input * course.n_samples..][..course.n_samples];
@@ -163,6 +165,7 @@ impl Setting {
         let lanes = &self.rates;
         if ode.mass.is_one() {
             for (rate, &register) in result.iter_mut().zip(&ode.residuals) {
+                // Residuals are left − right, so M ẋ = −r at ẋ = 0.
                 *rate = -lanes[register][0];
             }
         } else {
@@ -237,6 +240,7 @@ impl Setting {
                 break;
             }
         }
+        // Also after a refused stage: the buffers must go back, and the caller drops the state.
         for (place, x) in state.iter_mut().enumerate() {
             let sum: f64 = WEIGHTS.iter().zip(&slopes).map(|(w, k)| w * k[place]).sum();
             *x += self.step_s / 6.0 * sum;
@@ -283,6 +287,7 @@ impl Setting {
                     return Err(CoreError::Diverged { sample });
                 }
             }
+            // Not "any beyond": NaN is not below either.
             if !state.iter().all(|v| v.abs() < LARGEST_STATE) {
                 return Err(CoreError::Diverged { sample });
             }

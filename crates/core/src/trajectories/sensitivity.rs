@@ -82,6 +82,8 @@ impl TrajectorySensitivity {
                     let rows = &mut rows[(sample - start) * height..][..height];
                     self.measure(trajectory, sample, sample - start, n_columns, stride, rows);
                 }
+                // No step follows the record's last sample; one follows the last of a segment, up
+                // to its end.
                 if sample + 1 < setting.n_samples {
                     (0..setting.substeps).for_each(|part| {
                         self.advance(trajectory, sample, part, sample - start);
@@ -136,6 +138,8 @@ impl TrajectorySensitivity {
         ode.rates.prepare(n_moving, &setting.leaves, &mut self.rates);
         ode.rate_slopes.prepare(n_moving, &setting.leaves, &mut self.slopes);
         ode.output_slopes.prepare(n_moving, &setting.leaves, &mut self.outputs);
+        // Four stages of each part of a sample interval, and one at the sample for outputs that
+        // need ẋ.
         let n_stages = 4 * setting.substeps + 1;
         self.stages.resize(n_stages, Vec::new());
         self.masses.resize(n_stages, Vec::new());
@@ -155,7 +159,10 @@ impl TrajectorySensitivity {
         let mut state = vec![[0.0; BLOCK]; n];
         let mut slope = vec![[0.0; BLOCK]; n];
         let mut driven = vec![[0.0; BLOCK]; ode.n_inputs];
+        // Lanes beyond the last sample repeat it; nothing is taken from them.
         let sample = |lane: usize| (start + lane).min(stop - 1);
+        // The states along the run are known, so all samples of a block are evaluated side by side;
+        // only S must pass from one to the next.
         for part in 0..setting.substeps {
             for (stage, (place, share)) in STAGES.into_iter().enumerate() {
                 for lane in 0..BLOCK {
@@ -240,6 +247,7 @@ impl TrajectorySensitivity {
         let store = &mut self.masses[place];
         store.clear();
         store.resize(n * n, [0.0; BLOCK]);
+        // Serves every lane where M is fixed; where it moves each lane makes its own.
         self.inverse.copy_from_slice(&trajectory.setting.inverse_mass);
         for lane in 0..BLOCK {
             if let Mass::Moving(entries) = &ode.mass {
@@ -282,6 +290,7 @@ impl TrajectorySensitivity {
             }
         }
         for force in &self.rate_pattern.forces[group] {
+            // A delay acts through the rate of its input, everything else by itself.
             let late = force.delayed.map_or(1.0, |input| rate.of(trajectory, input));
             slope[force.row][force.lane] -= stage[force.entry][lane] * force.factor * late;
         }
@@ -352,6 +361,7 @@ impl TrajectorySensitivity {
         for group in 0..self.output_pattern.forces.len() {
             let own = group * n..(group + 1) * n;
             if ode.outputs_need_rates {
+                // ẋ at the sample itself: S as it stands, between no stages.
                 self.moved[own.clone()].copy_from_slice(&self.sensitivity[own.clone()]);
                 let place = 4 * trajectory.setting.substeps;
                 self.stage_slopes(trajectory, place, lane, group, Rate::Sample(sample));

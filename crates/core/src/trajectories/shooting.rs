@@ -110,7 +110,8 @@ impl Plan {
 }
 
 impl Flight {
-    /// Run, and hand rows of `stride` numbers (output, then its derivatives) to `sink` as in `TrajectorySensitivity`.
+    /// Run, and hand rows of `stride` numbers (output, then its derivatives) to `sink` as in
+    /// `TrajectorySensitivity`.
     ///
     /// # Errors
     /// `Diverged`, `Singular`, `NotFinite` where the trajectory or a derivative has no value.
@@ -224,6 +225,7 @@ impl Flight {
                 step = step.max(change.abs());
                 size = size.max(node.abs());
             }
+            // The buffer goes back before an error leaves.
             self.sides = sides;
             solved?;
             if step.is_nan() || size > LARGEST_STATE {
@@ -272,6 +274,8 @@ impl Flight {
             for state in 0..n {
                 for column in 0..count {
                     let slope = self.sensitivity.end(ode, state, column);
+                    // Columns: parameters, the node's states, shifts. Those of the node are the
+                    // transition A_s.
                     let is_node = (parameters.len()..parameters.len() + n).contains(&column);
                     if is_node { &mut self.transitions } else { &mut self.forced }.push(slope);
                 }
@@ -316,11 +320,14 @@ impl Flight {
         let width = n_free + wish.free_shift.len();
         let mut sides = vec![0.0; n_nodes * n * count];
         for (column, &place) in wish.free_initial.iter().enumerate() {
+            // Conditions at the beginning are the first rows of the system, those at the end its
+            // last.
             let row = if place < n_forward { place } else { n_nodes * n - n + place };
             sides[row * count + n_free + column] = 1.0;
         }
         for (place, &slope) in self.forced.iter().enumerate() {
             let (row, column) = (place / width, place % width);
+            // What a segment's end gains while its node stays: the right side d_s of its joint.
             let column = if column < n_free { column } else { column + n_initial };
             sides[(n_forward + row) * count + column] = slope;
         }

@@ -4,8 +4,9 @@
 use flightid_core::CoreError;
 use flightid_core::fits::least_squares::{Minimum, Options};
 use flightid_core::frequency_domain::frequency_fit::{
-    Cost, FrequencyFit, Measured, ResponseModel, Whitening, minimise_from,
+    Cost, FrequencyFit, Measured, Whitening, minimise_from,
 };
+use flightid_core::frequency_domain::response_model::ResponseModel;
 use num_complex::Complex64;
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;

@@ -3,7 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use flightid_core::frequency_domain::frequency_fit::{FrequencyFit, ResponseModel};
+use flightid_core::frequency_domain::frequency_fit::FrequencyFit;
+use flightid_core::frequency_domain::response_model::ResponseModel;
 use flightid_core::frequency_domain::state_space_response::FreeStateSpace;
 use flightid_core::records::state_space_family::StateSpaceFamily;
 use flightid_core::state_space::model_samples::sample;

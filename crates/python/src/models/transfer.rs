@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use flightid_core::frequency_domain::frequency_fit::ResponseModel;
+use flightid_core::frequency_domain::response_model::ResponseModel;
 use flightid_core::frequency_domain::transfer::{
     FreeTransfer, ResponseText, TransferFunctions as Functions,
 };
