@@ -22,7 +22,7 @@ title = "Roll"
 [[record]]
 name = "steps"
 path = "roll.csv"
-[identify]
+[fit]
 method = "output_error"
 [[model]]
 name = "Roll"

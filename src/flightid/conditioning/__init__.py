@@ -15,6 +15,7 @@ from flightid.conditioning.consistency import check_consistency
 from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.conditioning.detrend import Trend, detrend
 from flightid.conditioning.filter import FilterDesign, filter_record
+from flightid.conditioning.outliers import remove_outliers
 from flightid.conditioning.resample import resample
 from flightid.conditioning.segment import drop, split, split_by_mode
 from flightid.conditioning.sensor_position import (
@@ -57,6 +58,7 @@ __all__ = [
     "fourier_smooth",
     "local_derivative",
     "local_mean",
+    "remove_outliers",
     "resample",
     "split",
     "split_by_mode",

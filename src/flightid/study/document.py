@@ -203,18 +203,15 @@ def _options(study: Study) -> dict[str, Cell]:
     settings, response = study.settings, study.settings.response
     if not settings.models:
         return {}
-    options: dict[str, Cell] = {"fit": settings.method}
-    if not settings.on_records:
+    options: dict[str, Cell] = {"fit": settings.fit.method}
+    if settings.fit.on_responses:
         options |= {
             "estimator": response.estimator,
             "frequencies in a model's band": response.n_omega,
             "windows [s]": ", ".join(f"{value:g}" for value in response.window_s) or "chosen",
             "least coherence": response.minimum_coherence,
         }
-    options |= {
-        "starts of a fit": settings.starts,
-        "seed of the starts": settings.seed,
-    }
+    options |= {f"{name} of a fit": str(value) for name, value in settings.fit.options.items()}
     if settings.reduce is not None:
         options |= {
             name.replace("_", " "): value for name, value in vars(settings.reduce.limits).items()

@@ -32,6 +32,10 @@ ESTIMATORS = {
     "local_polynomial": "local polynomial estimate",
     "instrument": "instrument estimate",
     "output_error": "output error on the records",
+    "equation_error": "equation error on the records",
+    "fourier_regression": "regression on Fourier integrals",
+    "fourier_output_error": "output error at the harmonics",
+    "filter_error": "filter error on the records",
 }
 """Estimators in words, as legends and tables name them."""
 
@@ -50,7 +54,7 @@ def model_section(item: Identified, truth: Truth | None) -> Section:
     -------
     Section
     """
-    figures = [_bode_figure(item, truth)] if item.responses else record_figures(item.fit)
+    figures = _bode_figures(item, truth) if item.responses else record_figures(item.fit)
     blocks: list[Block] = [*figures, *result_blocks(item.fit, title="Parameters")]
     if len(item.fits) > 1:
         blocks.append(TableBlock(_comparison(item, truth)))
@@ -62,8 +66,12 @@ def model_section(item: Identified, truth: Truth | None) -> Section:
     ]
     if isinstance(item.fit.model, StateSpaceModel):
         parts.insert(0, Section("Modes and derivatives", _physics(item.fit)))
+    if item.tests is not None:
+        parts.insert(0, Section("Residual tests", result_blocks(item.tests)))
     if item.reduction is not None:
         parts.insert(0, Section("Reduction of the structure", reduction_blocks(item.reduction)))
+    if item.coherent is not None:
+        parts.insert(0, Section("Choice of responses", result_blocks(item.coherent)))
     return Section(item.settings.name, tuple(blocks), tuple(parts))
 
 
@@ -78,8 +86,13 @@ def _physics(fit: Fit) -> tuple[Block, ...]:
     return (*modes_blocks(modes(fit)), *physics_blocks(approximations, table))
 
 
-def _bode_figure(item: Identified, truth: Truth | None) -> Figure:
-    output, source = item.fit.model.outputs[0], item.fit.model.inputs[0]
+def _bode_figures(item: Identified, truth: Truth | None) -> list[Figure]:
+    """One picture for each response that was fitted."""
+    return [_bode_figure(item, each.name, truth) for each in item.fit.responses]
+
+
+def _bode_figure(item: Identified, name: str, truth: Truth | None) -> Figure:
+    output, source = name.split("/")
     curves = []
     for number, (method, response) in enumerate(item.responses.items()):
         pair = response.pair(output, source)
@@ -94,15 +107,17 @@ def _bode_figure(item: Identified, truth: Truth | None) -> Figure:
                 random_error=pair.random_error if number == 0 else None,
             )
         )
-    omega = curves[0].omega_rad_s
-    fitted = item.fit.model.frequency_response(omega)[0, 0]
+    omega, model = curves[0].omega_rad_s, item.fit.model
+    place = model.outputs.index(output), model.inputs.index(source)
+    fitted = model.frequency_response(omega)[place]
     curves.append(Curve("model", omega, fitted, colour=look.MODEL))
-    if truth is not None:
-        exact = truth.response(item.fit.model, omega)
-        if exact is not None:
-            curves.append(Curve("truth", omega, exact, colour=look.TRUTH, dash="dot"))
+    exact = None if truth is None else truth.response(model, omega)
+    if exact is not None and len(item.fit.responses) == 1:
+        curves.append(Curve("truth", omega, exact, colour=look.TRUTH, dash="dot"))
     shown = f"{output} to {source}: {curves[0].name} with its 95 % band of random error, and model"
-    return figure_block(bode(curves, unit=pair.unit), shown + ("; truth dotted." if truth else "."))
+    return figure_block(
+        bode(curves, unit=pair.unit), shown + ("; truth dotted." if exact is not None else ".")
+    )
 
 
 def _comparison(item: Identified, truth: Truth | None) -> Table:

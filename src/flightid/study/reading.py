@@ -36,6 +36,16 @@ class TableReader:
         """Tell whether the table gives this key."""
         return key in self._values
 
+    @property
+    def where(self) -> str:
+        """How the study file names the table."""
+        return self._where
+
+    def rest(self) -> dict[str, Any]:
+        """All values, for a part that checks its own keys."""
+        self._known += list(self._values)
+        return dict(self._values)
+
     def text(self, key: str, default: str = REQUIRED) -> str:
         """One string."""
         return str(self._take(key, default, lambda value: isinstance(value, str), "a text"))

@@ -112,6 +112,8 @@ def load_record(file: RecordFile, roles: Mapping[str, Role]) -> Record:
         file.path,
         inputs=named(Role.INPUT),
         outputs=named(Role.OUTPUT),
+        excitations=named(Role.EXCITATION),
+        others=named(Role.OTHER),
         time_column=file.time,
         units={key: unit for key, unit in file.units.items() if key in roles},
         sample_time_s=file.sample_time_s,

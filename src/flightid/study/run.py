@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
-from flightid.errors import StudyError
 from flightid.files import sha256_of_file
-from flightid.inspection import Inspection, inspect_log
-from flightid.logs import Log, read_log
 from flightid.progress import progress
 from flightid.record import Record
 from flightid.report.html import to_html
@@ -22,20 +18,16 @@ from flightid.study.settings import Settings, read_settings
 from flightid.study.stages import (
     Identified,
     Task,
-    channels_needed,
     check,
-    cut_records,
+    choose_responses,
     estimate,
+    examine_residuals,
     fit,
-    load_records,
     load_task,
 )
 from flightid.study.study import Study
-from flightid.study.truth import Truth
+from flightid.study.taking import take
 from flightid.study.tuning import TuneSettings, tune_models
-from flightid.vehicles import write_ardupilot_log
-
-FLIGHT_LOG = "flight.bin"
 
 
 def run_study(
@@ -83,14 +75,14 @@ def run_study(
     settings = read_settings(source)
     final = Path(output) if output is not None else source.with_name(f"{source.stem}-output")
     require_replaceable(final)
-    tasks = [load_task(model, on_records=settings.on_records) for model in settings.models]
+    tasks = [load_task(model) for model in settings.models]
     rated = settings.qualities
     if rated is not None:
         require_pairs(tasks, rated)
     # Reading and cutting, three steps for each model, writing; a flight before all of it.
     steps = 3 + 3 * (len(tasks) + len(settings.black_boxes))
     with whole_folder(final) as folder, progress(steps, source.stem) as advance:
-        taken = _take(settings, tasks, None if log is None else Path(log), folder)
+        taken = take(settings, tasks, None if log is None else Path(log), folder)
         advance(2)
         identified = tuple(_identify(task, taken.records, settings, advance) for task in tasks)
         boxes = []
@@ -117,63 +109,19 @@ def run_study(
     return study
 
 
-@dataclass(frozen=True, eq=False)
-class _Taken:
-    """Records of a study, and where they come from."""
-
-    records: Mapping[str, Record]
-    files: tuple[Path, ...]
-    inspection: Inspection | None = None
-    truth: Truth | None = None
-    log: Log | None = None
-
-
-def _take(settings: Settings, tasks: list[Task], given: Path | None, folder: Path) -> _Taken:
-    """Records from files, from the log given or named, or from one that is flown now."""
-    needed = channels_needed(settings, tasks)
-    if settings.record_files:
-        if given is not None:
-            raise StudyError(
-                "the study reads records, not a log", found=str(given), action="leave out --log"
-            )
-        paths = dict.fromkeys(file.path for file in settings.record_files)
-        return _Taken(load_records(settings, needed), tuple(paths))
-    flown, truth = _obtain_log(settings, given, folder)
-    opened = read_log(flown)
-    records = cut_records(opened, settings, needed)
-    return _Taken(records, (flown,), inspect_log(opened), truth, opened)
-
-
-def _obtain_log(settings: Settings, given: Path | None, folder: Path) -> tuple[Path, Truth | None]:
-    """Path of the log: the one given, the one the study names, or one that is flown now."""
-    if given is not None or settings.flight is None:
-        return given or _required(settings.log), None
-    flight = settings.flight.fly()
-    write_ardupilot_log(flight, folder / FLIGHT_LOG)
-    return folder / FLIGHT_LOG, Truth.of_flight(flight)
-
-
-def _required(path: Path | None) -> Path:
-    if path is None or not path.is_file():
-        raise StudyError(
-            "the log of the study is not there",
-            found=None if path is None else str(path),
-            needed="a file",
-            action="correct [log] path, or name a log with --log",
-        )
-    return path
-
-
 def _identify(
     task: Task, records: Mapping[str, Record], settings: Settings, advance: Callable[..., None]
 ) -> Identified:
-    responses = estimate(task, records, settings)
+    responses = estimate(task, records)
+    task, coherent = choose_responses(task, responses)
     advance()
-    fits, reduction = fit(task, responses, records, settings)
+    fits, reduction = fit(task, responses, records, settings.reduce, coherent)
     advance()
-    verifications = check(task, next(iter(fits.values())), records, settings)
+    counts = next(iter(fits.values()))
+    verifications = check(task, counts, records)
+    tests = examine_residuals(task, counts)
     advance()
-    return Identified(task.settings, responses, fits, verifications, reduction)
+    return Identified(task.settings, responses, fits, verifications, reduction, coherent, tests)
 
 
 def _write(study: Study, folder: Path) -> None:

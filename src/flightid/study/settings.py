@@ -7,24 +7,25 @@ are relative to the file.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any
 
 from flightid.errors import StudyError
 from flightid.study.black_box_settings import BlackBoxSettings, read_black_box
+from flightid.study.conditioning import Conditioning, read_conditioning, require_records
+from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
 from flightid.study.flight import FlightPlan, read_flight
+from flightid.study.model_settings import ModelSettings, read_model
 from flightid.study.qualities import QualitiesSettings, read_qualities
 from flightid.study.reading import TOP, TableReader
 from flightid.study.record_files import RecordFile, read_record_file
 from flightid.study.reducing import ReduceSettings, read_reduce
 from flightid.study.references import require_references
+from flightid.study.response_settings import ResponseSettings, read_response
 from flightid.study.tuning import TuneSettings, read_tune
 
 MAXIMUM_BYTES = 1 << 20
-ESTIMATORS = ("composite", "local_polynomial", "instrument")
-FITS = ("frequency_domain", "output_error")
 
 
 @dataclass(frozen=True)
@@ -47,77 +48,6 @@ class Segment:
     span_s: tuple[float, float] | None = None
     sid_axis: int | None = None
     run: int = 0
-
-
-@dataclass(frozen=True)
-class ModelSettings:
-    """One model to identify.
-
-    Attributes
-    ----------
-    name : str
-        Title in the report.
-    template : str
-        Name of a library model, or path of a model file.
-    axis : str or None
-        Axis of a library model that is written for any.
-    identify, verify : tuple of str
-        Segments for the fit, and segments kept for verification.
-    band_rad_s : tuple of float or None
-        Lowest and highest frequency of the fit, rad/s; None where records are fitted.
-    parameters : mapping
-        Overrides by parameter: value, min, max, free.
-    rivals : mapping of str to str
-        Models to verify side by side: library name, or path of a model file, by name.
-    keep, drop : tuple of str
-        Parameters that a reduction leaves in, or takes out first.
-    """
-
-    name: str
-    template: str
-    axis: str | None
-    identify: tuple[str, ...]
-    verify: tuple[str, ...]
-    band_rad_s: tuple[float, float] | None
-    parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    rivals: Mapping[str, str] = field(default_factory=dict)
-    keep: tuple[str, ...] = ()
-    drop: tuple[str, ...] = ()
-
-    @property
-    def segments(self) -> tuple[str, ...]:
-        """Every segment that the model uses."""
-        return (*self.identify, *self.verify)
-
-    @property
-    def template_path(self) -> Path | None:
-        """Path of the model file; None for a library model."""
-        return Path(self.template) if self.template.endswith(".toml") else None
-
-
-@dataclass(frozen=True)
-class ResponseSettings:
-    """How frequency responses are estimated.
-
-    Attributes
-    ----------
-    estimator : str
-        Estimator whose result is fitted.
-    compare : tuple of str
-        Estimators shown beside it.
-    n_omega : int
-        Frequencies in each model's band, spaced evenly in the logarithm.
-    window_s : tuple of float
-        Window lengths, s; empty: chosen by the estimator.
-    minimum_coherence : float
-        Frequencies below it take no part in a fit.
-    """
-
-    estimator: str = "composite"
-    compare: tuple[str, ...] = ()
-    n_omega: int = 60
-    window_s: tuple[float, ...] = ()
-    minimum_coherence: float = 0.6
 
 
 @dataclass(frozen=True)
@@ -149,14 +79,13 @@ class Settings:
     black_boxes : tuple of BlackBoxSettings
         Models without.
     response : ResponseSettings
-        How to estimate responses.
-    method : str
-        How models are fitted: ``"frequency_domain"`` to responses, ``"output_error"`` straight to
-        the records.
-    starts, seed : int
-        Starts of each fit, and the seed they are drawn with.
-    initial_state : {"trim", "estimate"}
-        Whether a prediction starts at rest or from a state that is solved for.
+        How to estimate responses, where a model does not say.
+    fit : FitSettings
+        How to fit models, where one does not say.
+    check : VerifySettings
+        How to verify models, where one does not say.
+    conditioning : tuple of Conditioning
+        What is done to records before anything is estimated.
     reduce : ReduceSettings or None
         How structures are reduced after their fit; None: not at all.
     tune : TuneSettings or None
@@ -179,18 +108,12 @@ class Settings:
     models: tuple[ModelSettings, ...]
     black_boxes: tuple[BlackBoxSettings, ...]
     response: ResponseSettings
-    method: str
-    starts: int
-    seed: int
-    initial_state: Literal["trim", "estimate"]
+    fit: FitSettings
+    check: VerifySettings
+    conditioning: tuple[Conditioning, ...] = ()
     reduce: ReduceSettings | None = None
     tune: TuneSettings | None = None
     qualities: QualitiesSettings | None = None
-
-    @property
-    def on_records(self) -> bool:
-        """Whether models are fitted to records, without responses."""
-        return self.method != FITS[0]
 
     def segment(self, name: str) -> Segment:
         """Segment of this name."""
@@ -230,19 +153,10 @@ def read_settings(path: Path) -> Settings:
     channels.finish()
     segments = tuple(_segment(reader) for reader in root.tables("segment"))
     files = tuple(read_record_file(reader, path.parent) for reader in root.tables("record"))
-    response = _response(root.table("response"))
-    fit = root.table("fit")
-    identify = root.table("identify")
-    method = identify.choice("method", FITS, FITS[0])
-    identify.finish()
-    starts, seed = fit.integer("starts", 1, minimum=1), fit.integer("seed", 0)
-    fit.finish()
-    check = root.table("verify")
-    initial_state = cast(
-        Literal["trim", "estimate"], check.choice("initial_state", ("trim", "estimate"), "trim")
-    )
-    check.finish()
-    on_records = method != FITS[0]
+    conditioning = tuple(read_conditioning(reader) for reader in root.tables("conditioning"))
+    response = read_response(root.table("response"))
+    fit = read_fit(root.table("fit"))
+    check = read_verify(root.table("verify"))
     reducing = root.maybe(lambda key: read_reduce(root.table(key)), "reduce")
     tuning = root.maybe(lambda key: read_tune(root.table(key)), "tune")
     qualities = root.maybe(
@@ -250,7 +164,14 @@ def read_settings(path: Path) -> Settings:
     )
     readers = root.tables("model")
     models = tuple(
-        _model(reader, path.parent, on_records=on_records, reduced=reducing is not None)
+        read_model(
+            reader,
+            path.parent,
+            response=response,
+            fit=fit,
+            check=check,
+            reduced=reducing is not None,
+        )
         for reader in readers
         if "structure" not in reader
     )
@@ -263,6 +184,7 @@ def read_settings(path: Path) -> Settings:
         )
     kind = "record" if files else "segment"
     require_references(files or segments, (*models, *boxes), kind=kind)
+    require_records(conditioning, [each.name for each in files or segments])
     return Settings(
         *words,
         log,
@@ -276,10 +198,9 @@ def read_settings(path: Path) -> Settings:
         models,
         boxes,
         response,
-        method,
-        starts,
-        seed,
-        initial_state,
+        fit,
+        check,
+        conditioning,
         reducing,
         tuning,
         qualities,
@@ -324,60 +245,3 @@ def _segment(reader: TableReader) -> Segment:
             "span_s or sid_axis", "must be given, not both", found=name, needed="one of them"
         )
     return Segment(name, span, axis, run)
-
-
-def _response(reader: TableReader) -> ResponseSettings:
-    usual = ResponseSettings()
-    estimator = reader.choice("estimator", ESTIMATORS, usual.estimator)
-    compare = reader.names("compare", ())
-    for word in compare:
-        if word not in ESTIMATORS:
-            raise reader.error("compare", "does not fit", found=word, needed=", ".join(ESTIMATORS))
-    made = ResponseSettings(
-        estimator,
-        compare,
-        reader.integer("n_omega", usual.n_omega, minimum=5),
-        reader.numbers("window_s", ()),
-        reader.positive("minimum_coherence", usual.minimum_coherence),
-    )
-    reader.finish()
-    return made
-
-
-def _model(reader: TableReader, folder: Path, *, on_records: bool, reduced: bool) -> ModelSettings:
-    template = reader.text("template")
-    band = (
-        reader.maybe(reader.interval, "band_rad_s") if on_records else reader.interval("band_rad_s")
-    )
-    if band is not None and band[0] <= 0:
-        raise reader.error("band_rad_s", "does not fit", found=band, needed="positive frequencies")
-    made = ModelSettings(
-        reader.text("name"),
-        str(folder / template) if template.endswith(".toml") else template,
-        reader.maybe(reader.text, "axis"),
-        reader.names("identify"),
-        reader.names("verify", ()),
-        band,
-        _overrides(reader),
-        {
-            rival: str(folder / rival) if rival.endswith(".toml") else rival
-            for rival in reader.names("rivals", ())
-        },
-        *((reader.names("keep", ()), reader.names("drop", ())) if reduced else ()),
-    )
-    reader.finish()
-    return made
-
-
-def _overrides(reader: TableReader) -> dict[str, dict[str, Any]]:
-    overrides: dict[str, dict[str, Any]] = {}
-    parameters = reader.table("parameters")
-    for name in reader.values("parameters"):
-        entry = parameters.table(name)
-        given: dict[str, Any] = {
-            key: entry.maybe(entry.number, key) for key in ("value", "minimum", "maximum")
-        }
-        given["free"] = entry.maybe(entry.flag, "free")
-        entry.finish()
-        overrides[name] = {key: value for key, value in given.items() if value is not None}
-    return overrides

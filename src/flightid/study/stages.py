@@ -1,24 +1,25 @@
-"""The stages of a study, one function each, from the log to the verified models."""
+"""The stages of a study, one function each, from the records to the verified models."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from flightid.conventions import Role
-from flightid.errors import StudyError
+from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.identification import Fit, Reduction, identify, reduce
-from flightid.logs import Log, SidRun
-from flightid.models import GreyBoxModel, load_structure
+from flightid.models import GreyBoxModel, StateSpaceModel, load_structure
 from flightid.record import Record
-from flightid.responses import FrequencyResponse, estimate_response
-from flightid.study.record_files import load_record
-from flightid.study.settings import ModelSettings, Segment, Settings
-from flightid.validation import Comparison, Verification, verify
-
-EXCITATION = "excitation"
+from flightid.responses import (
+    CoherentPairs,
+    FrequencyResponse,
+    coherent_pairs,
+    estimate_response,
+)
+from flightid.study.model_settings import ModelSettings
+from flightid.study.reducing import ReduceSettings
+from flightid.validation import Comparison, ResidualTests, Verification, residual_tests, verify
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,10 @@ class Identified:
         By segment, none of which the fit has seen; side by side where there are rivals.
     reduction : Reduction or None
         How the structure of the fits came about, where the study asks for a reduction.
+    coherent : CoherentPairs or None
+        Which responses were fitted, where coherence chose them.
+    tests : ResidualTests or None
+        Of the residuals of a fit to records, where the study asks for them.
     """
 
     settings: ModelSettings
@@ -68,6 +73,8 @@ class Identified:
     fits: Mapping[str, Fit]
     verifications: Mapping[str, Verification | Comparison]
     reduction: Reduction | None = None
+    coherent: CoherentPairs | None = None
+    tests: ResidualTests | None = None
 
     @property
     def response(self) -> FrequencyResponse | None:
@@ -85,7 +92,8 @@ class Identified:
         checks = (finding for each in self.verifications.values() for finding in each.findings)
         first = () if self.response is None else self.response.findings
         path = () if self.reduction is None else self.reduction.path_findings
-        return (*first, *self.fit.findings, *path, *checks)
+        tests = () if self.tests is None else self.tests.findings
+        return (*first, *self.fit.findings, *path, *tests, *checks)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values of every result."""
@@ -94,217 +102,180 @@ class Identified:
             "responses": {key: value.to_dict() for key, value in self.responses.items()},
             "fits": {key: value.to_dict() for key, value in self.fits.items()},
             "reduction": None if self.reduction is None else self.reduction.to_dict(),
+            "coherent": None if self.coherent is None else self.coherent.to_dict(),
+            "residual_tests": None if self.tests is None else self.tests.to_dict(),
             "verifications": {key: value.to_dict() for key, value in self.verifications.items()},
         }
 
 
-def load_task(settings: ModelSettings, *, on_records: bool = False) -> Task:
+def load_task(settings: ModelSettings) -> Task:
     """Load a model and apply the overrides of the study.
 
     Raises
     ------
-    StudyError
-        The model has more than one response, which records alone can fit.
     UnknownNameError
         There is no such library model, or no such parameter in it.
+    ModelError
+        A response that the model does not have.
     """
     path = settings.template_path
     model = load_structure(settings.template if path is None else path, axis=settings.axis)
-    if len(model.responses) != 1 and not on_records:
-        raise StudyError(
-            f"model {settings.name!r} has several responses",
-            found=", ".join(model.response_names),
-            needed="one output to one input",
-            action='fit it to the records: [identify] method = "output_error"',
-        )
     parameters = model.parameters
     for name, given in settings.parameters.items():
         parameters = parameters.with_parameter(replace(parameters[name], **given))
+    model = replace(model, parameters=parameters)
+    if settings.responses and not settings.by_coherence:
+        model = _with_responses(model, settings.responses)
     rivals = {
         name: load_structure(path if path.endswith(".toml") else name, axis=settings.axis)
         for name, path in settings.rivals.items()
     }
-    return Task(settings, replace(model, parameters=parameters), rivals)
+    return Task(settings, model, rivals)
 
 
-def channels_needed(settings: Settings, tasks: Iterable[Task]) -> dict[str, dict[str, Role]]:
-    """Channels that the models take from each record, with their roles.
-
-    Parameters
-    ----------
-    settings : Settings
-        The study.
-    tasks : iterable of Task
-        Its models with equations.
-
-    Returns
-    -------
-    dict of str to dict of str to Role
-        By name of the segment or record.
-    """
-    users = [(task.settings.segments, task.model.inputs, task.model.outputs) for task in tasks]
-    users += [(box.segments, box.inputs, (box.output,)) for box in settings.black_boxes]
-    needed: dict[str, dict[str, Role]] = {}
-    # Outputs last: what one model drives and another predicts is measured.
-    for role, place in ((Role.INPUT, 1), (Role.OUTPUT, 2)):
-        for user in users:
-            for name in user[0]:
-                needed.setdefault(name, {}).update(dict.fromkeys(user[place], role))
-    return needed
-
-
-def load_records(settings: Settings, needed: Mapping[str, Mapping[str, Role]]) -> dict[str, Record]:
-    """Read every record file that a model uses.
-
-    Raises
-    ------
-    StudyError
-        A file is not there, or it is not clear which manoeuvre is meant.
-    """
-    return {
-        file.name: load_record(file, needed[file.name])
-        for file in settings.record_files
-        if file.name in needed
-    }
-
-
-def cut_records(
-    log: Log, settings: Settings, needed: Mapping[str, Mapping[str, Role]]
-) -> dict[str, Record]:
-    """Take every segment that a model uses out of the log, with the channels its models need.
-
-    Parameters
-    ----------
-    log : Log
-        The flight.
-    settings : Settings
-        The study.
-    needed : mapping of str to mapping of str to Role
-        Channels by segment, from `channels_needed`.
-
-    Returns
-    -------
-    dict of str to Record
-        By segment name.
-
-    Raises
-    ------
-    StudyError
-        The log holds no such system-identification run.
-    """
-    return {
-        segment.name: _cut(log, segment, settings, needed[segment.name])
-        for segment in settings.segments
-        if segment.name in needed
-    }
-
-
-def _cut(log: Log, segment: Segment, settings: Settings, roles: Mapping[str, Role]) -> Record:
-    return log.record(
-        settings.channel_map,
-        names=list(roles),
-        span_s=segment.span_s,
-        sid_run=None if segment.sid_axis is None else sid_run(log, segment),
-        sample_rate_hz=settings.sample_rate_hz,
-        roles=roles,
-        gaps=settings.gaps,
-        max_gap_s=settings.max_gap_s,
-        name=segment.name,
-    )
-
-
-def sid_run(log: Log, segment: Segment) -> SidRun:
-    """System-identification run that a segment names.
-
-    Raises
-    ------
-    StudyError
-        The log holds no such run.
-    """
-    runs = [run for run in log.sid_runs if run.axis == segment.sid_axis]
-    if segment.run >= len(runs):
-        flown = ", ".join(str(run.axis) for run in log.sid_runs) or "none"
-        raise StudyError(
-            f"segment {segment.name!r}: the log holds no such system-identification run",
-            found=f"runs of SID_AXIS {flown}",
-            needed=f"run {segment.run} of SID_AXIS {segment.sid_axis}",
+def _with_responses(model: GreyBoxModel, names: tuple[str, ...]) -> GreyBoxModel:
+    """The model of which a fit takes these responses alone."""
+    if isinstance(model, StateSpaceModel):
+        return model.with_responses(*names)
+    kept = tuple(each for each in model.responses if each.name in names)
+    missing = [name for name in names if name not in model.response_names]
+    if missing:
+        raise DataError(
+            "the model has no such response",
+            found=", ".join(missing),
+            needed=", ".join(model.response_names),
         )
-    return runs[segment.run]
+    return replace(model, responses=kept)
 
 
-def estimate(
-    task: Task, records: Mapping[str, Record], settings: Settings
-) -> dict[str, FrequencyResponse]:
-    """Frequency responses of one model's segments by each estimator, the one that counts first."""
-    chosen, band = settings.response, task.settings.band_rad_s
-    if settings.on_records or band is None:
+def estimate(task: Task, records: Mapping[str, Record]) -> dict[str, FrequencyResponse]:
+    """Frequency responses of one model's records by each estimator, the one that counts first."""
+    settings = task.settings
+    chosen, band = settings.response, settings.band_rad_s
+    if not settings.fit.on_responses or band is None:
         return {}
+    flown = [records[name] for name in settings.identify]
+    held = [name for name in _outputs(task.model) if all(name in record for record in flown)]
     return {
         estimator: estimate_response(
-            [records[name] for name in task.settings.identify],
+            flown,
             inputs=task.model.inputs,
-            outputs=task.model.outputs,
-            excitations=EXCITATION if estimator == "instrument" else None,
-            band_rad_s=band,
-            n_omega=chosen.n_omega,
+            outputs=held,
+            excitations=chosen.instruments if estimator == "instrument" else None,
+            omega_rad_s=(*band, chosen.n_omega),
             window_s=list(chosen.window_s) or "auto",
             estimator=estimator,
         )
-        for estimator in dict.fromkeys((chosen.estimator, *chosen.compare))
+        for estimator in chosen.estimators
     }
+
+
+def _outputs(model: GreyBoxModel) -> tuple[str, ...]:
+    """Outputs of the responses that are fitted."""
+    return tuple(dict.fromkeys(name.split("/")[0] for name in model.response_names))
+
+
+def choose_responses(
+    task: Task, responses: Mapping[str, FrequencyResponse]
+) -> tuple[Task, CoherentPairs | None]:
+    """Where coherence says which responses are fitted: the model with those alone.
+
+    Raises
+    ------
+    DataError
+        No response is coherent.
+    """
+    settings = task.settings
+    if not settings.by_coherence or not responses:
+        return task, None
+    response = next(iter(responses.values()))
+    coherent = coherent_pairs(
+        response,
+        minimum_coherence=settings.response.minimum_coherence,
+        minimum_decades=settings.response.minimum_decades,
+    )
+    names = tuple(name for name in coherent.names if name in task.model.response_names)
+    if not names:
+        raise DataError(
+            f"no response of model {settings.name!r} is coherent",
+            found="; ".join(f"{pair.name}: {pair.reason}" for pair in coherent.pairs),
+            needed=f"coherence {settings.response.minimum_coherence:g} over "
+            f"{settings.response.minimum_decades:g} decades",
+            action="lower [response] minimum_coherence, or fly the inputs harder",
+        )
+    return replace(task, model=_with_responses(task.model, names)), coherent
 
 
 def fit(
     task: Task,
     responses: Mapping[str, FrequencyResponse],
     records: Mapping[str, Record],
-    settings: Settings,
+    reducing: ReduceSettings | None,
+    coherent: CoherentPairs | None = None,
 ) -> tuple[dict[str, Fit], Reduction | None]:
     """Fit the model to the response of each estimator, or to the records.
 
     Where the study asks for it, the structure is reduced by the data that count; all other
     estimates are then fitted with that structure.
     """
-    options: dict[str, Any] = {"starts": settings.starts, "seed": settings.seed}
-    sources: dict[str, Any] = dict(responses)
-    if settings.on_records:
-        options["method"] = settings.method
-        sources = {settings.method: [records[name] for name in task.settings.identify]}
-    else:
-        options["minimum_coherence"] = settings.response.minimum_coherence
-    (counts, data), *others = sources.items()
+    settings = task.settings
+    options: dict[str, Any] = {"method": settings.fit.method, **settings.fit.options}
+    if settings.fit.on_responses:
+        options.setdefault("minimum_coherence", settings.response.minimum_coherence)
+        if coherent is not None:
+            fitted = set(task.model.response_names)
+            bands = {name: band for name, band in coherent.bands.items() if name in fitted}
+            options.setdefault("band_rad_s", bands)
+    (counts, data), *others = _sources(task, responses, records).items()
     found, reduction, model = identify(task.model, data, **options), None, task.model
-    if settings.reduce is not None:
+    if reducing is not None:
         reduction = reduce(
             found,
             data,
-            keep=task.settings.keep,
-            drop=task.settings.drop,
-            after_rise=settings.reduce.after_rise,
-            **vars(settings.reduce.limits),
+            keep=settings.keep,
+            drop=settings.drop,
+            after_rise=reducing.after_rise,
+            **vars(reducing.limits),
         )
         found, model = reduction.fit, model.with_fixed(**reduction.dropped)
     rest = {name: identify(model, other, **options) for name, other in others}
     return {counts: found, **rest}, reduction
 
 
+def _sources(
+    task: Task, responses: Mapping[str, FrequencyResponse], records: Mapping[str, Record]
+) -> dict[str, Any]:
+    """What the model is fitted to, by estimator or method, what counts first."""
+    settings = task.settings
+    if not settings.fit.on_responses:
+        return {settings.fit.method: [records[name] for name in settings.identify]}
+    if settings.joint:
+        beside = [records[name] for name in settings.joint]
+        return {name: (response, beside) for name, response in responses.items()}
+    return dict(responses)
+
+
 def check(
-    task: Task, fitted: Fit, records: Mapping[str, Record], settings: Settings
+    task: Task, fitted: Fit, records: Mapping[str, Record]
 ) -> dict[str, Verification | Comparison]:
-    """Predict each segment that the fit has not seen, beside the rivals where there are any."""
-    outputs, initial_state = task.model.outputs, settings.initial_state
+    """Predict each record that the fit has not seen, beside the rivals where there are any."""
+    outputs, options = task.model.outputs, task.settings.check.options
     checked: dict[str, Verification | Comparison] = {}
     for name in task.settings.verify:
         record = records[name]
+        held = [output for output in outputs if output in record]
         if task.rivals:
             models = {task.settings.name: fitted, **task.rivals}
             checked[name] = verify(
-                [*models.values()],
-                record,
-                names=[*models],
-                initial_state=initial_state,
-                outputs=outputs,
+                [*models.values()], record, names=[*models], outputs=held, **options
             )
         else:
-            checked[name] = verify(fitted, record, initial_state=initial_state, outputs=outputs)
+            checked[name] = verify(fitted, record, outputs=held, **options)
     return checked
+
+
+def examine_residuals(task: Task, fitted: Fit) -> ResidualTests | None:
+    """Residual tests of a fit to records, where the study asks for them."""
+    if not task.settings.check.residual_tests or not fitted.records:
+        return None
+    return residual_tests(fitted)
