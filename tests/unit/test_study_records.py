@@ -208,7 +208,7 @@ def test_nothing_coherent_leaves_the_model_out_without_a_fault(
 def test_models_with_equations_may_use_record_files(folder: Path) -> None:
     head = units_in_mat(LINEAR).split("structure")[0]
     text = (
-        head.replace("[[model]]", '[identify]\nmethod = "output_error"\n[[model]]')
+        head.replace("[[model]]", '[fit]\nmethod = "output_error"\n[[model]]')
         + 'template = "own.toml"\nidentify = "fitted"\nverify = "unseen"\n'
     )
     (folder / "own.toml").write_text(OWN, encoding="utf-8")

@@ -165,18 +165,27 @@ def test_what_the_log_or_library_lacks_is_named(
     assert [item.name for item in tmp_path.iterdir()] == ["study.toml"]
 
 
-def test_a_model_with_several_responses_is_refused(study: fid.Study, tmp_path: Path) -> None:
-    (tmp_path / "two.toml").write_text(
-        'kind = "transfer"\nname = "two"\nsource = "none"\n'
-        '[inputs]\ntau_phi = "1"\n[outputs]\np = "rad/s"\nq = "rad/s"\n'
-        '[parameters]\nK = { value = 1.0, unit = "rad/s^2" }\n'
-        '[responses."p/tau_phi"]\ngain = "K"\ndenominator = ["s"]\n'
-        '[responses."q/tau_phi"]\ngain = "K"\ndenominator = ["s"]\n'
-    )
-    text = STUDY.replace('"rate_motor_lag"\naxis = "roll"', '"two.toml"')
+TWO_RESPONSES = (
+    'kind = "transfer"\nname = "two"\nsource = "none"\n'
+    '[inputs]\ntau_phi = "1"\n[outputs]\np = "rad/s"\nq = "rad/s"\n'
+    '[parameters]\nT_m = { value = 0.1, min = 0.001, max = 1.0, unit = "s" }\n'
+    'K = { value = 200.0, unit = "rad/s^2" }\n'
+    '[responses."p/tau_phi"]\ngain = "K"\ndenominator = ["s", "T_m*s + 1"]\n'
+    '[responses."q/tau_phi"]\ngain = "K"\ndenominator = ["s"]\n'
+)
+
+
+@pytest.mark.parametrize("wanted", ['"coherent"', '["p/tau_phi"]'])
+def test_of_several_responses_those_asked_for_are_fitted(
+    study: fid.Study, tmp_path: Path, wanted: str
+) -> None:
+    (tmp_path / "two.toml").write_text(TWO_RESPONSES)
+    text = STUDY.replace('"rate_motor_lag"\naxis = "roll"', f'"two.toml"\nresponses = {wanted}')
     (tmp_path / "study.toml").write_text(text)
-    with pytest.raises(StudyError, match="has several responses"):
-        fid.run_study(tmp_path / "study.toml", log=study.output / "flight.bin")
+    item = fid.run_study(tmp_path / "study.toml", log=study.output / "flight.bin").identified[0]
+    # A roll sweep on a rig moves no pitch: that response has no coherence.
+    assert [each.name for each in item.fit.responses] == ["p/tau_phi"]
+    assert (item.coherent is not None) == (wanted == '"coherent"')
 
 
 def test_a_log_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ from flightid.models import StateSpaceModel
 from flightid.study.reading import TableReader, unknown_key
 
 FREQUENCY_DOMAIN = "frequency_domain"
+COUNTS = ("starts", "maximum_iterations", "n_omega")
+"""Options that count something: at least one."""
 METHOD_NAMES = tuple(dict.fromkeys(way for of, _, way in METHODS if of is StateSpaceModel))
 
 
@@ -111,6 +113,7 @@ def _require_types(reader: TableReader, kind: type[Any], given: Mapping[str, Any
         wrong = wanted is not None and (
             not isinstance(value, wanted) or (isinstance(value, bool) and type(usual) is not bool)
         )
+        wrong = wrong or (each.name in COUNTS and value < 1)
         # Freedom and the initial state take names or a table beside their usual word or flag.
         if wrong and not (isinstance(usual, bool) and isinstance(value, tuple | str)):
             raise reader.error(
