@@ -162,7 +162,8 @@ def estimate(task: Task, records: Mapping[str, Record]) -> dict[str, FrequencyRe
             inputs=task.model.inputs,
             outputs=held,
             excitations=chosen.instruments if estimator == "instrument" else None,
-            omega_rad_s=(*band, chosen.n_omega),
+            band_rad_s=band,
+            n_omega=chosen.n_omega,
             window_s=list(chosen.window_s) or "auto",
             estimator=estimator,
         )
