@@ -226,7 +226,7 @@ def fit(
         if coherent is not None:
             fitted = set(task.model.response_names)
             bands = {name: band for name, band in coherent.bands.items() if name in fitted}
-            options.setdefault("omega_rad_s", bands)
+            options.setdefault("band_rad_s", bands)
     (counts, data), *others = _sources(task, responses, records).items()
     found, reduction, model = identify(task.model, data, **options), None, task.model
     if reducing is not None:
