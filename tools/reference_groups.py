@@ -87,9 +87,6 @@ GROUPS = {
         (
             "identify",
             "Fit",
-            "PolynomialFit",
-            "InnovationsFit",
-            "NarxFit",
             "Estimate",
             "Uncertain",
             "FittedResponse",

@@ -54,7 +54,7 @@ def print_subspace(record: fid.Record) -> None:
     structure = fid.InnovationsModel.subspace(
         "voltage", "temperature", 4, horizon=15, direct=True, offsets="none", refine=False
     )
-    order = fid.identify(structure, record).order
+    order = fid.identify(structure, record).details.order
     print("PO-MOESP singular values")
     for found, expected in zip(order.singular_values, SINGULAR_VALUES, strict=False):
         print(f"  {found:9.4f} (expected {expected:9.4f})")
@@ -97,7 +97,7 @@ def main(path: Path) -> None:
     print(delays.summary(), end="\n\n")
     for name, (structure, expected, loss) in EXPECTED.items():
         fit = fid.identify(structure, fitted)
-        print(f"{name}: loss {fit.criteria.loss:.6g}, expected {loss:.6g}")
+        print(f"{name}: loss {fit.details.criteria.loss:.6g}, expected {loss:.6g}")
         for key, parameter in fit.parameters.items():
             print(
                 f"  {key} {parameter.value:9.5f} (expected {expected[key]:9.5f}, "

@@ -73,10 +73,10 @@ def table_1(study: fid.Study) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for item in study.black_boxes:
         channel = f"{item.settings.output}/{item.settings.inputs[0]}"
-        if not isinstance(item.fit, fid.PolynomialFit):
+        if item.fit is None:
             rows.append((channel, PUBLISHED_HZ[channel], None, None, None, "left out"))
             continue
-        for root in item.fit.modes:
+        for root in item.fit.details.modes:
             frequency, damping = root.natural_frequency, root.damping
             if frequency is None or damping is None or frequency.stderr is None:
                 continue
@@ -127,7 +127,7 @@ def factored(roots: ArrayLike) -> str:
     return "".join(said) or "1"
 
 
-def equation(fit: fid.PolynomialFit) -> str:
+def equation(fit: fid.Fit) -> str:
     """The identified transfer function expanded and factored."""
     model = fit.model
     above, below = model.transfer(model.inputs[0])
@@ -192,7 +192,7 @@ def analyse(folder: Path, seed: int) -> fid.Study:
     print(table_1(study).to_text(), "\n")
     print("Equations (3) to (6) from these records")
     for item in study.black_boxes:
-        if isinstance(item.fit, fid.PolynomialFit):
+        if item.fit is not None:
             print(equation(item.fit))
     print()
     print(re_analysed().to_text())

@@ -118,7 +118,7 @@ def test_time_constants_turn_intervals_over():
     record = record.replace({"y": truth.simulate(record) + 0.1 * e})
     fit = fid.identify(P.oe("u", "y", nb=1, nf=1), record)
     tau = fid.interpret(fit).roots[0].time_constant
-    omega = fit.modes[0].natural_frequency
+    omega = fit.details.modes[0].natural_frequency
     assert_close(tau.interval95, [1 / omega.interval95[1], 1 / omega.interval95[0]], rtol=1e-12,
                  why="monotone")  # fmt: skip
 

@@ -20,11 +20,11 @@ def coverage(runs, *, feedback=0.0, n=500):
     for seed in range(runs):
         record = flown(SINGLE, seed, n=n, noise=0.5, feedback=feedback)
         fit = fid.identify(structure, record)
-        pole = fit.modes[0]
+        pole = fit.details.modes[0]
         for key, item, wanted in (
             ("frequency", pole.natural_frequency, mode.natural_frequency_rad_s),
             ("damping", pole.damping, mode.damping),
-            ("gain", fit.gains["y/u"], gain),
+            ("gain", fit.details.gains["y/u"], gain),
         ):
             low, high = item.interval95
             inside[key].append(low < wanted < high)

@@ -38,11 +38,11 @@ def coverage(case: str, runs: int, n: int = 600) -> dict[str, float]:
         for parameter, wanted in zip(fit.parameters.values(), theta, strict=True):
             low, high = parameter.interval95
             inside["coefficients"].append(low < wanted < high)
-        pole = fit.modes[0]
+        pole = fit.details.modes[0]
         for key, item, wanted in (
             ("frequency", pole.natural_frequency, mode.natural_frequency_rad_s),
             ("damping", pole.damping, mode.damping),
-            ("gain", fit.gains["y/u"], gain),
+            ("gain", fit.details.gains["y/u"], gain),
         ):
             low, high = item.interval95
             inside[key].append(low < wanted < high)

@@ -24,14 +24,14 @@ def fly(seed: int, *, offset: float = 0.0, curve: float = 0.0, name: str = "run"
     return record.replace({"y": y + offset + 0.05 * rng.standard_normal(400)})
 
 
-def linear_fit() -> fid.PolynomialFit:
+def linear_fit() -> fid.Fit:
     return fid.identify(fid.PolynomialModel.armax("u", "y", na=2, nb=2, nc=2), fly(0))
 
 
 def test_numbers_are_those_of_the_prediction() -> None:
     fit, record = linear_fit(), fly(1, offset=20.0)
     run = cross_validate(fit, record).of("run")
-    made = fit.predict(record)
+    made = fit.model.predict(record)
     assert_close(run.predicted, made.predicted, rtol=1e-15, why="the same prediction")
     error = record["y"] - made.predicted
     about = record["y"] - record["y"].mean()

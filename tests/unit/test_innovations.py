@@ -51,7 +51,7 @@ def test_noise_free_records_give_the_model_back(method, direct):
     assert_close(fit.model.pulse_response(30), pulses, atol=1e-11, why="rounding through one SVD")
     found, wanted = (np.sort_complex(each.poles()) for each in (fit.model, truth))
     assert_close(found, wanted, rtol=1e-11, why="rounding through one SVD")
-    assert fit.criteria.bic is None
+    assert fit.details.criteria.bic is None
     assert fit.covariance is None
 
 
@@ -69,25 +69,32 @@ def test_unstable_models_are_found_too():
 
 
 def test_order_is_found_and_refinement_lowers_the_loss(noisy):
-    assert noisy.order.chosen == noisy.order.gap == noisy.order.smallest_bic == 4
+    assert (
+        noisy.details.order.chosen
+        == noisy.details.order.gap
+        == noisy.details.order.smallest_bic
+        == 4
+    )
     rough = fid.identify(
         M.subspace(("u", "v"), ("y", "z"), 4, offsets="none", refine=False, maximum_order=6),
-        noisy.records,
+        [item.measured for item in noisy.records],
     )
-    assert noisy.criteria.loss < rough.criteria.loss
+    assert noisy.details.criteria.loss < rough.details.criteria.loss
     assert "not-refined" in [finding.code for finding in rough.findings]
     assert_close(
         noisy.model.pulse_response(20), PAIR.pulse_response(20), atol=0.15, why="noise of 0.5"
     )
-    assert "4 states chosen" in repr(noisy.order)
-    assert len(noisy.order.summary().rows) == 6
+    assert "4 states chosen" in repr(noisy.details.order)
+    assert len(noisy.details.order.summary().rows) == 6
 
 
 def test_all_methods_end_in_the_same_optimum(noisy):
     for method in ("n4sid", "pbsid"):
         structure = M.subspace(("u", "v"), ("y", "z"), 4, method=method, offsets="none")
-        fit = fid.identify(structure, noisy.records)
-        assert_close(fit.criteria.loss, noisy.criteria.loss, rtol=1e-6, why="one minimum")
+        fit = fid.identify(structure, [item.measured for item in noisy.records])
+        assert_close(
+            fit.details.criteria.loss, noisy.details.criteria.loss, rtol=1e-6, why="one minimum"
+        )
 
 
 def test_predictor_based_estimate_is_unbiased_under_feedback():
@@ -113,31 +120,33 @@ def assert_near(item, truth):
 
 
 def test_intervals_hold_the_truth_here(noisy):
-    for root, mode in zip(noisy.modes, PAIR.modes(), strict=True):
+    for root, mode in zip(noisy.details.modes, PAIR.modes(), strict=True):
         assert_near(root.natural_frequency, mode.natural_frequency_rad_s)
         assert_near(root.damping, mode.damping)
     for name, gain in PAIR.gains().items():
-        assert_near(noisy.gains[name], gain)
-    assert noisy.gains["y/u"].unit == "rad/(V)"
+        assert_near(noisy.details.gains[name], gain)
+    assert noisy.details.gains["y/u"].unit == "rad/(V)"
 
 
 def test_units_scale_gains_and_their_errors_alike():
     record = flown(SINGLE, 1, n=400, noise=0.5)
     other = record.replace({"y": 1000.0 * record["y"]})
     fits = [fid.identify(M.subspace("u", "y", 2), each) for each in (record, other)]
-    one, many = (fit.gains["y/u"] for fit in fits)
+    one, many = (fit.details.gains["y/u"] for fit in fits)
     assert_close(many.value, 1000.0 * one.value, rtol=1e-6, why="same optimum")
     assert_close(many.stderr, 1000.0 * one.stderr, rtol=1e-4, why="same optimum")
 
 
 def test_prediction_horizons_meet_their_limits(noisy):
-    record = noisy.records[0]
-    one = noisy.predict(record, 1)
-    assert_close(one.residual, noisy.errors[0], atol=1e-7, why="same predictor")
+    record = noisy.records[0].measured
+    one = noisy.model.predict(record, 1, offsets="none")
+    assert_close(
+        one.residual, noisy.residuals[0].matrix(["y", "z"]), atol=1e-7, why="same predictor"
+    )
     far = noisy.model.predict(record, 400, initial_state="zero", offsets="none")
     free = noisy.model.predict(record, initial_state="zero", offsets="none")
     assert_close(far.predicted[:, :300], free.predicted[:, :300], atol=1e-6, why="noise unseen")
-    rms = [noisy.predict(record, k).error_rms["y"] for k in (1, 3, 10)]
+    rms = [noisy.model.predict(record, k, offsets="none").error_rms["y"] for k in (1, 3, 10)]
     assert rms == sorted(rms)
     assert free.fit_percent["z"] < one.fit_percent["z"]
     assert "1 ahead from an estimated state" in repr(one)
@@ -170,12 +179,13 @@ def test_delayed_responses_have_no_zeros_at_infinity():
 
 
 def test_views_are_complete(noisy):
-    assert repr(noisy) in noisy.summary().to_text()
-    assert len(noisy.roots_table().rows) == len(noisy.roots)
-    assert json.loads(json.dumps(noisy.to_dict()))["order"]["chosen"] == 4
+    assert noisy.details.words in repr(noisy)
+    assert "free run from an estimated state" in noisy.summary().to_text()
+    assert len(noisy.details.roots_table().rows) == len(noisy.details.roots)
+    assert json.loads(json.dumps(noisy.to_dict()))["details"]["order"]["chosen"] == 4
     assert "pole" in noisy.model.summary().to_text()
     assert "<table" in noisy._repr_html_() + noisy.model._repr_html_()
-    figure = singular_values(noisy.order)
+    figure = singular_values(noisy.details.order)
     assert len(figure.data) >= 3
     tests = fid.residual_tests(noisy)
     assert tests.fitted_noise == 8

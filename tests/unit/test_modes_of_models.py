@@ -186,7 +186,7 @@ def test_black_box_fits_have_intervals_like_their_roots() -> None:
     innovations = fid.identify(fid.InnovationsModel.subspace("u", "y", order=2), record)
     for fit in (polynomial, innovations):
         mode = fid.modes(fit).modes[0]
-        root = next(r for r in fit.modes if abs(r.z - mode.root) < 1e-6)
+        root = next(r for r in fit.details.modes if abs(r.z - mode.root) < 1e-6)
         for mine, theirs in (
             (mode.natural_frequency, root.natural_frequency),
             (mode.damping_ratio, root.damping),

@@ -29,20 +29,20 @@ MODEL = fid.NarxStructure("y", ("u",), 1, 2, kernel=None, degree=2, stop="bic")
 
 def test_recovers_a_polynomial_system_exactly_and_runs_freely_on_new_data() -> None:
     fit = fid.identify(MODEL, [quadratic(), quadratic(seed=1)])
-    names = [item.term.name for item in fit.chosen]
+    names = [item.term.name for item in fit.details.chosen]
     assert names == ["constant", "y(t-1)", "u(t-1)", "u(t-2)", "u(t-2)^2"]
-    run = fit.predict(quadratic(seed=2))
+    run = fit.model.predict(quadratic(seed=2))
     assert run.start == 2
     assert run.diverged_at is None
     assert_close(run.predicted, run.measured, atol=1e-11, why="no noise, true structure")
     assert fit.findings == ()
-    assert fit.baseline_free_run_rms > 0.1
+    assert fit.details.baseline_free_run_rms > 0.1
 
 
 def test_weights_and_standard_errors_are_those_of_least_squares() -> None:
     record = quadratic(noise=0.05)
     fit = fid.identify(MODEL, record)
-    scaling = fit.equation.scaling
+    scaling = fit.model.scaling
     y, u = scaling.scaled(record, "y"), scaling.scaled(record, "u")
     data = {"y": y, "u": u}
     columns = [
@@ -50,20 +50,24 @@ def test_weights_and_standard_errors_are_those_of_least_squares() -> None:
             [np.ones(398)] + [data[lag.channel][2 - lag.lag : 400 - lag.lag] ** p for lag, p in t],
             axis=0,
         )
-        for t in (item.term.factors for item in fit.chosen)
+        for t in (item.term.factors for item in fit.details.chosen)
     ]
     p = np.array(columns).T
     weights, squares, *_ = np.linalg.lstsq(p, y[2:], rcond=None)
     covariance = np.linalg.inv(p.T @ p) * squares[0] / (398 - len(weights))
-    assert_close([item.weight for item in fit.chosen], weights, rtol=1e-9, why="same problem")
+    assert_close(
+        [item.weight for item in fit.details.chosen], weights, rtol=1e-9, why="same problem"
+    )
     stderr = np.sqrt(np.diag(covariance))
-    assert_close([item.stderr for item in fit.chosen], stderr, rtol=1e-9, why="same problem")
-    assert_close(fit.chosen[-1].sum_of_squares, squares[0], rtol=1e-9, why="same problem")
+    assert_close(
+        [item.stderr for item in fit.details.chosen], stderr, rtol=1e-9, why="same problem"
+    )
+    assert_close(fit.details.chosen[-1].sum_of_squares, squares[0], rtol=1e-9, why="same problem")
 
 
 def test_scaling_is_by_training_mean_and_n_minus_1_deviation() -> None:
     record = quadratic()
-    scaling = fid.identify(MODEL, record).equation.scaling
+    scaling = fid.identify(MODEL, record).model.scaling
     assert_close(scaling.mean["u"], np.mean(record["u"]), rtol=1e-14, why="definition")
     assert_close(scaling.deviation["y"], np.std(record["y"], ddof=1), rtol=1e-14, why="definition")
     assert scaling.units == {"y": "rad", "u": "V"}
@@ -72,10 +76,10 @@ def test_scaling_is_by_training_mean_and_n_minus_1_deviation() -> None:
 def test_horizons_one_k_and_free_run() -> None:
     record = quadratic(noise=0.1)
     fit = fid.identify(MODEL, record)
-    one, five, free = (fit.predict(record, h) for h in (1, 5, "free_run"))
+    one, five, free = (fit.model.predict(record, h) for h in (1, 5, "free_run"))
     assert one.error_rms < five.error_rms <= 1.05 * free.error_rms
-    assert_close(fit.one_step_rms, one.error_rms, rtol=1e-12, why="same prediction")
-    everything = fit.predict(record, 400)
+    assert_close(fit.details.one_step_rms, one.error_rms, rtol=1e-12, why="same prediction")
+    everything = fit.model.predict(record, 400)
     assert_close(everything.predicted, free.predicted, rtol=1e-12, why="all steps from the start")
     measured, predicted = free.scored
     assert fid.validation.theil(measured, predicted) < 0.3
@@ -104,12 +108,12 @@ def test_radial_models_beat_the_linear_one(kernel: str, candidates: str) -> None
         n_candidates=4 if candidates == "grid" else 40, maximum_terms=14,
     )  # fmt: skip
     fit = fid.identify(model, quadratic(noise=0.01))
-    assert {item.term.kind for item in fit.chosen} == {"constant", "linear", "radial"}
+    assert {item.term.kind for item in fit.details.chosen} == {"constant", "linear", "radial"}
     new = quadratic(seed=5)
-    free, linear = fit.predict(new).error_rms, fit.baseline.predict(new).error_rms
+    free, linear = fit.model.predict(new).error_rms, fit.details.baseline.predict(new).error_rms
     assert free < 0.5 * linear
     again = fid.identify(model, quadratic(noise=0.01))
-    assert again.equation.weights == fit.equation.weights
+    assert again.model.weights == fit.model.weights
 
 
 def test_centres_computed_on_the_fly_give_the_same_model(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -117,23 +121,27 @@ def test_centres_computed_on_the_fly_give_the_same_model(monkeypatch: pytest.Mon
     kept = fid.identify(model, quadratic(150, noise=0.01))
     monkeypatch.setattr("flightid.identification.narx.fit.MAXIMUM_BYTES", 0)
     lazy = fid.identify(model, quadratic(150, noise=0.01))
-    assert lazy.equation.weights == kept.equation.weights
-    assert lazy.equation.terms == kept.equation.terms
+    assert lazy.model.weights == kept.model.weights
+    assert lazy.model.terms == kept.model.terms
 
 
 def test_stops() -> None:
     record = quadratic(noise=0.05)
     radial = replace(MODEL, kernel="gaussian", degree=1)
     few = fid.identify(replace(radial, stop="terms", maximum_terms=6), record)
-    assert len(few.chosen) == 6
-    goal = few.chosen[-2].sum_of_squares
-    assert len(fid.identify(replace(radial, stop="sse", goal=goal * 1.0001), record).chosen) == 5
-    least = few.chosen[-1].error_reduction * 0.999
+    assert len(few.details.chosen) == 6
+    goal = few.details.chosen[-2].sum_of_squares
+    assert (
+        len(fid.identify(replace(radial, stop="sse", goal=goal * 1.0001), record).details.chosen)
+        == 5
+    )
+    least = few.details.chosen[-1].error_reduction * 0.999
     by_ratio = fid.identify(replace(radial, stop="err", goal=least, maximum_terms=6), record)
-    assert len(by_ratio.chosen) == 6
-    assert all(item.error_reduction >= least for item in by_ratio.chosen[4:])
+    assert len(by_ratio.details.chosen) == 6
+    assert all(item.error_reduction >= least for item in by_ratio.details.chosen[4:])
     kept = [
-        len(fid.identify(replace(MODEL, stop=s), record).chosen) for s in ("bic", "aicc", "aic")
+        len(fid.identify(replace(MODEL, stop=s), record).details.chosen)
+        for s in ("bic", "aicc", "aic")
     ]
     assert kept == sorted(kept)
 
@@ -142,12 +150,13 @@ def test_views() -> None:
     fit = fid.identify(MODEL, quadratic(noise=0.05))
     text = fit.summary().to_text()
     assert "u(t-2)^2" in text
-    assert "polynomial" in text
+    assert "polynomial" in fit.details.terms_table().to_text()
     assert "free run of the linear model" in text
-    assert fit.to_dict()["schema"] == "flightid.narx_fit/1"
-    assert "terms, 398 samples" in repr(fit)
+    assert fit.to_dict()["schema"] == "flightid.fit/1"
+    assert fit.details.n_samples == 398
+    assert fit.details.words in repr(fit)
     assert "<table>" in fit._repr_html_()
-    assert fit.model is MODEL
+    assert fit.structure is MODEL
 
 
 def test_terms_are_typed() -> None:
@@ -162,9 +171,9 @@ def test_an_unstable_model_is_held_flagged_and_never_nan() -> None:
     fit = fid.identify(MODEL, quadratic())
     weights = tuple(
         2.0 if term.name == "y(t-1)" else weight
-        for term, weight in zip(fit.equation.terms, fit.equation.weights, strict=True)
+        for term, weight in zip(fit.model.terms, fit.model.weights, strict=True)
     )
-    run = replace(fit.equation, weights=weights).predict(quadratic(seed=3))
+    run = replace(fit.model, weights=weights).predict(quadratic(seed=3))
     assert run.diverged_at is not None
     assert np.all(np.isfinite(run.predicted))
     low, high = np.min(quadratic()["y"]), np.max(quadratic()["y"])
@@ -207,7 +216,7 @@ def test_search_ranks_by_free_run_beside_the_linear_model() -> None:
     errors = [trial.score.rms for trial in found.trials if trial.score is not None]
     assert errors == sorted(errors)
     assert len(errors) == 4
-    assert found.best.model.input_lags == 2
+    assert found.best.structure.input_lags == 2
     first = found.trials[0]
     assert first.score is not None
     assert first.baseline is not None
@@ -271,12 +280,12 @@ def test_options_outside_their_range(change: dict[str, object], match: str) -> N
         replace(MODEL, **change)  # type: ignore[arg-type]
 
 
-def _constant() -> fid.NarxFit:
+def _constant() -> fid.Fit:
     record = quadratic()
     return fid.identify(MODEL, record.replace({"u": np.full(400, 3.3)}))
 
 
-def _sine() -> fid.NarxFit:
+def _sine() -> fid.Fit:
     record = quadratic()
     return fid.identify(replace(MODEL, input_lags=4), record.replace({"u": np.sin(record.time_s)}))
 
@@ -330,17 +339,17 @@ def test_refusals_of_a_prediction() -> None:
     fit = fid.identify(MODEL, quadratic())
     record = quadratic()
     with pytest.raises(OptionError, match="unknown horizon"):
-        fit.predict(record, "all")
+        fit.model.predict(record, "all")
     with pytest.raises(OptionError, match="unknown horizon"):
-        fit.predict(record, 0)
+        fit.model.predict(record, 0)
     with pytest.raises(UnitError, match="another unit"):
-        fit.predict(record.to_units(y="deg"))
+        fit.model.predict(record.to_units(y="deg"))
     slow = record.replace({"u": record["u"], "y": record["y"]}, time_s=record.time_s * 2)
     with pytest.raises(DataError, match="another sample time"):
-        fit.predict(slow)
+        fit.model.predict(slow)
     with pytest.raises(DataError, match="beyond the longest lag"):
-        fit.predict(record.segment(0.0, 0.4))
-    odd = replace(fit.equation, terms=(product_term([Lag("y", 9)]),), weights=(1.0,))
+        fit.model.predict(record.segment(0.0, 0.4))
+    odd = replace(fit.model, terms=(product_term([Lag("y", 9)]),), weights=(1.0,))
     assert isinstance(odd, NarxModel)
     with pytest.raises(ModelError, match="outside the model"):
         odd.predict(record)

@@ -18,11 +18,11 @@ from tests.narx_records import quadratic
 MODEL = fid.NarxStructure("y", ("u",), 2, 2, kernel=None, degree=2, stop="aic")
 
 
-def _problem(fit: fid.NarxFit, record: fid.Record) -> tuple[np.ndarray, np.ndarray]:
+def _problem(fit: fid.Fit, record: fid.Record) -> tuple[np.ndarray, np.ndarray]:
     """Columns (n_samples, n_terms) of the chosen products and the target of the weights."""
-    _, data = regressors_of(fit.model, fit.equation.scaling, [record])
-    terms = [item.term for item in fit.chosen]
-    return product_columns(terms, fit.model, data.vectors).T, data.target
+    _, data = regressors_of(fit.structure, fit.model.scaling, [record])
+    terms = [item.term for item in fit.details.chosen]
+    return product_columns(terms, fit.structure, data.vectors).T, data.target
 
 
 def test_local_penalties_are_ridge_along_orthogonal_parts_with_bayesian_errors() -> None:
@@ -31,21 +31,23 @@ def test_local_penalties_are_ridge_along_orthogonal_parts_with_bayesian_errors()
     columns, target = _problem(fit, record)
     q, r = np.linalg.qr(columns)
     lengths = np.diag(r) ** 2
-    penalties = np.array([item.penalty for item in fit.chosen])
+    penalties = np.array([item.penalty for item in fit.details.chosen])
     share = lengths / (lengths + penalties)
     inverse = np.linalg.inv(r)
     weights = inverse @ (share * (q.T @ target))
-    assert_close([item.weight for item in fit.chosen], weights, rtol=1e-8, why="same problem")
+    assert_close(
+        [item.weight for item in fit.details.chosen], weights, rtol=1e-8, why="same problem"
+    )
     noise = np.sum((target - columns @ weights) ** 2) / (target.size - share.sum())
     errors = np.sqrt(np.diag(noise * inverse @ np.diag(share) @ inverse.T))
-    assert_close([item.stderr for item in fit.chosen], errors, rtol=1e-8, why="posterior")
+    assert_close([item.stderr for item in fit.details.chosen], errors, rtol=1e-8, why="posterior")
     # Chen's update leaves the penalties where they are.
     g = share * (q.T @ target) / np.diag(r)
     update = share[5:] * noise / g[5:] ** 2
     assert_close(update, penalties[5:], rtol=1e-8, why="fixed point of the evidence")
     assert np.all(penalties[:5] == 0)
+    assert "penalty λ" in fit.details.terms_table().to_text()
     text = fit.summary().to_text()
-    assert "penalty λ" in text
     assert "posterior" in text
 
 
@@ -54,9 +56,9 @@ def test_local_penalties_never_add_terms_and_keep_the_true_one() -> None:
         record = quadratic(seed=seed, noise=0.2)
         plain = fid.identify(MODEL, record)
         local = fid.identify(replace(MODEL, regularisation="local"), record)
-        names = {item.term.name for item in local.chosen}
+        names = {item.term.name for item in local.details.chosen}
         assert "u(t-2)^2" in names
-        assert names <= {item.term.name for item in plain.chosen}
+        assert names <= {item.term.name for item in plain.details.chosen}
 
 
 def test_a_uniform_penalty_shrinks() -> None:
@@ -64,10 +66,10 @@ def test_a_uniform_penalty_shrinks() -> None:
     radial = replace(MODEL, kernel="gaussian", degree=1, stop="terms", maximum_terms=12)
     plain = fid.identify(radial, record)
     ridge = fid.identify(replace(radial, regularisation="uniform", penalty=5.0), record)
-    size = [np.linalg.norm([i.weight for i in fit.chosen[5:]]) for fit in (plain, ridge)]
+    size = [np.linalg.norm([i.weight for i in fit.details.chosen[5:]]) for fit in (plain, ridge)]
     assert size[1] < 0.5 * size[0]
-    assert ridge.chosen[-1].sum_of_squares > plain.chosen[-1].sum_of_squares
-    assert {item.penalty for item in ridge.chosen[5:]} == {5.0}
+    assert ridge.details.chosen[-1].sum_of_squares > plain.details.chosen[-1].sum_of_squares
+    assert {item.penalty for item in ridge.details.chosen[5:]} == {5.0}
 
 
 @pytest.mark.parametrize("kernel", [None, "gaussian"])
@@ -76,40 +78,42 @@ def test_held_back_samples_alone_make_weights_and_errors(kernel: str | None) -> 
     degree = 1 if kernel else 2
     model = replace(MODEL, held_back=0.4, kernel=kernel, degree=degree, maximum_terms=9)
     fit = fid.identify(model, record)
-    assert fit.n_samples == round(0.4 * 398)
-    first, _ = regressors_of(model, fit.equation.scaling, [record])
-    assert first.target.size == 398 - fit.n_samples
-    choice, _ = _select(model, candidate_terms(model, first.vectors), first)
-    assert {item.term for item in choice} == {item.term for item in fit.chosen}
+    assert fit.details.n_samples == round(0.4 * 398)
+    first, _ = regressors_of(model, fit.model.scaling, [record])
+    assert first.target.size == 398 - fit.details.n_samples
+    choice = _select(model, candidate_terms(model, first.vectors), first).chosen
+    assert {item.term for item in choice} == {item.term for item in fit.details.chosen}
     assert "took no part in the choice" in fit.summary().to_text()
     if kernel is None:
         columns, target = _problem(fit, record)
         weights, squares, *_ = np.linalg.lstsq(columns, target, rcond=None)
-        assert_close([i.weight for i in fit.chosen], weights, rtol=1e-8, why="least squares")
+        assert_close(
+            [i.weight for i in fit.details.chosen], weights, rtol=1e-8, why="least squares"
+        )
         covariance = np.linalg.inv(columns.T @ columns) * squares[0]
         errors = np.sqrt(np.diag(covariance) / (target.size - len(weights)))
-        assert_close([i.stderr for i in fit.chosen], errors, rtol=1e-8, why="least squares")
+        assert_close([i.stderr for i in fit.details.chosen], errors, rtol=1e-8, why="least squares")
     else:
-        assert {item.term.kind for item in fit.chosen} >= {"linear", "radial"}
-        assert fit.predict(quadratic(seed=4)).error_rms < fit.baseline_free_run_rms
+        assert {item.term.kind for item in fit.details.chosen} >= {"linear", "radial"}
+        assert fit.model.predict(quadratic(seed=4)).error_rms < fit.details.baseline_free_run_rms
 
 
 def test_residuals_go_into_the_residual_tests() -> None:
     records = [quadratic(noise=0.1), quadratic(seed=1, noise=0.1, n=300)]
     good = fid.identify(replace(MODEL, stop="bic"), records)
-    left = good.residuals(records)
+    left = good.residuals
     assert [record.n_samples for record in left] == [398, 298]
-    run = good.predict(records[0], 1)
+    run = good.model.predict(records[0], 1)
     assert_close(left[0]["y"], (run.measured - run.predicted)[2:], atol=1e-14, why="definition")
     assert left[0].unit("y") == "rad"
-    tests = fid.residual_tests(left, horizon="one step ahead")
+    tests = fid.residual_tests(good)
     assert {test.verdict for test in tests.tests} == {"pass"}
     poor = fid.identify(replace(MODEL, degree=1), records)
-    tests = fid.residual_tests(poor.residuals(records), horizon="one step ahead")
+    tests = fid.residual_tests(poor)
     assert tests.test("u²ε", "y", "u").verdict == "fail"
-    alone = good.residuals(records[0], "free_run")
+    alone = good.records[0].residual_record()
     assert_close(
-        alone[0]["y"] ** 2, (np.subtract(*good.predict(records[0]).scored)) ** 2, rtol=1e-12,
+        alone["y"][2:] ** 2, (np.subtract(*good.model.predict(records[0]).scored)) ** 2, rtol=1e-12,
         why="the free run's errors",
     )  # fmt: skip
 
@@ -149,7 +153,7 @@ def test_errors_of_terms_that_are_not_there_over_300_runs() -> None:
             fit = fid.identify(replace(model, held_back=share), record)
             found.extend(
                 abs(item.weight) > 1.96 * item.stderr
-                for item in fit.chosen[7:]
+                for item in fit.details.chosen[7:]
                 if item.term.name != "u(t-2)^2"
             )
     rates = {share: float(np.mean(found)) for share, found in missed.items()}

@@ -37,7 +37,9 @@ def test_scanned_models_agree_with_full_fits(scan):
     fit = fid.identify(trial.structure, flown(ARMAX, 0, n=1500, noise=0.3))
     errors = np.array([p.stderr for p in fit.parameters.values()])
     assert np.all(np.abs(trial.model.theta - fit.model.theta) < 0.3 * errors)
-    assert_close(trial.criteria.loss, fit.criteria.loss, rtol=5e-3, why="other first samples")
+    assert_close(
+        trial.criteria.loss, fit.details.criteria.loss, rtol=5e-3, why="other first samples"
+    )
 
 
 def test_the_free_run_of_the_scan_is_that_of_the_model(scan):

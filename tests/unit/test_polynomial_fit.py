@@ -77,7 +77,7 @@ def test_the_minimum_has_no_gradient_and_the_errors_belong_to_it():
         return np.sum(model.predict(record, 1, initial_state="zero").residual ** 2)
 
     here = loss(fit.model.theta)
-    assert_close(here, fit.criteria.loss * 500, rtol=1e-12, why="the same errors")
+    assert_close(here, fit.details.criteria.loss * 500, rtol=1e-12, why="the same errors")
     step = 1e-5
     for k in range(6):
         there = [loss(fit.model.theta + sign * step * np.eye(6)[k]) for sign in (1, -1)]
@@ -88,7 +88,7 @@ def test_the_minimum_has_no_gradient_and_the_errors_belong_to_it():
 def test_wrong_delay_and_right_delay_are_told_apart_by_the_loss():
     record = flown(TWO_INPUTS, 7, noise=0.1)
     losses = [
-        fid.identify(P.arx(["u", "v"], "y", na=4, nb=4, nk=[1, k]), record).criteria.loss
+        fid.identify(P.arx(["u", "v"], "y", na=4, nb=4, nk=[1, k]), record).details.criteria.loss
         for k in (1, 3, 5)
     ]
     assert losses[1] < losses[2]
@@ -164,12 +164,12 @@ def test_roots_gains_and_modes_carry_intervals():
     fit = fid.identify(
         P.armax("u", "y", na=2, nb=2, nc=2), [flown(ARMAX, s, n=1500, noise=0.5) for s in (14, 15)]
     )
-    (mode,) = fit.modes
+    (mode,) = fit.details.modes
     truth = ARMAX.modes()["y/u"][0]
     for found, wanted in (
         (mode.natural_frequency, truth.natural_frequency_rad_s),
         (mode.damping, truth.damping),
-        (fit.gains["y/u"], 7.5),
+        (fit.details.gains["y/u"], 7.5),
     ):
         assert abs(found.value - wanted) < 4.0 * found.stderr
     step = 1e-6
@@ -177,7 +177,7 @@ def test_roots_gains_and_modes_carry_intervals():
         moved = P.from_theta(fit.structure, fit.model.theta + step * np.eye(6)[k], 0.1)
         pole = moved.modes()["y/u"][0].z
         assert_close((pole - mode.z) / step, mode.gradient[k], atol=1e-4, why="difference")
-    table = fit.roots_table().to_text()
+    table = fit.details.roots_table().to_text()
     assert "zero" in table
     assert "±" in table
 
@@ -188,14 +188,14 @@ def test_a_fit_states_horizon_and_initial_state_and_keeps_everything_plain():
     assert "one step ahead from an estimated state" in text
     assert "free run from an estimated state" in text
     values = fit.to_dict()
-    assert values["schema"] == "flightid.polynomial_fit/1"
-    assert values["criteria"]["n_parameters"] == 5
+    assert values["schema"] == "flightid.fit/1"
+    assert values["details"]["criteria"]["n_parameters"] == 5
     assert values["provenance"]["offsets"][0]["y"] == pytest.approx(3.0, abs=1.0)
     again = P.from_dict(values["model"])
     np.testing.assert_array_equal(again.covariance, fit.covariance)
     assert "free-run fit" in repr(fit)
     assert "<table" in fit._repr_html_()
-    assert fit.predict(flown(ARMAX, 17), "free_run").error_rms < 1.0
+    assert fit.model.predict(flown(ARMAX, 17), "free_run").error_rms < 1.0
 
 
 def test_starts_are_systematic_first_then_random_and_reproducible():

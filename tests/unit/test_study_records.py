@@ -98,9 +98,9 @@ def test_the_input_without_coherence_is_left_out_and_the_rest_is_found(study: fi
     item = study.black_boxes[0]
     assert [finding.code for finding in item.left_out] == ["left-out"]
     assert "angle/idle is left out: coherence reaches" in item.left_out[0].message
-    assert isinstance(item.fit, fid.PolynomialFit)
+    assert isinstance(item.fit.model, fid.PolynomialModel)
     assert item.fit.model.inputs == ("drive",)
-    frequency = item.fit.modes[0].natural_frequency
+    frequency = item.fit.details.modes[0].natural_frequency
     assert frequency is not None
     assert frequency.stderr is not None
     truth = TRUTH.modes()["angle/drive"][0].natural_frequency_rad_s or 0.0
@@ -136,7 +136,7 @@ def test_a_balanced_choice_takes_the_noise_model_that_whitens(study: fid.Study) 
     assert isinstance(item.choice, fid.OrderScan)
     assert item.tests is not None
     assert item.tests.test("εε", "angle").verdict == "pass"
-    assert isinstance(item.fit, fid.PolynomialFit)
+    assert isinstance(item.fit.model, fid.PolynomialModel)
     assert (item.fit.structure.na, item.fit.structure.nk) == (2, (2,))
 
 
@@ -147,7 +147,7 @@ def test_the_other_rules_choose_as_they_say(choose: str, folder: Path) -> None:
     item = found.black_boxes[0]
     scan, fit = item.choice, item.fit
     assert isinstance(scan, fid.OrderScan)
-    assert isinstance(fit, fid.PolynomialFit)
+    assert isinstance(fit.model, fid.PolynomialModel)
     expected = {
         "free_run": scan.trials[0],
         "simplest": scan.simplest,
@@ -178,7 +178,7 @@ def test_a_narx_model_is_searched_and_tested(folder: Path) -> None:
     item = found.black_boxes[0]
     assert isinstance(item.choice, fid.validation.NarxSearch)
     assert len(item.choice.trials) == 4
-    assert isinstance(item.fit, fid.NarxFit)
+    assert isinstance(item.fit.model, fid.NarxModel)
     assert item.cross is not None
     assert {run.model for run in item.cross.runs} == {"model", "linear, same lags"}
     assert item.tests is not None

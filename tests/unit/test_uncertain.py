@@ -108,13 +108,15 @@ def test_fits_of_every_kind_have_a_covariance() -> None:
     record = record.replace({"y": truth.simulate(record) + noise})
     polynomial = fid.identify(fid.PolynomialModel.oe("u", "y", nb=2, nf=2), record)
     found = uncertain_of(polynomial).carried(lambda model: model.gains()["y/u"])
-    gain = polynomial.gains["y/u"]
+    gain = polynomial.details.gains["y/u"]
     assert found.stderr is not None
     assert_close(found.stderr[0], gain.stderr, rtol=0.02, why="the fit's own delta method")
     subspace = fid.identify(fid.InnovationsModel.subspace("u", "y", 2), record)
     found = uncertain_of(subspace).carried(lambda model: model.gains()["y/u"])
     assert found.stderr is not None
-    assert_close(found.stderr[0], subspace.gains["y/u"].stderr, rtol=0.02, why="delta method")
+    assert_close(
+        found.stderr[0], subspace.details.gains["y/u"].stderr, rtol=0.02, why="delta method"
+    )
 
 
 def test_a_response_moves_in_both_parts() -> None:

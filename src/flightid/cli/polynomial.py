@@ -116,7 +116,7 @@ def command(
     fit = flightid.identify(structure, records)
     note(repr(fit))
     for record in unseen:
-        note(f"{record.name}: {fit.predict(record)!r}")
+        note(f"{record.name}: {flightid.predict(fit, record)!r}")
     emit(fit, as_json=as_json)
     leave_by_verdict(fit.findings)
 

@@ -9,10 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import expm, logm, schur, solve_sylvester
 
 from flightid.errors import DataError, ModelError, OptionError
-from flightid.identification import InnovationsFit, PolynomialFit
-from flightid.models import InnovationsModel, PolynomialModel
+from flightid.models import InnovationsModel
 from flightid.models.linear.linear_system import LinearSystem
-from flightid.models.model import LinearModel, linear_system
+from flightid.models.model import linear_system
 
 Array = NDArray[np.float64]
 Four = tuple[Array, Array, Array, Array]
@@ -23,14 +22,14 @@ ROUNDING = 1e-9
 
 
 def to_continuous(
-    source: PolynomialModel | InnovationsModel | PolynomialFit | InnovationsFit,
+    source: object,
     hold: str = "zero",
 ) -> LinearSystem:
     """Continuous-time system whose samples are those of a discrete model.
 
     Parameters
     ----------
-    source : PolynomialModel, InnovationsModel or a fit of one
+    source : PolynomialModel, InnovationsModel, sampled LinearSystem, or a fit of one
         Its response to the inputs is converted; the noise model has no hold and is left out.
     hold : {"zero", "first", "tustin"}
         Inputs are steps or straight lines between samples (exact), or the bilinear rule, which
@@ -44,8 +43,8 @@ def to_continuous(
     Raises
     ------
     ModelError
-        A negative real pole, which has no real continuous counterpart; a pole at the origin that
-        is not a delay of an input; with "tustin" a pole at -1.
+        The model is continuous already; a negative real pole, which has no real continuous
+        counterpart; a pole at the origin that is not a delay of an input; with "tustin" one at -1.
     OptionError
         An unknown hold.
 
@@ -62,28 +61,28 @@ def to_continuous(
     -5.0
     """
     _require_hold(hold)
-    discrete = source.model if isinstance(source, PolynomialFit | InnovationsFit) else source
-    if isinstance(discrete, PolynomialModel):
-        outputs: tuple[str, ...] = (discrete.output,)
-        matrices = discrete.state_space()[:4]
-    else:
-        matrices, outputs = discrete.matrices[:4], discrete.outputs
+    discrete = linear_system(source).with_pade()
     step = discrete.sample_time_s
-    a, b, c, d, lags = _without_delays(*matrices)
+    if step is None:
+        raise ModelError(
+            "the model is continuous already", needed="a sampled model, or a fit of one"
+        )
+    a, b, c, d, lags = _without_delays(*discrete.state_space()[:4])
     if hold == "tustin":
         found = _from_tustin(a, b, c, d, step)
     else:
         _require_counterparts(a, step)
         found = _from_hold(a, b, c, d, step, hold)
-    return LinearSystem(*found, discrete.inputs, outputs, lags * step)
+    return LinearSystem(*found, discrete.inputs, discrete.outputs, lags * step)
 
 
-def to_discrete(source: LinearModel, sample_time_s: float, hold: str = "zero") -> InnovationsModel:
+def to_discrete(source: object, sample_time_s: float, hold: str = "zero") -> InnovationsModel:
     """Discrete model of a continuous one, without noise model.
 
     Parameters
     ----------
-    source : LinearSystem, TransferFunctionModel or another linear model
+    source : Fit or model
+        Of any kind with a linear system.
     sample_time_s : float
         Sample time T, s.
     hold : {"zero", "first", "tustin"}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import ModelError
 from flightid.findings import Finding
-from flightid.identification import InnovationsFit, PolynomialFit
+from flightid.identification import Fit
 from flightid.identification.prediction_error.roots import (
     POLE,
     ZERO,
@@ -183,7 +183,7 @@ class Interpretation:
 
 
 def interpret(
-    source: PolynomialModel | InnovationsModel | PolynomialFit | InnovationsFit,
+    source: object,
 ) -> Interpretation:
     """Say what a black-box model tells about the vehicle.
 
@@ -217,7 +217,7 @@ def interpret(
     >>> [round(item.frequency_hz, 3) for item in interpret(rig).resonances]
     [0.335]
     """
-    discrete = source.model if isinstance(source, PolynomialFit | InnovationsFit) else source
+    discrete = source.model if isinstance(source, Fit) else source
     if not isinstance(discrete, PolynomialModel | InnovationsModel):
         raise ModelError(
             "only discrete black-box models are interpreted",
@@ -225,13 +225,13 @@ def interpret(
             needed="PolynomialModel, InnovationsModel or a fit of one",
             action="for a state-space model of known physics see flightid.modes",
         )
-    if isinstance(source, PolynomialFit | InnovationsFit):
-        roots = source.roots
-    elif isinstance(source, PolynomialModel):
-        roots = fitted_roots(source, 1)
+    if isinstance(source, Fit):
+        roots = source.details.roots
+    elif isinstance(discrete, PolynomialModel):
+        roots = fitted_roots(discrete, 1)
     else:
-        errors = Errors(source.sample_time_s, None, 1)
-        roots = innovations_roots(source, errors, direct=True)
+        errors = Errors(discrete.sample_time_s, None, 1)
+        roots = innovations_roots(discrete, errors, direct=True)
     step = discrete.sample_time_s
     made = tuple(InterpretedRoot(root, _character(root, step), _decay(root)) for root in roots)
     return Interpretation(discrete.name, step, _transfers(discrete), made, tuple(_judge(made)))

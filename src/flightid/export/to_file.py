@@ -14,7 +14,7 @@ from flightid.export.exported import Exported
 from flightid.export.fmu import export_fmu
 from flightid.export.jsbsim import export_jsbsim
 from flightid.findings import Finding
-from flightid.identification import Fit, NarxFit
+from flightid.identification import Fit
 from flightid.models import (
     InnovationsModel,
     LinearSystem,
@@ -122,10 +122,7 @@ def export(
 
 def model_of(source: object) -> object:
     """The model of a fit, or the source itself."""
-    if isinstance(source, NarxFit):
-        return source.equation
-    model = getattr(source, "model", None)
-    return source if model is None or isinstance(source, NarxModel) else model
+    return source.model if isinstance(source, Fit) else source
 
 
 def _called(

@@ -2,11 +2,13 @@
 
 from flightid.identification.advice.advice import Advice, advise
 from flightid.identification.advice.impulse_response import ImpulseResponse, impulse_response
-from flightid.identification.fit import Fit, FittedResponse, LocalMinimum
+from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
+from flightid.identification.fitted_response import FittedResponse
 from flightid.identification.identify import identify
-from flightid.identification.narx.result import ChosenTerm, NarxFit
-from flightid.identification.prediction_error.result import PolynomialFit
+from flightid.identification.local_minimum import LocalMinimum
+from flightid.identification.narx.details import ChosenTerm, NarxDetails
+from flightid.identification.prediction_error.details import PolynomialDetails
 from flightid.identification.reduction.reduce import reduce
 from flightid.identification.reduction.result import Reduction, ReductionStep
 from flightid.identification.reduction.structures import (
@@ -14,8 +16,8 @@ from flightid.identification.reduction.structures import (
     StructureRow,
     compare_structures,
 )
+from flightid.identification.subspace.details import SubspaceDetails
 from flightid.identification.subspace.order import OrderChoice
-from flightid.identification.subspace.result import InnovationsFit
 from flightid.identification.uncertain_of import uncertain_of
 
 __all__ = [
@@ -25,15 +27,15 @@ __all__ = [
     "FittedRecord",
     "FittedResponse",
     "ImpulseResponse",
-    "InnovationsFit",
     "LocalMinimum",
-    "NarxFit",
+    "NarxDetails",
     "OrderChoice",
-    "PolynomialFit",
+    "PolynomialDetails",
     "Reduction",
     "ReductionStep",
     "StructureComparison",
     "StructureRow",
+    "SubspaceDetails",
     "advise",
     "compare_structures",
     "identify",

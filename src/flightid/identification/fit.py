@@ -4,95 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.findings import Finding
+from flightid.identification.details import Details
 from flightid.identification.fitted_record import FittedRecord
-from flightid.models import GreyBoxModel
+from flightid.identification.fitted_response import FittedResponse
+from flightid.identification.local_minimum import LocalMinimum
+from flightid.identification.training import TrainingChannel, training_channels
 from flightid.models.linear.linear_system import LinearSystem
-from flightid.responses import PairResponse
+from flightid.record import Record
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
 
 SCHEMA = "flightid.fit/1"
-
-
-@dataclass(frozen=True)
-class FittedResponse:
-    """One measured response with the model beside it.
-
-    Attributes
-    ----------
-    name : str
-        ``"output/input"``.
-    cost : float
-        J of this response; guide: at most 100, and 150 to 200 for a single off-axis one.
-    measured : PairResponse
-        The whole measured response.
-    omega_rad_s : ndarray, shape (n,)
-        Frequencies that were fitted, rad/s.
-    model : ndarray of complex, shape (n_f,)
-        The fitted model at every measured frequency.
-
-    Example
-    -------
-    >>> import flightid as fid
-    >>> omega = [1.0, 2.0, 4.0, 8.0]
-    >>> model = fid.load_model("rate_integrator")
-    >>> data = fid.FrequencyResponse.from_values(omega, model.frequency_response(omega),
-    ...     inputs=["tau_phi"], outputs=["p"], units={"p": "rad/s"})
-    >>> fid.identify(model, data).responses[0].name
-    'p/tau_phi'
-    """
-
-    name: str
-    cost: float
-    measured: PairResponse
-    omega_rad_s: NDArray[np.float64]
-    model: NDArray[np.complex128]
-
-    @property
-    def band_rad_s(self) -> tuple[float, float]:
-        """Lowest and highest fitted frequency, rad/s."""
-        return float(self.omega_rad_s[0]), float(self.omega_rad_s[-1])
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values without the curves."""
-        low, high = self.band_rad_s
-        return {
-            "cost": self.cost,
-            "band_rad_s": [low, high],
-            "n_frequencies": len(self.omega_rad_s),
-        }
-
-
-@dataclass(frozen=True)
-class LocalMinimum:
-    """A minimum that one or more starts found.
-
-    Attributes
-    ----------
-    objective : float
-        What was minimised, there.
-    count : int
-        Number of starts that ended there.
-    values : mapping of str to float
-        Free parameters there.
-    termination : str
-        Why the iteration ended.
-
-    Example
-    -------
-    >>> LocalMinimum(12.5, 3, {"K": 2.0}, "cost").count
-    3
-    """
-
-    objective: float
-    count: int
-    values: Mapping[str, float]
-    termination: str
+_COLUMNS = (
+    Column("parameter"),
+    Column("value", digits=6),
+    Column("unit"),
+    Column("standard error", digits=3),
+    Column("95 % low", digits=5),
+    Column("95 % high", digits=5),
+    Column("Cramér–Rao", "%", 3),
+    Column("insensitivity", "%", 3),
+    Column("status"),
+    Column("note"),
+)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -101,16 +41,16 @@ class Fit:
 
     Attributes
     ----------
-    model : TransferFunctionModel or StateSpaceModel
-        The model with the estimates as values.
+    model : Model
+        Of any kind, with the estimates.
     parameters : mapping of str to Estimate
-        All parameters, in the model's order.
+        All parameters, in the model's order; coefficients of a black box.
     cost, average_cost : float
         Σ J_l and its average over the responses; guide: average at most 100, below 50 nearly
         indistinguishable. On records: sum and average of the outputs' costs.
     costs : mapping of str to float
         J_l by response. On records, by output: percent of the output's variance that the model
-        leaves in the residuals.
+        leaves in `residuals`.
     names : tuple of str
         Parameters of `covariance` and `correlation`: free and not at a bound.
     covariance : ndarray, shape (n, n), or None
@@ -122,13 +62,14 @@ class Fit:
         What the starts found, best first.
     objective : float
         What was minimised: equal to `cost` for ``cost="coherence"``; on records the negative
-        logarithm of the likelihood, without its constant.
+        logarithm of the likelihood, without its constant; of a black box the sum of squared
+        errors, or the determinant of their covariance.
     termination : str
         Why the iteration ended.
     iterations : int
     intervals_from : str
-        ``"response covariance"``, ``"random error"`` (approximate), ``"coloured residuals"`` or
-        ``"nothing"``.
+        ``"response covariance"``, ``"random error"`` (approximate), ``"coloured residuals"``,
+        ``"white prediction errors"`` or ``"nothing"``.
     findings : tuple of Finding
     provenance : mapping
         Hash of the data, options, version of flightid, seed.
@@ -136,6 +77,16 @@ class Fit:
         In the time domain: measured and modelled outputs, initial states and biases.
     noise_covariance : ndarray, shape (n_outputs, n_outputs), or None
         R of the residuals, in the time domain.
+    prediction_errors : tuple of Record
+        Of a black box: errors one step ahead in place of the outputs, without the start.
+    residual_horizon : int or str
+        Of `residuals`: 1 where a good model leaves them white, else ``"free_run"``.
+    structure : Model, PolynomialStructure, SubspaceStructure or NarxStructure
+        What was asked.
+    method : str
+        As `flightid.identify` names it.
+    details : Details or None
+        What is special to the kind: `PolynomialDetails`, `SubspaceDetails`, `NarxDetails`.
 
     Example
     -------
@@ -151,7 +102,7 @@ class Fit:
     200.0
     """
 
-    model: GreyBoxModel
+    model: Any
     parameters: Mapping[str, Estimate]
     cost: float
     average_cost: float
@@ -169,20 +120,41 @@ class Fit:
     provenance: Mapping[str, object] = field(default_factory=dict)
     records: tuple[FittedRecord, ...] = ()
     noise_covariance: NDArray[np.float64] | None = None
+    prediction_errors: tuple[Record, ...] = ()
+    residual_horizon: int | str = "free_run"
+    structure: Any = None
+    method: str = ""
+    details: Any = None
+
+    @property
+    def residuals(self) -> tuple[Record, ...]:
+        """Errors on the training records in place of their outputs.
+
+        One step ahead for black boxes, without the samples of the start; measured minus model for
+        others.
+        """
+        return self.prediction_errors or tuple(item.residual_record() for item in self.records)
+
+    @property
+    def training(self) -> dict[str, TrainingChannel]:
+        """Where the training records were, by channel; empty for a fit of responses alone."""
+        return training_channels([item.measured for item in self.records])
 
     def linear_system(self) -> LinearSystem:
         """The linear system of the fitted model; ModelError with the reason where there is none."""
-        return self.model.linear_system()
+        made: LinearSystem = self.model.linear_system()
+        return made
 
     def __repr__(self) -> str:
-        """Size and average cost on one line."""
+        """Size, average cost and what the kind adds, on one line."""
         free = sum(p.status in ("free", "at bound") for p in self.parameters.values())
         counts = {"response": len(self.responses), "record": len(self.records)}
         seen = [f"{n} {word}{'' if n == 1 else 's'}" for word, n in counts.items() if n]
         unit = "" if self.responses else " %"
+        words = "" if self.details is None else f", {self.details.words}"
         return (
             f"Fit({self.model.name!r}, {free} free of {len(self.parameters)} parameters, "
-            f"{', '.join(seen)}, average cost {self.average_cost:.2f}{unit})"
+            f"{', '.join(seen)}, average cost {self.average_cost:.2f}{unit}{words})"
         )
 
     def summary(self) -> Table:
@@ -192,21 +164,11 @@ class Fit:
         -------
         Table
         """
-        columns = (
-            Column("parameter"),
-            Column("value", digits=5),
-            Column("unit"),
-            Column("95 % low"),
-            Column("95 % high"),
-            Column("Cramér–Rao", "%", 3),
-            Column("insensitivity", "%", 3),
-            Column("status"),
-        )
-        rows: list[tuple[Cell, ...]] = []
-        for p in self.parameters.values():
-            low, high = p.interval95 if p.interval95 is not None else (None, None)
-            bounds = (p.cramer_rao_percent, p.insensitivity_percent)
-            rows.append((p.name, p.value, p.unit, low, high, *bounds, p.status))
+        rows = [_row(p) for p in (self.details or Details()).quantities(self.parameters)]
+        table = Table(f"Fit of {self.model.name}", _COLUMNS, tuple(rows), self._notes())
+        return table.without_empty_columns()
+
+    def _notes(self) -> tuple[str, ...]:
         costs = ", ".join(f"{name} {cost:.3g}" for name, cost in self.costs.items())
         meaning = (
             "(guide: at most 100)"
@@ -214,19 +176,22 @@ class Fit:
             else "% of the outputs' variance left unexplained"
         )
         formulas = map(str, self.model.responses if self.responses else ())
-        notes = (
+        return (
             # Formulas of transfer functions; other responses are named with their costs below.
             *(text for text in formulas if text not in self.model.response_names),
+            *(() if self.details is None else self.details.notes(self.structure)),
             f"Average cost {self.average_cost:.3g} {meaning}; {costs}.",
             f"Intervals from: {self.intervals_from}.",
+            f"Ended by {self.termination} after {self.iterations} iterations.",
             *map(str, self.findings),
         )
-        return Table(f"Fit of {self.model.name}", columns, tuple(rows), notes)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""
         return {
             "schema": SCHEMA,
+            "method": self.method,
+            "structure": repr(self.structure),
             "model": self.model.to_dict(),
             "parameters": {name: p.to_dict() for name, p in self.parameters.items()},
             "cost": self.cost,
@@ -240,22 +205,24 @@ class Fit:
             "noise_covariance": (
                 None if self.noise_covariance is None else self.noise_covariance.tolist()
             ),
-            "minima": [
-                {
-                    "objective": each.objective,
-                    "count": each.count,
-                    "values": dict(each.values),
-                    "termination": each.termination,
-                }
-                for each in self.minima
-            ],
+            "minima": [minimum.to_dict() for minimum in self.minima],
             "objective": self.objective,
             "termination": self.termination,
             "iterations": self.iterations,
             "intervals_from": self.intervals_from,
+            "residual_horizon": self.residual_horizon,
+            "training": {name: channel.to_dict() for name, channel in self.training.items()},
+            "details": None if self.details is None else self.details.to_dict(),
             "findings": [finding.to_dict() for finding in self.findings],
             "provenance": dict(self.provenance),
         }
 
     def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
+        beside = () if self.details is None else self.details.tables()
+        return "".join(table._repr_html_() for table in (self.summary(), *beside))
+
+
+def _row(p: Estimate) -> tuple[Cell, ...]:
+    low, high = p.interval95 if p.interval95 is not None else (None, None)
+    guides = (p.cramer_rao_percent, p.insensitivity_percent)
+    return (p.name, p.value, p.unit, p.stderr, low, high, *guides, p.status, p.reason)

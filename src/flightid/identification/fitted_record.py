@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.record import Record
-
-if TYPE_CHECKING:
-    from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.estimate import Estimate
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -24,7 +21,8 @@ class FittedRecord:
     measured : Record
         What the fit saw.
     modelled : Record
-        The model's inputs and its outputs with biases, on the record's time base.
+        The model's inputs and its outputs with biases, on the record's time base; of a black box
+        its free run.
     outputs : tuple of str
         Channels that were fitted.
     initial_state, bias, reference_shift : mapping of str to Estimate
@@ -49,9 +47,9 @@ class FittedRecord:
     measured: Record
     modelled: Record
     outputs: tuple[str, ...]
-    initial_state: Mapping[str, Estimate]
-    bias: Mapping[str, Estimate]
-    reference_shift: Mapping[str, Estimate]
+    initial_state: Mapping[str, Estimate] = field(default_factory=dict)
+    bias: Mapping[str, Estimate] = field(default_factory=dict)
+    reference_shift: Mapping[str, Estimate] = field(default_factory=dict)
     states: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
     def residual(self, name: str) -> NDArray[np.float64]:
@@ -67,6 +65,10 @@ class FittedRecord:
     def rms(self) -> dict[str, float]:
         """Root mean square of the residual by output, in its unit."""
         return {name: float(np.sqrt(np.mean(self.residual(name) ** 2))) for name in self.outputs}
+
+    def residual_record(self) -> Record:
+        """The record with measured minus model in place of the outputs."""
+        return self.measured.replace({name: self.residual(name) for name in self.outputs})
 
     def __repr__(self) -> str:
         """Size and rms of the residuals on one line."""

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
-from typing import Any, overload
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from flightid.errors import FitError, OptionError
 from flightid.identification.filter_error.fit import fit_filter_error
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain.fit import Options, fit_responses
-from flightid.identification.frequency_domain.selection import Bands
 from flightid.identification.joint.fit import JointOptions, fit_jointly
 from flightid.identification.narx.fit import fit_narx
-from flightid.identification.narx.result import NarxFit
 from flightid.identification.output_error.fit import fit_output_error
 from flightid.identification.prediction_error.fit import fit_polynomial
-from flightid.identification.prediction_error.result import PolynomialFit
-from flightid.identification.records.options import Freedom, InitialState, RecordOptions
+from flightid.identification.records.options import RecordOptions
 from flightid.identification.regression.equation_error import (
     fit_equation_error,
     fit_fourier_regression,
@@ -30,7 +27,6 @@ from flightid.identification.regression.options import (
     FourierOutputErrorOptions,
 )
 from flightid.identification.subspace.fit import fit_subspace
-from flightid.identification.subspace.result import InnovationsFit
 from flightid.models import GreyBoxModel, StateSpaceModel, TransferFunctionModel
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.narx.structure import NarxStructure
@@ -116,7 +112,7 @@ def kind_of(data: object) -> str:
     return kinds[0] if len(set(kinds)) == 1 else BOTH
 
 
-def _method(model: object, data: object, name: str | None) -> Method:
+def _method(model: object, data: object, name: str | None) -> tuple[str, Method]:
     kind = kind_of(data)
     ways = {
         way: method for (of, on, way), method in METHODS.items() if (of, on) == (type(model), kind)
@@ -129,14 +125,14 @@ def _method(model: object, data: object, name: str | None) -> Method:
             "or NarxStructure, PolynomialStructure or SubspaceStructure and Record",
         )
     if name is None:
-        return next(iter(ways.values()))
+        return next(iter(ways.items()))
     if name not in ways:
         raise OptionError(
             f"method is not known for a {type(model).__name__} and {kind}",
             found=repr(name),
             needed=" or ".join(map(repr, ways)),
         )
-    return ways[name]
+    return name, ways[name]
 
 
 def _options(method: Method, given: dict[str, Any]) -> object:
@@ -151,91 +147,13 @@ def _options(method: Method, given: dict[str, Any]) -> object:
     return method.options(**given)
 
 
-@overload
-def identify(model: NarxStructure, data: Record | Sequence[Record]) -> NarxFit: ...
-
-
-@overload
-def identify(model: PolynomialStructure, data: Record | Sequence[Record]) -> PolynomialFit: ...
-
-
-@overload
-def identify(model: SubspaceStructure, data: Record | Sequence[Record]) -> InnovationsFit: ...
-
-
-@overload
-def identify(
-    model: GreyBoxModel,
-    data: FrequencyResponse,
-    *,
-    method: str | None = ...,
-    starts: int = ...,
-    seed: int = ...,
-    band_rad_s: Bands = ...,
-    n_omega: int = ...,
-    minimum_coherence: float | None = ...,
-    weight_gain: float = ...,
-    weight_phase: float = ...,
-    cost: str = ...,
-    maximum_iterations: int = ...,
-    correct_bias: bool = ...,
-    hold: str = ...,
-) -> Fit: ...
-
-
-@overload
-def identify(
-    model: GreyBoxModel,
-    data: Record | Sequence[Record],
-    *,
-    method: str | None = ...,
-    starts: int = ...,
-    seed: int = ...,
-    initial_state: InitialState = ...,
-    output_bias: Freedom = ...,
-    input_bias: Freedom = ...,
-    noise_covariance: str = ...,
-    loss: str = ...,
-    loss_limit: float = ...,
-    hold: str = ...,
-    start_from: str = ...,
-    band_rad_s: tuple[float, float] | None = ...,
-    half_width: int = ...,
-    process_noise: Sequence[str] | None = ...,
-    maximum_iterations: int = ...,
-) -> Fit: ...
-
-
-@overload
-def identify(
-    model: GreyBoxModel,
-    data: JointData,
-    *,
-    method: str | None = ...,
-    starts: int = ...,
-    seed: int = ...,
-    band_rad_s: Bands = ...,
-    n_omega: int = ...,
-    minimum_coherence: float | None = ...,
-    correct_bias: bool = ...,
-    initial_state: InitialState = ...,
-    output_bias: Freedom = ...,
-    input_bias: Freedom = ...,
-    noise_covariance: str = ...,
-    loss: str = ...,
-    loss_limit: float = ...,
-    hold: str = ...,
-    maximum_iterations: int = ...,
-) -> Fit: ...
-
-
 def identify(
     model: GreyBoxModel | NarxStructure | PolynomialStructure | SubspaceStructure,
     data: FrequencyResponse | Record | Sequence[Record] | JointData,
     *,
     method: str | None = None,
-    **options: Any,
-) -> Fit | NarxFit | PolynomialFit | InnovationsFit:
+    **options: Any,  # noqa: ANN401 - the method checks them
+) -> Fit:
     """Fit the free parameters of a model to data.
 
     By the kinds of model and data, the default first:
@@ -315,7 +233,7 @@ def identify(
 
     Returns
     -------
-    Fit, NarxFit, PolynomialFit or InnovationsFit
+    Fit
         Estimates with 95 % intervals that carry the errors of the data through the fit,
         Cramér–Rao bounds and insensitivities, costs, correlations, findings.
 
@@ -373,8 +291,6 @@ def identify(
     >>> round(fit.parameters["Lp"].value, 6), round(fit.parameters["Ltphi"].value, 6)
     (-6.0, 180.0)
     """
-    chosen = _method(model, data, method)
-    result: Fit | NarxFit | PolynomialFit | InnovationsFit = chosen.fit(
-        model, data, _options(chosen, options)
-    )
-    return result
+    name, chosen = _method(model, data, method)
+    fit: Fit = chosen.fit(model, data, _options(chosen, options))
+    return replace(fit, structure=model, method=name)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from flightid.errors import FitError, OptionError
-from flightid.identification.fit import LocalMinimum
+from flightid.identification.local_minimum import LocalMinimum
 from flightid.models import Parameter
 
 Array = NDArray[np.float64]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,9 +11,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import OptionError
 from flightid.identification.fit import Fit
-from flightid.identification.prediction_error.result import PolynomialFit
-from flightid.identification.subspace.result import InnovationsFit
-from flightid.models import GreyBoxModel, InnovationsModel, PolynomialModel
+from flightid.models import Model, PolynomialModel
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.uncertain import Uncertain
 
@@ -27,7 +26,7 @@ def uncertain_of(
 
     Parameters
     ----------
-    source : Fit, PolynomialFit, InnovationsFit, FrequencyResponse, or a model or system
+    source : Fit, FrequencyResponse, or a model or system
         A model without fit has no covariance: what is computed from it has no interval. Of a
         polynomial model its own covariance is taken.
     output, input : str, optional
@@ -68,63 +67,30 @@ def uncertain_of(
         return source
     if isinstance(source, Fit):
         return _of_fit(source)
-    polynomial = source.model if isinstance(source, PolynomialFit) else source
-    if isinstance(polynomial, PolynomialModel):
-        return _of_polynomial(polynomial)
-    if isinstance(source, InnovationsFit):
-        return _of_innovations(source)
+    if isinstance(source, PolynomialModel) and source.covariance is not None:
+        return _of_numbers(source, source.names, source.covariance, None)
     if isinstance(source, FrequencyResponse):
         return _of_response(source, output, input)
     return Uncertain.exact(source, NO_COVARIANCE)
 
 
-def _of_fit(fit: Fit) -> Uncertain[GreyBoxModel]:
-    model, names = fit.model, fit.names
-    centre = np.array([fit.parameters[name].value for name in names])
-    parameters = [model.parameters[name] for name in names]
+def _of_fit(fit: Fit) -> Uncertain[Model]:
+    if fit.covariance is None:
+        return Uncertain.exact(fit.model, "the fit knows no errors of its data")
+    parameters = [fit.model.parameters[name] for name in fit.names]
     bounds = np.array([p.minimum for p in parameters]), np.array([p.maximum for p in parameters])
+    return _of_numbers(fit.model, fit.names, fit.covariance, bounds)
 
-    def make(numbers: Array) -> GreyBoxModel:
+
+def _of_numbers(
+    model: Model, names: Sequence[str], covariance: Array, bounds: tuple[Array, Array] | None
+) -> Uncertain[Model]:
+    centre = np.array([model.parameters[name].value for name in names], dtype=np.float64)
+
+    def make(numbers: Array) -> Model:
         return model.with_values(dict(zip(names, map(float, numbers), strict=True)))
 
-    reason = "" if fit.covariance is not None else "the fit knows no errors of its data"
-    return Uncertain(centre, fit.covariance, make, bounds, reason)
-
-
-def _of_polynomial(model: PolynomialModel) -> Uncertain[PolynomialModel]:
-    structure = model.structure
-
-    def make(numbers: Array) -> PolynomialModel:
-        return PolynomialModel.from_theta(
-            structure,
-            numbers,
-            model.sample_time_s,
-            noise_variance=model.noise_variance,
-            covariance=model.covariance,
-            units=model.units,
-            name=model.name,
-            operating_point=model.operating_point,
-        )
-
-    reason = "" if model.covariance is not None else NO_COVARIANCE
-    return Uncertain(model.theta, model.covariance, make, None, reason)
-
-
-def _of_innovations(fit: InnovationsFit) -> Uncertain[InnovationsModel]:
-    model = fit.model
-    keys = "abcdk" if fit.structure.direct else "abck"
-    parts = {key: np.asarray(getattr(model, key)) for key in keys}
-    cuts = np.cumsum([part.size for part in parts.values()])[:-1]
-
-    def make(numbers: Array) -> InnovationsModel:
-        pieces = np.split(numbers, cuts)
-        shaped = {k: p.reshape(parts[k].shape) for k, p in zip(parts, pieces, strict=True)}
-        changes: dict[str, Any] = dict(shaped)
-        return replace(model, **changes)
-
-    centre = np.concatenate([part.ravel() for part in parts.values()])
-    reason = "" if fit.covariance is not None else "the fit gave no covariance"
-    return Uncertain(centre, fit.covariance, make, None, reason)
+    return Uncertain(centre, covariance, make, bounds)
 
 
 def _of_response(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol, runtime_checkable
+from typing import Protocol, Self, runtime_checkable
 
 from flightid.errors import ModelError
 from flightid.models.linear.linear_system import LinearSystem
@@ -48,6 +48,10 @@ class Model(Protocol):
     @property
     def sample_time_s(self) -> float | None:
         """Sample time, s; None for continuous time."""
+        ...
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """Copy with other values of some parameters."""
         ...
 
     def linear_system(self) -> LinearSystem:

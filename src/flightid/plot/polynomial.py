@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from flightid.identification import ImpulseResponse, InnovationsFit, PolynomialFit
+from flightid.identification import Fit, ImpulseResponse
 from flightid.identification.subspace.roots import ALL
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.plot import look
@@ -84,12 +84,13 @@ def order_scan(scan: OrderScan, taken: PolynomialStructure | None = None) -> go.
     return made
 
 
-def pole_zero(fit: PolynomialFit | InnovationsFit, response: str | None = None) -> go.Figure:
+def pole_zero(fit: Fit, response: str | None = None) -> go.Figure:
     """Draw poles and zeros in the z plane with 95 % ellipses, and the unit circle.
 
     Parameters
     ----------
-    fit : PolynomialFit or InnovationsFit
+    fit : Fit
+        Of a polynomial or innovations model.
     response : str, optional
         ``"output/input"``; default: the first.
 
@@ -97,9 +98,8 @@ def pole_zero(fit: PolynomialFit | InnovationsFit, response: str | None = None) 
     -------
     plotly.graph_objects.Figure
     """
-    output = fit.model.outputs[0] if isinstance(fit, InnovationsFit) else fit.model.output
-    name = response or f"{output}/{fit.model.inputs[0]}"
-    within = [root for root in fit.roots if root.response in (name, ALL)]
+    name = response or f"{fit.model.outputs[0]}/{fit.model.inputs[0]}"
+    within = [root for root in fit.details.roots if root.response in (name, ALL)]
     made = look.figure(1, height_px=560)
     angle = np.linspace(0.0, 2 * np.pi, 181)
     made.add_trace(

@@ -15,7 +15,7 @@ def singular_values(order: OrderChoice) -> go.Figure:
     Parameters
     ----------
     order : OrderChoice
-        Of an `InnovationsFit`.
+        Of a fit's `SubspaceDetails`.
 
     Returns
     -------

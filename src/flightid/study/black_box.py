@@ -8,7 +8,7 @@ from typing import Any
 
 from flightid.conventions import Light, Role
 from flightid.findings import Finding
-from flightid.identification import NarxFit, PolynomialFit, identify
+from flightid.identification import Fit, identify
 from flightid.models import NarxStructure, PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
@@ -27,7 +27,6 @@ from flightid.validation import (
     search_narx,
 )
 
-BlackBoxFit = PolynomialFit | NarxFit
 N_FREQUENCIES = 60
 AS_GOOD = 0.10
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
@@ -47,7 +46,7 @@ class BlackBox:
         The coherence test; inputs it does not keep are left out.
     choice : OrderScan, NarxSearch or None
         Structures that were tried, where there were several.
-    fit : PolynomialFit, NarxFit or None
+    fit : Fit or None
         None where no input is left.
     tests : ResidualTests or None
         Of errors one step ahead on the records of the fit.
@@ -61,7 +60,7 @@ class BlackBox:
     response: FrequencyResponse
     coherent: CoherentPairs
     choice: OrderScan | NarxSearch | None = None
-    fit: BlackBoxFit | None = None
+    fit: Fit | None = None
     tests: ResidualTests | None = None
     cross: CrossValidation | None = None
     spectra: SpectrumComparison | None = None
@@ -86,14 +85,15 @@ class BlackBox:
     def goal_findings(self) -> tuple[Finding, ...]:
         """Whether the sum of squares that was asked for was reached."""
         fit = self.fit
-        if not isinstance(fit, NarxFit) or fit.model.stop != "sse":
+        structure = None if fit is None else fit.structure
+        if fit is None or not isinstance(structure, NarxStructure) or structure.stop != "sse":
             return ()
-        reached = fit.chosen[-1].sum_of_squares
-        if reached <= fit.model.goal:
+        reached = fit.objective
+        if reached <= structure.goal:
             return ()
         message = (
-            f"the sum of squares is {reached:.3g} after {len(fit.chosen)} terms; the goal of "
-            f"{fit.model.goal:.3g} was not reached"
+            f"the sum of squares is {reached:.3g} after {len(fit.parameters)} terms; the goal of "
+            f"{structure.goal:.3g} was not reached"
         )
         action = "sensor noise may lie above the goal: stop by 'press', or allow more terms"
         return (Finding("goal-not-reached", Light.AMBER, message, action),)
@@ -179,7 +179,7 @@ def identify_black_box(settings: BlackBoxSettings, records: Mapping[str, Record]
         coherent,
         choice,
         fit,
-        _tests(fit, flown),
+        residual_tests(fit),
         cross_validate(fit, taken(settings.verify)) if settings.verify else None,
         compare_spectra(seen, run.predicted_record()),
     )
@@ -196,7 +196,7 @@ def _polynomial(
     inputs: tuple[str, ...],
     flown: list[Record],
     unseen: list[Record],
-) -> tuple[OrderScan | None, PolynomialFit]:
+) -> tuple[OrderScan | None, Fit]:
     if not settings.is_scanned:
         orders: dict[str, Any] = {name: values[0] for name, values in settings.orders.items()}
         asked = PolynomialModel.general(inputs, settings.output, **orders, **settings.options)
@@ -232,7 +232,7 @@ def _narx(
     inputs: tuple[str, ...],
     flown: list[Record],
     unseen: list[Record],
-) -> tuple[NarxSearch | None, NarxFit]:
+) -> tuple[NarxSearch | None, Fit]:
     outputs_back, inputs_back = settings.orders["output_lags"], settings.orders["input_lags"]
     model = NarxStructure(
         settings.output,
@@ -247,11 +247,3 @@ def _narx(
     pairs = [(a, b) for a in outputs_back for b in inputs_back]
     search = search_narx(model, flown, unseen, lags=pairs, widths=settings.widths)
     return search, search.best
-
-
-def _tests(fit: BlackBoxFit, flown: list[Record]) -> ResidualTests:
-    if isinstance(fit, PolynomialFit):
-        return residual_tests(fit)
-    runs = cross_validate(fit, flown, horizons=(1,)).runs
-    left = [run.residual_record() for run in runs if run.model == "model"]
-    return residual_tests(left, horizon="one step ahead")

@@ -7,7 +7,9 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from flightid.findings import Finding, worst
-from flightid.identification import PolynomialFit
+from flightid.identification import Fit
+from flightid.identification.prediction_error.details import PolynomialDetails
+from flightid.models import PolynomialStructure
 from flightid.plot import look
 from flightid.plot.cross_validation import cross_runs
 from flightid.plot.frequency_response import Curve, bode
@@ -20,7 +22,7 @@ from flightid.table import Cell, Column, Table
 from flightid.validation import CrossRun, OrderScan, Verdict
 
 if TYPE_CHECKING:
-    from flightid.study.black_box import BlackBox, BlackBoxFit
+    from flightid.study.black_box import BlackBox
 
 HZ = 1 / (2 * math.pi)
 
@@ -59,7 +61,7 @@ def _row(item: BlackBox) -> tuple[Cell, ...]:
         reasons = "; ".join(pair.reason for pair in item.coherent.pairs)
         return (name, "left out", None, None, None, None, reasons)
     structure = structure_words(item.fit)
-    modes = modes_words(item.fit) if isinstance(item.fit, PolynomialFit) else None
+    modes = modes_words(item.fit) if isinstance(item.fit.details, PolynomialDetails) else None
     free = [] if item.cross is None else _free_runs(item.cross.runs)
     lost = [finding.message for finding in item.left_out]
     return (
@@ -84,19 +86,23 @@ def _passed(item: BlackBox) -> str | None:
     return f"{passed} of {passed + len(item.tests.counted(Verdict.FAIL))}"
 
 
-def structure_words(fit: BlackBoxFit) -> str:
+def structure_words(fit: Fit) -> str:
     """Structure of a fit in a few words."""
-    if isinstance(fit, PolynomialFit):
-        return f"{fit.structure.kind}, {fit.structure.orders_text}"
-    model = fit.model
-    kind = model.kernel or "polynomial"
-    return f"NARX {model.output_lags} + {model.input_lags} lags, {kind}, {len(fit.chosen)} terms"
+    structure = fit.structure
+    if isinstance(structure, PolynomialStructure):
+        return f"{structure.kind}, {structure.orders_text}"
+    lags = f"{structure.output_lags} + {structure.input_lags} lags"
+    return f"NARX {lags}, {structure.kernel or 'polynomial'}, {len(fit.parameters)} terms"
 
 
-def modes_words(fit: PolynomialFit) -> str:
+def _is_linear(fit: Fit) -> bool:
+    return isinstance(fit.details, PolynomialDetails)
+
+
+def modes_words(fit: Fit) -> str:
     """Natural frequencies in Hz with half-widths, and dampings, in words."""
     said = []
-    for root in fit.modes:
+    for root in fit.details.modes:
         frequency, damping = root.natural_frequency, root.damping
         if frequency is None or damping is None:
             continue
@@ -172,7 +178,7 @@ def _bode_figure(item: BlackBox, name: str) -> Figure:
         )
     ]
     shown = f"{output} to {name}: estimate with its 95 % band of random error, and coherence"
-    if isinstance(fit, PolynomialFit) and name in fit.model.inputs:
+    if fit is not None and name in fit.model.inputs and _is_linear(fit):
         place = fit.model.inputs.index(name)
         response = fit.model.frequency_response(pair.omega_rad_s)[0, place]
         curves.append(Curve("model", pair.omega_rad_s, response, colour=look.MODEL))
@@ -187,7 +193,7 @@ def _choice(item: BlackBox) -> tuple[Block, ...]:
         return () if choice is None else result_blocks(choice)
     shown = "Every structure tried: error in free run on the selection records, and BIC of the fit."
     words = f"Chosen by “{item.settings.choose}”"
-    taken = item.fit.structure if isinstance(item.fit, PolynomialFit) else None
+    taken = item.fit.structure if item.fit is not None and _is_linear(item.fit) else None
     if taken is not None:
         words += f": {taken.orders_text}"
     if item.settings.choose == "balanced":
@@ -208,13 +214,14 @@ def _choice(item: BlackBox) -> tuple[Block, ...]:
     )
 
 
-def _model(fit: BlackBoxFit) -> tuple[Block, ...]:
-    if not isinstance(fit, PolynomialFit):
-        return result_blocks(fit)
+def _model(fit: Fit) -> tuple[Block, ...]:
+    if not _is_linear(fit):
+        beside = (TableBlock(table) for table in fit.details.tables())
+        return (*result_blocks(fit), *beside)
     picture = figure_block(pole_zero(fit), "Poles and zeros with 95 % ellipses.")
     return (
         *result_blocks(fit, title="Coefficients"),
-        TableBlock(fit.roots_table()),
+        TableBlock(fit.details.roots_table()),
         picture,
     )
 

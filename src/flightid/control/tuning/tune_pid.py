@@ -71,7 +71,7 @@ def tune_pid(
 
     Parameters
     ----------
-    fit : Fit, PolynomialFit, InnovationsFit, or with `nominal` a model
+    fit : Fit, or with `nominal` a model
         From the autopilot's output (mixer command, torque set-point) to the rate.
     gains : AxisLoop, Log or mapping of str to float
         As flown: the axis of `flightid.control.autopilots`, the log of the flight, or parameters

@@ -32,7 +32,7 @@ def modes(source: object, *, states: Mapping[str, str] | None = None) -> Modes:
 
     Parameters
     ----------
-    source : Fit, PolynomialFit, InnovationsFit, or a model or LinearSystem
+    source : Fit, or a model or LinearSystem
         A model alone has no intervals. Delays add no modes; noise models are left out.
     states : mapping of str to str, optional
         Conventional names (u, w, q, theta, …) of states that the model calls something else, for

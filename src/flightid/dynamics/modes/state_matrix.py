@@ -82,7 +82,7 @@ def read_states(source: object, states: Mapping[str, str]) -> StateMatrix:
 
     Parameters
     ----------
-    source : Fit, PolynomialFit, InnovationsFit, model or LinearSystem
+    source : Fit, model or LinearSystem
     states : mapping of str to str
         Conventional name by the model's own name of a state.
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError, FitError, OptionError
 from flightid.findings import Finding
-from flightid.identification.fit import Fit, FittedResponse
+from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
     judge_correlation,
     judge_cost,
@@ -23,6 +23,7 @@ from flightid.identification.fit_findings import (
     judge_parameters,
     judge_search,
 )
+from flightid.identification.fitted_response import FittedResponse
 from flightid.identification.frequency_domain.bias_rounds import (
     BiasRounds,
     iterate,

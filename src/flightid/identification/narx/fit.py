@@ -7,55 +7,123 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import DataError, FitError, SingularError
+from flightid.identification.black_box import (
+    BlackBoxEstimates,
+    BlackBoxRuns,
+    black_box_fit,
+    provenance_of,
+)
+from flightid.identification.fit import Fit
+from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.narx.candidates import (
     CandidateTerms,
     candidate_terms,
     product_columns,
 )
+from flightid.identification.narx.details import ChosenTerm, NarxDetails
 from flightid.identification.narx.findings import collinear_finding, free_run_findings
 from flightid.identification.narx.regressors import Regressors, regressors_of, scaling_of
-from flightid.identification.narx.result import ChosenTerm, NarxFit
 from flightid.models.narx.model import NarxModel
+from flightid.models.narx.prediction import NarxPrediction
 from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.structure import NarxStructure
 from flightid.record import Record
+from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
 # Radial candidates beyond this are computed when they are read instead of being kept.
 MAXIMUM_BYTES = 1 << 30
+_CHANNELS = ("output", "inputs")
 
 
-def fit_narx(model: NarxStructure, data: Record | Sequence[Record]) -> NarxFit:
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Chosen terms, how many candidates are combinations of them, covariance of the weights."""
+
+    chosen: tuple[ChosenTerm, ...]
+    collinear: int
+    covariance: Array
+
+
+def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
     """Choose terms by error reduction and fit them; the linear model of the same lags beside it.
 
     Reference: Chen, Cowan & Grant, IEEE Trans. Neural Networks 2 (1991), section III; penalties:
     Chen, Neurocomputing 69 (2006).
     """
-    records = [data] if isinstance(data, Record) else list(data)
-    scaling = scaling_of(model, records)
-    chosen_on, estimated_on = regressors_of(model, scaling, records)
-    candidates = candidate_terms(model, chosen_on.vectors)
-    chosen, collinear = _select(model, candidates, chosen_on)
-    if model.held_back:
-        chosen = _estimated(model, chosen, estimated_on)
-    equation = _equation(model, scaling, chosen)
-    baseline = _baseline(model, scaling, records)
-    one_step, _ = _rms(equation, records, 1)
-    free, held = _rms(equation, records, "free_run")
-    linear_free, _ = _rms(baseline, records, "free_run")
-    findings = (
-        *collinear_finding(collinear, len(chosen)),
-        *free_run_findings(free, linear_free, held),
+    records = (data,) if isinstance(data, Record) else tuple(data)
+    scaling = scaling_of(structure, records)
+    chosen_on, estimated_on = regressors_of(structure, scaling, records)
+    candidates = candidate_terms(structure, chosen_on.vectors)
+    selection = _select(structure, candidates, chosen_on)
+    collinear = selection.collinear
+    if structure.held_back:
+        selection = _estimated(structure, selection.chosen, estimated_on)
+    chosen = selection.chosen
+    model = _model(structure, scaling, chosen)
+    baseline = _baseline(structure, scaling, records)
+    flown = tuple(record for record in records if record.n_samples > structure.longest_lag)
+    one_step, free, linear = (
+        [each.predict(record, horizon) for record in flown]
+        for each, horizon in ((model, 1), (model, "free_run"), (baseline, "free_run"))
     )
-    n_samples = estimated_on.target.size
-    return NarxFit(equation, baseline, chosen, one_step, free, linear_free, n_samples, findings)
+    details = NarxDetails(
+        baseline,
+        chosen,
+        _rms(one_step),
+        _rms(free),
+        _rms(linear),
+        estimated_on.target.size,
+        scaling.units[structure.output],
+    )
+    errors = tuple(np.subtract(*run.scored)[None] for run in one_step)
+    squares = sum(float(np.sum(row**2)) for row in errors)
+    weights = {item.term.name: item.weight for item in chosen}
+    arrays = [record.matrix([structure.output, *structure.inputs]) for record in records]
+    options = {name: value for name, value in asdict(structure).items() if name not in _CHANNELS}
+    return black_box_fit(
+        model,
+        BlackBoxRuns(flown, tuple(run.predicted[None] for run in free), errors),
+        BlackBoxEstimates(
+            _parameters(structure, chosen),
+            tuple(weights),
+            selection.covariance if structure.held_back else None,
+        ),
+        (LocalMinimum(chosen[-1].sum_of_squares, 1, weights, structure.stop),),
+        iterations=len(chosen),
+        noise_covariance=np.array([[squares / max(details.n_samples - len(chosen), 1)]]),
+        findings=(
+            *collinear_finding(collinear, len(chosen)),
+            *free_run_findings(
+                details.free_run_rms, details.baseline_free_run_rms, _held(flown, free)
+            ),
+        ),
+        provenance=provenance_of(
+            "orthogonal least squares", records, arrays, [scaling.mean] * len(records), options
+        ),
+        details=details,
+    )
+
+
+def _parameters(structure: NarxStructure, chosen: Sequence[ChosenTerm]) -> dict[str, Estimate]:
+    """Weights by term; errors hold in spite of the choice only where samples were held back."""
+    if structure.held_back:
+        return {
+            item.term.name: Estimate(item.term.name, item.weight, "1", item.stderr, status="free")
+            for item in chosen
+        }
+    reason = "standard errors ignore the choice of terms: see held_back"
+    return {
+        item.term.name: Estimate(item.term.name, item.weight, "1", None, reason, status="free")
+        for item in chosen
+    }
 
 
 def _baseline(model: NarxStructure, scaling: Scaling, records: Sequence[Record]) -> NarxModel:
@@ -74,17 +142,16 @@ def _baseline(model: NarxStructure, scaling: Scaling, records: Sequence[Record])
     )
     data, _ = regressors_of(linear, scaling, records)
     candidates = replace(candidate_terms(linear, data.vectors), forced=0)
-    return _equation(linear, scaling, _select(linear, candidates, data)[0])
+    return _model(linear, scaling, _select(linear, candidates, data).chosen)
 
 
-def _equation(model: NarxStructure, scaling: Scaling, chosen: Sequence[ChosenTerm]) -> NarxModel:
+def _model(structure: NarxStructure, scaling: Scaling, chosen: Sequence[ChosenTerm]) -> NarxModel:
     terms = tuple(item.term for item in chosen)
-    return NarxModel(model, terms, tuple(item.weight for item in chosen), scaling)
+    weights = tuple(item.weight for item in chosen)
+    return NarxModel(structure, terms, weights, scaling, f"NARX model of {structure.output}")
 
 
-def _estimated(
-    model: NarxStructure, chosen: Sequence[ChosenTerm], data: Regressors
-) -> tuple[ChosenTerm, ...]:
+def _estimated(model: NarxStructure, chosen: Sequence[ChosenTerm], data: Regressors) -> Selection:
     """Weights of chosen terms by least squares on samples that took no part in the choice."""
     products = tuple(item.term for item in chosen if not item.term.centre)
     radial = tuple(item.term for item in chosen if item.term.centre)
@@ -97,12 +164,10 @@ def _estimated(
         )
     everything = CandidateTerms(products, radial, len(chosen))
     plain = replace(model, stop="terms", maximum_terms=len(chosen))
-    return _select(plain, everything, data)[0]
+    return _select(plain, everything, data)
 
 
-def _select(
-    model: NarxStructure, candidates: CandidateTerms, data: Regressors
-) -> tuple[tuple[ChosenTerm, ...], int]:
+def _select(model: NarxStructure, candidates: CandidateTerms, data: Regressors) -> Selection:
     target, forced = data.target, candidates.forced
     try:
         order, reduction, squares, press, weights, penalties, factor, collinear = (
@@ -133,42 +198,34 @@ def _select(
         raise FitError(
             "no term explains any of the output", action="allow linear terms or other lags"
         )
-    errors = _standard_errors(factor.reshape(kept, kept), penalties, squares[kept - 1], target.size)
+    spread = _spread(factor.reshape(kept, kept), penalties, squares[kept - 1], target.size)
+    errors = np.linalg.norm(spread, axis=1)
     terms = candidates.terms
     columns = (weights, errors, reduction, squares, press, penalties)
     chosen = tuple(
         ChosenTerm(terms[index], *map(float, values))
         for index, values in zip(order[:kept], zip(*columns, strict=False), strict=True)
     )
-    return chosen, collinear
+    return Selection(chosen, collinear, spread @ spread.T)
 
 
-def _standard_errors(factor: Array, penalties: Array, squares: float, n: int) -> Array:
-    """Standard errors of the weights in white noise; with penalties those of Bayes' posterior."""
+def _spread(factor: Array, penalties: Array, squares: float, n: int) -> Array:
+    """L with covariance L Lᵀ of the weights in white noise; with penalties Bayes' posterior."""
     lengths = np.diag(factor) ** 2
     determined = lengths / (lengths + penalties)
     residual = math.sqrt(squares / (n - float(np.sum(determined))))
-    spread: Array = residual * np.linalg.norm(np.linalg.inv(factor) * np.sqrt(determined), axis=1)
-    return spread
+    return np.asarray(residual * (np.linalg.inv(factor) * np.sqrt(determined)))
 
 
-def _rms(
-    equation: NarxModel, records: Sequence[Record], horizon: int | str
-) -> tuple[float, str | None]:
-    """Error over all records that are longer than the lags, and where the guard first held it."""
-    start = max(lag.lag for lag in equation.structure.lags)
-    runs = [
-        (record.name, equation.predict(record, horizon))
-        for record in records
-        if record.n_samples > start
-    ]
-    errors = np.concatenate([np.subtract(*run.scored) for _, run in runs])
-    held = next(
-        (
-            f"record {name!r}, sample {run.diverged_at}"
-            for name, run in runs
-            if run.diverged_at is not None
-        ),
-        None,
-    )
-    return float(np.sqrt(np.mean(errors**2))), held
+def _rms(runs: Sequence[NarxPrediction]) -> float:
+    """Error over all records after the lags."""
+    errors = np.concatenate([np.subtract(*run.scored) for run in runs])
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def _held(records: Sequence[Record], runs: Sequence[NarxPrediction]) -> str | None:
+    """Where the guard first held a run."""
+    for record, run in zip(records, runs, strict=True):
+        if run.diverged_at is not None:
+            return f"record {record.name!r}, sample {run.diverged_at}"
+    return None

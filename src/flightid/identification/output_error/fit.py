@@ -201,7 +201,8 @@ def _overgrown(
         return fitted
     options = FourierOutputErrorOptions(hold="first" if prepared.first_order_hold else "zero")
     try:
-        return fit_fourier_output_error(model, prepared.records, options).model
+        found: GreyBoxModel = fit_fourier_output_error(model, prepared.records, options).model
+        return found
     except FlightidError:
         # A nonlinear model, or records too short to transform: what was found is all there is.
         return fitted

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.identification.fit import LocalMinimum
+from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.roots import POLE, ZERO, FittedRoot
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -11,22 +10,29 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import DataError, FitError
-from flightid.identification.fit import LocalMinimum
+from flightid.identification.black_box import (
+    BlackBoxEstimates,
+    BlackBoxRuns,
+    black_box_fit,
+    provenance_of,
+)
+from flightid.identification.fit import Fit
+from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.backcast import backcast
+from flightid.identification.prediction_error.details import FitScore, PolynomialDetails
 from flightid.identification.prediction_error.findings import judge_polynomial
 from flightid.identification.prediction_error.information_criteria import criteria
 from flightid.identification.prediction_error.instrumental_variables import four_stage
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
 from flightid.identification.prediction_error.linear_regression import regress, require_independent
-from flightid.identification.prediction_error.result import FitScore, PolynomialFit
 from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
 from flightid.identification.prediction_error.starts import polynomial_starts
 from flightid.models.polynomial.model import PolynomialModel
+from flightid.models.polynomial.prediction import PolynomialPrediction
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 from flightid.uncertainty.estimate import Estimate
-from flightid.version import VERSION
 
 Array = NDArray[np.float64]
 BACKCASTS = 6
@@ -49,9 +55,7 @@ class _Found:
     skip: int
 
 
-def fit_polynomial(
-    structure: PolynomialStructure, data: Record | Sequence[Record]
-) -> PolynomialFit:
+def fit_polynomial(structure: PolynomialStructure, data: Record | Sequence[Record]) -> Fit:
     """Fit a polynomial structure to records; the structure holds all options.
 
     Reference: Ljung, *System Identification*, 2nd ed., sections 10.2, 10.3, 9.4 and 15.3.
@@ -210,7 +214,7 @@ def _assemble(
     records: tuple[Record, ...],
     data: SampledChannels,
     found: _Found,
-) -> PolynomialFit:
+) -> Fit:
     errors = _native.polynomial_errors(
         data.output,
         data.inputs,
@@ -223,7 +227,6 @@ def _assemble(
     counted = tuple(errors[span][found.skip :] for span in data.spans)
     squares = float(sum(row @ row for row in counted))
     n_counted = sum(row.size for row in counted)
-    measures = criteria(squares, n_counted, structure.n_parameters)
     model = PolynomialModel.from_theta(
         structure,
         found.theta,
@@ -238,33 +241,42 @@ def _assemble(
         replace(m, objective=squares) if m.objective == 0.0 and found.iterations == 0 else m
         for m in found.minima
     )
-    parameters = _parameters(structure, model, found)
+    parameters = _parameters(model, found)
     roots = fitted_roots(model, found.degrees)
-    return PolynomialFit(
+    runs = [model.predict(record, "free_run", offsets=structure.offsets) for record in records]
+    return black_box_fit(
         model,
-        structure,
-        parameters,
-        roots,
-        fitted_gains(model, found.degrees),
-        measures,
-        _scores(structure, model, records, data, counted),
-        records,
-        counted,
+        BlackBoxRuns(
+            records,
+            tuple(run.predicted[None] for run in runs),
+            tuple(row[None] for row in counted),
+            # Output error and instruments promise no white errors.
+            white=structure.kind != "OE" and structure.method != "iv4",
+        ),
+        BlackBoxEstimates(parameters, structure.names, found.covariance),
         minima,
-        minima[0].termination,
-        found.iterations,
-        judge_polynomial(structure, model, parameters, roots, minima, n_counted),
-        _provenance(structure, records, data),
+        iterations=found.iterations,
+        noise_covariance=np.array([[squares / found.degrees]]),
+        findings=judge_polynomial(structure, model, parameters, roots, minima, n_counted),
+        provenance=_provenance(structure, records, data),
+        details=PolynomialDetails(
+            roots,
+            fitted_gains(model, found.degrees),
+            criteria(squares, n_counted, structure.n_parameters),
+            {structure.output: _scores(structure, runs, data, counted)},
+            model.difference_equation(),
+            spent=(
+                structure.na + structure.nc + structure.nd,
+                max((b + f for b, f in zip(structure.nb, structure.nf, strict=True)), default=0),
+            ),
+        ),
     )
 
 
-def _parameters(
-    structure: PolynomialStructure, model: PolynomialModel, found: _Found
-) -> dict[str, Estimate]:
+def _parameters(model: PolynomialModel, found: _Found) -> dict[str, Estimate]:
     made = {}
-    units = _units(structure, model)
-    for place, (name, value) in enumerate(zip(structure.names, found.theta.tolist(), strict=True)):
-        unit = units[place]
+    for place, (name, coefficient) in enumerate(model.parameters.items()):
+        unit, value = coefficient.unit, float(found.theta[place])
         if found.covariance is None:
             reason = "the data do not tell the coefficients apart"
             made[name] = Estimate(name, value, unit, None, reason, status="free")
@@ -274,28 +286,16 @@ def _parameters(
     return made
 
 
-def _units(structure: PolynomialStructure, model: PolynomialModel) -> list[str]:
-    """B carries output over input, everything else is a plain number."""
-    found = ["1"] * structure.na
-    above = model.units.get(structure.output, "1")
-    for name, count in zip(structure.inputs, structure.nb, strict=True):
-        below = model.units.get(name, "1")
-        found += [above if below == "1" else f"{above}/({below})"] * count
-    return found + ["1"] * (structure.n_parameters - len(found))
-
-
 def _scores(
     structure: PolynomialStructure,
-    model: PolynomialModel,
-    records: Sequence[Record],
+    runs: Sequence[PolynomialPrediction],
     data: SampledChannels,
     counted: Sequence[Array],
-) -> tuple[FitScore, ...]:
+) -> tuple[FitScore, FitScore]:
     """One step with the errors of the fit, and free run, over all records of the fit."""
     about = np.concatenate([data.output[span] - data.output[span].mean() for span in data.spans])
     size = float(np.sqrt(about @ about))
     one_step = np.concatenate(counted)
-    runs = [model.predict(record, "free_run", offsets=structure.offsets) for record in records]
     free = np.concatenate([run.residual for run in runs])
     started = {
         "estimate": "an estimated state",
@@ -317,23 +317,15 @@ def _scores(
 def _provenance(
     structure: PolynomialStructure, records: Sequence[Record], data: SampledChannels
 ) -> dict[str, object]:
-    digest = hashlib.sha256(data.output.tobytes())
-    digest.update(np.ascontiguousarray(data.inputs).tobytes())
-    return {
-        "method": structure.method.replace("_", " "),
-        "flightid": VERSION,
-        "data_sha256": digest.hexdigest(),
-        "data_history": [str(step) for record in records for step in record.history],
-        "records": [record.name for record in records],
-        "offsets": [dict(row) for row in data.offsets],
-        "options": {
-            "initial_state": structure.initial_state,
-            "backcast": structure.backcast,
-            "offsets": structure.offsets,
-            "enforce_stability": structure.enforce_stability,
-            "kernel": structure.kernel,
-            "starts": structure.starts,
-            "seed": structure.seed,
-            "maximum_iterations": structure.maximum_iterations,
-        },
+    options = {
+        "initial_state": structure.initial_state,
+        "backcast": structure.backcast,
+        "offsets": structure.offsets,
+        "enforce_stability": structure.enforce_stability,
+        "kernel": structure.kernel,
+        "starts": structure.starts,
+        "seed": structure.seed,
+        "maximum_iterations": structure.maximum_iterations,
     }
+    method = structure.method.replace("_", " ")
+    return provenance_of(method, records, (data.output, data.inputs), data.offsets, options)

@@ -2,32 +2,39 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import asdict
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.identification.prediction_error.result import FitScore
+from flightid.identification.black_box import (
+    BlackBoxEstimates,
+    BlackBoxRuns,
+    black_box_fit,
+    provenance_of,
+)
+from flightid.identification.fit import Fit
+from flightid.identification.local_minimum import LocalMinimum
+from flightid.identification.prediction_error.details import FitScore
 from flightid.identification.prediction_error.roots import Errors
 from flightid.identification.subspace.data import SubspaceData, gather
+from flightid.identification.subspace.details import SubspaceDetails
 from flightid.identification.subspace.estimate import Matrices, decompose
 from flightid.identification.subspace.findings import judge_innovations
 from flightid.identification.subspace.order import OrderChoice, choose_order, determinant_criteria
 from flightid.identification.subspace.prediction_errors import Refined, refine
-from flightid.identification.subspace.result import InnovationsFit
 from flightid.identification.subspace.roots import innovations_gains, innovations_roots
 from flightid.models.innovations.model import InnovationsModel
-from flightid.models.innovations.prediction import one_step_errors
+from flightid.models.innovations.prediction import InnovationsPrediction, one_step_errors
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.record import Record
-from flightid.version import VERSION
+from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
 
 
-def fit_subspace(structure: SubspaceStructure, data: Record | Sequence[Record]) -> InnovationsFit:
+def fit_subspace(structure: SubspaceStructure, data: Record | Sequence[Record]) -> Fit:
     """Fit an innovations model to records; the structure holds all options.
 
     Reference: Ljung, *System Identification*, 2nd ed., sections 10.6 and 7.3.
@@ -72,7 +79,7 @@ def _assemble(
     data: SubspaceData,
     choice: OrderChoice,
     found: Refined,
-) -> InnovationsFit:
+) -> Fit:
     size = data.scales
     errors = tuple(size[:, None] * e for e in found.errors)
     joint = np.hstack(errors)
@@ -90,23 +97,39 @@ def _assemble(
     spread = Errors(model.sample_time_s, covariance, found.degrees)
     roots = innovations_roots(model, spread, direct=structure.direct)
     measures = determinant_criteria(joint, size[:, None], structure.n_parameters(model.order))
-    scores = _scores(structure, model, records, errors)
-    return InnovationsFit(
+    runs = [model.predict(record, "free_run", offsets=structure.offsets) for record in records]
+    parameters = _parameters(model)
+    values = {name: item.value for name, item in parameters.items()}
+    names = [name for name in parameters if structure.direct or not name.startswith("d")]
+    return black_box_fit(
         model,
-        structure,
-        choice,
-        roots,
-        innovations_gains(model, spread, direct=structure.direct),
-        covariance,
-        measures,
-        scores,
-        records,
-        errors,
-        found.termination,
-        found.iterations,
-        judge_innovations(structure, model, choice, roots, found.termination),
-        _provenance(structure, records, data),
+        BlackBoxRuns(records, tuple(run.predicted for run in runs), errors),
+        BlackBoxEstimates(parameters, tuple(names), covariance),
+        (LocalMinimum(measures.loss, 1, values, found.termination),),
+        iterations=found.iterations,
+        noise_covariance=np.asarray(model.noise_covariance),
+        findings=judge_innovations(structure, model, choice, roots, found.termination),
+        provenance=_provenance(structure, records, data),
+        details=SubspaceDetails(
+            roots,
+            innovations_gains(model, spread, direct=structure.direct),
+            measures,
+            _scores(structure, runs, errors),
+            repr(choice),
+            # Poles and gains of the predictor shape each correlation; input matrices the other.
+            spent=(2 * model.order, model.order),
+            order=choice,
+        ),
     )
+
+
+def _parameters(model: InnovationsModel) -> dict[str, Estimate]:
+    """Entries of the matrices, without intervals: they turn with the choice of states."""
+    reason = "states are free to turn: see poles, zeros and gains"
+    return {
+        name: Estimate(name, float(item.value or 0.0), item.unit, None, reason, status="free")
+        for name, item in model.parameters.items()
+    }
 
 
 def _in_units(structure: SubspaceStructure, found: Refined, size: Array) -> Array | None:
@@ -122,17 +145,15 @@ def _in_units(structure: SubspaceStructure, found: Refined, size: Array) -> Arra
 
 def _scores(
     structure: SubspaceStructure,
-    model: InnovationsModel,
-    records: Sequence[Record],
+    runs: Sequence[InnovationsPrediction],
     errors: Sequence[Array],
 ) -> dict[str, tuple[FitScore, FitScore]]:
-    runs = [model.predict(record, "free_run", offsets=structure.offsets) for record in records]
     free = np.hstack([run.residual for run in runs])
     step = np.hstack(list(errors))
     started = "rest" if structure.initial_state == "zero" else "an estimated state"
     found = {}
     for place, name in enumerate(structure.outputs):
-        about = np.concatenate([record[name] - record[name].mean() for record in records])
+        about = np.concatenate([run.measured[place] - run.measured[place].mean() for run in runs])
         size = float(np.linalg.norm(about))
 
         def score(words: str, row: Array, size: float = size) -> FitScore:
@@ -149,15 +170,7 @@ def _scores(
 def _provenance(
     structure: SubspaceStructure, records: Sequence[Record], data: SubspaceData
 ) -> dict[str, object]:
-    digest = hashlib.sha256(data.channels.output.tobytes())
-    digest.update(np.ascontiguousarray(data.channels.inputs).tobytes())
-    options = asdict(structure)
-    return {
-        "method": structure.method,
-        "flightid": VERSION,
-        "data_sha256": digest.hexdigest(),
-        "data_history": [str(step) for record in records for step in record.history],
-        "records": [record.name for record in records],
-        "offsets": [dict(row) for row in data.channels.offsets],
-        "options": {key: options[key] for key in options if key not in ("outputs", "inputs")},
-    }
+    channels, options = data.channels, asdict(structure)
+    kept = {key: options[key] for key in options if key not in ("outputs", "inputs")}
+    arrays = (channels.output, channels.inputs)
+    return provenance_of(structure.method, records, arrays, channels.offsets, kept)

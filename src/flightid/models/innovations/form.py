@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.errors import ModelError
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.parameters import Parameter
-from flightid.models.sampled.coefficients import coefficients
+from flightid.models.sampled.coefficients import coefficients, replaced
 from flightid.models.sampled.discrete_modes import DiscreteMode, discrete_modes
 
 Array = NDArray[np.float64]
@@ -153,6 +153,20 @@ class InnovationsForm:
         ]
         values = np.concatenate([matrix.ravel() for matrix in found.values()])
         return coefficients(names, values, ("1",) * len(names))
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """Copy with other values of some entries.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such one.
+        """
+        shapes = [matrix.shape for matrix in self.matrices]
+        cuts = np.cumsum([matrix.size for matrix in self.matrices])[:-1]
+        pieces = np.split(np.array(replaced(self.parameters, values)), cuts)
+        a, b, c, d, k = (row.reshape(shape) for row, shape in zip(pieces, shapes, strict=True))
+        return replace(self, a=a, b=b, c=c, d=d, k=k)
 
     def linear_system(self) -> LinearSystem:
         """The response to the inputs as a recursion; the innovations are left out."""

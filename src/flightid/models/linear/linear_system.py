@@ -120,6 +120,18 @@ class LinearSystem(Rational):
         """None: its entries are numbers without names."""
         return {}
 
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """Copy with other values of some parameters, of which it has none.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such one.
+        """
+        for name in values:
+            raise UnknownNameError("a linear system has no parameters", found=repr(name))
+        return self
+
     def linear_system(self) -> LinearSystem:
         """Itself."""
         return self

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.structure import NarxStructure
 from flightid.models.narx.terms import Lag, Term
 from flightid.models.parameters import Parameter
-from flightid.models.sampled.coefficients import coefficients
+from flightid.models.sampled.coefficients import coefficients, replaced
 from flightid.record import Record
 from flightid.table import Column, Table
 
@@ -83,6 +84,16 @@ class NarxModel:
         """Weights by the names of their terms, of scaled channels."""
         names = [term.name for term in self.terms]
         return coefficients(names, self.weights, ("1",) * len(names))
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """Copy with other values of some weights, by the names of their terms.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such one.
+        """
+        return replace(self, weights=tuple(replaced(self.parameters, values)))
 
     def linear_system(self) -> LinearSystem:
         """A NARX model has none.

@@ -159,6 +159,11 @@ class NarxStructure:
         span = range(self.delay, self.delay + self.input_lags)
         return (*outputs, *(Lag(name, lag) for name in self.inputs for lag in span))
 
+    @property
+    def longest_lag(self) -> int:
+        """Samples before the first that can be predicted."""
+        return max(lag.lag for lag in self.lags)
+
     def __repr__(self) -> str:
         """Structure on one line, the width in β and as it was given."""
         kernel = "no radial terms" if self.kernel is None else f"{self.kernel}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -14,7 +14,7 @@ from flightid.errors import ModelError
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.parameters import Parameter
 from flightid.models.polynomial.structure import PolynomialStructure
-from flightid.models.sampled.coefficients import coefficients
+from flightid.models.sampled.coefficients import coefficients, replaced
 from flightid.models.sampled.discrete_modes import DiscreteMode, discrete_modes, polynomial_roots
 
 Array = NDArray[np.float64]
@@ -220,6 +220,19 @@ class Polynomials:
             below = self.units.get(name, "1")
             found += [above if below == "1" else f"{above}/({below})"] * np.size(row)
         return (*found, *["1"] * (len(self.theta) - len(found)))
+
+    def with_values(self, values: Mapping[str, float]) -> Self:
+        """Copy with other values of some coefficients.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such one.
+        """
+        made = self.from_theta(
+            self.structure, replaced(self.parameters, values), self.sample_time_s
+        )
+        return replace(self, a=made.a, b=made.b, c=made.c, d=made.d, f=made.f)
 
     def linear_system(self) -> LinearSystem:
         """The response to the inputs as a recursion; the noise model is left out."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+from flightid.errors import UnknownNameError
 from flightid.models.parameters import Parameter
 
 
@@ -34,3 +35,26 @@ def coefficients(
     """
     rows = zip(names, values, units, strict=True)
     return {name: Coefficient(name, float(value), unit) for name, value, unit in rows}
+
+
+def replaced(parameters: Mapping[str, Parameter], values: Mapping[str, float]) -> list[float]:
+    """Values of all coefficients in order, some of them replaced.
+
+    Raises
+    ------
+    UnknownNameError
+        There is no such coefficient.
+
+    Example
+    -------
+    >>> replaced(coefficients(["a1", "b1"], [-0.5, 2.0], ["1", "1"]), {"b1": 3.0})
+    [-0.5, 3.0]
+    """
+    for name in values:
+        if name not in parameters:
+            raise UnknownNameError(
+                "there is no such coefficient",
+                found=repr(name),
+                needed=f"one of {', '.join(parameters)}"[:300],
+            )
+    return [float(values.get(name, item.value or 0.0)) for name, item in parameters.items()]

@@ -11,8 +11,8 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.errors import FitError, OptionError
 from flightid.findings import Finding
+from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
-from flightid.identification.narx.result import NarxFit
 from flightid.models.narx.model import NarxModel
 from flightid.models.narx.structure import NarxStructure
 from flightid.progress import track
@@ -39,7 +39,7 @@ class NarxTrial:
     """One structure of a search: its fit (None with the reason where there is none) and scores."""
 
     model: NarxStructure
-    fit: NarxFit | None
+    fit: Fit | None
     score: FreeRunScore | None
     baseline: FreeRunScore | None
     one_step_rms: float | None
@@ -62,7 +62,7 @@ class NarxSearch:
     findings: tuple[Finding, ...]
 
     @property
-    def best(self) -> NarxFit:
+    def best(self) -> Fit:
         """The fit with the smallest free-run error."""
         fit = self.trials[0].fit
         if fit is None:
@@ -161,7 +161,7 @@ def search_narx(
     ...     return fid.Record.from_arrays(np.arange(200) / 5, inputs={"u": u}, outputs={"y": y})
     >>> search = search_narx(fid.NarxStructure("y", ("u",), 1, 1, maximum_terms=8), fly(0), fly(1),
     ...                      lags=[(1, 1), (1, 2)])
-    >>> search.best.model.input_lags, search.trials[0].baseline.rms > search.trials[0].score.rms
+    >>> search.best.structure.input_lags, search.trials[0].baseline.rms > search.trials[0].score.rms
     (2, True)
     """
     unseen = [validation] if isinstance(validation, Record) else list(validation)
@@ -193,15 +193,17 @@ def _trial(
         fit = identify(model, training)
     except FitError as error:
         return NarxTrial(model, None, None, None, None, str(error))
-    one_step = _score(fit.equation, unseen, start, 1).rms
-    score = _score(fit.equation, unseen, start, "free_run")
-    return NarxTrial(model, fit, score, _score(fit.baseline, unseen, start, "free_run"), one_step)
+    one_step = _score(fit.model, unseen, start, 1).rms
+    score = _score(fit.model, unseen, start, "free_run")
+    return NarxTrial(
+        model, fit, score, _score(fit.details.baseline, unseen, start, "free_run"), one_step
+    )
 
 
 def _score(
-    equation: NarxModel, records: Sequence[Record], start: int, horizon: int | str
+    model: NarxModel, records: Sequence[Record], start: int, horizon: int | str
 ) -> FreeRunScore:
-    runs = [equation.predict(record, horizon) for record in records]
+    runs = [model.predict(record, horizon) for record in records]
     measured = np.concatenate([run.measured[start:] for run in runs])
     predicted = np.concatenate([run.predicted[start:] for run in runs])
     return FreeRunScore(
@@ -218,7 +220,7 @@ def _row(trial: NarxTrial) -> tuple[Cell, ...]:
         return (*head, None, None, None, None, None, None, trial.reason)
     return (
         *head,
-        len(trial.fit.chosen),
+        len(trial.fit.details.chosen),
         trial.one_step_rms,
         trial.score.rms,
         trial.score.fit_percent,
@@ -248,7 +250,7 @@ def _findings(best: NarxTrial) -> tuple[Finding, ...]:
                 Light.RED,
                 f"in free run the best model (rms {best.score.rms:.4g}) is worse than the linear "
                 f"model of the same lags (rms {best.baseline.rms:.4g})",
-                "use the linear model (best.baseline)",
+                "use the linear model (best.details.baseline)",
             )
         )
     return tuple(found)

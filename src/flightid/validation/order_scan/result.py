@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.identification.fit import Fit
 from flightid.identification.prediction_error.information_criteria import Criteria
-from flightid.identification.prediction_error.result import PolynomialFit
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.table import Cell, Column, Table
@@ -47,7 +47,7 @@ class OrderScan:
     kind : str
     trials : tuple of OrderTrial
         The smallest free-run error on the validation records first.
-    best : PolynomialFit
+    best : Fit
         Full fit of the first trial.
     validation : tuple of str
         Names of the validation records.
@@ -66,7 +66,7 @@ class OrderScan:
 
     kind: str
     trials: tuple[OrderTrial, ...]
-    best: PolynomialFit
+    best: Fit
     validation: tuple[str, ...]
     start: int
     unit: str

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import DataError, FitError, OptionError
+from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
 from flightid.identification.prediction_error.information_criteria import criteria
-from flightid.identification.prediction_error.result import PolynomialFit
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialOptions, PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels
@@ -252,7 +252,7 @@ def _fitted_trials(
         except FitError as error:
             trials.append(OrderTrial(structure, None, None, None, None, str(error)))
             continue
-        runs = [fit.predict(record) for record in unseen]
+        runs = [fit.model.predict(record, offsets=structure.offsets) for record in unseen]
         errors = np.concatenate([run.residual for run in runs])
         about = np.concatenate([run.measured - run.measured.mean() for run in runs])
         rms = float(np.sqrt(np.mean(errors**2)))
@@ -262,7 +262,7 @@ def _fitted_trials(
             OrderTrial(
                 structure,
                 fit.model,
-                fit.criteria,
+                fit.details.criteria,
                 None if diverged else rms,
                 None if diverged else percent,
                 "free run diverged" if diverged else "",
@@ -271,7 +271,7 @@ def _fitted_trials(
     return trials
 
 
-def _best(trials: Sequence[OrderTrial], fitted: Sequence[Record]) -> PolynomialFit:
+def _best(trials: Sequence[OrderTrial], fitted: Sequence[Record]) -> Fit:
     """Full fit of the first trial that allows one."""
     reasons = []
     for trial in trials:

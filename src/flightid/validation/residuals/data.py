@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError, ShapeError
 from flightid.identification import Fit
-from flightid.identification.prediction_error.result import PolynomialFit
-from flightid.identification.subspace.result import InnovationsFit
 from flightid.record import Record
 from flightid.validation.residuals.correlation import Series
 from flightid.validation.residuals.correlation_result import Horizon
@@ -19,10 +17,8 @@ from flightid.validation.verification.result import Verification
 
 Residuals = (
     Fit
+    | Sequence[Fit]
     | Verification
-    | PolynomialFit
-    | InnovationsFit
-    | Sequence[PolynomialFit]
     | Record
     | Sequence[Record]
     | Mapping[str, ArrayLike]
@@ -89,16 +85,12 @@ def gather_residuals(
     UnknownNameError
         A record lacks a channel.
     """
-    if isinstance(residuals, Fit):
-        return _of_fit(residuals, _channel_names(inputs), outputs, horizon)
     if isinstance(residuals, Verification):
         return _of_verification(residuals, _channel_names(inputs), outputs, horizon)
-    if isinstance(residuals, InnovationsFit):
-        return _of_innovations(residuals, _channel_names(inputs), outputs, horizon)
-    if isinstance(residuals, PolynomialFit):
+    if isinstance(residuals, Fit):
         residuals = (residuals,)
-    if isinstance(residuals, Sequence) and residuals and isinstance(residuals[0], PolynomialFit):
-        fits = tuple(fit for fit in residuals if isinstance(fit, PolynomialFit))
+    if isinstance(residuals, Sequence) and residuals and isinstance(residuals[0], Fit):
+        fits = tuple(fit for fit in residuals if isinstance(fit, Fit))
         return _of_fits(fits, _channel_names(inputs), outputs, horizon)
     if horizon is None:
         raise OptionError(
@@ -124,37 +116,10 @@ def gather_residuals(
     return _checked(_named(residuals, "e"), named, {}, horizon, predictor)
 
 
-def _of_fit(
-    fit: Fit,
-    inputs: Iterable[str] | None,
-    outputs: Iterable[str] | None,
-    horizon: Horizon | None,
-) -> ResidualData:
-    if not fit.records:
-        raise DataError(
-            "the fit has no residuals in time",
-            found="a fit of frequency responses",
-            needed="a fit of records",
-            action="verify it on records first: flightid.verify",
-        )
-    if horizon is Horizon.ONE_STEP:
-        raise OptionError(
-            "an output-error fit is a free run", found=str(horizon), needed=str(Horizon.FREE_RUN)
-        )
-    names = tuple(fit.records[0].outputs if outputs is None else outputs)
-    driven = tuple(fit.records[0].modelled.inputs if inputs is None else inputs)
-    measured = tuple(item.measured for item in fit.records)
-    _require_one_sample_time(measured)
-    made = {name: tuple(item.residual(name) for item in fit.records) for name in names}
-    return _checked(
-        made, _columns(measured, driven), _sizes(measured, names), Horizon.FREE_RUN, _FREE_RUN
-    )
-
-
 def _sizes(measured: Sequence[Record], names: Iterable[str]) -> dict[str, float]:
-    """Root mean square of each output over all records."""
+    """Root mean square of each output about its mean, over all records."""
     return {
-        name: float(np.sqrt(np.mean(np.concatenate(series) ** 2)))
+        name: float(np.sqrt(np.mean(np.concatenate([row - row.mean() for row in series]) ** 2)))
         for name, series in _columns(measured, names).items()
     }
 
@@ -186,84 +151,64 @@ def _of_verification(
 
 
 def _of_fits(
-    fits: Sequence[PolynomialFit],
+    fits: Sequence[Fit],
     inputs: Iterable[str] | None,
     outputs: Iterable[str] | None,
     horizon: Horizon | None,
 ) -> ResidualData:
-    """Errors one step ahead of models of one output each, cut to their common samples."""
-    if outputs is not None:
-        fits = [fit for fit in fits if fit.structure.output in tuple(outputs)]
-    records = fits[0].records if fits else ()
-    if any([*fit.records] != [*records] for fit in fits):
+    """Residuals of fits to the same records, cut to their common samples."""
+    wanted = None if outputs is None else tuple(outputs)
+    measured = _common_records(fits)
+    found = Horizon.ONE_STEP if all(fit.residual_horizon == 1 for fit in fits) else Horizon.FREE_RUN
+    if horizon is not None and horizon is not found:
+        raise OptionError(
+            "residuals of this fit come from another predictor",
+            found=str(horizon),
+            needed=str(found),
+        )
+    rows = list(zip(*(fit.residuals for fit in fits), strict=True))
+    counts = [min(record.n_samples for record in row) for row in rows]
+
+    def series(place: int, name: str) -> Series:
+        return tuple(row[place][name][-n:] for row, n in zip(rows, counts, strict=True))
+
+    made = {
+        name: series(place, name)
+        for place, fit in enumerate(fits)
+        for name in fit.records[0].outputs
+        if wanted is None or name in wanted
+    }
+    names = dict.fromkeys(name for fit in fits for name in fit.model.inputs)
+    driven = {name: series(0, name) for name in (names if inputs is None else inputs)}
+    spent = [(0, 0) if fit.details is None else fit.details.spent for fit in fits]
+    words = _FREE_RUN if found is Horizon.FREE_RUN else _ONE_STEP
+    checked = _checked(made, driven, _sizes(measured, made), found, words)
+    return replace(
+        checked,
+        fitted_noise=max(noise for noise, _ in spent),
+        fitted_input=max(count for _, count in spent),
+    )
+
+
+def _common_records(fits: Sequence[Fit]) -> list[Record]:
+    """The measured records of all fits, which must be the same."""
+    if not all(fit.residuals for fit in fits):
+        raise DataError(
+            "the fit has no residuals in time",
+            found="a fit of frequency responses",
+            needed="a fit of records",
+            action="verify it on records first: flightid.verify",
+        )
+    measured = [[item.measured for item in fit.records] for fit in fits]
+    if any(each != measured[0] for each in measured):
         raise DataError(
             "fits of different records have no common residuals",
-            found=", ".join(record.name for fit in fits for record in fit.records),
+            found=", ".join(record.name for each in measured for record in each),
             needed="the same records",
             action="fit all outputs to the same records",
         )
-    # Output error and instruments promise no white residual: what they leave is a free run's.
-    coloured = any(f.structure.kind == "OE" or f.structure.method == "iv4" for f in fits)
-    found = Horizon.FREE_RUN if coloured else Horizon.ONE_STEP
-    if horizon is not None and horizon is not found:
-        raise OptionError(
-            "these fits have another predictor", found=str(horizon), needed=str(found)
-        )
-    skips = [
-        max(record.n_samples - fit.errors[i].size for fit in fits)
-        for i, record in enumerate(records)
-    ]
-    series = {
-        fit.structure.output: tuple(
-            row[skip - (record.n_samples - row.size) :]
-            for row, skip, record in zip(fit.errors, skips, records, strict=True)
-        )
-        for fit in fits
-    }
-    names = dict.fromkeys(name for fit in fits for name in fit.structure.inputs)
-    driven = {
-        name: tuple(record[name][skip:] for record, skip in zip(records, skips, strict=True))
-        for name in (names if inputs is None else inputs)
-    }
-    scale = {
-        name: float(
-            np.sqrt(np.mean(np.concatenate([r[name] - r[name].mean() for r in records]) ** 2))
-        )
-        for name in series
-    }
-    structures = [fit.structure for fit in fits]
-    noise = max((s.na + s.nc + s.nd for s in structures), default=0)
-    spent = max((b + f for s in structures for b, f in zip(s.nb, s.nf, strict=True)), default=0)
-    words = _FREE_RUN if coloured else _ONE_STEP
-    made = _checked(series, driven, scale, found, words)
-    return replace(made, fitted_noise=noise, fitted_input=spent)
-
-
-def _of_innovations(
-    fit: InnovationsFit,
-    inputs: Iterable[str] | None,
-    outputs: Iterable[str] | None,
-    horizon: Horizon | None,
-) -> ResidualData:
-    """Errors one step ahead of all outputs of one model."""
-    if horizon not in (None, Horizon.ONE_STEP):
-        raise OptionError(
-            "these fits have another predictor", found=str(horizon), needed=str(Horizon.ONE_STEP)
-        )
-    names = tuple(fit.structure.outputs if outputs is None else outputs)
-    places = [fit.structure.outputs.index(name) for name in names]
-    driven = fit.structure.inputs if inputs is None else inputs
-    series = {name: tuple(e[i] for e in fit.errors) for name, i in zip(names, places, strict=True)}
-    made = _checked(
-        series,
-        _columns(fit.records, driven),
-        _sizes(fit.records, names),
-        Horizon.ONE_STEP,
-        _ONE_STEP,
-    )
-    # Poles and gains of the predictor shape each correlation; input matrices the other.
-    n = fit.model.order
-    return replace(made, fitted_noise=2 * n, fitted_input=n)
+    _require_one_sample_time(measured[0])
+    return measured[0]
 
 
 def _channel_names(inputs: Inputs | None) -> tuple[str, ...] | None:

@@ -75,7 +75,7 @@ def residual_tests(
 
     Parameters
     ----------
-    residuals : Fit, PolynomialFit, Verification, Record, sequence, mapping or array_like
+    residuals : Fit or sequence of Fit, Verification, Record, sequence, mapping or array_like
         A fit of records or a verification (measured minus free run), polynomial fits of one output
         each to the same records, records whose outputs are residuals, or samples, shape
         (n_samples,) or (n_outputs, n_samples), by name or bare.

@@ -9,8 +9,8 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
-from flightid.identification.narx.result import NarxFit
-from flightid.identification.prediction_error.result import PolynomialFit
+from flightid.identification.fit import Fit
+from flightid.models import NarxModel
 from flightid.record import Record
 from flightid.validation.verification.cross_validation_result import (
     LINEAR,
@@ -25,7 +25,7 @@ FREE_RUN = "free_run"
 
 
 def cross_validate(
-    fit: PolynomialFit | NarxFit,
+    fit: Fit,
     records: Record | Sequence[Record],
     *,
     horizons: Sequence[int | str] = (FREE_RUN, 1),
@@ -41,7 +41,7 @@ def cross_validate(
 
     Parameters
     ----------
-    fit : PolynomialFit or NarxFit
+    fit : Fit
     records : Record or sequence of Record
         With the model's channels, units and sample time.
     horizons : sequence of int or "free_run"
@@ -98,14 +98,14 @@ def cross_validate(
     return CrossValidation(fit.model.output, runs, tuple(_findings(runs)))
 
 
-def _runs(fit: PolynomialFit | NarxFit, record: Record, horizon: int | str) -> list[CrossRun]:
+def _runs(fit: Fit, record: Record, horizon: int | str) -> list[CrossRun]:
     output, words = fit.model.output, horizon_words(horizon)
-    if isinstance(fit, PolynomialFit):
-        made = fit.predict(record, horizon)
+    if not isinstance(fit.model, NarxModel):
+        made = fit.model.predict(record, horizon, offsets=fit.structure.offsets)
         start = "state solved for"
         return [CrossRun(record, output, MODEL, words, start, made.predicted, 0, made.diverged)]
     runs = []
-    for name, equation in ((MODEL, fit.equation), (LINEAR, fit.baseline)):
+    for name, equation in ((MODEL, fit.model), (LINEAR, fit.details.baseline)):
         found = equation.predict(record, horizon)
         start = f"{found.start} measured samples"
         held = found.diverged_at is not None
