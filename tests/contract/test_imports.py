@@ -13,6 +13,7 @@ BASE = {
     "errors",
     "files",
     "findings",
+    "option_forms",
     "options",
     "progress",
     "result",

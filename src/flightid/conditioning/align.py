@@ -181,9 +181,8 @@ def estimate_skew(
     require_match(record.unit(channel), record.unit(reference), subject=f"channel {channel}")
     step = record.sample_time_s
     length = record.n_samples // 8 if window_s is None else round(window_s / step)
-    low, high = (2 / (length * step) if length else 0.0, 0.4 / step)
-    if band_rad_s is not None:
-        low, high = (float(omega) / (2.0 * np.pi) for omega in band_rad_s)
+    usual = 2 / (length * step) if length else 0.0, 0.4 / step
+    low, high = usual if band_rad_s is None else (float(w) / (2 * np.pi) for w in band_rad_s)
     if not 16 <= length <= record.n_samples // 2 or not 0 < largest_s < length * step / 2:
         raise OptionError(
             "window or search range do not suit the record",
@@ -256,7 +255,7 @@ def _phase_slope(
     if np.count_nonzero(used) < 3:
         raise OptionError(
             "the band holds too few frequencies",
-            found=f"{np.count_nonzero(used)}",
+            found=np.count_nonzero(used),
             needed="at least 3",
             action="widen band_rad_s or lengthen window_s",
         )
@@ -394,9 +393,8 @@ def align(record: Record, skews_s: Mapping[str, float]) -> Record:
     samples = {name: record[name][kept] for name in record.channels}
     for name, lag in lags.items():
         samples[name] = shifted(record[name], lag)[kept]
-    options = {f"{name}_skew_s": float(skew) for name, skew in skews_s.items()}
-    step_done = Step("conditioning.align", options)
+    done = Step("conditioning.align", {f"{k}_skew_s": float(skew) for k, skew in skews_s.items()})
     broken = any(not float(lags.get(name, 0.0)).is_integer() for name in record.inputs)
     # Steps and lines that are moved by part of a sample no longer end at the samples.
     shape = record.input_shape.without_hold() if broken and record.hold != "band_limited" else None
-    return record.replace(samples, time_s=record.time_s[kept], step=step_done, input_shape=shape)
+    return record.replace(samples, time_s=record.time_s[kept], step=done, input_shape=shape)

@@ -1,0 +1,350 @@
+"""Options as data: a field with its unit, range and meaning, written once.
+
+A method's options are one frozen dataclass that derives from `Options`, its fields made by
+`option`. Checks, command line, study keys, provenance and the page of all options read the fields,
+so that a new option is one line in one file.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import cache
+from typing import Any, TypeVar
+
+from flightid.errors import FlightidError, OptionError
+from flightid.option_forms import BAND, NAMES, NUMBER, NUMBERS, WHOLE, WORD, Form, forms_of
+
+Made = TypeVar("Made", bound="Options")
+_KEY = "flightid"
+
+
+@dataclass(frozen=True)
+class Option:
+    """What is known of one option.
+
+    Attributes
+    ----------
+    name : str
+    default : object
+    forms : tuple of Form
+        What a value may be.
+    unit : str
+        Of a number; empty where it has none.
+    minimum, maximum : float or None
+        Least and greatest number that has a meaning.
+    above, below : float or None
+        Bounds that a number stays off.
+    choices : tuple of str
+        Words that a value may be; empty where any will do.
+    doc : str
+        Meaning, in one sentence.
+
+    Example
+    -------
+    >>> Option("draws", 300, (WHOLE,), minimum=10, doc="Vehicles drawn.").needed
+    'a whole number from 10 on'
+    """
+
+    name: str
+    default: object
+    forms: tuple[Form, ...]
+    unit: str = ""
+    minimum: float | None = None
+    maximum: float | None = None
+    above: float | None = None
+    below: float | None = None
+    choices: tuple[str, ...] = ()
+    doc: str = ""
+
+    @property
+    def range_words(self) -> str:
+        """Range in words, empty where there is none."""
+        low = f"from {self.minimum:g}" if self.minimum is not None else ""
+        low = f"above {self.above:g}" if self.above is not None else low
+        high = f"to {self.maximum:g}" if self.maximum is not None else ""
+        high = f"below {self.below:g}" if self.below is not None else high
+        if low.startswith("from") and not high:
+            return f"{low} on"
+        return " ".join(part for part in (low, "and" if low and high and "b" in high[0] else "",
+                                          high) if part)  # fmt: skip
+
+    @property
+    def needed(self) -> str:
+        """What a value may be, in words."""
+        parts = []
+        for form in self.forms:
+            if form is WORD and self.choices:
+                parts += [repr(word) for word in self.choices]
+            elif form in (WHOLE, NUMBER, NUMBERS, BAND):
+                unit = f", {self.unit}" if self.unit else ""
+                parts.append(" ".join((form.words, self.range_words)).strip() + unit)
+            else:
+                parts.append(form.words)
+        return " or ".join(parts)
+
+    def problem(self, value: object) -> str | None:
+        """What is wrong with a value, None where nothing is.
+
+        Parameters
+        ----------
+        value : object
+
+        Returns
+        -------
+        str or None
+            A clause that begins with the option's name.
+        """
+        forms = [form for form in self.forms if form.fits(value)]
+        if not forms:
+            return f"{self.name} has no meaning"
+        form = forms[0]
+        if form is WORD and self.choices and value not in self.choices:
+            return f"{self.name} is not known"
+        if form in (WHOLE, NUMBER):
+            return self._outside(float(typing.cast(float, value)))
+        if form in (NUMBERS, BAND):
+            numbers = typing.cast(Sequence[float], value)
+            return next(filter(None, map(self._outside, numbers)), None)
+        return None
+
+    def _outside(self, number: float) -> str | None:
+        too_small = (self.minimum is not None and number < self.minimum) or (
+            self.above is not None and number <= self.above
+        )
+        too_large = (self.maximum is not None and number > self.maximum) or (
+            self.below is not None and number >= self.below
+        )
+        if not (too_small or too_large):
+            return None
+        return f"{self.name} is too {'small' if too_small else 'large'}"
+
+
+def option(
+    default: Any = dataclasses.MISSING,  # noqa: ANN401 — a default of any type
+    *,
+    unit: str = "",
+    minimum: float | None = None,
+    maximum: float | None = None,
+    above: float | None = None,
+    below: float | None = None,
+    choices: Iterable[str] = (),
+    forms: Iterable[Form] = (),
+    doc: str,
+) -> Any:  # noqa: ANN401 — dataclasses.field is typed by its default
+    """Field of an options dataclass.
+
+    Parameters
+    ----------
+    default : object
+        Left out where a value must be given.
+    unit : str
+        Of a number.
+    minimum, maximum : float, optional
+        Least and greatest number.
+    above, below : float, optional
+        Bounds that a number stays off.
+    choices : iterable of str
+        Words that a value may be.
+    forms : iterable of Form
+        What a value may be; by default what the annotation says.
+    doc : str
+        Meaning, in one sentence.
+
+    Returns
+    -------
+    dataclasses.Field
+
+    Example
+    -------
+    >>> @dataclass(frozen=True)
+    ... class Search(Options):
+    ...     starts: int = option(1, minimum=1, doc="Starts of the search.")
+    >>> Search(starts=0)
+    Traceback (most recent call last):
+    flightid.errors.OptionError: starts is too small: found 0; needed a whole number from 1 on
+    """
+    facts = {
+        "unit": unit,
+        "minimum": minimum,
+        "maximum": maximum,
+        "above": above,
+        "below": below,
+        "choices": tuple(choices),
+        "doc": doc,
+    }
+    return field(default=default, metadata={_KEY: (facts, tuple(forms))})
+
+
+@dataclass(frozen=True)
+class Options:
+    """Base of every dataclass of options: checked when it is made.
+
+    Example
+    -------
+    >>> @dataclass(frozen=True)
+    ... class Cut(Options):
+    ...     cutoff_hz: float = option(10.0, unit="Hz", above=0.0, doc="Corner of the filter.")
+    >>> Cut().to_dict()
+    {'cutoff_hz': 10.0}
+    """
+
+    def __post_init__(self) -> None:
+        for each in options_of(type(self)):
+            value = getattr(self, each.name)
+            problem = each.problem(value)
+            if problem is not None:
+                raise OptionError(problem, found=repr(value), needed=each.needed)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values by name, for provenance."""
+        return {each.name: _plain(getattr(self, each.name)) for each in options_of(type(self))}
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value
+
+
+def options_of(options: type) -> tuple[Option, ...]:
+    """Options of a dataclass, in the order of its fields.
+
+    Parameters
+    ----------
+    options : type
+        A dataclass; fields that were not made by `option` are left out.
+
+    Returns
+    -------
+    tuple of Option
+    """
+    return _options_of(typing.cast(Hashable, options))
+
+
+@cache
+def _options_of(options: Hashable) -> tuple[Option, ...]:
+    assert isinstance(options, type)
+    hints = typing.get_type_hints(options)
+    made = []
+    for each in dataclasses.fields(options):
+        if _KEY not in each.metadata:
+            continue
+        facts, forms = each.metadata[_KEY]
+        kinds = forms or tuple(forms_of(hints[each.name]))
+        made.append(Option(each.name, each.default, kinds, **facts))
+    return tuple(made)
+
+
+def checked(options: type[Made], given: Mapping[str, object], subject: str = "this method") -> Made:
+    """Options from what was given by name.
+
+    Parameters
+    ----------
+    options : type
+        Dataclass of the options.
+    given : mapping of str to object
+        Values by name.
+    subject : str
+        What has the options, for an error.
+
+    Returns
+    -------
+    Options
+
+    Raises
+    ------
+    OptionError
+        A name that is none of its options, or a value outside its range.
+    """
+    known = [each.name for each in options_of(options)]
+    for name in given:
+        if name not in known:
+            raise OptionError(
+                f"{subject} has no such option",
+                found=name,
+                needed=", ".join(known) or "none",
+                action=_nearest(name, known),
+            )
+    return options(**given)
+
+
+def read_options(
+    options: type[Made],
+    table: Mapping[str, object],
+    where: str,
+    *,
+    error: type[FlightidError] = OptionError,
+) -> Made:
+    """Options from a table of a TOML file.
+
+    Parameters
+    ----------
+    options : type
+        Dataclass of the options.
+    table : mapping of str to object
+        The parsed table; lists stand for tuples, whole numbers for numbers.
+    where : str
+        How the file names the table, for example ``"study file, [response]"``.
+    error : type
+        Error to raise.
+
+    Returns
+    -------
+    Options
+
+    Raises
+    ------
+    FlightidError
+        Of type `error`: a key that has no meaning, with the nearest that has; a key that is
+        missing; a value outside its range, with key, found and range.
+    """
+    known = {each.name: each for each in options_of(options)}
+    for key in table:
+        if key not in known:
+            raise error(
+                f"{where}: there is no key {key!r}",
+                needed="one of " + ", ".join(known) if known else "no key at all",
+                action=_nearest(key, known),
+            )
+    values = {}
+    for name, each in known.items():
+        if name not in table:
+            if each.default is dataclasses.MISSING:
+                raise error(f"{where}: {name} is missing", needed=each.needed)
+            continue
+        value = read_value(each, table[name])
+        problem = each.problem(value)
+        if problem is not None:
+            raise error(f"{where}: {problem}", found=repr(table[name]), needed=each.needed)
+        values[name] = value
+    return options(**values)
+
+
+def read_value(wanted: Option, value: object) -> object:
+    """A value as its option takes it, from what TOML gives; as it is where it does not fit.
+
+    Parameters
+    ----------
+    wanted : Option
+    value : object
+
+    Returns
+    -------
+    object
+    """
+    # One name alone may stand for a list of one.
+    if isinstance(value, str) and NAMES in wanted.forms and WORD not in wanted.forms:
+        return (value,)
+    form = next((form for form in wanted.forms if form.fits(value)), None)
+    return value if form is None or form.read is None else form.read(value)
+
+
+def _nearest(name: str, known: Iterable[str]) -> str | None:
+    near = get_close_matches(name, list(known), n=1, cutoff=0.5)
+    return f"write {near[0]!r}" if near else None
