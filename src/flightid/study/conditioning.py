@@ -135,10 +135,10 @@ def require_records(steps: Sequence[Conditioning], names: Sequence[str]) -> None
                 )
 
 
-def condition(record: Record, steps: Sequence[Conditioning]) -> Record:
-    """Carry out the steps that are meant for a record; each stands in its history."""
+def condition(record: Record, steps: Sequence[Conditioning], name: str) -> Record:
+    """Carry out the steps that are meant for the record or group of this name, in order."""
     for step in steps:
-        if not step.records or record.name in step.records:
+        if not step.records or name in step.records:
             record = _apply(record, step)
     return record
 

@@ -93,23 +93,37 @@ def parameter_table(study: Study) -> Table:
         Column("95 % low"),
         Column("95 % high"),
     ]
-    if study.truth is not None:
-        columns += [Column("truth", digits=5), Column("inside")]
+    beside = _beside(study)
+    if beside:
+        columns += [Column(beside, digits=5), Column("inside")]
     rows: list[tuple[Cell, ...]] = []
     for item, parameter, true_value in _parameters(study):
         low, high = parameter.interval95 or (None, None)
         row: list[Cell] = [item.settings.name, parameter.name, parameter.value, parameter.unit]
         row += [low, high]
-        if study.truth is not None:
+        if beside:
             row += [true_value, _inside(parameter, true_value)]
         rows.append(tuple(row))
     notes = () if study.truth is None else ("Truth: what the simulated vehicle obeys at hover.",)
     return Table("Parameters", tuple(columns), tuple(rows), notes)
 
 
+def _beside(study: Study) -> str:
+    """What stands beside the estimates: the truth of a simulated flight, a reference, or nothing."""
+    if any(item.reference is not None for item in study.identified):
+        return "reference"
+    return "" if study.truth is None else "truth"
+
+
 def _parameters(study: Study) -> Iterator[tuple[Identified, Estimate, float | None]]:
     for item in study.identified:
         truth = {} if study.truth is None else study.truth.parameters(item.fit.model)
+        if item.reference is not None:
+            truth = {
+                name: p.value
+                for name, p in item.reference.parameters.items()
+                if p.value is not None
+            }
         for name, parameter in item.fit.parameters.items():
             yield item, parameter, truth.get(name)
 
@@ -194,7 +208,7 @@ def _interval_figure(study: Study) -> tuple[Figure, ...]:
     ]
     if not estimates:
         return ()
-    reference = "estimate" if study.truth is None else "truth"
+    reference = _beside(study) or "estimate"
     caption = f"Estimates with their 95 % intervals, in percent of the {reference}."
     return (figure_block(parameter_intervals(estimates), caption),)
 

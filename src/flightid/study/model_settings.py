@@ -49,6 +49,8 @@ class ModelSettings:
         Parameters that a reduction leaves in, or takes out first.
     condition : str or None
         Flight condition, where the study compares several.
+    reference : str or None
+        Model whose parameters and modes stand beside the estimates: library name or model file.
     """
 
     name: str
@@ -67,6 +69,7 @@ class ModelSettings:
     keep: tuple[str, ...] = ()
     drop: tuple[str, ...] = ()
     condition: str | None = None
+    reference: str | None = None
 
     @property
     def segments(self) -> tuple[str, ...]:
@@ -120,9 +123,10 @@ def read_model(
     )
     if band is not None and band[0] <= 0:
         raise reader.error("band_rad_s", "does not fit", found=band, needed="positive frequencies")
+    reference = reader.maybe(reader.text, "reference")
     made = ModelSettings(
         reader.text("name"),
-        str(folder / template) if template.endswith(".toml") else template,
+        _placed(folder, template),
         reader.maybe(reader.text, "axis"),
         reader.names("identify"),
         reader.names("verify", ()),
@@ -133,15 +137,18 @@ def read_model(
         joint,
         reader.names("responses", ()),
         read_overrides(reader),
-        {
-            rival: str(folder / rival) if rival.endswith(".toml") else rival
-            for rival in reader.names("rivals", ())
-        },
+        {rival: _placed(folder, rival) for rival in reader.names("rivals", ())},
         *((reader.names("keep", ()), reader.names("drop", ())) if reduced else ((), ())),
         condition=reader.maybe(reader.text, "condition"),
+        reference=None if reference is None else _placed(folder, reference),
     )
     reader.finish()
     return made
+
+
+def _placed(folder: Path, source: str) -> str:
+    """A library name as it is, a model file beside the study."""
+    return str(folder / source) if source.endswith(".toml") else source
 
 
 def read_overrides(reader: TableReader) -> dict[str, dict[str, Any]]:

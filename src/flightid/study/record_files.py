@@ -11,6 +11,9 @@ from flightid.errors import StudyError
 from flightid.record import Record, read_records
 from flightid.study.reading import TableReader
 
+ALL = "*"
+"""Manoeuvre that stands for all of a file."""
+
 
 @dataclass(frozen=True)
 class RecordFile:
@@ -23,7 +26,8 @@ class RecordFile:
     path : Path
         CSV, Parquet, MATLAB or netCDF.
     manoeuvre : str or None
-        Name of the manoeuvre, where the file holds several.
+        Name of the manoeuvre, where the file holds several; ``"*"`` takes all of them, and the
+        name then stands for the whole group.
     span_s : tuple of float or None
         Start and stop on the file's clock, s; None: all of it.
     time : str
@@ -76,8 +80,8 @@ def _texts(reader: TableReader, values: Mapping[str, object]) -> dict[str, str]:
     return {key: reader.text(key) for key in values}
 
 
-def load_record(file: RecordFile, roles: Mapping[str, Role]) -> Record:
-    """Read the channels that models need.
+def load_records(file: RecordFile, roles: Mapping[str, Role]) -> list[Record]:
+    """Read the channels that models need, of one manoeuvre or of all that the file holds.
 
     Parameters
     ----------
@@ -87,7 +91,7 @@ def load_record(file: RecordFile, roles: Mapping[str, Role]) -> Record:
 
     Returns
     -------
-    Record
+    list of Record
 
     Raises
     ------
@@ -119,6 +123,8 @@ def load_record(file: RecordFile, roles: Mapping[str, Role]) -> Record:
         sample_time_s=file.sample_time_s,
         resample_to_s=file.resample_to_s,
     )
+    if file.manoeuvre == ALL:
+        return [_named(file, record, f"{file.name}: {record.name}") for record in found]
     if file.manoeuvre is not None:
         found = [record for record in found if record.name == file.manoeuvre]
     if len(found) != 1:
@@ -126,9 +132,12 @@ def load_record(file: RecordFile, roles: Mapping[str, Role]) -> Record:
             f"it is not clear which manoeuvre record {file.name!r} is",
             found=f"{len(found)} of that name" if file.manoeuvre else f"{len(found)} in the file",
             needed="one",
-            action="name it with manoeuvre, or mend gaps with resample_to_s",
+            action='name it with manoeuvre, take all with "*", or mend gaps with resample_to_s',
         )
-    whole = found[0]
+    return [_named(file, found[0], file.name)]
+
+
+def _named(file: RecordFile, record: Record, name: str) -> Record:
     if file.span_s is None:
-        return whole.replace(name=file.name)
-    return whole.segment(*file.span_s, name=file.name)
+        return record.replace(name=name)
+    return record.segment(*file.span_s, name=name)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 from flightid.files import sha256_of_file
 from flightid.progress import progress
-from flightid.record import Record
 from flightid.report.html import to_html
 from flightid.report.text import to_text
 from flightid.study.black_box import identify_black_box
+from flightid.study.flown import Flown
 from flightid.study.output import RESULTS, require_replaceable, whole_folder
 from flightid.study.qualities import rate_models, require_pairs
 from flightid.study.settings import Settings, read_settings
@@ -110,7 +110,7 @@ def run_study(
 
 
 def _identify(
-    task: Task, records: Mapping[str, Record], settings: Settings, advance: Callable[..., None]
+    task: Task, records: Flown, settings: Settings, advance: Callable[..., None]
 ) -> Identified:
     responses = estimate(task, records)
     task, coherent = choose_responses(task, responses)
@@ -121,7 +121,16 @@ def _identify(
     verifications = check(task, counts, records)
     tests = examine_residuals(task, counts)
     advance()
-    return Identified(task.settings, responses, fits, verifications, reduction, coherent, tests)
+    return Identified(
+        task.settings,
+        responses,
+        fits,
+        verifications,
+        reduction,
+        coherent,
+        tests,
+        task.reference,
+    )
 
 
 def _write(study: Study, folder: Path) -> None:

@@ -10,13 +10,13 @@ from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.identification import Fit, Reduction, identify, reduce
 from flightid.models import GreyBoxModel, StateSpaceModel, load_structure
-from flightid.record import Record
 from flightid.responses import (
     CoherentPairs,
     FrequencyResponse,
     coherent_pairs,
     estimate_response,
 )
+from flightid.study.flown import Flown
 from flightid.study.model_settings import ModelSettings
 from flightid.study.reducing import ReduceSettings
 from flightid.validation import Comparison, ResidualTests, Verification, residual_tests, verify
@@ -34,11 +34,14 @@ class Task:
         Structure and start values, overrides applied.
     rivals : mapping of str to TransferFunctionModel or StateSpaceModel
         Models to verify side by side with the fit, by name.
+    reference : TransferFunctionModel or StateSpaceModel, optional
+        Model that stands beside the estimates.
     """
 
     settings: ModelSettings
     model: GreyBoxModel
     rivals: Mapping[str, GreyBoxModel] = field(default_factory=dict)
+    reference: GreyBoxModel | None = None
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -66,6 +69,8 @@ class Identified:
         Which responses were fitted, where coherence chose them.
     tests : ResidualTests or None
         Of the residuals of a fit to records, where the study asks for them.
+    reference : TransferFunctionModel or StateSpaceModel, optional
+        Model that stands beside the estimates.
     """
 
     settings: ModelSettings
@@ -75,6 +80,7 @@ class Identified:
     reduction: Reduction | None = None
     coherent: CoherentPairs | None = None
     tests: ResidualTests | None = None
+    reference: GreyBoxModel | None = None
 
     @property
     def response(self) -> FrequencyResponse | None:
@@ -130,7 +136,9 @@ def load_task(settings: ModelSettings) -> Task:
         name: load_structure(path if path.endswith(".toml") else name, axis=settings.axis)
         for name, path in settings.rivals.items()
     }
-    return Task(settings, model, rivals)
+    reference = settings.reference
+    beside = None if reference is None else load_structure(reference, axis=settings.axis)
+    return Task(settings, model, rivals, beside)
 
 
 def _with_responses(model: GreyBoxModel, names: tuple[str, ...]) -> GreyBoxModel:
@@ -148,13 +156,13 @@ def _with_responses(model: GreyBoxModel, names: tuple[str, ...]) -> GreyBoxModel
     return replace(model, responses=kept)
 
 
-def estimate(task: Task, records: Mapping[str, Record]) -> dict[str, FrequencyResponse]:
+def estimate(task: Task, records: Flown) -> dict[str, FrequencyResponse]:
     """Frequency responses of one model's records by each estimator, the one that counts first."""
     settings = task.settings
     chosen, band = settings.response, settings.band_rad_s
     if not settings.fit.on_responses or band is None:
         return {}
-    flown = [records[name] for name in settings.identify]
+    flown = records.of(settings.identify)
     held = [name for name in _outputs(task.model) if all(name in record for record in flown)]
     return {
         estimator: estimate_response(
@@ -210,7 +218,7 @@ def choose_responses(
 def fit(
     task: Task,
     responses: Mapping[str, FrequencyResponse],
-    records: Mapping[str, Record],
+    records: Flown,
     reducing: ReduceSettings | None,
     coherent: CoherentPairs | None = None,
 ) -> tuple[dict[str, Fit], Reduction | None]:
@@ -244,34 +252,32 @@ def fit(
 
 
 def _sources(
-    task: Task, responses: Mapping[str, FrequencyResponse], records: Mapping[str, Record]
+    task: Task, responses: Mapping[str, FrequencyResponse], records: Flown
 ) -> dict[str, Any]:
     """What the model is fitted to, by estimator or method, what counts first."""
     settings = task.settings
     if not settings.fit.on_responses:
-        return {settings.fit.method: [records[name] for name in settings.identify]}
+        return {settings.fit.method: records.of(settings.identify)}
     if settings.joint:
-        beside = [records[name] for name in settings.joint]
+        beside = records.of(settings.joint)
         return {name: (response, beside) for name, response in responses.items()}
     return dict(responses)
 
 
-def check(
-    task: Task, fitted: Fit, records: Mapping[str, Record]
-) -> dict[str, Verification | Comparison]:
+def check(task: Task, fitted: Fit, records: Flown) -> dict[str, Verification | Comparison]:
     """Predict each record that the fit has not seen, beside the rivals where there are any."""
     outputs, options = task.model.outputs, task.settings.check.options
     checked: dict[str, Verification | Comparison] = {}
     for name in task.settings.verify:
-        record = records[name]
-        held = [output for output in outputs if output in record]
+        flown = records.of([name])
+        held = [output for output in outputs if all(output in record for record in flown)]
         if task.rivals:
             models = {task.settings.name: fitted, **task.rivals}
             checked[name] = verify(
-                [*models.values()], record, names=[*models], outputs=held, **options
+                [*models.values()], flown, names=[*models], outputs=held, **options
             )
         else:
-            checked[name] = verify(fitted, record, outputs=held, **options)
+            checked[name] = verify(fitted, flown, outputs=held, **options)
     return checked
 
 

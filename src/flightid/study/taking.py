@@ -13,7 +13,8 @@ from flightid.logs import Log, read_log
 from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.record import Record
 from flightid.study.conditioning import condition
-from flightid.study.record_files import load_record
+from flightid.study.flown import Flown
+from flightid.study.record_files import ALL, load_records
 from flightid.study.response_settings import EXCITATION
 from flightid.study.settings import Segment, Settings
 from flightid.study.stages import Task
@@ -29,7 +30,7 @@ class Taken:
 
     Attributes
     ----------
-    records : mapping of str to Record
+    records : Flown
         Conditioned, by name.
     files : tuple of Path
         What was read.
@@ -38,7 +39,7 @@ class Taken:
     log : Log or None
     """
 
-    records: Mapping[str, Record]
+    records: Flown
     files: tuple[Path, ...]
     inspection: Inspection | None = None
     truth: Truth | None = None
@@ -60,12 +61,15 @@ def take(settings: Settings, tasks: list[Task], given: Path | None, folder: Path
                 "the study reads records, not a log", found=str(given), action="leave out --log"
             )
         paths = dict.fromkeys(file.path for file in settings.record_files)
-        files = {
-            file.name: load_record(file, needed[file.name])
-            for file in settings.record_files
-            if file.name in needed
+        wanted = [file for file in settings.record_files if file.name in needed]
+        read = {file.name: load_records(file, needed[file.name]) for file in wanted}
+        groups = {
+            file.name: tuple(record.name for record in read[file.name])
+            for file in wanted
+            if file.manoeuvre == ALL
         }
-        return Taken(_conditioned(files, settings), tuple(paths))
+        flat = {record.name: record for found in read.values() for record in found}
+        return Taken(_conditioned(flat, groups, settings), tuple(paths))
     flown, truth = _obtain_log(settings, given, folder)
     opened = read_log(flown)
     cut = {
@@ -73,11 +77,18 @@ def take(settings: Settings, tasks: list[Task], given: Path | None, folder: Path
         for segment in settings.segments
         if segment.name in needed
     }
-    return Taken(_conditioned(cut, settings), (flown,), inspect_log(opened), truth, opened)
+    return Taken(_conditioned(cut, {}, settings), (flown,), inspect_log(opened), truth, opened)
 
 
-def _conditioned(records: Mapping[str, Record], settings: Settings) -> dict[str, Record]:
-    return {name: condition(record, settings.conditioning) for name, record in records.items()}
+def _conditioned(
+    records: Mapping[str, Record], groups: Mapping[str, tuple[str, ...]], settings: Settings
+) -> Flown:
+    group_of = {member: name for name, members in groups.items() for member in members}
+    done = {
+        name: condition(record, settings.conditioning, group_of.get(name, name))
+        for name, record in records.items()
+    }
+    return Flown(done, groups)
 
 
 def _obtain_log(settings: Settings, given: Path | None, folder: Path) -> tuple[Path, Truth | None]:
