@@ -109,7 +109,7 @@ def parameter_table(study: Study) -> Table:
 
 
 def _beside(study: Study) -> str:
-    """What stands beside the estimates: the truth of a simulated flight, a reference, or nothing."""
+    """What stands beside the estimates: a reference, a simulated flight's truth, or nothing."""
     if any(item.reference is not None for item in study.identified):
         return "reference"
     return "" if study.truth is None else "truth"

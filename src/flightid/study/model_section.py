@@ -12,6 +12,7 @@ from flightid.errors import ModelError
 from flightid.models import StateSpaceModel
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
+from flightid.plot.modes import pole_map
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Figure, Lights, Section, TableBlock
 from flightid.report.figures import figure_block
@@ -65,7 +66,7 @@ def model_section(item: Identified, truth: Truth | None) -> Section:
         for name, verification in item.verifications.items()
     ]
     if isinstance(item.fit.model, StateSpaceModel):
-        parts.insert(0, Section("Modes and derivatives", _physics(item.fit)))
+        parts.insert(0, Section("Modes and derivatives", (*_physics(item.fit), *_beside(item))))
     if item.tests is not None:
         parts.insert(0, Section("Residual tests", result_blocks(item.tests)))
     if item.reduction is not None:
@@ -84,6 +85,16 @@ def _physics(fit: Fit) -> tuple[Block, ...]:
     with suppress(ModelError):
         table = derivatives(fit)
     return (*modes_blocks(modes(fit)), *physics_blocks(approximations, table))
+
+
+def _beside(item: Identified) -> tuple[Block, ...]:
+    """Eigenvalues of the reference, in a table and beside those of the fit."""
+    if item.reference is None:
+        return ()
+    theirs = modes(item.reference)
+    both = {"identified": modes(item.fit), "reference": theirs}
+    picture = figure_block(pole_map(both), "Eigenvalues with 95 % regions, beside the reference's.")
+    return (picture, TableBlock(theirs.table(), folded=True))
 
 
 def _bode_figures(item: Identified, truth: Truth | None) -> list[Figure]:
