@@ -21,7 +21,7 @@ from flightid.uncertainty.estimate import Estimate
 from flightid.version import VERSION
 
 Array = NDArray[np.float64]
-WHITE = "white prediction errors"
+WHITE, COLOURED = "white prediction errors", "coloured residuals"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +47,12 @@ class BlackBoxRuns:
 
 @dataclass(frozen=True, eq=False)
 class BlackBoxEstimates:
-    """Estimates of a model with their covariance, None where there is none."""
+    """Estimates of a model with their covariance, if there is one, and what it rests on."""
 
     parameters: Mapping[str, Estimate]
     names: tuple[str, ...]
     covariance: Array | None
+    source: str = WHITE
 
 
 def black_box_fit(
@@ -83,7 +84,7 @@ def black_box_fit(
         objective=minima[0].objective,
         termination=minima[0].termination,
         iterations=iterations,
-        intervals_from="nothing" if covariance is None else WHITE,
+        intervals_from="nothing" if covariance is None else estimates.source,
         findings=tuple(findings),
         provenance=provenance,
         records=tuple(

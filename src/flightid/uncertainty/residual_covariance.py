@@ -27,6 +27,8 @@ ROUNDING = 1e-9
 """Share of the variance for white residuals below which there is rounding alone."""
 DRAWS = 32
 """Draws of random walks."""
+COLOURED = 1.5
+"""Ratio of coloured over white standard errors above which residuals count as coloured."""
 LARGEST_RATIO, SMALLEST_RATIO = 50.0, 0.02
 """Ratios of coloured over white standard errors beyond which neither can be believed."""
 
@@ -125,7 +127,7 @@ class ResidualCovariance:
 
 
 def colour_findings(smallest: float, largest: float) -> list[Finding]:
-    """Red where the colour of the residuals changes standard errors beyond belief.
+    """Verdict on the colour of residuals: red where it changes standard errors beyond belief.
 
     Parameters
     ----------
@@ -134,7 +136,7 @@ def colour_findings(smallest: float, largest: float) -> list[Finding]:
 
     Example
     -------
-    >>> colour_findings(0.9, 1.7)
+    >>> colour_findings(0.9, 1.2)
     []
     """
     if smallest >= SMALLEST_RATIO and largest <= LARGEST_RATIO:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from flightid import _native
 from flightid.errors import DataError, FitError
 from flightid.identification.black_box import (
+    COLOURED,
+    WHITE,
     BlackBoxEstimates,
     BlackBoxRuns,
     black_box_fit,
@@ -19,6 +21,10 @@ from flightid.identification.black_box import (
 from flightid.identification.fit import Fit
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.backcast import backcast
+from flightid.identification.prediction_error.coloured_errors import (
+    has_noise_model,
+    output_error_covariance,
+)
 from flightid.identification.prediction_error.details import FitScore, PolynomialDetails
 from flightid.identification.prediction_error.findings import judge_polynomial
 from flightid.identification.prediction_error.information_criteria import criteria
@@ -33,6 +39,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.residual_covariance import colour_findings
 
 Array = NDArray[np.float64]
 BACKCASTS = 6
@@ -53,6 +60,8 @@ class _Found:
     iterations: int
     memory: list[list[float]]
     skip: int
+    freedom: Array | None = None
+    colour: tuple[float, float] = (1.0, 1.0)
 
 
 def fit_polynomial(structure: PolynomialStructure, data: Record | Sequence[Record]) -> Fit:
@@ -105,8 +114,9 @@ def _regression(structure: PolynomialStructure, data: SampledChannels) -> _Found
         return _linear(structure, smooth.theta, smooth.covariance, degrees, "kernel", skip)
     require_independent(made, structure)
     if structure.method == "iv4":
-        theta, covariance = four_stage(structure, data)
-        return _linear(structure, theta, covariance, degrees, "instruments", skip)
+        theta, known = four_stage(structure, data)
+        found = _linear(structure, theta, known.covariance, degrees, "instruments", skip)
+        return replace(found, freedom=known.freedom, colour=known.colour)
     covariance = made.sum_of_squares / degrees * _inverse_square(made.factor)
     return _linear(structure, made.theta, covariance, degrees, "regression", skip)
 
@@ -224,6 +234,7 @@ def _assemble(
         BEFORE[structure.past],
         found.memory,
     )
+    found = _coloured(structure, data, found, errors)
     counted = tuple(errors[span][found.skip :] for span in data.spans)
     squares = float(sum(row @ row for row in counted))
     n_counted = sum(row.size for row in counted)
@@ -242,7 +253,8 @@ def _assemble(
         for m in found.minima
     )
     parameters = _parameters(model, found)
-    roots = fitted_roots(model, found.degrees)
+    degrees = found.degrees if found.freedom is None else float(np.min(found.freedom))
+    roots = fitted_roots(model, degrees)
     runs = [model.predict(record, "free_run", offsets=structure.offsets) for record in records]
     return black_box_fit(
         model,
@@ -253,15 +265,23 @@ def _assemble(
             # Output error and instruments promise no white errors.
             white=structure.kind != "OE" and structure.method != "iv4",
         ),
-        BlackBoxEstimates(parameters, structure.names, found.covariance),
+        BlackBoxEstimates(
+            parameters,
+            structure.names,
+            found.covariance,
+            WHITE if found.freedom is None else COLOURED,
+        ),
         minima,
         iterations=found.iterations,
         noise_covariance=np.array([[squares / found.degrees]]),
-        findings=judge_polynomial(structure, model, parameters, roots, minima, n_counted),
+        findings=(
+            *judge_polynomial(structure, model, parameters, roots, minima, n_counted),
+            *colour_findings(*found.colour),
+        ),
         provenance=_provenance(structure, records, data),
         details=PolynomialDetails(
             roots,
-            fitted_gains(model, found.degrees),
+            fitted_gains(model, degrees),
             criteria(squares, n_counted, structure.n_parameters),
             {structure.output: _scores(structure, runs, data, counted)},
             model.difference_equation(),
@@ -273,6 +293,16 @@ def _assemble(
     )
 
 
+def _coloured(
+    structure: PolynomialStructure, data: SampledChannels, found: _Found, errors: Array
+) -> _Found:
+    """Errors of the coefficients by the colour of residuals that no noise model answers for."""
+    if found.covariance is None or structure.kernel is not None or has_noise_model(structure):
+        return found
+    known = output_error_covariance(structure, data, found.theta, errors, found.skip)
+    return replace(found, covariance=known.covariance, freedom=known.freedom, colour=known.colour)
+
+
 def _parameters(model: PolynomialModel, found: _Found) -> dict[str, Estimate]:
     made = {}
     for place, (name, coefficient) in enumerate(model.parameters.items()):
@@ -282,7 +312,8 @@ def _parameters(model: PolynomialModel, found: _Found) -> dict[str, Estimate]:
             made[name] = Estimate(name, value, unit, None, reason, status="free")
             continue
         stderr = float(np.sqrt(found.covariance[place, place]))
-        made[name] = Estimate(name, value, unit, stderr, freedom=found.degrees, status="free")
+        degrees = found.degrees if found.freedom is None else float(found.freedom[place])
+        made[name] = Estimate(name, value, unit, stderr, freedom=degrees, status="free")
     return made
 
 

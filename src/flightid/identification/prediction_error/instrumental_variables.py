@@ -9,16 +9,20 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from flightid.errors import DataError
+from flightid.identification.prediction_error.coloured_errors import instrumental_covariance
 from flightid.identification.prediction_error.linear_regression import reflected, regress
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
+from flightid.uncertainty.residual_covariance import ResidualCovariance
 
 Array = NDArray[np.float64]
 SPARE_LAGS = 8
 ROWS_PER_LAG = 20
 
 
-def four_stage(structure: PolynomialStructure, data: SampledChannels) -> tuple[Array, Array]:
+def four_stage(
+    structure: PolynomialStructure, data: SampledChannels
+) -> tuple[Array, ResidualCovariance]:
     """Coefficients of A y = B u + v with v of any colour, and their covariance.
 
     Least squares; instruments from its noise-free output; a long noise model of what is left; the
@@ -65,7 +69,7 @@ def _left(structure: PolynomialStructure, data: SampledChannels, theta: Array) -
 
 def _instruments(
     structure: PolynomialStructure, data: SampledChannels, theta: Array, whitener: Array
-) -> tuple[Array, Array]:
+) -> tuple[Array, ResidualCovariance]:
     below = reflected(np.concatenate([[1.0], theta[: structure.na]]))
     clean = np.zeros_like(data.output)
     for row, b in zip(data.inputs, _numerators(structure, theta), strict=True):
@@ -88,11 +92,9 @@ def _instruments(
             action="lower the orders or use a richer input",
         )
     found = np.linalg.solve(product, instruments.T @ target)
-    errors = target - regressors @ found
-    variance = float(errors @ errors) / (target.size - found.size)
-    inverse = np.linalg.inv(product)
-    covariance = variance * inverse @ (instruments.T @ instruments) @ inverse.T
-    return found, np.asarray(covariance)
+    ends = np.cumsum([n - start for n in data.lengths])[:-1]
+    parts = (instruments, regressors, target - regressors @ found)
+    return found, instrumental_covariance(*(np.split(part, ends) for part in parts))
 
 
 def _columns(

@@ -30,7 +30,7 @@ class Errors:
 
     sample_time_s: float
     covariance: Array | None
-    degrees: int
+    degrees: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class FittedRoot:
         }
 
 
-def fitted_roots(model: PolynomialModel, degrees: int) -> tuple[FittedRoot, ...]:
+def fitted_roots(model: PolynomialModel, degrees: float) -> tuple[FittedRoot, ...]:
     """Poles and zeros of each response, the slowest poles first.
 
     Parameters
@@ -215,7 +215,7 @@ def propagated(
     return Estimate(name, value, unit, stderr, freedom=errors.degrees, status="derived")
 
 
-def fitted_gains(model: PolynomialModel, degrees: int) -> dict[str, Estimate]:
+def fitted_gains(model: PolynomialModel, degrees: float) -> dict[str, Estimate]:
     """Steady gains by ``"output/input"`` with intervals; an integrator has none."""
     places = _places(model)
     found = {}

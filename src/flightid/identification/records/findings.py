@@ -10,11 +10,9 @@ from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.identification.records.setup import RecordSet
-from flightid.uncertainty.residual_covariance import LARGEST_RATIO, colour_findings
+from flightid.uncertainty.residual_covariance import colour_findings
 
 GOOD_PERCENT, POOR_PERCENT = 10.0, 40.0
-COLOURED = 1.5
-"""Ratio of corrected to white standard errors above which residuals count as coloured."""
 _STILL = 1e-12
 _DEGREES = 180.0 / np.pi
 
@@ -83,15 +81,4 @@ def judge_fit(costs: Mapping[str, float], colour: tuple[float, float]) -> list[F
                 else "look at the residuals: add dynamics, check signs and units, or it is noise",
             )
         )
-    found += colour_findings(*colour)
-    if COLOURED < colour[1] <= LARGEST_RATIO:
-        found.append(
-            Finding(
-                "residuals-coloured",
-                Light.AMBER,
-                f"residuals are coloured: standard errors are up to {colour[1]:.2g} times those of "
-                "white residuals, and the intervals allow for it",
-                "run residual_tests: where inputs still predict them, dynamics are missing",
-            )
-        )
-    return found
+    return [*found, *colour_findings(*colour)]

@@ -1,0 +1,169 @@
+"""Covariance of coefficients whose equation has no model of the noise.
+
+Output error and finite impulse responses leave in their residuals whatever the noise is; the
+inverse information would take it for white. (A, C and D are noise models: where a structure has
+one, its errors are white or the structure is wrong, which the residual tests tell.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.sampled.channels import SampledChannels
+from flightid.uncertainty.residual_covariance import Block, ResidualCovariance, residual_covariance
+
+Array = NDArray[np.float64]
+INDEPENDENT = 1e-9
+"""Share of the largest singular value below which a start's direction is another's."""
+
+
+def has_noise_model(structure: PolynomialStructure) -> bool:
+    """Whether A, C or D shapes the noise.
+
+    Example
+    -------
+    >>> from flightid.models import PolynomialModel
+    >>> has_noise_model(PolynomialModel.oe("y", "u", nb=1, nf=2))
+    False
+    """
+    return bool(structure.na or structure.nc or structure.nd)
+
+
+def output_error_covariance(
+    structure: PolynomialStructure,
+    data: SampledChannels,
+    theta: Array,
+    errors: Array,
+    skip: int,
+) -> ResidualCovariance:
+    """Covariance of the coefficients of B and F by the colour of the errors.
+
+    Parameters
+    ----------
+    structure : PolynomialStructure
+        Without noise model.
+    data : SampledChannels
+    theta : ndarray, shape (n_coefficients,)
+        Estimates, B of all inputs before F of all inputs.
+    errors : ndarray, shape (n_samples,)
+        Measured minus modelled, records after records.
+    skip : int
+        First errors of each record that the fit left out.
+
+    Assumes
+    -------
+    Stationary noise, independent of the inputs.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., eqs. 9.41 and 9.42 (errors that are not white).
+    """
+    size = float(np.sqrt(errors @ errors / errors.size)) or 1.0
+    blocks = []
+    for span in data.spans:
+        shared, own = _sensitivities(
+            structure, theta, data.inputs[:, span], data.output[span] - errors[span]
+        )
+        if structure.initial_state != "estimate" or structure.backcast or skip:
+            own = own[:, :0]
+        blocks.append(
+            Block.of(
+                shared[None, skip:] / size, own[None, skip:], errors[None, span][:, skip:] / size
+            )
+        )
+    return residual_covariance(blocks)
+
+
+def _sensitivities(
+    structure: PolynomialStructure, theta: Array, inputs: Array, modelled: Array
+) -> tuple[Array, Array]:
+    """Derivatives of the output by the coefficients, and directions of what was before.
+
+    ŷᵢ = Bᵢ/Fᵢ uᵢ: ∂ŷᵢ/∂b_k = q⁻ᵏ/Fᵢ uᵢ and ∂ŷᵢ/∂f_k = −q⁻ᵏ/Fᵢ ŷᵢ. What was before a record runs out
+    as impulses through 1/Fᵢ; each ŷᵢ holds its part of that.
+    """
+    n = modelled.size
+    numerators, denominators = _polynomials(structure, theta)
+    driven, starts = [], []
+    for row, b, f in zip(inputs, numerators, denominators, strict=True):
+        driven.append(lfilter(b, f, row))
+        reach = min(max(b.size - 1, f.size - 1), n)
+        impulses = np.zeros((n, reach))
+        impulses[np.arange(reach), np.arange(reach)] = 1.0
+        starts.append(lfilter([1.0], f, impulses, axis=0))
+    own = np.concatenate(starts, axis=1)
+    shares = np.linalg.lstsq(own, modelled - np.sum(driven, axis=0), rcond=INDEPENDENT)[0]
+    of_b, of_f, first = [], [], 0
+    for i, (row, b, f) in enumerate(zip(inputs, numerators, denominators, strict=True)):
+        whole = driven[i] + starts[i] @ shares[first : first + starts[i].shape[1]]
+        first += starts[i].shape[1]
+        moved = lfilter([1.0], f, row)
+        of_b += [_late(moved, lag) for lag in range(structure.nk[i], b.size)]
+        turned = lfilter([1.0], f, whole)
+        of_f += [-_late(turned, lag) for lag in range(1, f.size)]
+    return np.array([*of_b, *of_f]).T, _independent(own)
+
+
+def _polynomials(structure: PolynomialStructure, theta: Array) -> tuple[list[Array], list[Array]]:
+    """B with its delay and F with its leading one, by input."""
+    counts = [*structure.nb, *structure.nf]
+    parts = np.split(theta, np.cumsum(counts)[:-1])
+    above, below = parts[: len(structure.nb)], parts[len(structure.nb) :]
+    return (
+        [np.concatenate([np.zeros(k), b]) for k, b in zip(structure.nk, above, strict=True)],
+        [np.concatenate([[1.0], f]) for f in below],
+    )
+
+
+def _late(row: Array, lag: int) -> Array:
+    """A row that comes some samples later, from rest."""
+    return np.concatenate([np.zeros(min(lag, row.size)), row[: max(row.size - lag, 0)]])
+
+
+def _independent(columns: Array) -> Array:
+    """Orthonormal directions that columns span: inputs with one F in common share theirs."""
+    if not columns.shape[1]:
+        return columns
+    left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
+    return np.asarray(left[:, sizes > INDEPENDENT * sizes[0]])
+
+
+def instrumental_covariance(
+    instruments: Sequence[Array], regressors: Sequence[Array], errors: Sequence[Array]
+) -> ResidualCovariance:
+    """Covariance of coefficients by instruments, by the colour of what the equation leaves.
+
+    Parameters
+    ----------
+    instruments, regressors : sequence of ndarray, shape (n_samples, n)
+        By record.
+    errors : sequence of ndarray, shape (n_samples,)
+
+    Reference
+    ---------
+    Söderström & Stoica, *System Identification*, eq. 8.30.
+    """
+    total = np.concatenate(list(errors))
+    size = float(np.sqrt(total @ total / total.size)) or 1.0
+    found = residual_covariance(
+        [
+            Block.of(each[None] / size, np.zeros((1, len(each), 0)), error[None] / size)
+            for each, error in zip(instruments, errors, strict=True)
+        ]
+    )
+    product = sum(z.T @ r for z, r in zip(instruments, regressors, strict=True))
+    square = sum(z.T @ z for z in instruments)
+    turn = np.linalg.solve(product, square)
+    return ResidualCovariance(
+        turn @ found.covariance @ turn.T,
+        turn @ found.white @ turn.T,
+        found.freedom,
+        found.own,
+        found.crossed,
+        found.orders,
+    )
