@@ -75,19 +75,27 @@ class Plan:
     repeats: int
 
     def sweeps(self, seed: int) -> list[fid.Record]:
-        """Sweep one input a record, as often as planned."""
+        """Sweep one input a record, as often as planned; inputs are what the servos give."""
+        return [actuator_positions(record, SERVOS) for record in self.fly_sweeps(seed)]
+
+    def doublets(self, seed: int) -> list[fid.Record]:
+        """Doublets for verification; inputs are what the servos give."""
+        return [actuator_positions(record, SERVOS) for record in self.fly_doublets(seed)]
+
+    def fly_sweeps(self, seed: int) -> list[fid.Record]:
+        """Sweep one stick a record, as often as planned."""
         return [
             self._fly(_sweep(self, name), f"{name} sweep {number + 1}", seed, number)
             for number in range(self.repeats)
             for name in INPUTS
         ]
 
-    def doublets(self, seed: int) -> list[fid.Record]:
-        """Doublets for verification, one input a record; no fit sees them."""
+    def fly_doublets(self, seed: int) -> list[fid.Record]:
+        """Doublets for verification, one stick a record; no fit sees them."""
         return [self._fly(_doublet(name), f"{name} doublet", seed, -1) for name in INPUTS]
 
     def _fly(self, shape: Excitation, name: str, seed: int, number: int) -> fid.Record:
-        flight = fly_closed_loop(
+        return fly_closed_loop(
             fid.load_model(LIBRARY[self.condition]),
             PILOT,
             shape,
@@ -95,7 +103,6 @@ class Plan:
             seed=1000 * seed + 10 * (number + 1) + INPUTS.index(shape.names[0]),
             name=name,
         )
-        return actuator_positions(flight, SERVOS)
 
 
 def plan(condition: str, *, full: bool) -> Plan:

@@ -115,6 +115,18 @@ def test_the_dryer_script_checks_a_record_of_the_same_format(tmp_path: Path) -> 
 
 
 @pytest.mark.nightly
+def test_the_r50_is_found_by_a_study_file_alone(tmp_path: Path) -> None:
+    for name in ("fly.py", "flights.py", "study.toml"):
+        (tmp_path / name).write_text((EXAMPLES / "r50" / name).read_text(encoding="utf-8"))
+    assert _script(tmp_path / "fly.py", folder=tmp_path).returncode == 0
+    run = _run(FLIGHTID, "--quiet", "run", "study.toml", "--output", "out", folder=tmp_path)
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    inside = re.search(r"(\d+) of (\d+) true values lie inside", run.stdout)
+    assert inside is not None
+    assert int(inside.group(1)) >= 0.88 * int(inside.group(2)) > 50
+
+
+@pytest.mark.nightly
 def test_the_r50_is_found_from_its_flights(tmp_path: Path) -> None:
     run = _script(EXAMPLES / "r50" / "study.py", "short", "0", "out", folder=tmp_path)
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]

@@ -139,7 +139,12 @@ def _result(study: Study) -> list[Block]:
     blocks: list[Block] = [Paragraph(notes)] if notes else []
     short = [*map(_in_short, study.identified), *map(black_box_in_short, study.black_boxes)]
     blocks.append(Lights(tuple(short), repeats=True))
-    inside = [_inside(parameter, true) for _, parameter, true in _parameters(study)]
+    # A tied parameter follows another: it would count the same miss twice.
+    inside = [
+        _inside(parameter, true)
+        for _, parameter, true in _parameters(study)
+        if parameter.status != "tied"
+    ]
     judged = np.array([value for value in inside if value is not None], dtype=bool)
     if judged.size:
         blocks.append(Lights((recovered(judged),)))

@@ -11,7 +11,8 @@ from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, r
 from flightid.study.reading import TableReader
 from flightid.study.response_settings import ResponseSettings, read_response
 
-COHERENT = "coherent"
+COHERENT, UNBROKEN = "coherent", "unbroken"
+"""Responses by coherence: over all coherent frequencies, or over the widest band without a gap."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +34,11 @@ class ModelSettings:
     band_rad_s : tuple of float or None
         Lowest and highest frequency of the fit, rad/s; None where records are fitted.
     responses : tuple of str
-        Responses that are fitted, ``"output/input"``; ``("coherent",)``: those with coherence.
-        Empty: the model's own.
+        Responses that are fitted, ``"output/input"``; ``("coherent",)``: those with coherence, over
+        all frequencies that have it; ``("unbroken",)``: over the widest band without a gap. Empty:
+        the model's own.
+    outputs : tuple of str
+        Outputs whose responses are fitted; empty: all.
     response : ResponseSettings
         How responses are estimated.
     fit : FitSettings
@@ -64,6 +68,7 @@ class ModelSettings:
     check: VerifySettings
     joint: tuple[str, ...] = ()
     responses: tuple[str, ...] = ()
+    outputs: tuple[str, ...] = ()
     parameters: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     rivals: Mapping[str, str] = field(default_factory=dict)
     keep: tuple[str, ...] = ()
@@ -84,7 +89,7 @@ class ModelSettings:
     @property
     def by_coherence(self) -> bool:
         """Whether coherence says which responses are fitted."""
-        return self.responses == (COHERENT,)
+        return self.responses in ((COHERENT,), (UNBROKEN,))
 
 
 def read_model(
@@ -136,6 +141,7 @@ def read_model(
         check,
         joint,
         reader.names("responses", ()),
+        reader.names("outputs", ()),
         read_overrides(reader),
         {rival: _placed(folder, rival) for rival in reader.names("rivals", ())},
         *((reader.names("keep", ()), reader.names("drop", ())) if reduced else ((), ())),

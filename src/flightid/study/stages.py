@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from flightid.errors import DataError
+from flightid.errors import DataError, UnknownNameError
 from flightid.findings import Finding
 from flightid.identification import Fit, Reduction, identify, reduce
 from flightid.models import GreyBoxModel, StateSpaceModel, load_structure
@@ -17,7 +18,7 @@ from flightid.responses import (
     estimate_response,
 )
 from flightid.study.flown import Flown
-from flightid.study.model_settings import ModelSettings
+from flightid.study.model_settings import UNBROKEN, ModelSettings
 from flightid.study.reducing import ReduceSettings
 from flightid.validation import Comparison, ResidualTests, Verification, residual_tests, verify
 
@@ -130,6 +131,8 @@ def load_task(settings: ModelSettings) -> Task:
     for name, given in settings.parameters.items():
         parameters = parameters.with_parameter(replace(parameters[name], **given))
     model = replace(model, parameters=parameters)
+    if settings.outputs:
+        model = _with_responses(model, _of_outputs(model, settings.outputs))
     if settings.responses and not settings.by_coherence:
         model = _with_responses(model, settings.responses)
     rivals = {
@@ -139,6 +142,16 @@ def load_task(settings: ModelSettings) -> Task:
     reference = settings.reference
     beside = None if reference is None else load_structure(reference, axis=settings.axis)
     return Task(settings, model, rivals, beside)
+
+
+def _of_outputs(model: GreyBoxModel, outputs: tuple[str, ...]) -> tuple[str, ...]:
+    """Responses of some outputs."""
+    for name in outputs:
+        if name not in model.outputs:
+            raise UnknownNameError(
+                "the model has no such output", found=name, needed=", ".join(model.outputs)
+            )
+    return tuple(name for name in model.response_names if name.split("/")[0] in outputs)
 
 
 def _with_responses(model: GreyBoxModel, names: tuple[str, ...]) -> GreyBoxModel:
@@ -203,6 +216,8 @@ def choose_responses(
         minimum_coherence=settings.response.minimum_coherence,
         minimum_decades=settings.response.minimum_decades,
     )
+    if settings.responses == (UNBROKEN,):
+        coherent = unbroken(response, coherent)
     names = tuple(name for name in coherent.names if name in task.model.response_names)
     if not names:
         raise DataError(
@@ -213,6 +228,18 @@ def choose_responses(
             action="lower [response] minimum_coherence, or fly the inputs harder",
         )
     return replace(task, model=_with_responses(task.model, names)), coherent
+
+
+def unbroken(response: FrequencyResponse, coherent: CoherentPairs) -> CoherentPairs:
+    """The choice with each response's widest coherent band without a gap in place of all."""
+    judged = []
+    for pair in coherent.pairs:
+        band = response.pair(*pair.name.split("/")).usable_band(coherent.minimum_coherence)
+        decades = 0.0 if band is None else math.log10(band[1] / band[0])
+        kept = pair.kept and decades >= coherent.minimum_decades
+        reason = pair.reason if kept or not pair.kept else "no unbroken band is wide enough"
+        judged.append(replace(pair, band_rad_s=band, decades=decades, kept=kept, reason=reason))
+    return replace(coherent, pairs=tuple(judged))
 
 
 def fit(
