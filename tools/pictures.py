@@ -27,7 +27,7 @@ OPTIONS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
-    "--virtual-time-budget=20000",
+    "--virtual-time-budget=60000",
 )
 PAGE_SIZE = (1180, 2700)
 # File name -> (first line, last line) of the page's picture, in px.
@@ -53,14 +53,14 @@ def photograph(page: Path, picture: Path, size: tuple[int, int] = PAGE_SIZE) -> 
 
 
 def keep(whole: Path, picture: Path, rows: tuple[int, int] | None = None) -> Path:
-    """Keep a picture with few colours, since plots have few; of a page only some rows, shrunk."""
+    """Keep a picture in few colours, the rare ones among them; of a page only some rows, shrunk."""
     with Image.open(whole) as image:
         first, last = rows or (0, image.height)
         part = image.convert("RGB").crop((0, first, image.width, last))
         if rows is not None:
             size = (round(part.width * SCALE), round(part.height * SCALE))
             part = part.resize(size, Image.Resampling.LANCZOS)
-        part.quantize(64).save(picture, optimize=True)
+        part.quantize(128, Image.Quantize.MAXCOVERAGE).save(picture, optimize=True)
     size_bytes = picture.stat().st_size
     if size_bytes > MAXIMUM_BYTES:
         raise SystemExit(f"{picture.name} has {size_bytes} bytes, at most {MAXIMUM_BYTES} are kept")
