@@ -11,7 +11,7 @@ import numpy as np
 import tables
 from vehicles import COUPLINGS, truth
 
-from flightid.plot.fit import Estimate, estimates_of, fit_figure, parameter_intervals
+from flightid.plot.fit import EstimateBar, estimates_of, fit_figure, parameter_intervals
 from flightid.plot.fitted_record import record_figure
 from flightid.plot.reduction import reduction_path
 from flightid.report.blocks import result_blocks
@@ -94,7 +94,7 @@ def _parameters(found: Study) -> tuple[Block, ...]:
     )
 
 
-def _estimates(found: Study) -> list[Estimate]:
+def _estimates(found: Study) -> list[EstimateBar]:
     both = [("time", found.found.time), ("frequency", found.found.frequency)]
     drawn = [
         replace(each, name=f"{each.name}, {domain}")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from flightid.conventions import Light
-from flightid.errors import ExportError, OptionError
+from flightid.errors import OptionError
 from flightid.export.c import export_c
 from flightid.export.exported import Exported
 from flightid.export.fmu import export_fmu
@@ -16,17 +16,13 @@ from flightid.export.jsbsim import export_jsbsim
 from flightid.findings import Finding
 from flightid.identification import Fit
 from flightid.models import (
-    InnovationsModel,
-    LinearSystem,
-    NarxModel,
-    PolynomialModel,
     StateSpaceModel,
     TransferFunctionModel,
     write_model,
     write_system,
 )
 from flightid.models.linear.system_files import MATLAB_RECIPE
-from flightid.models.model import linear_system
+from flightid.models.model import linear_system, model_of
 
 FORMATS = {
     ".toml": "toml",
@@ -120,11 +116,6 @@ def export(
     return _toml(model, place) if chosen == "toml" else _matrices(source, model, place, chosen)
 
 
-def model_of(source: object) -> object:
-    """The model of a fit, or the source itself."""
-    return source.model if isinstance(source, Fit) else source
-
-
 def _called(
     function: Callable[..., Exported], *arguments: object, options: Mapping[str, object]
 ) -> Exported:
@@ -141,11 +132,6 @@ def _called(
 
 
 def _toml(model: object, path: Path) -> Exported:
-    known = TransferFunctionModel | StateSpaceModel | PolynomialModel | InnovationsModel | NarxModel
-    if not isinstance(model, known | LinearSystem):
-        raise ExportError(
-            "this is no model that a file could hold", found=type(model).__name__, needed="a model"
-        )
     if path.suffix != ".toml":
         raise OptionError("a TOML file ends in .toml", found=path.name)
     write_model(model, path)
@@ -153,8 +139,6 @@ def _toml(model: object, path: Path) -> Exported:
 
 
 def _matrices(source: object, model: object, path: Path, format: str) -> Exported:
-    if isinstance(model, NarxModel):
-        raise ExportError("a NARX model has no matrices", needed="toml")
     if path.suffix.lower() != f".{format}":
         raise OptionError("the suffix is not that of the format", found=path.name, needed=format)
     system = linear_system(model)

@@ -14,7 +14,7 @@ from flightid.models.language.tables import Axis, TableFunction
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.system_files import read_system, write_system
 from flightid.models.load import library_names, load_model, load_structure
-from flightid.models.model import LinearModel, Model, linear_system
+from flightid.models.model import LinearModel, Model, linear_system, model_of
 from flightid.models.narx.model import NarxModel
 from flightid.models.narx.prediction import NarxPrediction
 from flightid.models.narx.structure import NarxStructure
@@ -64,6 +64,7 @@ __all__ = [
     "linear_system",
     "load_model",
     "load_structure",
+    "model_of",
     "read_system",
     "to_control",
     "to_scipy",

@@ -86,6 +86,12 @@ class LinearModel(Protocol):
         ...
 
 
+def model_of(source: object) -> object:
+    """The model of a fit, or the source itself."""
+    inner = getattr(source, "model", None)
+    return source if inner is None else inner
+
+
 def linear_system(source: object) -> LinearSystem:
     """The linear system of a model, a fit, an interconnection or itself.
 

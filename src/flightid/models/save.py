@@ -10,18 +10,18 @@ from pathlib import Path
 from flightid.errors import ModelError
 from flightid.files import write_atomically
 from flightid.models.kinds import model_to_description
-from flightid.models.model import Model
+from flightid.models.model import model_of
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
-def write_model(source: Model, path: str | Path) -> Path:
+def write_model(source: object, path: str | Path) -> Path:
     """Write a model to a TOML file; `load_model` gives the same model back.
 
     Parameters
     ----------
-    source : Model
-        Of any kind, with all its numbers; of a fit its ``model``, of a NARX fit its ``equation``.
+    source : Fit or model
+        Of any kind.
     path : str or Path
         File ending in ``.toml``; its folder must exist. It is written whole or not at all.
 
@@ -55,7 +55,7 @@ def write_model(source: Model, path: str | Path) -> Path:
     return write_atomically(path, model_as_toml(source))
 
 
-def model_as_toml(model: Model) -> str:
+def model_as_toml(source: object) -> str:
     """Text of the TOML file.
 
     Example
@@ -64,7 +64,11 @@ def model_as_toml(model: Model) -> str:
     >>> print(model_as_toml(load_model("quadrotor_yaw")).splitlines()[1])
     name = "Quadrotor on a rig, yaw"
     """
-    plain = {key: value for key, value in model_to_description(model).items() if key != "schema"}
+    plain = {
+        key: value
+        for key, value in model_to_description(model_of(source)).items()
+        if key != "schema"
+    }
     kind = {"kind": plain.pop("kind", "transfer")}
     single = {k: v for k, v in plain.items() if not isinstance(v, Mapping) and v not in ("", [])}
     lines = [f"{_key(key)} = {_value(value)}" for key, value in {**kind, **single}.items()]

@@ -11,8 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from flightid import _native
 from flightid.conventions import Role
 from flightid.errors import DataError, ModelError, OptionError, ShapeError
-from flightid.models import LinearModel, LinearSystem, StateSpaceModel
+from flightid.models import LinearModel, LinearSystem, NarxModel, StateSpaceModel
 from flightid.models.linear.hold_equivalent import Hold
+from flightid.models.model import linear_system, model_of
 from flightid.models.sampled.recursion import run_recursion
 from flightid.record import Channel, InputHold, Record, Step
 from flightid.record.chosen_hold import chosen_hold
@@ -27,7 +28,7 @@ from flightid.simulation.nonlinear import run_equations, start_of
 
 
 def simulate(
-    source: LinearModel,
+    source: object,
     record: Record,
     *,
     hold: Hold | None = None,
@@ -40,11 +41,11 @@ def simulate(
 ) -> Record:
     """Drive a model with the inputs of a record.
 
-    Linear models are discretised exactly for the chosen hold, fractional delays included; a sampled
-    `LinearSystem` runs as it is, from rest. A
-    nonlinear `StateSpaceModel` advances by Runge-Kutta steps of fourth order and takes its inputs
-    and states whole, not as departures from a trim. Before the first sample each input is taken
-    to have had the value of that sample.
+    Linear models are discretised exactly for the chosen hold, fractional delays included; sampled
+    models run as they are, from rest at the point they hold about. A nonlinear `StateSpaceModel`
+    advances by Runge-Kutta steps of fourth order and takes its inputs and states whole, not as
+    departures from a trim. Before the first sample each input is taken to have had the value of
+    that sample.
 
     Assumes: what the inputs do between their samples. ``"first"`` (straight lines) has no phase
     lag and belongs to models whose delay includes the half sample of an autopilot's output hold,
@@ -53,10 +54,9 @@ def simulate(
 
     Parameters
     ----------
-    source : LinearModel
-        Anything with ``inputs``, ``outputs`` and ``state_space()`` returning A, B, C, D and the
-        delay of each input in s: a `LinearSystem`, a transfer-function model; or a nonlinear
-        `StateSpaceModel`.
+    source : Fit or model
+        Of any kind; or anything with ``inputs``, ``outputs`` and ``state_space()`` returning A, B,
+        C, D and the delay of each input in s.
     record : Record
         Holds the inputs by name, in the model's units.
     hold : {"first", "zero"}, optional
@@ -111,37 +111,64 @@ def simulate(
     >>> bool(np.allclose(simulate(lag, record)["y"], 1 - np.exp(-time_s)))
     True
     """
-    if not isinstance(source, LinearModel):
-        raise ModelError(
-            "the model cannot be simulated",
-            found=type(source).__name__,
-            needed="an object with inputs, outputs and state_space()",
-        )
+    model = _runnable(source, noise, initial_state)
     between = chosen_hold(record, hold).hold
-    names, outputs = tuple(source.inputs), tuple(source.outputs)
-    driven = record.matrix(names) + _biases(input_bias, names)
+    names, outputs = tuple(model.inputs), tuple(model.outputs)
+    point = getattr(model_of(source), "operating_point", {})
+    driven = record.matrix(names) + _biases(input_bias, names) - _column(point, names)
     first = between == "first"
-    if isinstance(source, StateSpaceModel) and not source.is_linear:
-        computed = _run_nonlinear(source, driven, record, first, initial_state, substeps, noise)
+    if isinstance(model, NarxModel):
+        computed = model.from_rest(driven, record.sample_time_s)
+    elif isinstance(model, StateSpaceModel) and not model.is_linear:
+        computed = _run_nonlinear(model, driven, record, first, initial_state, substeps, noise)
     else:
         if substeps is not None:
             raise OptionError(
                 "a linear model has no substeps: its discretisation is exact", found=substeps
             )
-        computed = _run_linear(source, driven, record.sample_time_s, initial_state, first)
+        computed = _run_linear(model, driven, record.sample_time_s, initial_state, first)
         if noise is not None and noise.moves:
             computed = computed + linear_disturbance(
-                source, noise, record.sample_time_s, record.n_samples
+                model, noise, record.sample_time_s, record.n_samples
             )
     if noise is not None:
         computed = computed + noise.on_sensors(outputs, record.n_samples)
-    computed = computed + _biases(output_bias, outputs)
+    computed = computed + _column(point, outputs) + _biases(output_bias, outputs)
+    units = {**getattr(model, "units", {}), **(units or {})}
     made = dict(zip(outputs, computed, strict=True))
     made_record = _as_record(record, names, made, units, between, noise)
-    if isinstance(source, LinearSystem) and source.is_discrete:
-        # A sampled system reads its inputs at their samples alone.
+    if getattr(model, "sample_time_s", None) is not None:
+        # A sampled model reads its inputs at their samples alone.
         return made_record.replace(input_shape=record.input_shape)
     return made_record
+
+
+def _runnable(
+    source: object, noise: Noise | None, initial_state: object
+) -> LinearModel | NarxModel:
+    """The model as it is run: sampled ones as recursions."""
+    model = model_of(source)
+    if isinstance(model, NarxModel):
+        if initial_state is not None or (noise is not None and noise.moves):
+            raise OptionError(
+                "a NARX model has no states to start from or to disturb",
+                found="initial_state or process noise",
+                needed="neither: it starts from lags at the training mean",
+            )
+        return model
+    if getattr(model, "sample_time_s", None) is not None:
+        return linear_system(model)
+    if not isinstance(model, LinearModel):
+        raise ModelError(
+            "the model cannot be simulated",
+            found=type(model).__name__,
+            needed="a fit or a model, or an object with inputs, outputs and state_space()",
+        )
+    return model
+
+
+def _column(values: Mapping[str, float], names: tuple[str, ...]) -> NDArray[np.float64]:
+    return np.array([[values.get(name, 0.0)] for name in names]).reshape(len(names), 1)
 
 
 def _run_nonlinear(
@@ -234,7 +261,7 @@ def _biases(biases: Mapping[str, float] | None, names: tuple[str, ...]) -> NDArr
     for name in biases or {}:
         if name not in names:
             raise OptionError("a bias has no channel", found=name, needed=f"one of {list(names)}")
-    return np.array([[(biases or {}).get(name, 0.0)] for name in names]).reshape(len(names), 1)
+    return _column(biases or {}, names)
 
 
 def _as_record(

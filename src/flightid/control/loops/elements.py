@@ -11,7 +11,7 @@ from flightid.control.loops.block import Block, Equations, Hold, Limits, RateLim
 from flightid.errors import ModelError, OptionError
 from flightid.models import StateSpaceModel
 from flightid.models.linear.linear_system import LinearSystem
-from flightid.models.model import linear_system
+from flightid.models.model import linear_system, model_of
 
 
 def gain(
@@ -317,7 +317,7 @@ def system(source: object, *, rename: Mapping[str, str] | None = None, name: str
     >>> system(fid.load_model("rate_integrator"), rename={"tau_phi": "u"}).inputs
     ('u',)
     """
-    model = getattr(source, "model", source)
+    model = model_of(source)
     linear = linear_system(source)
     names = dict(rename or {})
     for channel in names:

@@ -13,6 +13,7 @@ from flightid.control.margins.loop_grid import Roots, loop_grid, roots_of, whole
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
 from flightid.identification.uncertain_of import uncertain_of
+from flightid.models import Model, linear_system
 from flightid.responses import FrequencyResponse
 from flightid.responses.arithmetic import Known, apply_known, loop_of_sensitivity, open_loop
 from flightid.uncertainty.uncertain import Uncertain
@@ -174,6 +175,8 @@ def _modelled(
     uncertain = uncertain_of(source)
     model = uncertain.value
     if not isinstance(model, Responding):
+        if isinstance(model, Model):
+            linear_system(model)  # its refusal has the reason
         raise ModelError(
             "the loop has no frequency response",
             found=type(source).__name__,

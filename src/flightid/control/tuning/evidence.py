@@ -16,7 +16,7 @@ from flightid.findings import Finding
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.linear.linear_system import LinearSystem
-from flightid.models.model import linear_system
+from flightid.models.model import linear_system, model_of
 from flightid.uncertainty.uncertain import Uncertain
 
 CORNER = 2.0
@@ -191,7 +191,7 @@ def _hold_in_model(source: object) -> bool:
 
 def _linear(source: object, sample_time_s: float) -> LinearSystem:
     """Continuous system, or a recursion at the loop's own samples."""
-    model = getattr(source, "model", source)
+    model = model_of(source)
     if isinstance(model, PolynomialModel | InnovationsModel):
         if abs(model.sample_time_s / sample_time_s - 1.0) > 1e-6:
             return to_continuous(model)

@@ -15,7 +15,7 @@ from flightid.dynamics.modes.modes import modes
 from flightid.dynamics.modes.result import Modes
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.findings import Finding
-from flightid.models.model import linear_system
+from flightid.models.model import linear_system, model_of
 from flightid.responses import FrequencyResponse
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
@@ -305,7 +305,7 @@ def _pairs(source: object, given: Pairs | None) -> tuple[Pairs, list[Finding]]:
 def _channels(source: object) -> tuple[Sequence[str], Sequence[str]]:
     if isinstance(source, FrequencyResponse):
         return source.outputs, source.inputs
-    inner = getattr(source, "model", source)
+    inner = model_of(source)
     if hasattr(inner, "outputs") and hasattr(inner, "inputs"):
         return tuple(inner.outputs), tuple(inner.inputs)
     system = linear_system(source)

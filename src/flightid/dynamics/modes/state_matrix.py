@@ -12,7 +12,7 @@ from flightid.errors import UnknownNameError
 from flightid.identification import Fit
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.models import LinearSystem, StateSpaceModel
-from flightid.models.model import linear_system
+from flightid.models.model import linear_system, model_of
 from flightid.uncertainty.uncertain import Uncertain, uncertain_numbers
 
 Array = NDArray[np.float64]
@@ -98,7 +98,7 @@ def read_states(source: object, states: Mapping[str, str]) -> StateMatrix:
         There is no such state.
     """
     system = linear_system(source)
-    model = getattr(source, "model", source)
+    model = model_of(source)
     for name in states:
         if name not in system.states:
             raise UnknownNameError(

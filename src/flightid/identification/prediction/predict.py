@@ -13,7 +13,7 @@ from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.sampled import predict_sampled
 from flightid.models import InnovationsModel, LinearSystem, NarxModel, PolynomialModel
 from flightid.models.linear.hold_equivalent import Hold
-from flightid.models.model import LinearModel
+from flightid.models.model import LinearModel, model_of
 from flightid.record import Record
 from flightid.units import canonical
 
@@ -163,12 +163,12 @@ def predictor_of(source: object) -> tuple[Any, Predictor]:
     ModelError
         The source is no model and holds none.
     """
-    for candidate in (getattr(source, "equation", None), getattr(source, "model", source)):
-        if isinstance(candidate, LinearSystem) and candidate.is_discrete:
-            return _without_noise(candidate), predict_sampled
-        for kind, way in PREDICTORS:
-            if isinstance(candidate, kind):
-                return candidate, way
+    model: Any = model_of(source)
+    if isinstance(model, LinearSystem) and model.is_discrete:
+        return _without_noise(model), predict_sampled
+    for kind, way in PREDICTORS:
+        if isinstance(model, kind):
+            return model, way
     raise ModelError(
         "the model cannot be simulated",
         found=type(source).__name__,
@@ -187,7 +187,7 @@ def _without_noise(system: LinearSystem) -> InnovationsModel:
 
 def output_names(model: object) -> tuple[str, ...]:
     """Outputs of a model of any kind."""
-    inner: Any = getattr(model, "model", model)
+    inner: Any = model_of(model)
     several = getattr(inner, "outputs", None)
     return (inner.output,) if several is None else tuple(several)
 

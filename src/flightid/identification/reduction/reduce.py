@@ -102,6 +102,13 @@ def reduce(
     >>> found.dropped
     {'Lp': 0.0}
     """
+    if not isinstance(getattr(fit, "model", None), GreyBoxModel):
+        raise ModelError(
+            "only named parameters of a fit are dropped one by one",
+            found=type(getattr(fit, "model", fit)).__name__,
+            needed="a fit of a state-space or transfer-function model",
+            action="choose the orders of a black box by scan_orders",
+        )
     limits = ReductionLimits(
         maximum_insensitivity_percent,
         maximum_cramer_rao_percent,
@@ -180,7 +187,7 @@ def _options(fit: Fit, given: Mapping[str, object]) -> dict[str, Any]:
     before = fit.provenance.get("options")
     used = dict(before) if isinstance(before, Mapping) else {}
     if not fit.responses:
-        used["method"] = str(fit.provenance.get("method")).replace(" ", "_").lower()
+        used["method"] = fit.method
     if "starts" in used:
         used["starts"] = 1
     return used | dict(given)

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import ModelError, OptionError
@@ -21,6 +22,7 @@ from flightid.record import Record
 from flightid.table import Column, Table
 
 SCHEMA = "flightid.narx_equation/1"
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
@@ -138,17 +140,50 @@ class NarxModel:
         """
         if horizon != "free_run" and not (isinstance(horizon, int) and horizon > 0):
             raise OptionError("unknown horizon", found=horizon, needed="1, 2, … or 'free_run'")
-        structure, scaling = self.structure, self.scaling
+        name, scaling = self.output, self.scaling
+        scaled = [scaling.scaled(record, channel) for channel in (name, *self.inputs)]
+        ahead = 0 if horizon == "free_run" else int(horizon)
+        values, start, diverged = self._run(scaled[0], np.array(scaled[1:]), ahead)
+        predicted = values * scaling.deviation[name] + scaling.mean[name]
+        predicted[:start] = record[name][:start]
+        return NarxPrediction(record[name], predicted, horizon, start, diverged)
+
+    def from_rest(self, inputs: Array, sample_time_s: float) -> Array:
+        """Free run from lags at the training mean, shape (1, n_samples), in the output's unit.
+
+        Parameters
+        ----------
+        inputs : ndarray, shape (n_inputs, n_samples)
+            In the inputs' units.
+        sample_time_s : float
+            Of the inputs, s.
+
+        Raises
+        ------
+        DataError
+            Another sample time than in training.
+        """
+        scaling = self.scaling
+        scaling.require_sample_time(sample_time_s)
+        rows = [
+            (row - scaling.mean[name]) / scaling.deviation[name]
+            for name, row in zip(self.inputs, inputs, strict=True)
+        ]
+        values, _, _ = self._run(np.zeros(inputs.shape[1]), np.array(rows), 0)
+        return np.asarray(values * scaling.deviation[self.output] + scaling.mean[self.output])[None]
+
+    def _run(self, output: Array, inputs: Array, ahead: int) -> tuple[Array, int, int | None]:
+        """Native run of scaled channels: values, samples that start it, where it was held."""
+        structure = self.structure
         channels = (structure.output, *structure.inputs)
-        scaled = [scaling.scaled(record, name) for name in channels]
         places = {lag: place for place, lag in enumerate(structure.lags)}
-        low, high = scaling.output_range
+        low, high = self.scaling.output_range
         middle, half = 0.5 * (low + high), 0.5 * structure.guard * (high - low)
         radial = [i for i, term in enumerate(self.terms) if term.centre]
         centres = [self.terms[i].centre for i in radial]
-        values, start, diverged = _native.run_narx(
-            scaled[0],
-            np.array(scaled[1:]).reshape(len(structure.inputs), record.n_samples),
+        return _native.run_narx(
+            output,
+            inputs.reshape(len(structure.inputs), output.size),
             [(channels.index(lag.channel), lag.lag) for lag in structure.lags],
             self._monomials(places),
             np.array(centres, dtype=np.float64).reshape(len(radial), len(structure.lags)),
@@ -156,12 +191,8 @@ class NarxModel:
             structure.kernel or "gaussian",
             structure.beta,
             (middle - half, middle + half),
-            0 if horizon == "free_run" else int(horizon),
+            ahead,
         )
-        name = structure.output
-        predicted = values * scaling.deviation[name] + scaling.mean[name]
-        predicted[:start] = record[name][:start]
-        return NarxPrediction(record[name], predicted, horizon, start, diverged)
 
     def _monomials(self, places: dict[Lag, int]) -> list[tuple[float, list[tuple[int, int]]]]:
         found = []

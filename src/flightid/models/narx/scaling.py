@@ -33,14 +33,24 @@ class Scaling:
                 needed=self.units[name],
                 action="convert it with Record.to_units",
             )
-        if abs(record.sample_time_s / self.sample_time_s - 1.0) > 1e-6:
+        self.require_sample_time(record.sample_time_s)
+        return np.ascontiguousarray((record[name] - self.mean[name]) / self.deviation[name])
+
+    def require_sample_time(self, sample_time_s: float) -> None:
+        """Refuse another sample time than that of the training records.
+
+        Raises
+        ------
+        DataError
+            It differs.
+        """
+        if abs(sample_time_s / self.sample_time_s - 1.0) > 1e-6:
             raise DataError(
                 "the record has another sample time than the model's training records",
-                found=f"{record.sample_time_s:.6g} s",
+                found=f"{sample_time_s:.6g} s",
                 needed=f"{self.sample_time_s:.6g} s",
                 action="resample it with conditioning.resample",
             )
-        return np.ascontiguousarray((record[name] - self.mean[name]) / self.deviation[name])
 
     def to_dict(self) -> dict[str, object]:
         """Plain values without the units."""

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError, ShapeError
 from flightid.identification import Fit
+from flightid.models import Model
 from flightid.record import Record
 from flightid.validation.residuals.correlation import Series
 from flightid.validation.residuals.correlation_result import Horizon
@@ -92,6 +93,13 @@ def gather_residuals(
     if isinstance(residuals, Sequence) and residuals and isinstance(residuals[0], Fit):
         fits = tuple(fit for fit in residuals if isinstance(fit, Fit))
         return _of_fits(fits, _channel_names(inputs), outputs, horizon)
+    if isinstance(residuals, Model):
+        raise DataError(
+            "a model has no residuals of its own",
+            found=type(residuals).__name__,
+            needed="a fit, or predictions of records",
+            action="predict records first: residual_tests(flightid.verify(model, records))",
+        )
     if horizon is None:
         raise OptionError(
             "the predictor is not said",

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.findings import Finding
+from flightid.models import model_of
 from flightid.responses import FrequencyResponse
 from flightid.table import Cell, Column, Table
 
@@ -236,7 +237,7 @@ def mismatch(
     >>> mismatch(lag, late).findings[0].light.value
     'red'
     """
-    inner = getattr(source, "model", source)
+    inner = model_of(source)
     inputs = tuple(getattr(inner, "inputs", ()))
     outputs = tuple(getattr(inner, "outputs", ()))
     chosen = getattr(inner, "response_names", None)
