@@ -1,0 +1,87 @@
+"""What the data of a fit show of themselves: power, coherence, and whether a loop was closed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from flightid.conventions import Light
+from flightid.errors import FlightidError
+from flightid.evidence.evidence import BAND, COHERENCE, LOOP, Check
+from flightid.evidence.feedback import feedback_test
+from flightid.evidence.spans import Span, judge_coherence, judge_span
+from flightid.record import Record
+from flightid.responses import FrequencyResponse, estimate_response
+from flightid.responses.bands import usable_band
+from flightid.uncertainty.feedback import FeedbackTest
+
+KEPT = 4
+"""Sets of records whose examination is kept: a scan fits the same ones many times."""
+CLOSED_ACTION = (
+    "use the injected excitation as instrument, a method with a noise model, or fly with the loop "
+    "open; loop='open' overrides where you know it"
+)
+
+
+def loop_check(test: FeedbackTest) -> Check:
+    """The light of a feedback test.
+
+    Example
+    -------
+    >>> loop_check(FeedbackTest("closed", "declared")).light.value
+    'amber'
+    """
+    if test.is_closed:
+        return Check(LOOP, Light.AMBER, str(test), CLOSED_ACTION)
+    if test.loop == "unknown" and test.source != "instrument":
+        return Check(LOOP, Light.UNKNOWN, str(test), "declare loop='open' or 'closed'")
+    return Check(LOOP, Light.GREEN, str(test))
+
+
+def loop_of_responses(responses: Sequence[FrequencyResponse]) -> Check | None:
+    """The worst of what responses know of their loop; None where one does not know."""
+    tests = [each.loop for each in responses]
+    known = [test for test in tests if test is not None]
+    if not known or len(known) < len(tests):
+        return None
+    checks = [loop_check(test) for test in known]
+    order = (Light.AMBER, Light.UNKNOWN, Light.GREEN)
+    return min(checks, key=lambda check: order.index(check.light))
+
+
+@lru_cache(maxsize=KEPT)
+def loop_of_records(
+    records: tuple[Record, ...], inputs: tuple[str, ...], outputs: tuple[str, ...]
+) -> Check | None:
+    """What records know of their loop, else what the test says; None where it cannot be made."""
+    try:
+        return loop_check(feedback_test(records, inputs=inputs, outputs=outputs))
+    except FlightidError:
+        return None
+
+
+@lru_cache(maxsize=KEPT)
+def power_of_records(
+    records: tuple[Record, ...], inputs: tuple[str, ...], outputs: tuple[str, ...]
+) -> tuple[Check, ...]:
+    """Band and coherence of each output with all inputs together, from a quick response.
+
+    Multiple coherence counts: an input that does little for one output may move another.
+    """
+    try:
+        found = estimate_response(
+            records, inputs=inputs, outputs=outputs, covariance=False, loop="open"
+        )
+    except FlightidError as error:
+        said = f"the records give no response: {error}"
+        return tuple(Check(name, Light.UNKNOWN, said) for name in (BAND, COHERENCE))
+    spans = []
+    for name, coherence in zip(found.outputs, found.multiple_coherence, strict=True):
+        band = usable_band(found.omega_rad_s, coherence)
+        inside = np.ones(coherence.size, dtype=bool)
+        if band is not None:
+            inside = (found.omega_rad_s >= band[0]) & (found.omega_rad_s <= band[1])
+        spans.append(Span(name, band, float(np.mean(coherence[inside]))))
+    return judge_span(spans), judge_coherence(spans)

@@ -1,0 +1,198 @@
+"""Evidence: what was examined of a result, what that says, and the one light that follows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from flightid.conventions import Light
+from flightid.errors import OptionError
+from flightid.findings import Finding
+from flightid.table import Column, Table
+
+SCHEMA = "flightid.evidence/1"
+
+INSPECTION = "inspection"
+BAND = "excitation band"
+COHERENCE = "coherence"
+LOOP = "loop"
+SETTLED = "estimator settled"
+AGREEMENT = "agreement of parts"
+SIGNS = "declared signs"
+RESIDUALS = "residuals"
+GUIDELINES = "guidelines"
+NAMES = (INSPECTION, BAND, COHERENCE, LOOP, SETTLED, AGREEMENT, SIGNS, RESIDUALS, GUIDELINES)
+ALWAYS = (BAND, COHERENCE, LOOP, SETTLED, AGREEMENT)
+"""What every result needs before it may be green."""
+
+_ABSENT: Mapping[str, tuple[str, str]] = {
+    INSPECTION: ("the log was not inspected", "run inspect_log, or `flightid inspect`"),
+    BAND: ("the band that the inputs excite was not examined", "fit records or their responses"),
+    COHERENCE: ("coherence was not examined", "fit records or a response estimated from them"),
+    LOOP: ("whether a loop was closed was not examined", "declare loop='open' or 'closed'"),
+    SETTLED: ("whether the estimator settled was not examined", ""),
+    AGREEMENT: (
+        "whether parts of the data agree was not examined",
+        "fit halves of the record, or records, by themselves and compare their intervals",
+    ),
+    SIGNS: ("declared signs were not examined", ""),
+    RESIDUALS: ("residuals were not tested", "run residual_tests"),
+    GUIDELINES: ("guidelines were not examined", ""),
+}
+_ORDER = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing that was examined.
+
+    Attributes
+    ----------
+    name : str
+        One of `NAMES`.
+    light : Light
+    what : str
+        What was found, with numbers and units.
+    action : str
+        What to do about it; empty where nothing is to be done.
+
+    Example
+    -------
+    >>> print(Check("loop", Light.GREEN, "loop open, as declared").finding)
+    [green] loop open, as declared
+    """
+
+    name: str
+    light: Light
+    what: str
+    action: str = ""
+
+    def __post_init__(self) -> None:
+        if self.name not in NAMES:
+            raise OptionError("no such check", found=self.name, needed=", ".join(NAMES))
+
+    @property
+    def finding(self) -> Finding:
+        """The check as a finding; its code is ``evidence-`` and the name."""
+        code = "evidence-" + self.name.replace(" ", "-")
+        return Finding(code, self.light, self.what, self.action)
+
+    def to_dict(self) -> dict[str, str]:
+        """Plain values."""
+        return {
+            "name": self.name,
+            "light": str(self.light),
+            "what": self.what,
+            "action": self.action,
+        }
+
+
+@dataclass(frozen=True, repr=False)
+class Evidence:
+    """Checks of a result, and its light.
+
+    Red where a check is red. Green where every required check is there and green, and no other is
+    worse. Amber otherwise: what was not examined is never green.
+
+    Attributes
+    ----------
+    checks : tuple of Check
+        One of a name at most.
+    required : tuple of str
+        Names that must be there for green.
+
+    Example
+    -------
+    >>> evidence = Evidence((Check("loop", Light.GREEN, "loop open, as declared"),), ("loop",))
+    >>> evidence.light.value, Evidence(evidence.checks).light.value
+    ('green', 'amber')
+    """
+
+    checks: tuple[Check, ...] = ()
+    required: tuple[str, ...] = ALWAYS
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Required checks that are not there."""
+        present = {check.name for check in self.checks}
+        return tuple(name for name in self.required if name not in present)
+
+    @property
+    def light(self) -> Light:
+        """The light of the result: everything that shows one shows this."""
+        found = self._worst(self.findings)
+        return Light.AMBER if found is Light.UNKNOWN else found
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Every check, and what is missing, in the order of `NAMES`."""
+        present = {check.name: check.finding for check in self.checks}
+        absent = {
+            name: Finding("evidence-" + name.replace(" ", "-"), Light.AMBER, *_ABSENT[name])
+            for name in self.missing
+        }
+        both = present | absent
+        return tuple(both[name] for name in NAMES if name in both)
+
+    @property
+    def reason(self) -> Finding | None:
+        """The finding that gives the light; one that was examined goes before one that was not."""
+        absent = {"evidence-" + name.replace(" ", "-") for name in self.missing}
+        ranked = sorted(self.findings, key=lambda f: (_ORDER.index(f.light), f.code in absent))
+        return ranked[0] if ranked else None
+
+    def check(self, name: str) -> Check | None:
+        """The check of a name; None where it was not made."""
+        return next((check for check in self.checks if check.name == name), None)
+
+    def with_checks(self, checks: Iterable[Check], *, required: Iterable[str] = ()) -> Evidence:
+        """Copy with more checks, in place of those of their names, and more required names."""
+        given = {check.name: check for check in checks}
+        kept = tuple(check for check in self.checks if check.name not in given)
+        names = dict.fromkeys((*self.required, *required))
+        return replace(self, checks=(*kept, *given.values()), required=tuple(names))
+
+    def summary(self) -> Table:
+        """Table of the checks, and of what was not examined."""
+        columns = (Column("examined"), Column("light"), Column("found"), Column("do"))
+        rows = []
+        for name in NAMES:
+            check = self.check(name)
+            if check is not None:
+                rows.append((name, str(check.light), check.what, check.action or None))
+            elif name in self.missing:
+                rows.append((name, "not examined", *_ABSENT[name]))
+        return Table(repr(self), columns, tuple(rows))
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "schema": SCHEMA,
+            "light": str(self.light),
+            "checks": [check.to_dict() for check in self.checks],
+            "required": list(self.required),
+            "missing": list(self.missing),
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Evidence:
+        """Evidence from its plain values."""
+        checks = tuple(
+            Check(item["name"], Light(item["light"]), item["what"], item["action"])
+            for item in values["checks"]
+        )
+        return cls(checks, tuple(values["required"]))
+
+    def __repr__(self) -> str:
+        """Light and numbers of checks on one line."""
+        absent = f", not examined: {', '.join(self.missing)}" if self.missing else ""
+        return f"Evidence({self.light}, {len(self.checks)} checks{absent})"
+
+    def _repr_html_(self) -> str:
+        return self.summary()._repr_html_()
+
+    @staticmethod
+    def _worst(findings: Iterable[Finding]) -> Light:
+        lights = {finding.light for finding in findings}
+        return next((light for light in _ORDER if light in lights), Light.AMBER)

@@ -1,0 +1,174 @@
+"""Evidence of a fit from what exists when it is made: its data, its findings and its end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from flightid.conventions import Light
+from flightid.evidence.data_checks import loop_of_records, loop_of_responses, power_of_records
+from flightid.evidence.evidence import (
+    ALWAYS,
+    BAND,
+    GUIDELINES,
+    INSPECTION,
+    RESIDUALS,
+    SETTLED,
+    SIGNS,
+    Check,
+    Evidence,
+)
+from flightid.evidence.parameter_checks import declared_signs
+from flightid.evidence.spans import Span, judge_coherence, judge_span
+from flightid.findings import Finding, worst
+from flightid.inspection import Inspection
+from flightid.record import Record
+from flightid.responses import FrequencyResponse
+
+FROM_LOG = "Log.record"
+CONVERGED = frozenset({"gradient", "step", "cost", "zero", "bounds"})
+# Which check a finding of a fit belongs to; all others are guidelines.
+BELONGS = {
+    "estimator-bias": SETTLED,
+    "estimator-bias-not-corrected": SETTLED,
+    "not-converged": SETTLED,
+    "not-refined": SETTLED,
+    "several-minima": SETTLED,
+    "local-minima": SETTLED,
+    "stability-enforced": SETTLED,
+    "root-at-circle": SETTLED,
+    "predictor-at-circle": SETTLED,
+    "input-not-excited": BAND,
+    "residuals-coloured": RESIDUALS,
+    "output-unexplained": RESIDUALS,
+}
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a fit hands over.
+
+    Attributes
+    ----------
+    data : sequence of FrequencyResponse or Record
+        What was fitted.
+    inputs, outputs : tuple of str
+        Channels of the model.
+    spans : sequence of Span
+        Band and mean coherence of each fitted response; empty for records alone.
+    findings : sequence of Finding
+        Of the fit.
+    termination : str
+        Why the iteration ended; empty where nothing was iterated.
+    signs : mapping of str to (sign, value, interval or None, status)
+        Parameters whose bounds declare a sign.
+    """
+
+    data: Sequence[FrequencyResponse | Record]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    spans: Sequence[Span]
+    findings: Sequence[Finding]
+    termination: str
+    signs: Mapping[str, tuple[int, float, tuple[float, float] | None, str]]
+
+
+def gather_evidence(made: Made) -> Evidence:
+    """Examine a fit as far as its own data and end allow.
+
+    Parameters
+    ----------
+    made : Made
+
+    Returns
+    -------
+    Evidence
+        Agreement of parts is required and not examined here, so none is green yet.
+    """
+    responses = [each for each in made.data if isinstance(each, FrequencyResponse)]
+    records = [each for each in made.data if isinstance(each, Record)]
+    checks: list[Check] = []
+    if made.spans:
+        checks += [judge_span(made.spans), judge_coherence(made.spans)]
+    elif records:
+        checks += power_of_records(tuple(records), made.inputs, made.outputs)
+    loop = loop_of_responses(responses) if responses else None
+    if loop is None and records:
+        loop = loop_of_records(tuple(records), made.inputs, made.outputs)
+    checks += [] if loop is None else [loop]
+    if made.signs:
+        checks.append(declared_signs(made.signs))
+    checks = _with_findings(checks, made)
+    return Evidence(tuple(checks), _required(made, responses, records))
+
+
+def _required(
+    made: Made, responses: Sequence[FrequencyResponse], records: Sequence[Record]
+) -> tuple[str, ...]:
+    histories = [*(each.history for each in responses), *(each.history for each in records)]
+    logged = any(step.operation == FROM_LOG for history in histories for step in history)
+    signs = (SIGNS,) if made.signs else ()
+    return (*((INSPECTION,) if logged else ()), *ALWAYS, *signs)
+
+
+def _with_findings(checks: list[Check], made: Made) -> list[Check]:
+    """The checks with the fit's findings among them, the worst word of each name first."""
+    groups: dict[str, list[Finding]] = {SETTLED: [], GUIDELINES: []}
+    for finding in made.findings:
+        if not finding.code.startswith("hold-"):
+            groups.setdefault(BELONGS.get(finding.code, GUIDELINES), []).append(finding)
+    found = {check.name: check for check in checks}
+    for name, findings in groups.items():
+        said = _of_findings(name, findings, made.termination)
+        if said is not None:
+            found[name] = worse(found.get(name), said)
+    return list(found.values())
+
+
+def _of_findings(name: str, findings: Sequence[Finding], termination: str) -> Check | None:
+    light = worst(tuple(findings))
+    if findings and light is not Light.GREEN:
+        first = next(finding for finding in findings if finding.light is light)
+        return Check(name, light, first.message, first.action)
+    if name == SETTLED:
+        return _ended(findings, termination)
+    if name == GUIDELINES:
+        return Check(name, Light.GREEN, "every guideline is met")
+    return Check(name, Light.GREEN, findings[0].message) if findings else None
+
+
+def _ended(findings: Sequence[Finding], termination: str) -> Check | None:
+    corrected = "".join(f"; {finding.message}" for finding in findings)
+    if termination in CONVERGED:
+        return Check(SETTLED, Light.GREEN, f"the search ended at a minimum{corrected}")
+    if not termination:
+        return Check(SETTLED, Light.GREEN, f"solved in one step{corrected}")
+    action = "raise maximum_iterations, use more starts, or simplify the model"
+    return Check(SETTLED, Light.AMBER, f"the search ended by {termination!r}", action)
+
+
+def worse(one: Check | None, other: Check) -> Check:
+    """The one of two checks with the worse light; the first where they are alike."""
+    if one is None:
+        return other
+    pair = (one.finding, other.finding)
+    return one if worst(pair) is one.light else other
+
+
+def inspection_check(inspection: Inspection) -> Check:
+    """The verdict on the log that the data come from."""
+    light = inspection.verdict
+    reasons = [finding for finding in inspection.findings if finding.light is light]
+    if light is Light.GREEN or not reasons:
+        return Check(INSPECTION, light, f"{inspection.name} can support identification")
+    return Check(INSPECTION, light, reasons[0].message, reasons[0].action)
+
+
+def residual_check(findings: Iterable[Finding]) -> Check:
+    """The verdict of residual tests."""
+    found = tuple(findings)
+    light = worst(found)
+    first = next((finding for finding in found if finding.light is light), None)
+    if first is None:
+        return Check(RESIDUALS, Light.UNKNOWN, "no residual test could be made")
+    return Check(RESIDUALS, light, first.message, first.action)

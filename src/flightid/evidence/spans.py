@@ -1,0 +1,79 @@
+"""Bands in which data say something: how wide, and with how much coherence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flightid.conventions import Light
+from flightid.evidence.evidence import BAND, COHERENCE, Check
+from flightid.inspection.thresholds import BAND_GOOD, BAND_LEAST, MINIMUM_COHERENCE
+
+MORE = "fly a sweep or multisine over a decade around the crossover, or excite more"
+
+
+@dataclass(frozen=True)
+class Span:
+    """The band of one response.
+
+    Attributes
+    ----------
+    name : str
+        ``"output/input"``, or the output where all inputs count together.
+    band_rad_s : tuple of float, or None
+        rad/s; None where no two neighbouring frequencies have the coherence.
+    coherence : float
+        Mean γ² in the band; over all frequencies where there is none.
+
+    Example
+    -------
+    >>> Span("p/tau", (1.0, 20.0), 0.9).ratio
+    20.0
+    """
+
+    name: str
+    band_rad_s: tuple[float, float] | None
+    coherence: float
+
+    @property
+    def ratio(self) -> float:
+        """Highest over lowest frequency; one where there is no band."""
+        return 1.0 if self.band_rad_s is None else self.band_rad_s[1] / self.band_rad_s[0]
+
+    def __str__(self) -> str:
+        """Name and band."""
+        if self.band_rad_s is None:
+            return f"{self.name} has no band with coherence"
+        low, high = self.band_rad_s
+        return f"{self.name} {low:.3g} to {high:.3g} rad/s"
+
+
+def judge_span(spans: Sequence[Span]) -> Check:
+    """How wide the narrowest band is, by the thresholds of the inspection of logs.
+
+    Example
+    -------
+    >>> judge_span([Span("p/tau", (1.0, 2.0), 0.9)]).light.value
+    'amber'
+    """
+    narrow = min(spans, key=lambda span: span.ratio)
+    if narrow.ratio >= BAND_GOOD.value:
+        return Check(BAND, Light.GREEN, f"narrowest band: {narrow}")
+    if narrow.ratio >= BAND_LEAST.value:
+        return Check(BAND, Light.AMBER, f"{narrow}: less than a decade", MORE)
+    return Check(BAND, Light.AMBER, f"{narrow}: too narrow for more than a gain", MORE)
+
+
+def judge_coherence(spans: Sequence[Span]) -> Check:
+    """Mean coherence of the worst band.
+
+    Example
+    -------
+    >>> judge_coherence([Span("p/tau", (1.0, 20.0), 0.9)]).light.value
+    'green'
+    """
+    poor = min(spans, key=lambda span: span.coherence)
+    text = f"mean coherence of {poor.name} {poor.coherence:.2f}"
+    if poor.coherence >= MINIMUM_COHERENCE.value:
+        return Check(COHERENCE, Light.GREEN, f"least {text}")
+    return Check(COHERENCE, Light.AMBER, f"{text}, below {MINIMUM_COHERENCE.value:g}", MORE)
