@@ -112,6 +112,11 @@ class Evidence:
     checks: tuple[Check, ...] = ()
     required: tuple[str, ...] = ALWAYS
 
+    def __post_init__(self) -> None:
+        for name in self.required:
+            if name not in NAMES:
+                raise OptionError("no such check", found=name, needed=", ".join(NAMES))
+
     @property
     def missing(self) -> tuple[str, ...]:
         """Required checks that are not there."""

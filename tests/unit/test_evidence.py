@@ -1,0 +1,104 @@
+"""The gate: what checks make of a light, what a fit examines, and that nothing absent is green."""
+
+from __future__ import annotations
+
+import pytest
+
+from flightid.conventions import Light
+from flightid.errors import OptionError
+from flightid.evidence import Check, Evidence, inspection_check, residual_check
+from flightid.evidence.evidence import ALWAYS, NAMES
+from flightid.evidence.parameter_checks import declared_signs
+from flightid.evidence.spans import Span, judge_span
+from flightid.findings import Finding
+
+
+def _all_green() -> Evidence:
+    return Evidence(tuple(Check(name, Light.GREEN, "fine") for name in ALWAYS))
+
+
+def test_green_needs_every_required_check() -> None:
+    assert _all_green().light is Light.GREEN
+    for name in ALWAYS:
+        left = tuple(check for check in _all_green().checks if check.name != name)
+        evidence = Evidence(left)
+        assert (evidence.light, evidence.missing) == (Light.AMBER, (name,))
+        assert evidence.reason is not None
+        assert "not examined" in evidence.reason.message
+    assert Evidence().light is Light.AMBER
+    assert Evidence((), ()).light is Light.AMBER
+
+
+@pytest.mark.parametrize(
+    ("light", "whole"), [("red", "red"), ("amber", "amber"), ("unknown", "amber")]
+)
+def test_one_worse_check_is_the_light_of_all(light: str, whole: str) -> None:
+    evidence = _all_green().with_checks([Check("residuals", Light(light), "bad", "do this")])
+    assert evidence.light == whole
+    assert evidence.reason is not None
+    assert (evidence.reason.message, evidence.reason.action) == ("bad", "do this")
+
+
+def test_what_was_examined_gives_the_reason_before_what_was_not() -> None:
+    evidence = Evidence((Check("loop", Light.AMBER, "closed"),))
+    assert evidence.reason is not None
+    assert evidence.reason.message == "closed"
+
+
+def test_a_check_replaces_that_of_its_name_and_may_be_required() -> None:
+    evidence = _all_green().with_checks([Check("loop", Light.RED, "closed")], required=["residuals"])
+    assert len(evidence.checks) == len(ALWAYS)
+    assert (evidence.light, evidence.missing) == (Light.RED, ("residuals",))
+    with pytest.raises(OptionError, match="no such check"):
+        Evidence((), ("weather",))
+    with pytest.raises(OptionError, match="no such check"):
+        Check("weather", Light.GREEN, "fine")
+
+
+def test_views_hold_everything() -> None:
+    evidence = Evidence((Check("loop", Light.GREEN, "open"),), ("loop", "inspection"))
+    assert Evidence.from_dict(evidence.to_dict()) == evidence
+    text = evidence.summary().to_text()
+    assert "not examined" in text
+    assert "inspect_log" in text
+    assert [finding.code for finding in evidence.findings] == [
+        "evidence-inspection",
+        "evidence-loop",
+    ]
+    assert repr(evidence) == "Evidence(amber, 1 checks, not examined: inspection)"
+    assert set(ALWAYS) < set(NAMES)
+
+
+@pytest.mark.parametrize(("ratio", "light"), [(20.0, "green"), (4.0, "amber"), (2.0, "amber")])
+def test_a_narrow_band_is_not_green(ratio: float, light: str) -> None:
+    assert judge_span([Span("p/tau", (1.0, ratio), 0.9)]).light == light
+    assert judge_span([Span("p/tau", None, 0.1), Span("q/tau", (1.0, 30.0), 0.9)]).light == "amber"
+
+
+@pytest.mark.parametrize(
+    ("sign", "value", "interval", "light"),
+    [
+        (1, 2.0, (1.0, 3.0), "green"),
+        (1, 2.0, (-1.0, 5.0), "amber"),
+        (-1, -2.0, (-5.0, 0.5), "amber"),
+        (-1, 0.0, None, "amber"),
+    ],
+)
+def test_a_sign_that_the_data_do_not_tell_is_doubted(
+    sign: int, value: float, interval: tuple[float, float] | None, light: str
+) -> None:
+    assert declared_signs({"L": (sign, value, interval, "free")}).light == light
+
+
+def test_residual_tests_and_inspections_become_checks() -> None:
+    bad = Finding("residuals-not-white", Light.RED, "fails", "raise the order")
+    assert residual_check([bad]).light is Light.RED
+    assert residual_check([]).light is Light.UNKNOWN
+
+    class Inspected:
+        name = "log.bin"
+        verdict = Light.AMBER
+        findings = (Finding("narrow", Light.AMBER, "too narrow", "fly a sweep"),)
+
+    check = inspection_check(Inspected())  # type: ignore[arg-type]
+    assert (check.light, check.what) == (Light.AMBER, "too narrow")
