@@ -147,6 +147,20 @@ class Evidence:
         ranked = sorted(self.findings, key=lambda f: (_ORDER.index(f.light), f.code in absent))
         return ranked[0] if ranked else None
 
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """The light, and every reason for which it is not green, one a line."""
+        reasons = [f for f in self.findings if f.light is not Light.GREEN]
+        return (f"Light: {self.light}.", *(f"[{f.light}] {f.message}" for f in reasons))
+
+    @property
+    def verdict(self) -> Finding:
+        """The light with its first reason, as one finding."""
+        reason = self.reason
+        if self.light is Light.GREEN or reason is None:
+            return Finding("evidence", self.light, "every check that is needed was made and holds")
+        return Finding("evidence", self.light, reason.message, reason.action)
+
     def check(self, name: str) -> Check | None:
         """The check of a name; None where it was not made."""
         return next((check for check in self.checks if check.name == name), None)

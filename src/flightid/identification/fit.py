@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.evidence import Evidence
 from flightid.findings import Finding
 from flightid.identification.details import Details
 from flightid.identification.fitted_record import FittedRecord
@@ -87,6 +88,8 @@ class Fit:
         As `flightid.identify` names it.
     details : Details or None
         What is special to the kind: `PolynomialDetails`, `SubspaceDetails`, `NarxDetails`.
+    evidence : Evidence
+        What was examined of data and fit, and the light that follows.
 
     Example
     -------
@@ -125,6 +128,7 @@ class Fit:
     structure: Any = None
     method: str = ""
     details: Any = None
+    evidence: Evidence = field(default_factory=Evidence)
 
     @property
     def residuals(self) -> tuple[Record, ...]:
@@ -184,6 +188,7 @@ class Fit:
             f"Intervals from: {self.intervals_from}.",
             f"Ended by {self.termination} after {self.iterations} iterations.",
             *map(str, self.findings),
+            *self.evidence.lines,
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -214,6 +219,7 @@ class Fit:
             "training": {name: channel.to_dict() for name, channel in self.training.items()},
             "details": None if self.details is None else self.details.to_dict(),
             "findings": [finding.to_dict() for finding in self.findings],
+            "evidence": self.evidence.to_dict(),
             "provenance": dict(self.provenance),
         }
 

@@ -9,6 +9,7 @@ from typing import Any
 from flightid.errors import FitError, OptionError
 from flightid.identification.filter_error.fit import fit_filter_error
 from flightid.identification.fit import Fit
+from flightid.identification.fit_evidence import evidence_of
 from flightid.identification.frequency_domain.fit import Options, fit_responses
 from flightid.identification.joint.fit import JointOptions, fit_jointly
 from flightid.identification.narx.fit import fit_narx
@@ -293,4 +294,5 @@ def identify(
     """
     name, chosen = _method(model, data, method)
     fit: Fit = chosen.fit(model, data, _options(chosen, options))
-    return replace(fit, structure=model, method=name)
+    fit = replace(fit, structure=model, method=name)
+    return replace(fit, evidence=evidence_of(fit, flat(data)))

@@ -1,0 +1,68 @@
+"""What a fit hands over to the gate: its data, bands, findings, end, and declared signs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from flightid.evidence import Evidence, gather_evidence
+from flightid.evidence.gather import Made
+from flightid.evidence.parameter_checks import Signed
+from flightid.evidence.spans import Span
+from flightid.identification.fit import Fit
+from flightid.identification.fitted_response import FittedResponse
+from flightid.models.parameters import Parameters
+from flightid.uncertainty.estimate import Estimate
+
+NOT_NEGATIVE_BY_NATURE = "s"
+"""Delays and time constants: a bound at zero declares no sign."""
+
+
+def evidence_of(fit: Fit, data: Sequence[Any]) -> Evidence:
+    """Examine a fit as far as its own data and end allow.
+
+    Parameters
+    ----------
+    fit : Fit
+    data : sequence of FrequencyResponse or Record
+        What it was made from.
+
+    Returns
+    -------
+    Evidence
+    """
+    asked = getattr(fit.structure, "parameters", None)
+    return gather_evidence(
+        Made(
+            data,
+            tuple(fit.model.inputs),
+            tuple(fit.model.outputs),
+            [_span(each) for each in fit.responses],
+            fit.findings,
+            fit.termination,
+            _signs(asked, fit.parameters) if isinstance(asked, Parameters) else {},
+        )
+    )
+
+
+def _span(response: FittedResponse) -> Span:
+    low, high = response.band_rad_s
+    measured = response.measured
+    inside = (measured.omega_rad_s >= low) & (measured.omega_rad_s <= high)
+    return Span(response.name, (low, high), float(np.mean(measured.coherence[inside])))
+
+
+def _signs(asked: Parameters, found: Mapping[str, Estimate]) -> dict[str, Signed]:
+    """Free parameters whose bounds leave one sign."""
+    signs: dict[str, Signed] = {}
+    for parameter in asked.free:
+        estimate = found.get(parameter.name)
+        if estimate is None or estimate.unit == NOT_NEGATIVE_BY_NATURE:
+            continue
+        sign = (parameter.minimum >= 0.0) - (parameter.maximum <= 0.0)
+        if sign:
+            status = estimate.status or ""
+            signs[parameter.name] = (sign, estimate.value, estimate.interval95, status)
+    return signs
