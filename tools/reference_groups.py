@@ -111,6 +111,8 @@ GROUPS = {
             "Comparison",
             "residual_tests",
             "ResidualTests",
+            "Evidence",
+            "Check",
             "validation",
         ),
     ),

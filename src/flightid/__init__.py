@@ -58,7 +58,7 @@ if TYPE_CHECKING:
     from flightid.dynamics.rotor.result import RotorPhysics
     from flightid.dynamics.rotor.rotor_physics import rotor_physics
     from flightid.errors import FlightidError
-    from flightid.evidence import FeedbackTest, feedback_test
+    from flightid.evidence import Check, Evidence, FeedbackTest, feedback_test
     from flightid.export import Exported
     from flightid.export.to_file import export
     from flightid.findings import Finding
@@ -221,6 +221,8 @@ _HOMES = {
     "to_scipy": "flightid.models",
     "read_system": "flightid.models",
     "write_system": "flightid.models",
+    "Check": "flightid.evidence",
+    "Evidence": "flightid.evidence",
     "FeedbackTest": "flightid.evidence",
     "feedback_test": "flightid.evidence",
     "Exported": "flightid.export",
@@ -246,6 +248,7 @@ __all__ = [
     "Advice",
     "AxisLoop",
     "Channel",
+    "Check",
     "ClosedLoop",
     "CoherentPairs",
     "Comparison",
@@ -254,6 +257,7 @@ __all__ = [
     "DiskMargin",
     "DisturbanceRejection",
     "Estimate",
+    "Evidence",
     "Exported",
     "FeedbackTest",
     "Finding",

@@ -46,7 +46,9 @@ def test_what_was_examined_gives_the_reason_before_what_was_not() -> None:
 
 
 def test_a_check_replaces_that_of_its_name_and_may_be_required() -> None:
-    evidence = _all_green().with_checks([Check("loop", Light.RED, "closed")], required=["residuals"])
+    evidence = _all_green().with_checks(
+        [Check("loop", Light.RED, "closed")], required=["residuals"]
+    )
     assert len(evidence.checks) == len(ALWAYS)
     assert (evidence.light, evidence.missing) == (Light.RED, ("residuals",))
     with pytest.raises(OptionError, match="no such check"):

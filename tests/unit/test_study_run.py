@@ -78,7 +78,7 @@ def test_every_stage_left_its_result(study: fid.Study) -> None:
     assert item.reduction is not None
     (step,) = item.reduction.path
     assert (step.name, step.accepted) == ("tau", False)
-    assert item.fit is item.reduction.start
+    assert item.fit.model is item.reduction.start.model
     assert {f.code for f in item.reduction.path_findings} <= {f.code for f in item.findings}
     beside = item.verifications["doublet"]
     assert isinstance(beside, fid.Comparison)

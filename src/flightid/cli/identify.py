@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import click
 from flightid.cli.output import emit, json_option, leave_by_verdict, note
 
 if TYPE_CHECKING:
+    from flightid.identification import Fit, Reduction
     from flightid.models import GreyBoxModel
     from flightid.record import Record
     from flightid.responses import FrequencyResponse
@@ -78,12 +80,33 @@ def command(
         advance()
         fit = flightid.identify(model, data, starts=starts, seed=seed)
         result = flightid.reduce(fit, data) if reduced else fit
+        if file.suffix.lower() in LOGS:
+            result = _with_inspection(result, file)
         advance()
     note(repr(result))
     if isinstance(result, flightid.Reduction) and not as_json:
         emit(result.fit, as_json=False)
     emit(result, as_json=as_json)
-    leave_by_verdict(result.findings)
+    found = result.fit if isinstance(result, flightid.Reduction) else result
+    leave_by_verdict((*result.findings, *found.evidence.findings))
+
+
+def _with_inspection(result: Fit | Reduction, file: Path) -> Fit | Reduction:
+    """The fit, or every fit of a reduction, with the verdict on the log among its evidence."""
+    import flightid
+    from flightid.evidence import inspection_check
+
+    check = inspection_check(flightid.inspect_log(file))
+
+    def examined(fit: Fit) -> Fit:
+        return replace(fit, evidence=fit.evidence.with_checks([check]))
+
+    if not isinstance(result, flightid.Reduction):
+        return examined(result)
+    path = tuple(
+        step if step.fit is None else replace(step, fit=examined(step.fit)) for step in result.path
+    )
+    return replace(result, start=examined(result.start), path=path)
 
 
 def _records(

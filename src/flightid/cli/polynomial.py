@@ -118,7 +118,7 @@ def command(
     for record in unseen:
         note(f"{record.name}: {flightid.predict(fit, record)!r}")
     emit(fit, as_json=as_json)
-    leave_by_verdict(fit.findings)
+    leave_by_verdict((*fit.findings, *fit.evidence.findings))
 
 
 def _records(file: Path, output: str | None, inputs: tuple[str, ...]) -> list[Record]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from importlib.metadata import version
 from typing import Protocol
 
+from flightid.evidence import Evidence
 from flightid.findings import Finding
 from flightid.report.content import Block, KeyValues, Lights, TableBlock
 from flightid.table import Cell, Table
@@ -44,6 +45,9 @@ def result_blocks(result: Result, *, title: str = "", folded: bool = False) -> t
     """
     table = result.summary()
     said = {str(finding) for finding in result.findings}
+    # A fit's evidence has a block of its own.
+    examined = getattr(result, "evidence", None)
+    said |= set(examined.lines) if isinstance(examined, Evidence) else set()
     notes = tuple(note for note in table.notes if note not in said)
     shown = Table(title or table.title, table.columns, table.rows, notes)
     lights = (Lights(tuple(result.findings)),) if result.findings else ()

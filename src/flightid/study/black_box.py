@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from flightid.conventions import Light, Role
 from flightid.findings import Finding
 from flightid.identification import Fit, identify
+from flightid.inspection import Inspection
 from flightid.models import NarxStructure, PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.responses import CoherentPairs, FrequencyResponse, coherent_pairs, estimate_response
 from flightid.study.black_box_settings import NARX, BlackBoxSettings
+from flightid.study.evidence import examined
 from flightid.validation import (
     CrossValidation,
     NarxSearch,
@@ -124,7 +126,11 @@ class BlackBox:
         }
 
 
-def identify_black_box(settings: BlackBoxSettings, records: Mapping[str, Record]) -> BlackBox:
+def identify_black_box(
+    settings: BlackBoxSettings,
+    records: Mapping[str, Record],
+    inspection: Inspection | None = None,
+) -> BlackBox:
     """Carry out every stage of one black-box model.
 
     Parameters
@@ -133,6 +139,8 @@ def identify_black_box(settings: BlackBoxSettings, records: Mapping[str, Record]
         What is asked.
     records : mapping of str to Record
         By name.
+    inspection : Inspection, optional
+        Of the log that they come from.
 
     Returns
     -------
@@ -173,7 +181,7 @@ def identify_black_box(settings: BlackBoxSettings, records: Mapping[str, Record]
     )
     seen = taken(settings.coherence)[0]
     run = cross_validate(fit, seen, horizons=("free_run",)).of(seen.name)
-    return BlackBox(
+    box = BlackBox(
         settings,
         response,
         coherent,
@@ -183,6 +191,8 @@ def identify_black_box(settings: BlackBoxSettings, records: Mapping[str, Record]
         cross_validate(fit, taken(settings.verify)) if settings.verify else None,
         compare_spectra(seen, run.predicted_record()),
     )
+    beyond = [finding for finding in box.findings if finding not in fit.findings]
+    return replace(box, fit=examined(fit, inspection, beyond))
 
 
 def _narrowed(record: Record, settings: BlackBoxSettings, inputs: Sequence[str]) -> Record:

@@ -17,6 +17,7 @@ from flightid.plot.polynomial import order_scan, pole_zero
 from flightid.plot.residuals import correlations, spectrum_comparison
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Figure, Lights, Paragraph, Section, TableBlock
+from flightid.report.evidence import evidence_blocks
 from flightid.report.figures import figure_block
 from flightid.table import Cell, Column, Table
 from flightid.validation import CrossRun, OrderScan, Verdict
@@ -115,16 +116,13 @@ def modes_words(fit: Fit) -> str:
 
 
 def black_box_in_short(item: BlackBox) -> Finding:
-    """One line about a model: its worst verdict, and the first finding that gave it."""
-    name, findings = item.settings.name, item.findings
-    light = worst(findings)
+    """One line about a model: the light of its evidence, and the first reason for it."""
+    name = item.settings.name
     if item.fit is None:
-        return Finding("model", light, f"{name}: {item.left_out[0].message}")
-    reasons = [finding for finding in findings if finding.light is light]
+        return Finding("model", worst(item.findings), f"{name}: {item.left_out[0].message}")
+    verdict = item.fit.evidence.verdict
     first = f"{name}: {structure_words(item.fit)}"
-    if not reasons or light is worst(()):
-        return Finding("model", light, f"{first}; every guideline is met.")
-    return Finding("model", light, f"{first}; {reasons[0].message}", reasons[0].action)
+    return Finding("model", verdict.light, f"{first}; {verdict.message}", verdict.action)
 
 
 def black_box_section(item: BlackBox) -> Section:
@@ -144,7 +142,8 @@ def black_box_section(item: BlackBox) -> Section:
         parts.append(Section("Choice of the structure", _choice(item)))
     if item.fit is not None:
         goal = (Lights(item.goal_findings),) if item.goal_findings else ()
-        parts.append(Section("Model", (*goal, *_model(item.fit))))
+        evidence = evidence_blocks(item.fit.evidence)
+        parts.append(Section("Model", (*goal, *_model(item.fit), *evidence)))
     if item.tests is not None:
         parts.append(Section("Residual tests", tuple(_tests(item))))
     if item.cross is not None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flightid.findings import Finding, worst
+from flightid.findings import Finding
 from flightid.plot.fit import EstimateBar, parameter_intervals
 from flightid.report.blocks import provenance
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
@@ -156,15 +156,11 @@ def _result(study: Study) -> list[Block]:
 
 
 def _in_short(item: Identified) -> Finding:
-    """One line about a model: its worst verdict, and the first finding that gave it."""
-    findings = item.findings
-    light = worst(findings)
-    reasons = [finding for finding in findings if finding.light is light]
+    """One line about a model: the light of its evidence, and the first reason for it."""
+    verdict = item.fit.evidence.verdict
     name, fitted = item.settings.name, item.fit
     first = f"{name}: average cost {fitted.average_cost:.3g}"
-    if not reasons or light is worst(()):
-        return Finding("model", light, f"{first}; every guideline is met.")
-    return Finding("model", light, f"{first}; {reasons[0].message}", reasons[0].action)
+    return Finding("model", verdict.light, f"{first}; {verdict.message}", verdict.action)
 
 
 def _source_blocks(study: Study) -> Iterator[Block]:

@@ -15,6 +15,7 @@ from flightid.plot.frequency_response import Curve, bode
 from flightid.plot.modes import pole_map
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Figure, Lights, Section, TableBlock
+from flightid.report.evidence import evidence_blocks
 from flightid.report.figures import figure_block
 from flightid.report.fitted_record import record_figures
 from flightid.report.modes import modes_blocks, physics_blocks
@@ -56,7 +57,8 @@ def model_section(item: Identified, truth: Truth | None) -> Section:
     Section
     """
     figures = _bode_figures(item, truth) if item.responses else record_figures(item.fit)
-    blocks: list[Block] = [*figures, *result_blocks(item.fit, title="Parameters")]
+    shown = result_blocks(item.fit, title="Parameters")
+    blocks: list[Block] = [*figures, *shown, *evidence_blocks(item.fit.evidence)]
     if len(item.fits) > 1:
         blocks.append(TableBlock(_comparison(item, truth)))
     if item.response is not None and item.response.findings:

@@ -11,7 +11,7 @@ from flightid.progress import progress
 from flightid.report.html import to_html
 from flightid.report.text import to_text
 from flightid.study.black_box import identify_black_box
-from flightid.study.flown import Flown
+from flightid.study.evidence import examined
 from flightid.study.output import RESULTS, require_replaceable, whole_folder
 from flightid.study.qualities import rate_models, require_pairs
 from flightid.study.settings import Settings, read_settings
@@ -26,7 +26,7 @@ from flightid.study.stages import (
     load_task,
 )
 from flightid.study.study import Study
-from flightid.study.taking import take
+from flightid.study.taking import Taken, take
 from flightid.study.tuning import TuneSettings, tune_models
 
 
@@ -84,10 +84,10 @@ def run_study(
     with whole_folder(final) as folder, progress(steps, source.stem) as advance:
         taken = take(settings, tasks, None if log is None else Path(log), folder)
         advance(2)
-        identified = tuple(_identify(task, taken.records, settings, advance) for task in tasks)
+        identified = tuple(_identify(task, taken, settings, advance) for task in tasks)
         boxes = []
         for asked in settings.black_boxes:
-            boxes.append(identify_black_box(asked, taken.records))
+            boxes.append(identify_black_box(asked, taken.records, taken.inspection))
             advance(3)
         wanted = settings.tune or (TuneSettings() if tune else None)
         tuning = None if wanted is None else tune_models(identified, taken.log, wanted)
@@ -110,8 +110,9 @@ def run_study(
 
 
 def _identify(
-    task: Task, records: Flown, settings: Settings, advance: Callable[..., None]
+    task: Task, taken: Taken, settings: Settings, advance: Callable[..., None]
 ) -> Identified:
+    records = taken.records
     responses = estimate(task, records)
     task, coherent = choose_responses(task, responses)
     advance()
@@ -120,6 +121,10 @@ def _identify(
     counts = next(iter(fits.values()))
     verifications = check(task, counts, records)
     tests = examine_residuals(task, counts)
+    found = [*(() if tests is None else tests.findings)]
+    found += [finding for each in verifications.values() for finding in each.findings]
+    first = next(iter(fits))
+    fits = {**fits, first: examined(counts, taken.inspection, found)}
     advance()
     return Identified(
         task.settings,

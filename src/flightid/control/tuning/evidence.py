@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.dynamics.continuous import to_continuous
 from flightid.errors import DataError, FlightidError
+from flightid.evidence import Evidence as GateEvidence
 from flightid.findings import Finding
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.models import InnovationsModel, PolynomialModel
@@ -106,11 +107,12 @@ def gather(
     DataError
         No covariance; a fit or a verification that is red.
     """
+    found = _judged(source)
     _refuse_red("the fit", source)
     for each in _listed(verification):
         _refuse_red("the verification", each)
     uncertain: Uncertain[Any] = uncertain_of(source)
-    findings: list[Finding] = []
+    findings: list[Finding] = [*found]
     if not uncertain.known:
         if not nominal:
             raise DataError(
@@ -158,6 +160,25 @@ def _listed(given: Verdicts | Iterable[Verdicts] | None) -> Sequence[Verdicts]:
     if given is None:
         return ()
     return tuple(given) if isinstance(given, Iterable) else (given,)
+
+
+def _judged(source: object) -> tuple[Finding, ...]:
+    """The light of a fit's evidence: red is refused, amber goes on with its gains."""
+    examined = getattr(source, "evidence", None)
+    if not isinstance(examined, GateEvidence):
+        return ()
+    verdict = examined.verdict
+    if verdict.light is Light.RED:
+        raise DataError(
+            "the fit is red, so no gains are made from it",
+            found=verdict.message,
+            needed="a model that its data support",
+            action=verdict.action or None,
+        )
+    if verdict.light is Light.GREEN:
+        return ()
+    text = f"gains rest on a fit that is {verdict.light}: {verdict.message}"
+    return (Finding("fit-evidence", verdict.light, text, verdict.action),)
 
 
 def _refuse_red(what: str, result: object) -> None:
