@@ -115,7 +115,7 @@ OWN = {
         "expected fixed flight lock_number n_alpha normalisation output_is response_type "
         "rotor_speed_rad_s sign signs speed states t_theta2_s task",
     ),
-    "evidence": ("one check of the gate", "action check checks light what"),
+    "evidence": ("checks of the gate", "checks required"),
     "excitation": (
         "the shape of a manoeuvre; injection clocks are stated in hertz by their firmware",
         "amplitude chirp clock_hz control current excitation fade_in_s fade_out_s hold_cycles "
