@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid import _native
@@ -42,13 +43,21 @@ def test_intervals_cover_the_truth_in_calm_air(options: dict[str, object]) -> No
     assert 0.93 <= share <= 0.97, share
 
 
-def in_turbulence(calm: fid.Record, model: fid.StateSpaceModel, seed: int) -> fid.Record:
-    """White process noise on both derivatives, four steps in a sample, and noise on the outputs."""
+def in_turbulence(
+    calm: fid.Record, model: fid.StateSpaceModel, seed: int, time_constant_s: float = 0.0
+) -> fid.Record:
+    """Process noise on both derivatives, four steps in a sample, and noise on the outputs.
+
+    White, or of first order with the same density at low frequency.
+    """
     a, _, c, _, _ = model.state_space()
     generator = np.random.default_rng(seed)
     step = calm.sample_time_s / 4
     count = 4 * (calm.n_samples - 1) + 1
     forced = generator.standard_normal((1, count, 2)) * GUSTS * np.sqrt(step)
+    if time_constant_s:
+        pole = np.exp(-step / time_constant_s)
+        forced = lfilter([1.0 - pole], [1.0, -pole], forced, axis=1)
     phi = _native.matrix_exponential(np.ascontiguousarray(a * step))
     shaken = _native.linear_recursion(phi, forced, np.zeros((1, 2)))[0, ::4] @ c.T
     outputs = {
@@ -67,6 +76,20 @@ def test_filter_error_covers_the_truth_in_turbulence() -> None:
     flights = [in_turbulence(calm, model, seed) for seed in range(FLIGHTS)]
     share = _share(flights, model, method="filter_error")
     assert 0.93 <= share <= 0.97, share
+
+
+def test_a_gust_that_is_no_white_noise_widens_the_intervals() -> None:
+    """A filter for white noise is biased by it: the light says so, and the bars grow."""
+    model = short_period(tau=0.02)
+    calm = fly(model)
+    white, gust = (
+        fid.identify(model, in_turbulence(calm, model, 0, tau), method="filter_error")
+        for tau in (0.0, 0.3)
+    )
+    codes = [{each.code for each in fit.findings} for fit in (white, gust)]
+    assert "residuals-coloured" not in codes[0]
+    assert "residuals-coloured" in codes[1]
+    assert gust.parameters["Malpha"].freedom < 0.2 * white.parameters["Malpha"].freedom
 
 
 def test_filter_error_beats_output_error_in_turbulence() -> None:

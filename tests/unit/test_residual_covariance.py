@@ -126,7 +126,9 @@ def test_colour_is_that_of_the_known_answer() -> None:
 
 
 def test_absurd_ratios_are_red() -> None:
-    assert colour_findings(0.5, 8.0) == []
+    assert colour_findings(0.5, 1.4) == []
+    (finding,) = colour_findings(0.5, 8.0)
+    assert (finding.code, finding.light.value) == ("residuals-coloured", "amber")
     for ratios in ((1e-4, 1.0), (1.0, 1e4)):
         (finding,) = colour_findings(*ratios)
         assert (finding.code, finding.light.value) == ("colour-absurd", "red")

@@ -116,7 +116,11 @@ class ResidualCovariance:
     @property
     def colour(self) -> tuple[float, float]:
         """Smallest and largest of `ratios`; one without parameters."""
-        ratios = self.ratios if self.white.size else np.ones(1)
+        return self.colour_of(len(self.white))
+
+    def colour_of(self, count: int) -> tuple[float, float]:
+        """The same of the first parameters alone."""
+        ratios = self.ratios[:count] if count else np.ones(1)
         return float(np.min(ratios)), float(np.max(ratios))
 
     @property
@@ -129,6 +133,8 @@ class ResidualCovariance:
 def colour_findings(smallest: float, largest: float) -> list[Finding]:
     """Verdict on the colour of residuals: red where it changes standard errors beyond belief.
 
+    Amber where it widens them, and the intervals allow for it.
+
     Parameters
     ----------
     smallest, largest : float
@@ -139,8 +145,19 @@ def colour_findings(smallest: float, largest: float) -> list[Finding]:
     >>> colour_findings(0.9, 1.2)
     []
     """
-    if smallest >= SMALLEST_RATIO and largest <= LARGEST_RATIO:
+    believed = smallest >= SMALLEST_RATIO and largest <= LARGEST_RATIO
+    if believed and largest <= COLOURED:
         return []
+    if believed:
+        return [
+            Finding(
+                "residuals-coloured",
+                Light.AMBER,
+                f"residuals are coloured: standard errors are up to {largest:.2g} times those of "
+                "white residuals, and the intervals allow for it",
+                "run residual_tests: where inputs still predict them, dynamics are missing",
+            )
+        ]
     ratio = largest if largest > LARGEST_RATIO else smallest
     return [
         Finding(

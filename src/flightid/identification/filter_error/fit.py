@@ -18,6 +18,7 @@ from flightid.conditioning.smoothing import fourier_smooth
 from flightid.conventions import Light
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
+from flightid.identification.filter_error.innovation_covariance import innovation_covariance
 from flightid.identification.filter_error.innovations import (
     FilteredData,
     InnovationsProblem,
@@ -37,7 +38,6 @@ from flightid.identification.regression.fit import (
 from flightid.identification.regression.options import FilterErrorOptions
 from flightid.models import StateSpaceModel
 from flightid.record import Record, Step
-from flightid.uncertainty.cramer_rao import inverse_hessian
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
@@ -73,11 +73,14 @@ def fit_filter_error(
     columns = np.concatenate([inner.mask, ~bounded])
     jacobian = end.jacobian[:, columns] / np.sqrt(end.cost / freedom)
     require_seen(inner, jacobian[:, : len(inner.names)])
-    # Twice the inverse Hessian of Σ r², which is the inverse of Fisher's information.
-    covariance = 2.0 * inverse_hessian(jacobian)
+    found = innovation_covariance(filtered, end.residuals / np.sqrt(end.cost / freedom), jacobian)
     count = len(inner.names)
     known = Knowledge(
-        jacobian[:, :count], covariance[:count, :count], np.full(count, freedom), "innovations"
+        jacobian[:, :count],
+        found.covariance[:count, :count],
+        found.freedom[:count],
+        "innovations",
+        found.colour_of(count),
     )
     noise = _noises(problem, end, filtered)
     return assemble(

@@ -56,6 +56,8 @@ class RecordInnovations:
         Derivatives of the innovations; constants of the record taken out.
     constants : ndarray
         Initial state, then output biases, then input shifts.
+    space : ndarray, shape (n_samples · n_outputs, rank)
+        Orthonormal directions that the constants follow in the whitened innovations.
     filter : SteadyFilter
     """
 
@@ -63,6 +65,7 @@ class RecordInnovations:
     states: Array
     slopes: Array
     constants: Array
+    space: Array
     filter: SteadyFilter
 
 
@@ -219,7 +222,7 @@ class InnovationsProblem:
         kept = nuisance.removed_from(white.reshape(flat.shape[1], -1)).reshape(white.shape)
         triangle = np.linalg.inv(whitener)
         slope = (kept.swapaxes(1, 2) @ triangle.T).swapaxes(1, 2)
-        return RecordInnovations(innovations, state, slope, nuisance.values, found)
+        return RecordInnovations(innovations, state, slope, nuisance.values, nuisance.space, found)
 
     def _constants(self, n: int, m: int, p: int) -> list[tuple[Array, Array, Array]]:
         """Start, outputs and inputs of one run for each constant of a record."""
