@@ -80,8 +80,9 @@ class Option:
             if form is WORD and self.choices:
                 parts += [repr(word) for word in self.choices]
             elif form in (WHOLE, NUMBER, NUMBERS, BAND):
-                unit = f", {self.unit}" if self.unit else ""
-                parts.append(" ".join((form.words, self.range_words)).strip() + unit)
+                unit = f"[{self.unit}]" if self.unit else ""
+                words = (form.words, self.range_words, unit)
+                parts.append(" ".join(word for word in words if word))
             else:
                 parts.append(form.words)
         return " or ".join(parts)

@@ -169,7 +169,7 @@ def test_a_parameter_without_which_nothing_is_left_stays(data: fid.FrequencyResp
 def test_refusals(fit: fid.Fit, data: fid.FrequencyResponse) -> None:
     with pytest.raises(OptionError, match="after_rise is not known"):
         fid.reduce(fit, data, after_rise="hope")
-    with pytest.raises(OptionError, match="maximum_correlation has no meaning"):
+    with pytest.raises(OptionError, match="maximum_correlation is too small"):
         fid.reduce(fit, data, maximum_correlation=0.0)
     with pytest.raises(UnknownNameError, match="no such parameter"):
         fid.reduce(fit, data, keep=["Lq"])

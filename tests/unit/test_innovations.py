@@ -195,12 +195,12 @@ def test_views_are_complete(noisy):
 @pytest.mark.parametrize(
     ("change", "problem"),
     [
-        ({"order": 0}, "order is outside its range"),
-        ({"method": "era"}, "unknown method"),
-        ({"offsets": "median"}, "unknown offsets"),
-        ({"initial_state": "rest"}, "unknown initial_state"),
+        ({"order": 0}, "order is too small"),
+        ({"method": "era"}, "method is not known"),
+        ({"offsets": "median"}, "offsets is not known"),
+        ({"initial_state": "rest"}, "initial_state is not known"),
         ({"horizon": 4, "order": 6}, "the horizon is too short"),
-        ({"maximum_iterations": 0}, "maximum_iterations is outside"),
+        ({"maximum_iterations": 0}, "maximum_iterations is too small"),
     ],
 )
 def test_options_outside_their_range_are_refused(change, problem):

@@ -264,15 +264,15 @@ def test_search_keeps_structures_that_cannot_be_fitted_with_the_reason() -> None
     ("change", "match"),
     [
         ({"output_lags": -1}, "output_lags is too small"),
-        ({"stop": "never"}, "unknown stop"),
-        ({"kernel": "cubic"}, "unknown kernel"),
-        ({"candidates": "all"}, "unknown candidates"),
+        ({"stop": "never"}, "stop is not known"),
+        ({"kernel": "cubic"}, "kernel is not known"),
+        ({"candidates": "all"}, "candidates is not known"),
         ({"output_lags": 0, "input_lags": 0}, "has no lags"),
         ({"inputs": ("y",)}, "named twice"),
-        ({"guard": 0.5}, "guard cuts"),
+        ({"guard": 0.5}, "guard is too small"),
         ({"stop": "sse"}, "has no goal"),
         ({"width": 0.0}, "radial width"),
-        ({"width_convention": "fwhm"}, "unknown width convention"),
+        ({"width_convention": "fwhm"}, "width_convention is not known"),
     ],
 )
 def test_options_outside_their_range(change: dict[str, object], match: str) -> None:

@@ -121,11 +121,11 @@ def test_residuals_go_into_the_residual_tests() -> None:
 @pytest.mark.parametrize(
     ("change", "match"),
     [
-        ({"regularisation": "lasso"}, "unknown regularisation"),
-        ({"penalty": -1.0}, "a penalty is negative"),
+        ({"regularisation": "lasso"}, "regularisation is not known"),
+        ({"penalty": -1.0}, "penalty is too small"),
         ({"penalty": 1.0}, "penalty and regularisation disagree"),
         ({"regularisation": "uniform"}, "penalty and regularisation disagree"),
-        ({"held_back": 1.0}, "held_back is no share"),
+        ({"held_back": 1.0}, "held_back is too large"),
         ({"held_back": 0.5, "regularisation": "local"}, "no standard errors to hold samples"),
     ],
 )

@@ -213,7 +213,7 @@ REFUSED = [
     ({"initial_state": {"u": 1.0}}, UnknownNameError, "names an unknown state"),
     ({"output_bias": ["beta"]}, UnknownNameError, "output_bias names an unknown channel"),
     ({"maximum_iterations": 0}, OptionError, "maximum_iterations is too small"),
-    ({"loss_limit": 0.0}, OptionError, "loss_limit has no meaning"),
+    ({"loss_limit": 0.0}, OptionError, "loss_limit is too small"),
     ({"method": "guess"}, OptionError, "method is not known"),
     ({"n_omega": 20}, OptionError, "no such option: found n_omega"),
 ]

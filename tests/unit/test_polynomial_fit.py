@@ -273,7 +273,7 @@ def test_instruments_that_fail_say_so():
         (lambda: P.oe("u", "y", nb=0, nf=2), "denominator alone"),
         (lambda: P.armax("u", "y", na=1, nb=1, nc=1, method="iv4"), "belong to ARX"),
         (lambda: P.arx("u", "y", na=1, nb=1, kernel="tc", method="iv4"), "stands alone"),
-        (lambda: P.arx("u", "y", na=1, nb=1, initial_state="guess"), "unknown initial"),
+        (lambda: P.arx("u", "y", na=1, nb=1, initial_state="guess"), "initial_state is not known"),
         (
             lambda: P.arx("u", "y", na=1, nb=1, initial_state="zero", backcast=True),
             "backcast estimates the initial state",

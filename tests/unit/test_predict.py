@@ -140,12 +140,12 @@ def test_kinds_are_verified_side_by_side_on_the_same_samples() -> None:
 @pytest.mark.parametrize(
     ("error", "message", "options"),
     [
-        (OptionError, "unknown horizon", {"horizon": 0}),
-        (OptionError, "unknown initial state", {"initial_state": "somewhere"}),
+        (OptionError, "horizon is too small", {"horizon": 0}),
+        (OptionError, "initial_state is not known", {"initial_state": "somewhere"}),
         (OptionError, "no state biases", {"state_bias": True}),
         (OptionError, "no names", {"initial_state": {"x": 1.0}}),
         (OptionError, "leaves nothing of the record", {"settle_s": 40.0}),
-        (OptionError, "no length of time", {"settle_s": -1.0}),
+        (OptionError, "settle_s is too small", {"settle_s": -1.0}),
         (OptionError, "takes no bias off", {"horizon": 2, "output_bias": True}),
         (UnknownNameError, "no such output", {"outputs": ["z"]}),
     ],

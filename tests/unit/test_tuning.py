@@ -230,9 +230,9 @@ def test_noise_bounds_the_gains(fit: fid.Fit) -> None:
     ("changes", "said"),
     [
         ({"objective": "luck"}, "objective is not known"),
-        ({"phase_margin_deg": -1.0}, "phase_margin_deg has no meaning"),
-        ({"phase_margin_deg": 95.0}, "leaves no bandwidth"),
-        ({"step_limit": 1.0}, "must leave room"),
+        ({"phase_margin_deg": -1.0}, "phase_margin_deg is too small"),
+        ({"phase_margin_deg": 95.0}, "phase_margin_deg is too large"),
+        ({"step_limit": 1.0}, "step_limit is too small"),
     ],
 )
 def test_requirements_without_meaning_are_refused(changes: dict, said: str) -> None:

@@ -143,7 +143,7 @@ def test_refusals() -> None:
     record = _record()
     with pytest.raises(OptionError, match="nothing to verify on"):
         fid.verify(LAG, [])
-    with pytest.raises(OptionError, match="unknown initial state"):
+    with pytest.raises(OptionError, match="initial_state is not known"):
         fid.verify(LAG, record, initial_state="guess")  # type: ignore[arg-type]
     with pytest.raises(OptionError, match="hold is not known"):
         fid.verify(LAG, record, hold="second")  # type: ignore[arg-type]

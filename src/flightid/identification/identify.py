@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from flightid.errors import FitError, OptionError
 from flightid.identification.filter_error.fit import fit_filter_error
 from flightid.identification.fit import Fit
 from flightid.identification.fit_evidence import evidence_of
-from flightid.identification.frequency_domain.fit import Options, fit_responses
-from flightid.identification.joint.fit import JointOptions, fit_jointly
+from flightid.identification.frequency_domain.fit import fit_responses
+from flightid.identification.frequency_domain.options import FrequencyDomainOptions
+from flightid.identification.joint.fit import fit_jointly
+from flightid.identification.joint.options import JointOptions
 from flightid.identification.narx.fit import fit_narx
 from flightid.identification.output_error.fit import fit_output_error
 from flightid.identification.prediction_error.fit import fit_polynomial
@@ -32,6 +34,7 @@ from flightid.models import GreyBoxModel, StateSpaceModel, TransferFunctionModel
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.narx.structure import NarxStructure
 from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.options import Options, checked
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 
@@ -40,7 +43,7 @@ RESPONSES, RECORDS, BOTH = "responses", "records", "responses and records"
 
 
 @dataclass(frozen=True)
-class NoOptions:
+class NoOptions(Options):
     """A method without options."""
 
 
@@ -57,14 +60,16 @@ class Method:
     """
 
     fit: Callable[..., Any]
-    options: type[Any]
+    options: type[Options]
 
 
 # Kind of model, kind of data, name of the method. The first method of a pair is its default; a new
 # method adds its lines.
 METHODS: dict[tuple[type, str, str], Method] = {
-    (TransferFunctionModel, RESPONSES, "frequency_domain"): Method(fit_responses, Options),
-    (StateSpaceModel, RESPONSES, "frequency_domain"): Method(fit_responses, Options),
+    (TransferFunctionModel, RESPONSES, "frequency_domain"): Method(
+        fit_responses, FrequencyDomainOptions
+    ),
+    (StateSpaceModel, RESPONSES, "frequency_domain"): Method(fit_responses, FrequencyDomainOptions),
     (NarxStructure, RECORDS, "orthogonal_least_squares"): Method(
         lambda model, data, _: fit_narx(model, data), NoOptions
     ),
@@ -134,18 +139,6 @@ def _method(model: object, data: object, name: str | None) -> tuple[str, Method]
             needed=" or ".join(map(repr, ways)),
         )
     return name, ways[name]
-
-
-def _options(method: Method, given: dict[str, Any]) -> object:
-    known = [each.name for each in fields(method.options)]
-    for name in given:
-        if name not in known:
-            raise OptionError(
-                "this fit has no such option",
-                found=name,
-                needed=", ".join(known) or "none",
-            )
-    return method.options(**given)
 
 
 def identify(
@@ -293,6 +286,6 @@ def identify(
     (-6.0, 180.0)
     """
     name, chosen = _method(model, data, method)
-    fit: Fit = chosen.fit(model, data, _options(chosen, options))
+    fit: Fit = chosen.fit(model, data, checked(chosen.options, options, "this fit"))
     fit = replace(fit, structure=model, method=name)
     return replace(fit, evidence=evidence_of(fit, flat(data)))

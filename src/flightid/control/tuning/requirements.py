@@ -2,26 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 
-from flightid.errors import OptionError
+from flightid.options import Options, option
 
 OBJECTIVES = ("disturbance", "crossover", "disturbance_bandwidth")
-_OPTIONAL = (
-    "crossover_rad_s",
-    "disturbance_bandwidth_rad_s",
-    "disturbance_peak_db",
-    "delay_margin_s",
-    "noise_growth",
-    "output_noise_rms",
-    "band_factor",
-    "angle_crossover_rad_s",
-)
 
 
 @dataclass(frozen=True)
-class TuningRequirements:
+class TuningRequirements(Options):
     """Requirements on the loops of one axis; each must hold for every plant the data allow.
 
     Without a target the gains are those of the highest `objective` within the limits. With
@@ -70,44 +59,42 @@ class TuningRequirements:
     2.0
     """
 
-    phase_margin_deg: float = 45.0
-    gain_margin_db: float = 6.0
-    sensitivity_peak: float = 2.0
-    delay_margin_s: float | None = None
-    crossover_rad_s: float | None = None
-    disturbance_bandwidth_rad_s: float | None = None
-    disturbance_peak_db: float | None = None
-    noise_growth: float | None = 2.0
-    output_noise_rms: float | None = None
-    band_factor: float | None = 3.0
-    step_limit: float = 2.0
-    angle_phase_margin_deg: float = 60.0
-    angle_crossover_rad_s: float | None = None
-    objective: str = "disturbance"
-
-    def __post_init__(self) -> None:
-        if self.objective not in OBJECTIVES:
-            raise OptionError(
-                "objective is not known", found=repr(self.objective), needed=f"one of {OBJECTIVES}"
-            )
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if each.name == "objective" or (value is None and each.name in _OPTIONAL):
-                continue
-            if not (math.isfinite(value) and value > 0.0):
-                raise OptionError(f"{each.name} has no meaning", found=value, needed="positive")
-        if min(self.sensitivity_peak, self.step_limit) <= 1.0:
-            raise OptionError(
-                "sensitivity_peak and step_limit must leave room",
-                found=f"{self.sensitivity_peak:g} and {self.step_limit:g}",
-                needed="more than 1",
-            )
-        if max(self.phase_margin_deg, self.angle_phase_margin_deg) >= 90.0:
-            raise OptionError(
-                "a phase margin of 90° leaves no bandwidth",
-                found=f"{max(self.phase_margin_deg, self.angle_phase_margin_deg):g}°",
-                needed="less than 90°",
-            )
+    phase_margin_deg: float = option(
+        45.0, unit="deg", above=0.0, below=90.0, doc="Least phase margin of the rate loop."
+    )
+    gain_margin_db: float = option(6.0, unit="dB", above=0.0, doc="Least gain margin, both ways.")
+    sensitivity_peak: float = option(2.0, above=1.0, doc="Largest |1/(1 + L)|.")
+    delay_margin_s: float | None = option(
+        None, unit="s", above=0.0, doc="Least extra delay that the rate loop survives."
+    )
+    crossover_rad_s: float | None = option(
+        None, unit="rad/s", above=0.0, doc="Target: least crossover of the rate loop."
+    )
+    disturbance_bandwidth_rad_s: float | None = option(
+        None, unit="rad/s", above=0.0, doc="Target: least −3 dB frequency of the sensitivity."
+    )
+    disturbance_peak_db: float | None = option(
+        None, unit="dB", above=0.0, doc="Largest sensitivity, where it is asked for in dB."
+    )
+    noise_growth: float | None = option(
+        2.0, above=0.0, doc="Largest output noise over that of the flown gains."
+    )
+    output_noise_rms: float | None = option(
+        None, above=0.0, doc="Largest output noise; full output is 1."
+    )
+    band_factor: float | None = option(
+        3.0, above=0.0, doc="The identified band's upper edge over the crossover, at least."
+    )
+    step_limit: float = option(2.0, above=1.0, doc="Largest ratio of a gain to the flown one.")
+    angle_phase_margin_deg: float = option(
+        60.0, unit="deg", above=0.0, below=90.0, doc="Least phase margin of the angle loop."
+    )
+    angle_crossover_rad_s: float | None = option(
+        None, unit="rad/s", above=0.0, doc="Target: least crossover of the angle loop."
+    )
+    objective: str = option(
+        "disturbance", choices=OBJECTIVES, doc="What is made as good as the limits allow."
+    )
 
     @property
     def has_target(self) -> bool:

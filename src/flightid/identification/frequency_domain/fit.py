@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, FitError, OptionError
+from flightid.errors import DataError, FitError
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
@@ -40,9 +40,9 @@ from flightid.identification.frequency_domain.error_model import (
 )
 from flightid.identification.frequency_domain.estimates import Statistics, statistics
 from flightid.identification.frequency_domain.estimator_bias import Correction
+from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.search import minimise
 from flightid.identification.frequency_domain.selection import (
-    Bands,
     SelectedResponse,
     select_points,
 )
@@ -50,53 +50,18 @@ from flightid.identification.frequency_domain.setup_checks import check_setup
 from flightid.identification.multistart import DenseEnd, cluster, local_minima
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
-from flightid.simulation.model_outputs import HOLDS
 from flightid.units import require_match
 from flightid.version import VERSION
 
 Array = NDArray[np.float64]
-COSTS = ("coherence", "likelihood")
 _DECIBEL = 20.0 / np.log(10.0)
 _DEGREE = 180.0 / np.pi
 
 
-@dataclass(frozen=True)
-class Options:
-    """Options of a frequency-domain fit; see `flightid.identify`."""
-
-    starts: int = 1
-    seed: int = 0
-    band_rad_s: Bands = None
-    n_omega: int = 20
-    minimum_coherence: float | None = 0.6
-    weight_gain: float = 1.0
-    weight_phase: float = 0.01745
-    cost: str = "coherence"
-    maximum_iterations: int = 200
-    correct_bias: bool = True
-    hold: str = "band_limited"
-
-    def check(self) -> None:
-        """Refuse options without a meaning.
-
-        Raises
-        ------
-        OptionError
-            The cost or the hold is not known, or no iteration is allowed.
-        """
-        if self.hold not in HOLDS:
-            raise OptionError("hold is not known", found=repr(self.hold), needed=" or ".join(HOLDS))
-        if self.cost not in COSTS:
-            raise OptionError("cost is not known", found=repr(self.cost), needed=" or ".join(COSTS))
-        if self.maximum_iterations < 1:
-            raise OptionError(
-                "maximum_iterations is too small", found=self.maximum_iterations, needed="1 or more"
-            )
-
-
-def fit_responses(model: GreyBoxModel, data: FrequencyResponse, options: Options) -> Fit:
+def fit_responses(
+    model: GreyBoxModel, data: FrequencyResponse, options: FrequencyDomainOptions
+) -> Fit:
     """Fit a model to measured responses; see `flightid.identify`."""
-    options.check()
     check_channels(model, data)
     selected = select_by(model, data, options)
     setup = check_start(model, selected)
@@ -117,7 +82,7 @@ def _fit_selected(
     data: FrequencyResponse,
     selected: list[SelectedResponse],
     setup: list[Finding],
-    options: Options,
+    options: FrequencyDomainOptions,
 ) -> Fit:
     errors = error_model(data, selected)
     groups = cluster(_minimise(model, selected, errors, options))
@@ -145,7 +110,7 @@ def _fit_selected(
 
 
 def select_by(
-    model: GreyBoxModel, data: FrequencyResponse, options: Options
+    model: GreyBoxModel, data: FrequencyResponse, options: FrequencyDomainOptions
 ) -> list[SelectedResponse]:
     """Points of the model's responses that the options choose."""
     return select_points(
@@ -169,7 +134,7 @@ def _statistics(
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     end: DenseEnd,
-    options: Options,
+    options: FrequencyDomainOptions,
     following: Array | None = None,
 ) -> Statistics:
     sensitivity = _sensitivity(fitted, selected, errors, options)
@@ -181,7 +146,7 @@ def _without_bias(
     correction: Correction,
     errors: ErrorModel,
     found: Statistics,
-    options: Options,
+    options: FrequencyDomainOptions,
 ) -> BiasRounds:
     once = replace(options, starts=1)
 
@@ -255,7 +220,7 @@ def _minimise(
     model: GreyBoxModel,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
-    options: Options,
+    options: FrequencyDomainOptions,
 ) -> list[DenseEnd]:
     return minimise(
         model,
@@ -272,7 +237,7 @@ def _sensitivity(
     fitted: GreyBoxModel,
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
-    options: Options,
+    options: FrequencyDomainOptions,
 ) -> Array | None:
     """Derivatives of the minimised residuals with respect to the measured points."""
     if not errors.runs:
@@ -305,7 +270,7 @@ def compare_responses(
 
 def _assemble(
     fitted: GreyBoxModel,
-    options: Options,
+    options: FrequencyDomainOptions,
     data: FrequencyResponse,
     groups: Sequence[Sequence[DenseEnd]],
     responses: tuple[FittedResponse, ...],
@@ -345,27 +310,14 @@ def _assemble(
     )
 
 
-def _provenance(data: FrequencyResponse, options: Options) -> dict[str, object]:
+def _provenance(data: FrequencyResponse, options: FrequencyDomainOptions) -> dict[str, object]:
     digest = hashlib.sha256()
     for array in (data.omega_rad_s, data.response, data.coherence, data.random_error):
         digest.update(np.ascontiguousarray(array).tobytes())
-    bands = options.band_rad_s
     return {
         "method": "frequency domain",
         "flightid": VERSION,
         "data_sha256": digest.hexdigest(),
         "data_history": [str(step) for step in data.history],
-        "options": {
-            "starts": options.starts,
-            "seed": options.seed,
-            "band_rad_s": dict(bands) if isinstance(bands, dict) else bands,
-            "n_omega": options.n_omega,
-            "minimum_coherence": options.minimum_coherence,
-            "weight_gain": options.weight_gain,
-            "weight_phase": options.weight_phase,
-            "cost": options.cost,
-            "maximum_iterations": options.maximum_iterations,
-            "correct_bias": options.correct_bias,
-            "hold": options.hold,
-        },
+        "options": options.to_dict(),
     }

@@ -107,7 +107,6 @@ def select_points(
     OptionError
         An option outside its range.
     """
-    _check_options(n_omega, minimum_coherence, weight_gain, weight_phase)
     if isinstance(bands, Mapping):
         stray = set(bands) - set(names)
         if stray:
@@ -127,24 +126,6 @@ def select_points(
             SelectedResponse(name, pair, places, weight_gain * weight, weight_phase * weight)
         )
     return chosen
-
-
-def _check_options(
-    n_omega: int, minimum_coherence: float | None, weight_gain: float, weight_phase: float
-) -> None:
-    if n_omega < MINIMUM_POINTS:
-        raise OptionError(
-            "n_omega is too small", found=n_omega, needed=f"at least {MINIMUM_POINTS}"
-        )
-    if minimum_coherence is not None and not 0.0 <= minimum_coherence <= 1.0:
-        raise OptionError(
-            "minimum_coherence has no meaning", found=minimum_coherence, needed="0 to 1, or None"
-        )
-    for name, value in (("weight_gain", weight_gain), ("weight_phase", weight_phase)):
-        if not (np.isfinite(value) and value >= 0.0):
-            raise OptionError(f"{name} has no meaning", found=value, needed="a number from 0 up")
-    if weight_gain == 0.0 and weight_phase == 0.0:
-        raise OptionError("both weights are zero", needed="weight_gain or weight_phase above 0")
 
 
 def _places(

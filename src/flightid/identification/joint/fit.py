@@ -26,15 +26,16 @@ from flightid.identification.frequency_domain.bias_statistics import errors_afte
 from flightid.identification.frequency_domain.error_model import ErrorModel, error_model, whitening
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.fit import (
-    Options,
     check_channels,
     check_start,
     compare_responses,
     response_at,
     select_by,
 )
-from flightid.identification.frequency_domain.selection import Bands, SelectedResponse
+from flightid.identification.frequency_domain.options import FrequencyDomainOptions
+from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.joint.independence import judge_independence
+from flightid.identification.joint.options import JointOptions
 from flightid.identification.output_error.fit import (
     Searched,
     WhitenedResponses,
@@ -42,7 +43,6 @@ from flightid.identification.output_error.fit import (
     searched,
 )
 from flightid.identification.records.findings import judge_channels
-from flightid.identification.records.options import RecordOptions
 from flightid.identification.records.setup import RecordSet, prepare_records
 from flightid.models import GreyBoxModel
 from flightid.record import Record
@@ -50,28 +50,6 @@ from flightid.responses import FrequencyResponse
 from flightid.uncertainty.residual_covariance import Beside
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class JointOptions(RecordOptions):
-    """Options of a joint fit: those of records, and points of the response; see `identify`."""
-
-    band_rad_s: Bands = None
-    n_omega: int = 20
-    minimum_coherence: float | None = 0.6
-    correct_bias: bool = True
-
-    @property
-    def of_responses(self) -> Options:
-        """The part that concerns the responses."""
-        return Options(
-            band_rad_s=self.band_rad_s,
-            n_omega=self.n_omega,
-            minimum_coherence=self.minimum_coherence,
-            cost="likelihood",
-            correct_bias=self.correct_bias,
-            hold=self.hold,
-        )
 
 
 @dataclass(frozen=True)
@@ -124,7 +102,6 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
     """Fit a model to a frequency response and records together; see `flightid.identify`."""
     response, records = _divided(data)
     of_responses = options.of_responses
-    of_responses.check()
     check_channels(model, response)
     prepared = prepare_records(model, records, options)
     points = _points(model, response, of_responses)
@@ -157,7 +134,9 @@ def _divided(data: Sequence[object]) -> tuple[FrequencyResponse, list[Record]]:
     return responses[0], [item for item in data if isinstance(item, Record)]
 
 
-def _points(model: GreyBoxModel, response: FrequencyResponse, options: Options) -> ChosenPoints:
+def _points(
+    model: GreyBoxModel, response: FrequencyResponse, options: FrequencyDomainOptions
+) -> ChosenPoints:
     selected = select_by(model, response, options)
     return ChosenPoints(selected, error_model(response, selected))
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,6 @@ from flightid.uncertainty.estimate import Estimate
 Array = NDArray[np.float64]
 # Radial candidates beyond this are computed when they are read instead of being kept.
 MAXIMUM_BYTES = 1 << 30
-_CHANNELS = ("output", "inputs")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +86,6 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
     squares = sum(float(np.sum(row**2)) for row in errors)
     weights = {item.term.name: item.weight for item in chosen}
     arrays = [record.matrix([structure.output, *structure.inputs]) for record in records]
-    options = {name: value for name, value in asdict(structure).items() if name not in _CHANNELS}
     return black_box_fit(
         model,
         BlackBoxRuns(flown, tuple(run.predicted[None] for run in free), errors),
@@ -106,7 +104,11 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
             ),
         ),
         provenance=provenance_of(
-            "orthogonal least squares", records, arrays, [scaling.mean] * len(records), options
+            "orthogonal least squares",
+            records,
+            arrays,
+            [scaling.mean] * len(records),
+            structure.to_dict(),
         ),
         details=details,
     )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flightid.errors import OptionError
 from flightid.models.linear.hold_equivalent import Hold
+from flightid.options import Options, option
 
 FREE_RUN = "free_run"
 STARTS = ("trim", "zero", "measured", "estimate")
@@ -20,7 +20,7 @@ InitialState = str | Mapping[str, float | str]
 
 
 @dataclass(frozen=True)
-class Request:
+class Request(Options):
     """One way to predict.
 
     Attributes
@@ -44,31 +44,18 @@ class Request:
     '1 sample ahead'
     """
 
-    horizon: int | str = FREE_RUN
-    initial_state: InitialState | None = None
-    settle_s: float | None = None
-    state_bias: bool = False
-    output_bias: bool = False
-    hold: Hold = "first"
-
-    def __post_init__(self) -> None:
-        ahead = self.horizon
-        counted = isinstance(ahead, int) and not isinstance(ahead, bool) and ahead > 0
-        if ahead != FREE_RUN and not counted:
-            raise OptionError("unknown horizon", found=ahead, needed="1, 2, … or 'free_run'")
-        known = self.initial_state is None or isinstance(self.initial_state, Mapping)
-        if not known and self.initial_state not in STARTS:
-            raise OptionError(
-                "unknown initial state",
-                found=repr(self.initial_state),
-                needed=" or ".join(map(repr, STARTS)) + ", or numbers by state",
-            )
-        if self.hold not in ("first", "zero"):
-            raise OptionError("hold is not known", found=self.hold, needed="'first' or 'zero'")
-        if self.settle_s is not None and not (math.isfinite(self.settle_s) and self.settle_s >= 0):
-            raise OptionError(
-                "settle_s is no length of time", found=self.settle_s, needed="0 s or more"
-            )
+    horizon: int | str = option(
+        FREE_RUN, unit="samples", minimum=1, choices=(FREE_RUN,), doc="How far ahead."
+    )
+    initial_state: InitialState | None = option(
+        None, choices=STARTS, doc="Where a state begins; default: by the kind of model."
+    )
+    settle_s: float | None = option(
+        None, unit="s", minimum=0.0, doc="First stretch that tells a start and counts no score."
+    )
+    state_bias: bool = option(False, doc="Constants on the state derivatives are solved for.")
+    output_bias: bool = option(False, doc="Constants on the outputs are solved for.")
+    hold: Hold = option("first", choices=("first", "zero"), doc="What inputs do between samples.")
 
     @property
     def words(self) -> str:

@@ -348,15 +348,7 @@ def _scores(
 def _provenance(
     structure: PolynomialStructure, records: Sequence[Record], data: SampledChannels
 ) -> dict[str, object]:
-    options = {
-        "initial_state": structure.initial_state,
-        "backcast": structure.backcast,
-        "offsets": structure.offsets,
-        "enforce_stability": structure.enforce_stability,
-        "kernel": structure.kernel,
-        "starts": structure.starts,
-        "seed": structure.seed,
-        "maximum_iterations": structure.maximum_iterations,
-    }
     method = structure.method.replace("_", " ")
-    return provenance_of(method, records, (data.output, data.inputs), data.offsets, options)
+    return provenance_of(
+        method, records, (data.output, data.inputs), data.offsets, structure.to_dict()
+    )

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import norm
 
 from flightid.errors import OptionError, UnknownNameError
+from flightid.options import Options, option
 
 InitialState = str | Mapping[str, float | str]
-Freedom = bool | Sequence[str]
+Freedom = bool | str | Sequence[str]
 
 ESTIMATE, TRIM = "estimate", "trim"
 HOLDS = ("first", "zero")
@@ -21,47 +22,34 @@ STARTS = ("model", "equation_error")
 
 
 @dataclass(frozen=True)
-class RecordOptions:
+class RecordOptions(Options):
     """Options of output error; see `flightid.identify`."""
 
-    starts: int = 1
-    seed: int = 0
-    initial_state: InitialState = ESTIMATE
-    output_bias: Freedom = True
-    input_bias: Freedom = False
-    noise_covariance: str = "diagonal"
-    loss: str = "gaussian"
-    loss_limit: float = 1.345
-    hold: str = "first"
-    start_from: str = "model"
-    maximum_iterations: int = 100
-
-    def __post_init__(self) -> None:
-        for name, known in (
-            ("noise_covariance", COVARIANCES),
-            ("loss", LOSSES),
-            ("hold", HOLDS),
-            ("start_from", STARTS),
-        ):
-            found = getattr(self, name)
-            if found not in known:
-                raise OptionError(
-                    f"{name} is not known", found=repr(found), needed=" or ".join(known)
-                )
-        if isinstance(self.initial_state, str) and self.initial_state not in (ESTIMATE, TRIM):
-            raise OptionError(
-                "initial_state is not known",
-                found=repr(self.initial_state),
-                needed="'estimate', 'trim', or a mapping of states to numbers or 'estimate'",
-            )
-        if self.maximum_iterations < 1:
-            raise OptionError(
-                "maximum_iterations is too small", found=self.maximum_iterations, needed="1 or more"
-            )
-        if not 0.0 < self.loss_limit < 100.0:
-            raise OptionError(
-                "loss_limit has no meaning", found=self.loss_limit, needed="deviations, above 0"
-            )
+    starts: int = option(
+        1, minimum=1, doc="Number of starts: the model's values, then a Latin hypercube."
+    )
+    seed: int = option(0, minimum=0, doc="Seed of the hypercube.")
+    initial_state: InitialState = option(
+        ESTIMATE,
+        choices=(ESTIMATE, TRIM),
+        doc="State at the first sample of each record; by state a number or 'estimate'.",
+    )
+    output_bias: Freedom = option(
+        True, doc="Constants added to outputs of each record, estimated: all, none, or names."
+    )
+    input_bias: Freedom = option(
+        False, doc="Constants added to inputs of each record, estimated: all, none, or names."
+    )
+    noise_covariance: str = option(
+        "diagonal", choices=COVARIANCES, doc="Whether noise of outputs may be correlated."
+    )
+    loss: str = option("gaussian", choices=LOSSES, doc="'huber' counts outliers less.")
+    loss_limit: float = option(
+        1.345, unit="deviations", above=0.0, below=100.0, doc="Where 'huber' begins."
+    )
+    hold: str = option("first", choices=HOLDS, doc="What inputs do between samples.")
+    start_from: str = option("model", choices=STARTS, doc="Where the first start comes from.")
+    maximum_iterations: int = option(100, minimum=1, doc="Most steps of each start.")
 
     @property
     def limit(self) -> float:
@@ -77,18 +65,8 @@ class RecordOptions:
         inside = float(norm.cdf(k) - norm.cdf(-k))
         return inside - 2.0 * k * float(norm.pdf(k)) + k**2 * (1.0 - inside)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {each.name: _plain(getattr(self, each.name)) for each in fields(self)}
 
-
-def _plain(value: object) -> object:
-    if isinstance(value, Mapping):
-        return dict(value)
-    return list(value) if isinstance(value, list | tuple) else value
-
-
-def chosen(option: Freedom, names: Sequence[str], subject: str) -> list[int]:
+def chosen(freed: Freedom, names: Sequence[str], subject: str) -> list[int]:
     """Places of the names that an option frees.
 
     Raises
@@ -96,9 +74,9 @@ def chosen(option: Freedom, names: Sequence[str], subject: str) -> list[int]:
     UnknownNameError
         A name that is not there.
     """
-    if isinstance(option, bool):
-        return list(range(len(names))) if option else []
-    wanted = (option,) if isinstance(option, str) else tuple(option)
+    if isinstance(freed, bool):
+        return list(range(len(names))) if freed else []
+    wanted = (freed,) if isinstance(freed, str) else tuple(freed)
     for name in wanted:
         if name not in names:
             raise UnknownNameError(
@@ -108,7 +86,7 @@ def chosen(option: Freedom, names: Sequence[str], subject: str) -> list[int]:
 
 
 def initial_values(
-    option: InitialState, states: Sequence[str], trim: Sequence[float]
+    start: InitialState, states: Sequence[str], trim: Sequence[float]
 ) -> tuple[list[float], list[int]]:
     """Initial state and the places of its free entries.
 
@@ -120,10 +98,10 @@ def initial_values(
         Neither a number nor ``"estimate"``.
     """
     values = list(map(float, trim))
-    if isinstance(option, str):
-        return values, list(range(len(states))) if option == ESTIMATE else []
+    if isinstance(start, str):
+        return values, list(range(len(states))) if start == ESTIMATE else []
     free = []
-    for name, given in option.items():
+    for name, given in start.items():
         if name not in states:
             raise UnknownNameError(
                 "initial_state names an unknown state", found=repr(name), needed=", ".join(states)

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flightid.errors import OptionError
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
     CORRELATION_GUIDE,
     CRAMER_RAO_GUIDE_PERCENT,
     INSENSITIVITY_GUIDE_PERCENT,
 )
+from flightid.options import Options, option
 from flightid.uncertainty.estimate import Estimate
 
 COST_RISE_PERCENT = 2.0
@@ -23,18 +23,21 @@ at each of 20 points. Below it a rise in percent of a cost near zero has no mean
 
 
 @dataclass(frozen=True)
-class ReductionLimits:
+class ReductionLimits(Options):
     """Guides that a reduction works towards; see `flightid.reduce`."""
 
-    maximum_insensitivity_percent: float = INSENSITIVITY_GUIDE_PERCENT
-    maximum_cramer_rao_percent: float = CRAMER_RAO_GUIDE_PERCENT
-    maximum_correlation: float = CORRELATION_GUIDE
-    maximum_cost_rise_percent: float = COST_RISE_PERCENT
-
-    def __post_init__(self) -> None:
-        for name, value in vars(self).items():
-            if not value > 0.0:
-                raise OptionError(f"{name} has no meaning", found=value, needed="above zero")
+    maximum_insensitivity_percent: float = option(
+        INSENSITIVITY_GUIDE_PERCENT, unit="%", above=0.0, doc="Largest insensitivity."
+    )
+    maximum_cramer_rao_percent: float = option(
+        CRAMER_RAO_GUIDE_PERCENT, unit="%", above=0.0, doc="Largest Cramér–Rao bound."
+    )
+    maximum_correlation: float = option(
+        CORRELATION_GUIDE, above=0.0, doc="Largest correlation of two parameters."
+    )
+    maximum_cost_rise_percent: float = option(
+        COST_RISE_PERCENT, unit="%", above=0.0, doc="Largest rise of the cost in one step."
+    )
 
     def is_marked(self, before: Fit, after: Fit) -> bool:
         """Whether the cost has risen markedly from one fit to the next."""

@@ -2,71 +2,60 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass
 
-from flightid.errors import OptionError
 from flightid.identification.records.options import HOLDS
+from flightid.options import Options, option
 
 Band = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class RegressionOptions:
+class RegressionOptions(Options):
     """What all of them share."""
 
-    hold: str = "first"
-    maximum_iterations: int = 100
-
-    def __post_init__(self) -> None:
-        if self.hold not in HOLDS:
-            raise OptionError("hold is not known", found=repr(self.hold), needed=" or ".join(HOLDS))
-        if self.maximum_iterations < 1:
-            raise OptionError(
-                "maximum_iterations is too small", found=self.maximum_iterations, needed="1 or more"
-            )
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        plain = {each.name: getattr(self, each.name) for each in fields(self)}
-        return {name: list(v) if isinstance(v, tuple) else v for name, v in plain.items()}
+    hold: str = option("first", choices=HOLDS, doc="What inputs do between samples.")
+    maximum_iterations: int = option(100, minimum=1, doc="Most steps of each start.")
 
 
 @dataclass(frozen=True)
 class EquationErrorOptions(RegressionOptions):
     """Options of equation error in the time domain."""
 
-    half_width: int = 2
-    output_bias: bool = True
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.half_width < 1:
-            raise OptionError(
-                "half_width is too small", found=self.half_width, needed="1 neighbour or more"
-            )
+    half_width: int = option(
+        2, unit="samples", minimum=1, doc="Neighbours on each side of a local derivative."
+    )
+    output_bias: bool = option(
+        True, doc="Constants added to each equation of each record, estimated."
+    )
 
 
 @dataclass(frozen=True)
 class FourierOptions(RegressionOptions):
     """Options of equation error in the frequency domain."""
 
-    band_rad_s: Band | None = None
+    band_rad_s: Band | None = option(
+        None, unit="rad/s", doc="Band of the harmonics; default: to two fifths of Nyquist."
+    )
 
 
 @dataclass(frozen=True)
 class FourierOutputErrorOptions(FourierOptions):
     """Options of output error in the frequency domain."""
 
-    starts: int = 1
-    seed: int = 0
+    starts: int = option(1, minimum=1, doc="Number of starts, the model's values first.")
+    seed: int = option(0, minimum=0, doc="Seed of the starts.")
 
 
 @dataclass(frozen=True)
 class FilterErrorOptions(RegressionOptions):
     """Options of filter error."""
 
-    process_noise: tuple[str, ...] | list[str] | None = None
-    output_bias: bool = True
-    input_bias: bool = False
-    starts: int = 1
-    seed: int = 0
+    process_noise: Sequence[str] | None = option(
+        None, doc="States driven by noise; default: those whose equations hold free parameters."
+    )
+    output_bias: bool = option(True, doc="Constants added to outputs of each record, estimated.")
+    input_bias: bool = option(False, doc="Constants added to inputs of each record, estimated.")
+    starts: int = option(1, minimum=1, doc="Number of starts, the model's values first.")
+    seed: int = option(0, minimum=0, doc="Seed of the starts.")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,7 +169,6 @@ def _scores(
 def _provenance(
     structure: SubspaceStructure, records: Sequence[Record], data: SubspaceData
 ) -> dict[str, object]:
-    channels, options = data.channels, asdict(structure)
-    kept = {key: options[key] for key in options if key not in ("outputs", "inputs")}
-    arrays = (channels.output, channels.inputs)
-    return provenance_of(structure.method, records, arrays, channels.offsets, kept)
+    channels = data.channels
+    arrays, options = (channels.output, channels.inputs), structure.to_dict()
+    return provenance_of(structure.method, records, arrays, channels.offsets, options)

@@ -7,6 +7,7 @@ from typing import TypedDict
 
 from flightid.errors import OptionError
 from flightid.models.sampled.channels import OFFSETS
+from flightid.options import Options, option
 
 METHODS = ("moesp", "n4sid", "cva", "pbsid")
 INITIAL_STATES = ("estimate", "zero")
@@ -28,7 +29,7 @@ class SubspaceOptions(TypedDict, total=False):
 
 
 @dataclass(frozen=True)
-class SubspaceStructure:
+class SubspaceStructure(Options):
     """A state-space model in innovations form, for `identify`.
 
     Made by `InnovationsModel.subspace`.
@@ -70,15 +71,27 @@ class SubspaceStructure:
 
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
-    order: int | None = None
-    method: str = "moesp"
-    horizon: int | None = None
-    direct: bool = False
-    refine: bool = True
-    initial_state: str = "estimate"
-    offsets: str = "mean"
-    maximum_order: int = 10
-    maximum_iterations: int = 100
+    order: int | None = option(
+        None, minimum=1, maximum=LARGEST_ORDER, doc="States; default: by the singular values."
+    )
+    method: str = option("moesp", choices=METHODS, doc="How the subspace is weighed.")
+    horizon: int | None = option(
+        None, unit="samples", minimum=1, maximum=LARGEST_HORIZON, doc="Block rows; default: 15."
+    )
+    direct: bool = option(False, doc="Inputs act without delay.")
+    refine: bool = option(True, doc="A prediction-error fit follows, which gives intervals.")
+    initial_state: str = option(
+        "estimate", choices=INITIAL_STATES, doc="State at the first sample of each record."
+    )
+    offsets: str = option(
+        "mean", choices=OFFSETS, doc="What is taken off each channel of each record."
+    )
+    maximum_order: int = option(
+        10, minimum=1, maximum=LARGEST_ORDER, doc="Largest order that the choice considers."
+    )
+    maximum_iterations: int = option(
+        100, minimum=1, maximum=10_000, doc="Most steps of the prediction-error fit."
+    )
 
     def __post_init__(self) -> None:
         channels = [*self.outputs, *self.inputs]
@@ -86,23 +99,7 @@ class SubspaceStructure:
             raise OptionError("a channel is named twice", found=", ".join(channels))
         if not self.outputs or not self.inputs:
             raise OptionError("the model has no outputs or no inputs", found=", ".join(channels))
-        choices = {"method": METHODS, "initial_state": INITIAL_STATES, "offsets": OFFSETS}
-        for name, allowed in choices.items():
-            if getattr(self, name) not in allowed:
-                needed = ", ".join(allowed)
-                raise OptionError(f"unknown {name}", found=getattr(self, name), needed=needed)
-        limits = {
-            "order": LARGEST_ORDER,
-            "maximum_order": LARGEST_ORDER,
-            "horizon": LARGEST_HORIZON,
-            "maximum_iterations": 10_000,
-        }
-        for name, limit in limits.items():
-            value = getattr(self, name)
-            if value is not None and not 1 <= value <= limit:
-                raise OptionError(
-                    f"{name} is outside its range", found=value, needed=f"1 to {limit}"
-                )
+        super().__post_init__()
         if self.horizon is not None and self.horizon < self.least_horizon:
             raise OptionError(
                 "the horizon is too short for the order",

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from flightid.errors import OptionError
-from flightid.models.narx.terms import KERNELS, Lag, width_to_beta
+from flightid.models.narx.terms import KERNELS, WIDTH_FACTORS, Lag, width_to_beta
+from flightid.options import Options, option
 
 STOPS = ("press", "sse", "err", "terms", "aic", "aicc", "bic")
 CANDIDATES = ("data", "kmeans", "grid")
@@ -14,7 +14,7 @@ REGULARISATIONS = ("none", "uniform", "local")
 
 
 @dataclass(frozen=True)
-class NarxStructure:
+class NarxStructure(Options):
     """Structure of y(t) = f(y(t-1) … y(t-n_y), u(t-d) … u(t-d-n_u+1)) for `identify`.
 
     Every channel is scaled to zero mean and unit deviation (N - 1) over the training records; the
@@ -79,48 +79,35 @@ class NarxStructure:
 
     output: str
     inputs: tuple[str, ...]
-    output_lags: int
-    input_lags: int
-    delay: int = 1
-    kernel: str | None = "gaussian"
-    width: float = 5.0
-    width_convention: str = "beta"
-    candidates: str = "data"
-    n_candidates: int = 100
-    seed: int = 0
-    constant: bool = True
-    linear: bool = True
-    degree: int = 1
-    stop: str = "press"
-    goal: float = 0.0
-    maximum_terms: int = 30
-    regularisation: str = "none"
-    penalty: float = 0.0
-    held_back: float = 0.0
-    guard: float = 3.0
+    output_lags: int = option(minimum=0, unit="samples", doc="Lags of the output.")
+    input_lags: int = option(minimum=0, unit="samples", doc="Lags of each input.")
+    delay: int = option(1, minimum=0, unit="samples", doc="Smallest lag of the inputs.")
+    kernel: str | None = option("gaussian", choices=KERNELS, doc="Radial function.")
+    width: float = option(5.0, unit="deviations", doc="Width of the radial functions.")
+    width_convention: str = option("beta", choices=WIDTH_FACTORS, doc="What a width means.")
+    candidates: str = option("data", choices=CANDIDATES, doc="Centres to choose from.")
+    n_candidates: int = option(100, minimum=1, doc="Clusters, or levels along each regressor.")
+    seed: int = option(0, minimum=0, doc="Seed of the clusters.")
+    constant: bool = option(True, doc="A constant term is in the model.")
+    linear: bool = option(True, doc="Linear terms are in the model.")
+    degree: int = option(1, minimum=1, doc="Largest total power of the products.")
+    stop: str = option("press", choices=STOPS, doc="What ends the choice of terms.")
+    goal: float = option(0.0, doc="Error or error-reduction ratio that ends the choice.")
+    maximum_terms: int = option(30, minimum=1, doc="Most terms.")
+    regularisation: str = option("none", choices=REGULARISATIONS, doc="Penalties of weights.")
+    penalty: float = option(0.0, minimum=0.0, doc="Penalty of a squared coefficient.")
+    held_back: float = option(
+        0.0, minimum=0.0, below=1.0, doc="Share of each record kept from the choice of terms."
+    )
+    guard: float = option(3.0, minimum=1.0, unit="half ranges", doc="Where predictions are held.")
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "inputs", tuple(self.inputs))
-        least = {"input_lags": 0, "output_lags": 0, "delay": 0, "degree": 1, "maximum_terms": 1}
-        for name, low in {**least, "n_candidates": 1}.items():
-            if getattr(self, name) < low:
-                raise OptionError(f"{name} is too small", found=getattr(self, name), needed=low)
-        choices = {
-            "stop": STOPS,
-            "candidates": CANDIDATES,
-            "kernel": (*KERNELS, None),
-            "regularisation": REGULARISATIONS,
-        }
-        for name, allowed in choices.items():
-            if getattr(self, name) not in allowed:
-                needed = ", ".join(map(str, allowed))
-                raise OptionError(f"unknown {name}", found=getattr(self, name), needed=needed)
+        super().__post_init__()
         if not self.lags:
             raise OptionError("a NARX model has no lags", needed="output_lags or input_lags")
         if len({self.output, *self.inputs}) != 1 + len(self.inputs):
             raise OptionError("a channel is named twice", found=(self.output, *self.inputs))
-        if not (math.isfinite(self.guard) and self.guard >= 1):
-            raise OptionError("guard cuts training data", found=self.guard, needed="1 or more")
         if self.stop in ("sse", "err") and not self.goal > 0:
             raise OptionError(f"stop {self.stop!r} has no goal", found=self.goal, needed="above 0")
         width_to_beta(self.width, self.width_convention)
@@ -128,17 +115,11 @@ class NarxStructure:
 
     def _check_penalties(self) -> None:
         penalty, kind = self.penalty, self.regularisation
-        if not (math.isfinite(penalty) and penalty >= 0):
-            raise OptionError("a penalty is negative", found=penalty, needed="0 or more")
         if (kind == "uniform") is not (penalty > 0) and kind != "local":
             raise OptionError(
                 "penalty and regularisation disagree",
                 found=f"regularisation={kind!r}, penalty={penalty}",
                 needed="a penalty above 0 for 'uniform', none for 'none'",
-            )
-        if not 0 <= self.held_back < 1:
-            raise OptionError(
-                "held_back is no share", found=self.held_back, needed="0 to below 1, such as 0.5"
             )
         if self.held_back and kind != "none":
             raise OptionError(

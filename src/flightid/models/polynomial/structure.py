@@ -8,6 +8,7 @@ from typing import TypedDict
 
 from flightid.errors import OptionError
 from flightid.models.sampled.channels import OFFSETS
+from flightid.options import Options, option
 
 INITIAL_STATES = ("estimate", "zero")
 METHODS = ("prediction_error", "iv4")
@@ -33,7 +34,7 @@ class PolynomialOptions(TypedDict, total=False):
 
 
 @dataclass(frozen=True)
-class PolynomialStructure:
+class PolynomialStructure(Options):
     """Orders of A y = Σ (Bᵢ/Fᵢ) uᵢ(t - nkᵢ) + (C/D) e, for `identify`.
 
     Made by `PolynomialModel.arx`, `.armax`, `.oe`, `.bj` and `.general`.
@@ -88,28 +89,29 @@ class PolynomialStructure:
     nd: int
     nf: tuple[int, ...]
     nk: tuple[int, ...]
-    initial_state: str = "estimate"
-    backcast: bool = False
-    method: str = "prediction_error"
-    offsets: str = "mean"
-    enforce_stability: bool = False
-    kernel: str | None = None
-    starts: int = 4
-    seed: int = 0
-    maximum_iterations: int = 200
+    initial_state: str = option(
+        "estimate", choices=INITIAL_STATES, doc="What stands for the time before each record."
+    )
+    backcast: bool = option(
+        False, doc="Estimate that time by running the noise model backwards over the record."
+    )
+    method: str = option(
+        "prediction_error", choices=METHODS, doc="Prediction errors, or instruments for ARX."
+    )
+    offsets: str = option(
+        "mean", choices=OFFSETS, doc="What is taken off each channel of each record."
+    )
+    enforce_stability: bool = option(False, doc="Keep the roots of A inside the unit circle.")
+    kernel: str | None = option(None, choices=KERNELS, doc="Regularisation of an ARX model.")
+    starts: int = option(
+        4, minimum=1, doc="Starts of the iteration: systematic ones, then random noise models."
+    )
+    seed: int = option(0, minimum=0, doc="Seed of the random starts.")
+    maximum_iterations: int = option(200, minimum=1, doc="Most steps of each start.")
 
     def __post_init__(self) -> None:
         self._check_orders()
-        choices = {
-            "initial_state": INITIAL_STATES,
-            "method": METHODS,
-            "offsets": OFFSETS,
-            "kernel": (*KERNELS, None),
-        }
-        for name, allowed in choices.items():
-            if getattr(self, name) not in allowed:
-                needed = ", ".join(map(str, allowed))
-                raise OptionError(f"unknown {name}", found=getattr(self, name), needed=needed)
+        super().__post_init__()
         if self.backcast and self.initial_state != "estimate":
             raise OptionError(
                 "backcast estimates the initial state",
@@ -128,9 +130,6 @@ class PolynomialStructure:
                 found=f"method {self.method!r}, enforce_stability {self.enforce_stability}",
                 needed="method 'prediction_error' without enforce_stability",
             )
-        for name in ("starts", "maximum_iterations"):
-            if getattr(self, name) < 1:
-                raise OptionError(f"{name} is too small", found=getattr(self, name), needed=1)
 
     @property
     def past(self) -> str:
