@@ -83,9 +83,9 @@ DICTIONARY = {
 OWN = {
     "conditioning": (
         "signals as they come from sensors: filters and skews in hertz and seconds",
-        "accelerations air_data angles at_s conversion cutoff_hz design estimate half_width "
-        "interpolation largest_s position_m rates reference shortest_s skews_s spans_s vectors "
-        "velocities zero_phase",
+        "accelerations air_data angles at_s conversion cutoff_hz design deviations estimate "
+        "half_width interpolation largest_s position_m rates reference shortest_s skews_s spans_s "
+        "vectors velocities zero_phase",
     ),
     "control.autopilots": (
         "what a firmware calls its parameters, filters and clocks",

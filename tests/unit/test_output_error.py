@@ -267,7 +267,7 @@ def test_residual_tests_and_verification_take_the_fit() -> None:
     tests = fid.residual_tests(fit)
     assert tests.n_records == 1
     assert tests.outputs == ("alpha", "q", "nz")
-    with pytest.raises(OptionError, match="is a free run"):
+    with pytest.raises(OptionError, match="come from another predictor"):
         fid.residual_tests(fit, horizon="one step ahead")
     assert fid.verify(fit, _noisy(_flown(1.0), 9), initial_state="estimate").theil["q"] < 0.1
     omega = np.geomspace(1.0, 20.0, 30)
