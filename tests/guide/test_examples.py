@@ -115,6 +115,25 @@ def test_the_dryer_script_checks_a_record_of_the_same_format(tmp_path: Path) -> 
 
 
 @pytest.mark.nightly
+def test_the_unstable_helicopter_is_found_by_a_study_file_alone(tmp_path: Path) -> None:
+    files = ("fly.py", "flights.py", "study.toml", "heave.toml", "candidate.toml")
+    for name in (*files, "full_envelope.toml"):
+        (tmp_path / name).write_text((EXAMPLES / "ah64" / name).read_text(encoding="utf-8"))
+    assert _script(tmp_path / "fly.py", folder=tmp_path).returncode == 0
+    run = _run(FLIGHTID, "--quiet", "run", "study.toml", "--output", "out", folder=tmp_path)
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    results = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
+    costs = [next(iter(model["fits"].values()))["average_cost"] for model in results["models"]]
+    assert costs[1] < 0.5 * costs[0], "inflow explains what a delay cannot"
+    dropped = re.search(r"dropped ([^;]*);", run.stdout)
+    assert dropped is not None
+    assert set(dropped.group(1).split(", ")) == {"Xw", "Yr", "Lr", "Mw", "Nq", "Nlat"}
+    inside = re.search(r"(\d+) of (\d+) true values lie inside", run.stdout)
+    assert inside is not None
+    assert int(inside.group(1)) >= 0.88 * int(inside.group(2)) > 30
+
+
+@pytest.mark.nightly
 def test_the_r50_is_found_by_a_study_file_alone(tmp_path: Path) -> None:
     for name in ("fly.py", "flights.py", "study.toml"):
         (tmp_path / name).write_text((EXAMPLES / "r50" / name).read_text(encoding="utf-8"))

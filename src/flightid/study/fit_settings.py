@@ -48,6 +48,8 @@ class VerifySettings:
         None: as the kind of model starts.
     settle_s : float or None
     state_bias, output_bias : bool or None
+    against_responses : bool
+        Whether models are also judged against the measured responses.
     residual_tests : bool
         Whether residuals of fits to records are tested.
     """
@@ -57,6 +59,7 @@ class VerifySettings:
     state_bias: bool | None = None
     output_bias: bool | None = None
     residual_tests: bool = False
+    against_responses: bool = False
 
     @property
     def options(self) -> dict[str, Any]:
@@ -142,6 +145,7 @@ def read_verify(reader: TableReader, usual: VerifySettings | None = None) -> Ver
         given(reader.flag, "state_bias", usual.state_bias),
         given(reader.flag, "output_bias", usual.output_bias),
         reader.flag("residual_tests", usual.residual_tests),
+        reader.flag("against_responses", usual.against_responses),
     )
     reader.finish()
     return made

@@ -14,7 +14,7 @@ from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
 from flightid.plot.modes import pole_map
 from flightid.report.blocks import result_blocks
-from flightid.report.content import Block, Figure, Lights, Section, TableBlock
+from flightid.report.content import Block, Figure, Lights, Paragraph, Section, TableBlock
 from flightid.report.evidence import evidence_blocks
 from flightid.report.figures import figure_block
 from flightid.report.fitted_record import record_figures
@@ -86,15 +86,22 @@ def _physics(fit: Fit) -> tuple[Block, ...]:
         approximations = approximate_modes(fit)
     with suppress(ModelError):
         table = derivatives(fit)
-    return (*modes_blocks(modes(fit)), *physics_blocks(approximations, table))
+    try:
+        shown = modes_blocks(modes(fit))
+    except ModelError as reason:
+        shown = (Paragraph(f"No modes: {reason}."),)
+    return (*shown, *physics_blocks(approximations, table))
 
 
 def _beside(item: Identified) -> tuple[Block, ...]:
     """Eigenvalues of the reference, in a table and beside those of the fit."""
     if item.reference is None:
         return ()
-    theirs = modes(item.reference)
-    both = {"identified": modes(item.fit), "reference": theirs}
+    try:
+        theirs, ours = modes(item.reference), modes(item.fit)
+    except ModelError:
+        return ()
+    both = {"identified": ours, "reference": theirs}
     picture = figure_block(pole_map(both), "Eigenvalues with 95 % regions, beside the reference's.")
     return (picture, TableBlock(theirs.table(), folded=True))
 

@@ -53,6 +53,10 @@ class ModelSettings:
         Parameters that a reduction leaves in, or takes out first.
     condition : str or None
         Flight condition, where the study compares several.
+    values_from : mapping of str to tuple of str
+        Parameters that start at another model's estimates, by the name of that model.
+    reduce : bool
+        Whether the reduction that the study asks for is meant for this model.
     reference : str or None
         Model whose parameters and modes stand beside the estimates: library name or model file.
     """
@@ -75,6 +79,8 @@ class ModelSettings:
     drop: tuple[str, ...] = ()
     condition: str | None = None
     reference: str | None = None
+    values_from: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    reduce: bool = True
 
     @property
     def segments(self) -> tuple[str, ...]:
@@ -147,9 +153,16 @@ def read_model(
         *((reader.names("keep", ()), reader.names("drop", ())) if reduced else ((), ())),
         condition=reader.maybe(reader.text, "condition"),
         reference=None if reference is None else _placed(folder, reference),
+        values_from=_values_from(reader),
+        reduce=reader.flag("reduce", True) if reduced else False,
     )
     reader.finish()
     return made
+
+
+def _values_from(reader: TableReader) -> dict[str, tuple[str, ...]]:
+    inner = reader.table("values_from")
+    return {name: inner.names(name) for name in reader.values("values_from")}
 
 
 def _placed(folder: Path, source: str) -> str:

@@ -19,10 +19,14 @@ class ReduceSettings:
         Guides that a parameter must meet to stay.
     after_rise : {"stop", "next"}
         What follows a step whose cost rises markedly.
+    rough : bool
+        The path needs neither intervals nor corrections of bias: the reduced structure is fitted
+        once more with both.
     """
 
     limits: ReductionLimits
     after_rise: str
+    rough: bool = False
 
 
 def read_reduce(reader: TableReader) -> ReduceSettings:
@@ -41,5 +45,6 @@ def read_reduce(reader: TableReader) -> ReduceSettings:
         }
     )
     after_rise = reader.choice("after_rise", AFTER_RISE, AFTER_RISE[0])
+    rough = reader.flag("rough", False)
     reader.finish()
-    return ReduceSettings(limits, after_rise)
+    return ReduceSettings(limits, after_rise, rough)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flightid.study.reading import TableReader
@@ -22,6 +23,8 @@ class ResponseSettings:
         Estimators shown beside it.
     instruments : tuple of str
         Channels that move the inputs from outside the loop, for the instrument estimator.
+    inputs : tuple of str
+        All inputs that moved: responses are conditioned on those beside the model's own.
     n_omega : int
         Frequencies in each model's band, spaced evenly in the logarithm.
     window_s : tuple of float
@@ -35,6 +38,7 @@ class ResponseSettings:
     estimator: str = "composite"
     compare: tuple[str, ...] = ()
     instruments: tuple[str, ...] = (EXCITATION,)
+    inputs: tuple[str, ...] = ()
     n_omega: int = 60
     window_s: tuple[float, ...] = ()
     minimum_coherence: float = 0.6
@@ -44,6 +48,10 @@ class ResponseSettings:
     def estimators(self) -> tuple[str, ...]:
         """The one that counts, then those beside it."""
         return tuple(dict.fromkeys((self.estimator, *self.compare)))
+
+    def moved(self, own: Sequence[str]) -> tuple[str, ...]:
+        """The model's inputs and those that moved beside them."""
+        return tuple(dict.fromkeys((*own, *self.inputs)))
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -68,6 +76,7 @@ def read_response(reader: TableReader, usual: ResponseSettings | None = None) ->
         reader.choice("estimator", ESTIMATORS, usual.estimator),
         compare,
         reader.names("instruments", usual.instruments),
+        reader.names("inputs", usual.inputs),
         reader.integer("n_omega", usual.n_omega, minimum=5),
         reader.numbers("window_s", usual.window_s),
         reader.positive("minimum_coherence", usual.minimum_coherence),

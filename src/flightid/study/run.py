@@ -24,6 +24,7 @@ from flightid.study.stages import (
     examine_residuals,
     fit,
     load_task,
+    start_from,
 )
 from flightid.study.study import Study
 from flightid.study.taking import Taken, take
@@ -84,7 +85,10 @@ def run_study(
     with whole_folder(final) as folder, progress(steps, source.stem) as advance:
         taken = take(settings, tasks, None if log is None else Path(log), folder)
         advance(2)
-        identified = tuple(_identify(task, taken, settings, advance) for task in tasks)
+        identified: tuple[Identified, ...] = ()
+        for task in tasks:
+            begun = start_from(task, identified)
+            identified = (*identified, _identify(begun, taken, settings, advance))
         boxes = []
         for asked in settings.black_boxes:
             boxes.append(identify_black_box(asked, taken.records, taken.inspection))
@@ -119,7 +123,7 @@ def _identify(
     fits, reduction = fit(task, responses, records, settings.reduce, coherent)
     advance()
     counts = next(iter(fits.values()))
-    verifications = check(task, counts, records)
+    verifications = check(task, counts, records, next(iter(responses.values()), None))
     tests = examine_residuals(task, counts)
     found = [*(() if tests is None else tests.findings)]
     found += [finding for each in verifications.values() for finding in each.findings]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from flightid.errors import DataError, UnknownNameError
+from flightid.errors import DataError, StudyError, UnknownNameError
 from flightid.findings import Finding
 from flightid.identification import Fit, Reduction, identify, reduce
 from flightid.models import GreyBoxModel, StateSpaceModel, load_structure
@@ -176,11 +176,13 @@ def estimate(task: Task, records: Flown) -> dict[str, FrequencyResponse]:
     if not settings.fit.on_responses or band is None:
         return {}
     flown = records.of(settings.identify)
-    held = [name for name in _outputs(task.model) if all(name in record for record in flown)]
+    # Outputs beside those that are fitted help to tell initial states when bias is taken out.
+    wanted = settings.outputs or task.model.outputs
+    held = [name for name in wanted if all(name in record for record in flown)]
     return {
         estimator: estimate_response(
             flown,
-            inputs=task.model.inputs,
+            inputs=chosen.moved(task.model.inputs),
             outputs=held,
             excitations=chosen.instruments if estimator == "instrument" else None,
             band_rad_s=band,
@@ -190,11 +192,6 @@ def estimate(task: Task, records: Flown) -> dict[str, FrequencyResponse]:
         )
         for estimator in chosen.estimators
     }
-
-
-def _outputs(model: GreyBoxModel) -> tuple[str, ...]:
-    """Outputs of the responses that are fitted."""
-    return tuple(dict.fromkeys(name.split("/")[0] for name in model.response_names))
 
 
 def choose_responses(
@@ -263,19 +260,37 @@ def fit(
             bands = {name: band for name, band in coherent.bands.items() if name in fitted}
             options.setdefault("band_rad_s", bands)
     (counts, data), *others = _sources(task, responses, records).items()
-    found, reduction, model = identify(task.model, data, **options), None, task.model
-    if reducing is not None:
-        reduction = reduce(
-            found,
-            data,
-            keep=settings.keep,
-            drop=settings.drop,
-            after_rise=reducing.after_rise,
-            **vars(reducing.limits),
-        )
-        found, model = reduction.fit, model.with_fixed(**reduction.dropped)
+    model, reduction = task.model, None
+    if reducing is None or not settings.reduce:
+        counted = identify(model, data, **options)
+    else:
+        reduction = _reduced(task, data, options, reducing)
+        counted, model = reduction.fit, model.with_fixed(**reduction.dropped)
+        if reducing.rough:
+            counted = identify(reduction.fit.model, data, **options)
     rest = {name: identify(model, other, **options) for name, other in others}
-    return {counts: found, **rest}, reduction
+    return {counts: counted, **rest}, reduction
+
+
+def _reduced(
+    task: Task,
+    data: Any,  # noqa: ANN401  # whatever identify takes
+    options: Mapping[str, Any],
+    reducing: ReduceSettings,
+) -> Reduction:
+    """The path of the structure, on the data as they are or without what only intervals need."""
+    given = dict(options)
+    if reducing.rough and isinstance(data, FrequencyResponse):
+        data = replace(data, errors=None, linear=None)
+        given["correct_bias"] = False
+    return reduce(
+        identify(task.model, data, **given),
+        data,
+        keep=task.settings.keep,
+        drop=task.settings.drop,
+        after_rise=reducing.after_rise,
+        **vars(reducing.limits),
+    )
 
 
 def _sources(
@@ -291,9 +306,43 @@ def _sources(
     return dict(responses)
 
 
-def check(task: Task, fitted: Fit, records: Flown) -> dict[str, Verification | Comparison]:
+def start_from(task: Task, earlier: Sequence[Identified]) -> Task:
+    """The model with start values that earlier models of the study gave.
+
+    Raises
+    ------
+    StudyError
+        No model of that name comes before this one.
+    UnknownNameError
+        A model has no such parameter.
+    """
+    model = task.model
+    for name, wanted in task.settings.values_from.items():
+        given = [item for item in earlier if item.settings.name == name]
+        if not given:
+            raise StudyError(
+                f"study file, model {task.settings.name!r}: values_from names no earlier model",
+                found=name,
+                needed=", ".join(item.settings.name for item in earlier) or "an earlier [[model]]",
+            )
+        model = model.with_values(
+            {each: given[0].fit.model.parameters[each].value or 0.0 for each in wanted}
+        )
+    return replace(task, model=model)
+
+
+def check(
+    task: Task,
+    fitted: Fit,
+    records: Flown,
+    response: FrequencyResponse | None = None,
+) -> dict[str, Verification | Comparison]:
     """Predict each record that the fit has not seen, beside the rivals where there are any."""
     outputs, options = task.model.outputs, task.settings.check.options
+    if task.settings.check.against_responses and response is not None:
+        options["responses"] = response
+    if task.settings.outputs:
+        outputs = task.settings.outputs
     checked: dict[str, Verification | Comparison] = {}
     for name in task.settings.verify:
         flown = records.of([name])

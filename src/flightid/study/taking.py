@@ -136,6 +136,8 @@ def channels_needed(settings: Settings, tasks: Iterable[Task]) -> dict[str, dict
         instruments = [each for each in task.settings.response.channels if each not in brought]
         for name in task.settings.identify:
             needed.setdefault(name, {}).update(dict.fromkeys(instruments, Role.EXCITATION))
+            beside = dict.fromkeys(task.settings.response.inputs, Role.INPUT)
+            needed[name].update(beside)
     # Outputs last: what one model drives and another predicts is measured.
     for role, place in ((Role.INPUT, 1), (Role.OUTPUT, 2)):
         for user in users:
