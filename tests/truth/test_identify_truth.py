@@ -11,9 +11,9 @@ from flightid.responses.errors.random_error import Known
 from flightid.uncertainty import (
     correlation,
     cramer_rao,
+    estimator_gain,
     gauss_newton_hessian,
     insensitivity,
-    propagate,
 )
 from tests.closeness import assert_close
 
@@ -136,8 +136,8 @@ def test_bounds_from_closed_hessians() -> None:
     assert_close(insensitivity(jacobian), 1 / np.sqrt([8.0, 28.0]), rtol=1e-12, why="by hand")
     expected = -12.0 / np.sqrt(28.0 * 8.0)
     assert_close(correlation(inverse)[0, 1], expected, rtol=1e-12, why="by hand")
-    ordinary = propagate(jacobian, np.eye(4), 0.25 * np.eye(4))
-    assert_close(ordinary, 0.25 * 2 * inverse, rtol=1e-12, why="σ² (XᵀX)⁻¹")
+    gain = estimator_gain(jacobian, np.eye(4))
+    assert_close(0.25 * gain @ gain.T, 0.25 * 2 * inverse, rtol=1e-12, why="σ² (XᵀX)⁻¹")
 
 
 def test_percentages_of_an_integrator_in_closed_form() -> None:

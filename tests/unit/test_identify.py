@@ -10,7 +10,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import DataError, FitError, OptionError, UnitError, UnknownNameError
-from flightid.uncertainty import null_combination, propagate
+from flightid.uncertainty import estimator_gain, null_combination
 from flightid.uncertainty.cramer_rao import cramer_rao
 from flightid.uncertainty.insensitivity import insensitivity
 from tests.closeness import assert_close
@@ -227,9 +227,9 @@ def test_values_of_inference_are_checked() -> None:
     with pytest.raises(ArithmeticError, match="singular"):
         cramer_rao(same)
     with pytest.raises(ArithmeticError, match="no influence"):
-        propagate(zero, np.eye(2), np.eye(2))
+        estimator_gain(zero, np.eye(2))
     with pytest.raises(ArithmeticError, match="singular"):
-        propagate(same, np.eye(2), np.eye(2))
+        estimator_gain(same, np.eye(2))
     assert null_combination(np.eye(2)) is None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,24 +16,15 @@ from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.fitted_response import FittedResponse
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.training import TrainingChannel, training_channels
+from flightid.models import Model
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.record import Record
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.uncertain import Uncertain
 
 SCHEMA = "flightid.fit/1"
-_COLUMNS = (
-    Column("parameter"),
-    Column("value", digits=6),
-    Column("unit"),
-    Column("standard error", digits=3),
-    Column("95 % low", digits=5),
-    Column("95 % high", digits=5),
-    Column("Cramér–Rao", "%", 3),
-    Column("insensitivity", "%", 3),
-    Column("status"),
-    Column("note"),
-)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -161,15 +152,56 @@ class Fit:
             f"{', '.join(seen)}, average cost {self.average_cost:.2f}{unit}{words})"
         )
 
-    def summary(self) -> Table:
+    def uncertain(self) -> Uncertain[Model]:
+        """The fitted model with the covariance of its parameters, for what is computed from it.
+
+        Parameters at a bound or fixed count as known exactly.
+
+        Example
+        -------
+        >>> import numpy as np
+        >>> import flightid as fid
+        >>> truth = fid.load_model("rate_first_order").with_values({"Lp": -5.0, "Ltphi": 150.0})
+        >>> omega = np.geomspace(0.5, 20.0, 30)
+        >>> data = fid.FrequencyResponse.from_values(
+        ...     omega, truth.frequency_response(omega), inputs=truth.inputs, outputs=truth.outputs,
+        ...     units=truth.units, random_error=np.full((1, 1, 30), 0.02))
+        >>> fid.identify(truth, data).uncertain()
+        Uncertain(3 numbers, covariance known)
+        """
+        if self.covariance is None:
+            return Uncertain.exact(self.model, "the fit knows no errors of its data")
+        free = [self.model.parameters[name] for name in self.names]
+        bounds = np.array([p.minimum for p in free]), np.array([p.maximum for p in free])
+        return uncertain_model(self.model, self.names, self.covariance, bounds)
+
+    def summary(self, *, level: float = LEVEL) -> Table:
         """Table of the parameters, with costs and findings below.
+
+        Parameters
+        ----------
+        level : float
+            Of the intervals.
 
         Returns
         -------
         Table
         """
-        rows = [_row(p) for p in (self.details or Details()).quantities(self.parameters)]
-        table = Table(f"Fit of {self.model.name}", _COLUMNS, tuple(rows), self._notes())
+        words = interval_words(level)
+        columns = (
+            Column("parameter"),
+            Column("value", digits=6),
+            Column("unit"),
+            Column("standard error", digits=3),
+            Column(f"{words} low", digits=5),
+            Column(f"{words} high", digits=5),
+            Column("Cramér–Rao", "%", 3),
+            Column("insensitivity", "%", 3),
+            Column("status"),
+            Column("note"),
+        )
+        rows = [_row(p, level) for p in (self.details or Details()).quantities(self.parameters)]
+        table = Table(f"Fit of {self.model.name}", columns, tuple(rows), self._notes())
         return table.without_empty_columns()
 
     def _notes(self) -> tuple[str, ...]:
@@ -228,7 +260,22 @@ class Fit:
         return "".join(table._repr_html_() for table in (self.summary(), *beside))
 
 
-def _row(p: Estimate) -> tuple[Cell, ...]:
-    low, high = p.interval95 if p.interval95 is not None else (None, None)
+def uncertain_model(
+    model: Model,
+    names: Sequence[str],
+    covariance: NDArray[np.float64],
+    bounds: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
+) -> Uncertain[Model]:
+    """A model with the covariance of some of its parameters."""
+    numbers = np.array([model.parameters[name].value for name in names], dtype=np.float64)
+
+    def make(values: NDArray[np.float64]) -> Model:
+        return model.with_values(dict(zip(names, map(float, values), strict=True)))
+
+    return Uncertain(numbers, covariance, make, bounds)
+
+
+def _row(p: Estimate, level: float) -> tuple[Cell, ...]:
+    low, high = p.interval(level) or (None, None)
     guides = (p.cramer_rao_percent, p.insensitivity_percent)
     return (p.name, p.value, p.unit, p.stderr, low, high, *guides, p.status, p.reason)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import OptionError
-from flightid.identification.fit import Fit
-from flightid.models import Model, PolynomialModel
+from flightid.identification.fit import Fit, uncertain_model
+from flightid.models import PolynomialModel
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.uncertain import Uncertain
 
@@ -66,31 +65,12 @@ def uncertain_of(
     if isinstance(source, Uncertain):
         return source
     if isinstance(source, Fit):
-        return _of_fit(source)
+        return source.uncertain()
     if isinstance(source, PolynomialModel) and source.covariance is not None:
-        return _of_numbers(source, source.names, source.covariance, None)
+        return uncertain_model(source, source.names, source.covariance, None)
     if isinstance(source, FrequencyResponse):
         return _of_response(source, output, input)
     return Uncertain.exact(source, NO_COVARIANCE)
-
-
-def _of_fit(fit: Fit) -> Uncertain[Model]:
-    if fit.covariance is None:
-        return Uncertain.exact(fit.model, "the fit knows no errors of its data")
-    parameters = [fit.model.parameters[name] for name in fit.names]
-    bounds = np.array([p.minimum for p in parameters]), np.array([p.maximum for p in parameters])
-    return _of_numbers(fit.model, fit.names, fit.covariance, bounds)
-
-
-def _of_numbers(
-    model: Model, names: Sequence[str], covariance: Array, bounds: tuple[Array, Array] | None
-) -> Uncertain[Model]:
-    centre = np.array([model.parameters[name].value for name in names], dtype=np.float64)
-
-    def make(numbers: Array) -> Model:
-        return model.with_values(dict(zip(names, map(float, numbers), strict=True)))
-
-    return Uncertain(centre, covariance, make, bounds)
 
 
 def _of_response(

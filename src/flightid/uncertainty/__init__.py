@@ -3,7 +3,6 @@
 from flightid.uncertainty.covariance import (
     decibel_phase_sensitivity,
     estimator_gain,
-    propagate,
     window_covariance,
 )
 from flightid.uncertainty.cramer_rao import correlation, cramer_rao, gauss_newton_hessian
@@ -25,7 +24,6 @@ __all__ = [
     "half_width",
     "insensitivity",
     "null_combination",
-    "propagate",
     "uncertain_numbers",
     "window_covariance",
 ]

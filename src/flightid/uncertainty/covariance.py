@@ -17,46 +17,6 @@ _DECIBEL = 20.0 / np.log(10.0)
 _DEGREE = 180.0 / np.pi
 
 
-def propagate(jacobian: Array, sensitivity: Array, covariance: Array) -> Array:
-    """Covariance of the estimates from that of the data (a sandwich).
-
-    Parameters
-    ----------
-    jacobian, sensitivity
-        As for `estimator_gain`.
-    covariance : ndarray, shape (n_data, n_data)
-        Covariance Σ of the data's errors.
-
-    Returns
-    -------
-    ndarray, shape (n_parameters, n_parameters)
-        A Σ Aᵀ with the gain A.
-
-    Raises
-    ------
-    SingularError
-        Some combination of the parameters has no influence on the residuals.
-
-    Assumes
-    -------
-    Errors small enough for one linearisation; a model that can follow the true response. Biased
-    when the residuals show structure: the interval then holds for the best fit of a wrong model.
-
-    Reference
-    ---------
-    White (1982), "Maximum likelihood estimation of misspecified models", eq. 2.2; Pintelon &
-    Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., §9.7.
-
-    Example
-    -------
-    >>> propagate(np.array([[1.0], [1.0]]), np.eye(2), 4.0 * np.eye(2))
-    array([[2.]])
-    """
-    gain = estimator_gain(jacobian, sensitivity)
-    result = gain @ covariance @ gain.T
-    return np.asarray(0.5 * (result + result.T))
-
-
 def estimator_gain(jacobian: Array, sensitivity: Array, *, total: Array | None = None) -> Array:
     """How far the estimates move with the data, but for the sign.
 

@@ -28,6 +28,7 @@ from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
+from flightid.uncertainty.quantiles import LEVEL
 
 SCHEMA = "flightid.disk_margin/1"
 Array = NDArray[np.float64]
@@ -107,7 +108,7 @@ class DiskMargin:
             f" dB, phase {self.phase.value:.3g} deg)"
         )
 
-    def summary(self) -> Table:
+    def summary(self, *, level: float = LEVEL) -> Table:
         """Table of all numbers with their intervals.
 
         Returns
@@ -115,7 +116,7 @@ class DiskMargin:
         Table
         """
         title = f"Disk margin at {', '.join(self.channels)}, skew {self.skew:g}"
-        return estimate_table(title, self.quantities, tuple(map(str, self.findings)))
+        return estimate_table(title, self.quantities, tuple(map(str, self.findings)), level=level)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""

@@ -17,6 +17,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.table import Table
 from flightid.uncertainty.estimate import Reading, estimate_table
+from flightid.uncertainty.quantiles import LEVEL
 
 SCHEMA = "flightid.disturbance_rejection/1"
 Array = NDArray[np.float64]
@@ -78,7 +79,7 @@ class DisturbanceRejection:
         shown = f"bandwidth {self.bandwidth.text}, peak {self.peak.text}"
         return f"DisturbanceRejection({self.name}: {shown})"
 
-    def summary(self) -> Table:
+    def summary(self, *, level: float = LEVEL) -> Table:
         """Table of all numbers with their intervals.
 
         Returns
@@ -86,7 +87,9 @@ class DisturbanceRejection:
         Table
         """
         notes = tuple(map(str, self.findings))
-        return estimate_table(f"Disturbance rejection of {self.name}", self.quantities, notes)
+        return estimate_table(
+            f"Disturbance rejection of {self.name}", self.quantities, notes, level=level
+        )
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""

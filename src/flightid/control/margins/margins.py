@@ -16,6 +16,7 @@ from flightid.control.margins.loop_source import Controller, Given, Loop, read_l
 from flightid.findings import Finding
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading, estimate_table
+from flightid.uncertainty.quantiles import LEVEL
 
 SCHEMA = "flightid.margins/1"
 Array = NDArray[np.float64]
@@ -160,7 +161,7 @@ class Margins:
             f"gain {self.gain_margin.text})"
         )
 
-    def summary(self) -> Table:
+    def summary(self, *, level: float = LEVEL) -> Table:
         """Table of all numbers with their intervals.
 
         Returns
@@ -168,7 +169,7 @@ class Margins:
         Table
         """
         notes = tuple(map(str, self.findings))
-        return estimate_table(f"Margins of {self.name}", self.quantities, notes)
+        return estimate_table(f"Margins of {self.name}", self.quantities, notes, level=level)
 
     def crossing_table(self) -> Table:
         """Table of every crossing, by frequency.

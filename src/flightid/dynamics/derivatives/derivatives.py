@@ -16,6 +16,7 @@ from flightid.identification import Fit
 from flightid.models import StateSpaceModel
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.quantiles import LEVEL, interval_words
 from flightid.units import convert, same_dimension
 
 Array = NDArray[np.float64]
@@ -151,7 +152,7 @@ class DerivativeTable:
         found = (each.coefficient for each in self.derivatives)
         return {q.name: q.value for q in found if q is not None and q.value is not None}
 
-    def summary(self) -> Table:
+    def summary(self, *, level: float = LEVEL) -> Table:
         """Table of the derivatives by force and moment, with and without dimensions."""
         columns = (
             Column("derivative"),
@@ -159,12 +160,12 @@ class DerivativeTable:
             Column("kind"),
             Column("value"),
             Column("unit"),
-            Column("95 % low"),
-            Column("95 % high"),
+            Column(f"{interval_words(level)} low"),
+            Column(f"{interval_words(level)} high"),
             Column("coefficient"),
             Column("value", digits=4),
-            Column("95 % low"),
-            Column("95 % high"),
+            Column(f"{interval_words(level)} low"),
+            Column(f"{interval_words(level)} high"),
             Column("status"),
         )
         notes = [f"Not derivatives: {', '.join(self.others)}."] if self.others else []
@@ -173,7 +174,7 @@ class DerivativeTable:
         notes += [f"No interval: {reason}." for reason in sorted(reasons)]
         without = {e.si.reason for e in self.derivatives if e.si.value is None}
         notes += [f"No coefficient: {reason}." for reason in sorted(without)]
-        rows = tuple(_row(each) for each in self.derivatives)
+        rows = tuple(_row(each, level) for each in self.derivatives)
         title = f"Derivatives of {self.name}"
         return Table(
             title, columns, rows, (*notes, *map(str, self.findings))
@@ -351,13 +352,13 @@ def _coefficient(
     return si.scaled(1.0 / factor, name=normalisation.symbol(axis, variable), unit=unit)
 
 
-def _row(each: Derivative) -> tuple[Cell, ...]:
+def _row(each: Derivative, level: float) -> tuple[Cell, ...]:
     unit = "" if each.dimensional.unit == "1" else each.dimensional.unit
     value = each.dimensional
-    cells: list[Cell] = [value.value, unit, *(value.interval95 or (None, None))]
+    cells: list[Cell] = [value.value, unit, *(value.interval(level) or (None, None))]
     without = each.coefficient
     if without is None:
         cells += [None, None, None, None]
     else:
-        cells += [without.name, without.value, *(without.interval95 or (None, None))]
+        cells += [without.name, without.value, *(without.interval(level) or (None, None))]
     return (each.name, each.meaning, each.kind, *cells, each.status)

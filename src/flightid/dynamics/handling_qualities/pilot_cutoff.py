@@ -18,6 +18,7 @@ from flightid.record import Record
 from flightid.responses.spectrum_measures import band_rms, cutoff_frequency
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
+from flightid.uncertainty.quantiles import LEVEL
 from flightid.uncertainty.uneven import LogarithmicEnds
 
 SCHEMA = "flightid.pilot_cutoff/1"
@@ -68,10 +69,12 @@ class PilotCutoff:
         """Channel and cut-off on one line."""
         return f"PilotCutoff({self.channel}, {self.cutoff.text})"
 
-    def summary(self) -> Table:
+    def summary(self, *, level: float = LEVEL) -> Table:
         """Table of cut-off and root mean square."""
         notes = tuple(map(str, self.findings))
-        return estimate_table(f"Pilot's use of {self.channel}", (self.cutoff, self.rms), notes)
+        return estimate_table(
+            f"Pilot's use of {self.channel}", (self.cutoff, self.rms), notes, level=level
+        )
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""

@@ -13,6 +13,7 @@ from flightid.dynamics.handling_qualities.rating_charts import RatingChart
 from flightid.findings import Finding
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
+from flightid.uncertainty.quantiles import LEVEL
 from flightid.uncertainty.uncertain import LOST, Uncertain
 from flightid.uncertainty.uneven import drawn_estimate
 
@@ -168,10 +169,10 @@ class AttitudeBandwidth:
             f"AttitudeBandwidth({self.name}, {self.bandwidth_rad_s:.4g} rad/s, phase delay {delay})"
         )
 
-    def summary(self) -> Table:
-        """Table of all values with 95 % intervals."""
+    def summary(self, *, level: float = LEVEL) -> Table:
+        """Table of all values with intervals at a level."""
         title = f"Attitude bandwidth of {self.name}, {self.response_type} command"
-        return estimate_table(title, self.quantities, tuple(map(str, self.findings)))
+        return estimate_table(title, self.quantities, tuple(map(str, self.findings)), level=level)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""

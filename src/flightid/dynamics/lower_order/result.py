@@ -18,6 +18,7 @@ from flightid.models import TransferFunctionModel
 from flightid.responses import FrequencyResponse
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
+from flightid.uncertainty.quantiles import LEVEL
 from flightid.uncertainty.uncertain import LOST, Uncertain
 from flightid.uncertainty.uneven import drawn_estimate
 from flightid.validation.verification.muad import Mismatch
@@ -188,8 +189,8 @@ class LowerOrder:
         """Kind, pair and mismatch on one line."""
         return f"LowerOrder({self.kind}, {self.name}, mismatch {self.mismatch_cost:.1f})"
 
-    def summary(self) -> Table:
-        """Table of the numbers with 95 % intervals."""
+    def summary(self, *, level: float = LEVEL) -> Table:
+        """Table of the numbers with intervals at a level."""
         low, high = self.band_rad_s
         inside = self.mismatch.inside_percent[0]
         notes = [
@@ -200,7 +201,9 @@ class LowerOrder:
         if inside is not None:
             notes.append(f"{inside:.0f} % inside the envelopes of unnoticed added dynamics.")
         title = f"{structure_of(self.kind).title}: equivalent system of {self.name}"
-        return estimate_table(title, self.quantities, (*notes, *map(str, self.findings)))
+        return estimate_table(
+            title, self.quantities, (*notes, *map(str, self.findings)), level=level
+        )
 
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""

@@ -8,6 +8,7 @@ from flightid.errors import ModelError
 from flightid.findings import Finding
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.quantiles import LEVEL, interval_words
 
 SCHEMA = "flightid.rotor_physics/1"
 THEORY, GIVEN, FULL = "theory", "given", "full model's mode"
@@ -86,22 +87,22 @@ class RotorPhysics:
             needed=", ".join(fact.identified.name for fact in self.facts),
         )
 
-    def summary(self) -> Table:
+    def summary(self, *, level: float = LEVEL) -> Table:
         """Table of identified and expected numbers with their ratios."""
         columns = (
             Column("quantity"),
             Column("formula"),
             Column("identified"),
-            Column("95 % low"),
-            Column("95 % high"),
+            Column(f"{interval_words(level)} low"),
+            Column(f"{interval_words(level)} high"),
             Column("unit"),
             Column("expected"),
             Column("from"),
             Column("ratio", digits=3),
-            Column("95 % low", digits=3),
-            Column("95 % high", digits=3),
+            Column(f"{interval_words(level)} low", digits=3),
+            Column(f"{interval_words(level)} high", digits=3),
         )
-        rows = tuple(_row(fact) for fact in self.facts)
+        rows = tuple(_row(fact, level) for fact in self.facts)
         reasons = dict.fromkeys(f.identified.reason for f in self.facts if f.identified.reason)
         notes = (
             f"Rotor speed {self.rotor_speed_rad_s:.4g} rad/s.",
@@ -135,11 +136,11 @@ class RotorPhysics:
         return self.summary()._repr_html_()
 
 
-def _row(fact: RotorFact) -> tuple[Cell, ...]:
+def _row(fact: RotorFact, level: float) -> tuple[Cell, ...]:
     mine = fact.identified
     unit = "" if mine.unit == "1" else mine.unit
-    low, high = mine.interval95 or (None, None)
-    ends = fact.ratio.interval95 or (None, None)
+    low, high = mine.interval(level) or (None, None)
+    ends = fact.ratio.interval(level) or (None, None)
     return (
         mine.name, fact.formula, mine.value, low, high, unit,
         fact.expected.value, fact.expected_from, fact.ratio.value, *ends,
