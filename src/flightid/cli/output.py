@@ -12,6 +12,7 @@ import click
 if TYPE_CHECKING:
     from flightid.findings import Finding
 
+HOLD_HELP = "Inputs between samples: lines or steps. Default: what the records know, else first."
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flightid.cli.output import emit, json_option, note
+from flightid.cli.output import HOLD_HELP, emit, json_option, note
 from flightid.cli.pairs import numbers, pairs
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def quadrotor(output: Path, scenario: str, seed: int, as_json: bool) -> None:
 @click.option("--duration", type=float, default=10.0, show_default=True, help="Of shapes, s.")
 @click.option("--rate", type=float, default=100.0, show_default=True, help="Of shapes, Hz.")
 @click.option("--span", nargs=2, type=float, help="First and last instant in a log, s.")
-@click.option("--hold", type=click.Choice(["first", "zero"]), default="first", show_default=True)
+@click.option("--hold", type=click.Choice(["first", "zero"]), help=HOLD_HELP)
 @click.option("--substeps", type=click.IntRange(1), help="Runge-Kutta steps in a sample.")
 @click.option("--sensor", multiple=True, help="OUTPUT=DEVIATION: white noise of a sensor.")
 @click.option("--process", multiple=True, help="STATE=SIZE: white noise on its derivative, 1/√s.")
@@ -86,7 +86,7 @@ def model(
     duration: float,
     rate: float,
     span: tuple[float, float] | None,
-    hold: Hold,
+    hold: Hold | None,
     substeps: int | None,
     sensor: tuple[str, ...],
     process: tuple[str, ...],

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from flightid.cli.output import emit, emit_values, json_option, leave_by_verdict, note
+from flightid.cli.output import HOLD_HELP, emit, emit_values, json_option, leave_by_verdict, note
 
 if TYPE_CHECKING:
+    from flightid.models.linear.hold_equivalent import Hold
     from flightid.validation import Comparison, ResidualTests, Verification
 
 
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 @click.option(
     "--initial-state", type=click.Choice(["trim", "estimate"]), default="trim", show_default=True
 )
-@click.option("--hold", type=click.Choice(["first", "zero"]), default="first", show_default=True)
+@click.option("--hold", type=click.Choice(["first", "zero"]), help=HOLD_HELP)
 @click.option("--state-bias/--no-state-bias", default=True, help="Solve for state biases.")
 @click.option("--output-bias/--no-output-bias", default=True, help="Solve for shifts of outputs.")
 @click.option(
@@ -57,7 +58,7 @@ def command(
     rivals: tuple[str, ...],
     outputs: tuple[str, ...],
     initial_state: str,
-    hold: str,
+    hold: Hold | None,
     state_bias: bool,
     output_bias: bool,
     with_residuals: bool,
@@ -90,7 +91,7 @@ def command(
         output_bias=output_bias,
         initial_state="estimate" if initial_state == "estimate" else "trim",
         outputs=compared,
-        hold="zero" if hold == "zero" else "first",
+        hold=hold,
     )
     on_trial = result.first if isinstance(result, Comparison) else result
     tests = residual_tests(on_trial) if with_residuals else None

@@ -12,6 +12,7 @@ from flightid.identification.fit import Fit
 from flightid.identification.fit_evidence import evidence_of
 from flightid.identification.frequency_domain.fit import fit_responses
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
+from flightid.identification.held_inputs import hold_for, with_hold_said
 from flightid.identification.joint.fit import fit_jointly
 from flightid.identification.joint.options import JointOptions
 from flightid.identification.narx.fit import fit_narx
@@ -186,7 +187,8 @@ def identify(
         Seed of the hypercube.
     maximum_iterations : int
         Most steps of each start.
-    hold : str
+    hold : str, optional
+        Default: what the data know (`Record.hold`), else as below, and a finding says so.
         What inputs do between samples. Records: "first" (straight lines, default) or "zero"
         (steps), as for `flightid.simulate`. Responses, for the correction of bias:
         "band_limited" (default: smooth, filtered before they were sampled), "first" or "zero".
@@ -286,6 +288,9 @@ def identify(
     (-6.0, 180.0)
     """
     name, chosen = _method(model, data, method)
-    fit: Fit = chosen.fit(model, data, checked(chosen.options, options, "this fit"))
+    held = hold_for(chosen.options, flat(data), options)
+    given = options if held is None else {**options, "hold": held.hold}
+    fit: Fit = chosen.fit(model, data, checked(chosen.options, given, "this fit"))
     fit = replace(fit, structure=model, method=name)
+    fit = fit if held is None else with_hold_said(fit, held)
     return replace(fit, evidence=evidence_of(fit, flat(data)))

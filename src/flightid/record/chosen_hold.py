@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 from flightid.conventions import Light
 from flightid.errors import DataError
@@ -35,6 +36,11 @@ class ChosenHold:
     hold: InputHold
     source: str
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def in_time(self) -> Literal["zero", "first"]:
+        """The hold of a run in time, which knows no other."""
+        return "zero" if self.hold == "zero" else "first"
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, for the provenance of a result."""

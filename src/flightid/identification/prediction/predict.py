@@ -15,6 +15,7 @@ from flightid.models import InnovationsModel, LinearSystem, NarxModel, Polynomia
 from flightid.models.linear.hold_equivalent import Hold
 from flightid.models.model import LinearModel, model_of
 from flightid.record import Record
+from flightid.record.chosen_hold import chosen_hold
 from flightid.units import canonical
 
 Predictor = Callable[[Any, Record, tuple[str, ...], Request], Prediction]
@@ -38,7 +39,7 @@ def predict(
     settle_s: float | None = ...,
     state_bias: bool = ...,
     output_bias: bool = ...,
-    hold: Hold = ...,
+    hold: Hold | None = ...,
 ) -> Prediction: ...
 
 
@@ -53,7 +54,7 @@ def predict(
     settle_s: float | None = ...,
     state_bias: bool = ...,
     output_bias: bool = ...,
-    hold: Hold = ...,
+    hold: Hold | None = ...,
 ) -> tuple[Prediction, ...]: ...
 
 
@@ -67,7 +68,7 @@ def predict(
     settle_s: float | None = None,
     state_bias: bool = False,
     output_bias: bool = False,
-    hold: Hold = "first",
+    hold: Hold | None = None,
 ) -> Prediction | tuple[Prediction, ...]:
     """Predict the outputs of records from their inputs, with any fit or model.
 
@@ -98,8 +99,9 @@ def predict(
     state_bias, output_bias : bool
         Solve for a constant on each state derivative (of a nonlinear model: on each input), and on
         each output.
-    hold : {"first", "zero"}
-        What the inputs of a model in continuous time do between samples.
+    hold : {"first", "zero"}, optional
+        What the inputs of a model in continuous time do between samples; default: what each record
+        knows, else "first".
 
     Returns
     -------
@@ -142,7 +144,6 @@ def predict(
     Prediction(free run from an initial state solved for over the first 2 s, 300 samples, fit y
     100.0 %)
     """
-    request = Request(horizon, initial_state, settle_s, state_bias, output_bias, hold)
     model, way = predictor_of(source)
     asked = (outputs,) if isinstance(outputs, str) else outputs
     flown = (records,) if isinstance(records, Record) else tuple(records)
@@ -151,7 +152,18 @@ def predict(
     chosen = outputs_held(model, flown, asked)
     for record in flown:
         require_units(model, record, chosen)
-    made = tuple(way(model, record, chosen, request) for record in flown)
+    made = tuple(
+        way(
+            model,
+            record,
+            chosen,
+            Request(
+                horizon, initial_state, settle_s, state_bias, output_bias,
+                chosen_hold(record, hold).in_time,
+            ),
+        )
+        for record in flown
+    )  # fmt: skip
     return made[0] if isinstance(records, Record) else made
 
 

@@ -47,7 +47,9 @@ class RecordOptions(Options):
     loss_limit: float = option(
         1.345, unit="deviations", above=0.0, below=100.0, doc="Where 'huber' begins."
     )
-    hold: str = option("first", choices=HOLDS, doc="What inputs do between samples.")
+    hold: str = option(
+        "first", choices=HOLDS, doc="What inputs do between samples, where no record knows."
+    )
     start_from: str = option("model", choices=STARTS, doc="Where the first start comes from.")
     maximum_iterations: int = option(100, minimum=1, doc="Most steps of each start.")
 

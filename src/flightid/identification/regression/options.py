@@ -15,7 +15,9 @@ Band = tuple[float, float]
 class RegressionOptions(Options):
     """What all of them share."""
 
-    hold: str = option("first", choices=HOLDS, doc="What inputs do between samples.")
+    hold: str = option(
+        "first", choices=HOLDS, doc="What inputs do between samples, where no record knows."
+    )
     maximum_iterations: int = option(100, minimum=1, doc="Most steps of each start.")
 
 

@@ -20,6 +20,7 @@ from flightid.identification.prediction.request import FREE_RUN, InitialState, R
 from flightid.identification.prediction.result import Prediction
 from flightid.models.linear.hold_equivalent import Hold
 from flightid.record import Record
+from flightid.record.chosen_hold import chosen_hold
 from flightid.responses import FrequencyResponse
 from flightid.validation.verification.baseline import baseline_findings
 from flightid.validation.verification.comparison import Comparison, compared
@@ -40,7 +41,7 @@ def verify(  # type: ignore[overload-overlap]  # a list is an object too
     state_bias: bool | None = ...,
     output_bias: bool | None = ...,
     outputs: Sequence[str] | None = ...,
-    hold: Hold = ...,
+    hold: Hold | None = ...,
     responses: FrequencyResponse | None = ...,
 ) -> Comparison: ...
 
@@ -57,7 +58,7 @@ def verify(
     state_bias: bool | None = ...,
     output_bias: bool | None = ...,
     outputs: Sequence[str] | None = ...,
-    hold: Hold = ...,
+    hold: Hold | None = ...,
     responses: FrequencyResponse | None = ...,
 ) -> Verification: ...
 
@@ -73,7 +74,7 @@ def verify(
     state_bias: bool | None = None,
     output_bias: bool | None = None,
     outputs: Sequence[str] | None = None,
-    hold: Hold = "first",
+    hold: Hold | None = None,
     responses: FrequencyResponse | None = None,
 ) -> Verification | Comparison:
     """Predict records with a model, or with several of any kinds side by side, and judge it.
@@ -113,8 +114,9 @@ def verify(
         Solve for state biases b and output biases y_ref; default: for models in continuous time.
     outputs : sequence of str, optional
         Outputs to compare; default: those of the models that every record holds.
-    hold : {"first", "zero"}
-        What inputs do between samples, as for `flightid.simulate`.
+    hold : {"first", "zero"}, optional
+        What inputs do between samples; default: what the records know, else "first", and a finding
+        says so.
     responses : FrequencyResponse, optional
         Measured responses: the models are judged against them too, inside the envelopes of
         maximum unnoticed added dynamics (see `flightid.validation.mismatch`).
@@ -134,7 +136,7 @@ def verify(
     UnitError
         A unit of the model and one of a record differ.
     DataError
-        The free run diverges, or an output does not change.
+        The free run diverges, an output does not change, or records hold inputs differently.
 
     Reference
     ---------
@@ -161,6 +163,7 @@ def verify(
     models = [predictor_of(each) for each in several]
     chosen = _compared([model for model, _ in models], flown, outputs)
     _require_change(flown, chosen)
+    held = chosen_hold(flown, hold)
     requests = [
         Request(
             horizon,
@@ -169,7 +172,7 @@ def verify(
             # Models in continuous time hold about the record's own trim, which no training told.
             way is predict_continuous if state_bias is None else state_bias,
             way is predict_continuous if output_bias is None else output_bias,
-            hold,
+            held.in_time,
         )
         for _, way in models
     ]
@@ -179,13 +182,14 @@ def verify(
             require_units(model, record, chosen)
         runs.append([way(model, record, chosen, request) for record in flown])
     results = []
-    for each, (model, _), request, made in zip(
+    for each, (model, way), request, made in zip(
         several, models, requests, _scored_alike(runs), strict=True
     ):
         seen = None if responses is None else mismatch(model, responses)
         judged = judge(tuple(made), chosen, request, seen)
         beside = baseline_findings(each, made, request)
-        results.append(replace(judged, findings=(*judged.findings, *beside)))
+        said = held.findings if way is predict_continuous else ()
+        results.append(replace(judged, findings=(*judged.findings, *beside, *said)))
     if not isinstance(source, list | tuple):
         return results[0]
     return compared(dict(zip(_names(several, names), results, strict=True)))
