@@ -2,144 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
-from flightid.errors import FitError, OptionError
-from flightid.identification.filter_error.fit import fit_filter_error
 from flightid.identification.fit import Fit
 from flightid.identification.fit_evidence import evidence_of
-from flightid.identification.frequency_domain.fit import fit_responses
-from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.held_inputs import hold_for, with_hold_said
-from flightid.identification.joint.fit import fit_jointly
-from flightid.identification.joint.options import JointOptions
-from flightid.identification.narx.fit import fit_narx
-from flightid.identification.output_error.fit import fit_output_error
-from flightid.identification.prediction_error.fit import fit_polynomial
-from flightid.identification.records.options import RecordOptions
-from flightid.identification.regression.equation_error import (
-    fit_equation_error,
-    fit_fourier_regression,
-)
-from flightid.identification.regression.fourier_output_error_fit import fit_fourier_output_error
-from flightid.identification.regression.options import (
-    EquationErrorOptions,
-    FilterErrorOptions,
-    FourierOptions,
-    FourierOutputErrorOptions,
-)
-from flightid.identification.subspace.fit import fit_subspace
-from flightid.models import GreyBoxModel, StateSpaceModel, TransferFunctionModel
+from flightid.identification.methods import flat, method_of
+from flightid.models import GreyBoxModel
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.narx.structure import NarxStructure
 from flightid.models.polynomial.structure import PolynomialStructure
-from flightid.options import Options, checked
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
 
 JointData = tuple[FrequencyResponse, Record | Sequence[Record]]
-RESPONSES, RECORDS, BOTH = "responses", "records", "responses and records"
-
-
-@dataclass(frozen=True)
-class NoOptions(Options):
-    """A method without options."""
-
-
-@dataclass(frozen=True)
-class Method:
-    """One way to fit a kind of model to a kind of data.
-
-    Attributes
-    ----------
-    fit : callable
-        ``fit(model, data, options)``.
-    options : type
-        Dataclass of its options; `identify` refuses any other.
-    """
-
-    fit: Callable[..., Any]
-    options: type[Options]
-
-
-# Kind of model, kind of data, name of the method. The first method of a pair is its default; a new
-# method adds its lines.
-METHODS: dict[tuple[type, str, str], Method] = {
-    (TransferFunctionModel, RESPONSES, "frequency_domain"): Method(
-        fit_responses, FrequencyDomainOptions
-    ),
-    (StateSpaceModel, RESPONSES, "frequency_domain"): Method(fit_responses, FrequencyDomainOptions),
-    (NarxStructure, RECORDS, "orthogonal_least_squares"): Method(
-        lambda model, data, _: fit_narx(model, data), NoOptions
-    ),
-    (PolynomialStructure, RECORDS, "prediction_error"): Method(
-        lambda model, data, _: fit_polynomial(model, data), NoOptions
-    ),
-    (SubspaceStructure, RECORDS, "subspace"): Method(
-        lambda model, data, _: fit_subspace(model, data), NoOptions
-    ),
-    (TransferFunctionModel, RECORDS, "output_error"): Method(fit_output_error, RecordOptions),
-    (StateSpaceModel, RECORDS, "output_error"): Method(fit_output_error, RecordOptions),
-    (StateSpaceModel, RECORDS, "equation_error"): Method(fit_equation_error, EquationErrorOptions),
-    (StateSpaceModel, RECORDS, "fourier_regression"): Method(
-        fit_fourier_regression, FourierOptions
-    ),
-    (StateSpaceModel, RECORDS, "fourier_output_error"): Method(
-        fit_fourier_output_error, FourierOutputErrorOptions
-    ),
-    (StateSpaceModel, RECORDS, "filter_error"): Method(fit_filter_error, FilterErrorOptions),
-    (TransferFunctionModel, BOTH, "joint"): Method(
-        lambda model, data, options: fit_jointly(model, flat(data), options), JointOptions
-    ),
-    (StateSpaceModel, BOTH, "joint"): Method(
-        lambda model, data, options: fit_jointly(model, flat(data), options), JointOptions
-    ),
-}
-
-
-def flat(data: object) -> list[object]:
-    """The items of data, those of sequences in it among them."""
-    if not (isinstance(data, list | tuple) and data):
-        return [data]
-    return [item for part in data for item in flat(part)]
-
-
-def kind_of(data: object) -> str:
-    """Kind of data: ``"responses"``, ``"records"``, ``"responses and records"``, or its type."""
-    items = flat(data)
-    kinds = [
-        RESPONSES if isinstance(item, FrequencyResponse) else RECORDS
-        for item in items
-        if isinstance(item, FrequencyResponse | Record)
-    ]
-    if len(kinds) < len(items):
-        return type(data).__name__
-    return kinds[0] if len(set(kinds)) == 1 else BOTH
-
-
-def _method(model: object, data: object, name: str | None) -> tuple[str, Method]:
-    kind = kind_of(data)
-    ways = {
-        way: method for (of, on, way), method in METHODS.items() if (of, on) == (type(model), kind)
-    }
-    if not ways:
-        raise FitError(
-            "there is no fit for this model and these data",
-            found=f"{type(model).__name__} and {type(data).__name__}",
-            needed="TransferFunctionModel or StateSpaceModel and FrequencyResponse or Record, "
-            "or NarxStructure, PolynomialStructure or SubspaceStructure and Record",
-        )
-    if name is None:
-        return next(iter(ways.items()))
-    if name not in ways:
-        raise OptionError(
-            f"method is not known for a {type(model).__name__} and {kind}",
-            found=repr(name),
-            needed=" or ".join(map(repr, ways)),
-        )
-    return name, ways[name]
 
 
 def identify(
@@ -287,10 +165,9 @@ def identify(
     >>> round(fit.parameters["Lp"].value, 6), round(fit.parameters["Ltphi"].value, 6)
     (-6.0, 180.0)
     """
-    name, chosen = _method(model, data, method)
+    chosen = method_of(model, data, method)
     held = hold_for(chosen.options, flat(data), options)
     given = options if held is None else {**options, "hold": held.hold}
-    fit: Fit = chosen.fit(model, data, checked(chosen.options, given, "this fit"))
-    fit = replace(fit, structure=model, method=name)
+    fit = replace(chosen.run(model, data, given), structure=model, method=chosen.name)
     fit = fit if held is None else with_hold_said(fit, held)
     return replace(fit, evidence=evidence_of(fit, flat(data)))

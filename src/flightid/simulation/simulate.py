@@ -13,7 +13,7 @@ from flightid.conventions import Role
 from flightid.errors import DataError, ModelError, OptionError, ShapeError
 from flightid.models import LinearModel, LinearSystem, NarxModel, StateSpaceModel
 from flightid.models.linear.hold_equivalent import Hold
-from flightid.models.model import linear_system, model_of
+from flightid.models.model import Model, linear_system, model_of
 from flightid.models.sampled.recursion import run_recursion
 from flightid.record import Channel, InputHold, Record, Step
 from flightid.record.chosen_hold import chosen_hold
@@ -156,7 +156,9 @@ def _runnable(
                 needed="neither: it starts from lags at the training mean",
             )
         return model
-    if getattr(model, "sample_time_s", None) is not None:
+    if getattr(model, "sample_time_s", None) is not None or (
+        isinstance(model, Model) and not isinstance(model, LinearModel)
+    ):
         return linear_system(model)
     if not isinstance(model, LinearModel):
         raise ModelError(

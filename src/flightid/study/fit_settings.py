@@ -7,14 +7,14 @@ from dataclasses import MISSING, dataclass, field, fields
 from typing import Any
 
 from flightid.errors import OptionError
-from flightid.identification.identify import METHODS, RECORDS
+from flightid.identification.methods import METHODS, RECORDS
 from flightid.models import StateSpaceModel
 from flightid.study.reading import TableReader, unknown_key
 
 FREQUENCY_DOMAIN = "frequency_domain"
 COUNTS = ("starts", "maximum_iterations", "n_omega")
 """Options that count something: at least one."""
-METHOD_NAMES = tuple(dict.fromkeys(way for of, _, way in METHODS if of is StateSpaceModel))
+METHOD_NAMES = tuple(way.name for way in METHODS if StateSpaceModel in way.kinds)
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class FitSettings:
     @property
     def on_responses(self) -> bool:
         """Whether the method takes frequency responses, alone or with records."""
-        return all(on != RECORDS for _, on, way in METHODS if way == self.method)
+        return all(way.data != RECORDS for way in METHODS if way.name == self.method)
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def read_fit(reader: TableReader, usual: FitSettings | None = None) -> FitSettin
     """
     usual = usual or FitSettings()
     method = reader.choice("method", METHOD_NAMES, usual.method)
-    kind = next(way.options for (_, _, name), way in METHODS.items() if name == method)
+    kind = next(way.options for way in METHODS if way.name == method)
     known = [each.name for each in fields(kind)]
     given = {key: _plain(value) for key, value in reader.rest().items() if key != "method"}
     for key in given:

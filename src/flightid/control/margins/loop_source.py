@@ -173,10 +173,10 @@ def _modelled(
     unstable_poles: int | None,
 ) -> Loop:
     uncertain = uncertain_of(source)
+    if isinstance(uncertain.value, Model) and not isinstance(uncertain.value, Responding):
+        uncertain = uncertain.then(linear_system)
     model = uncertain.value
     if not isinstance(model, Responding):
-        if isinstance(model, Model):
-            linear_system(model)  # its refusal has the reason
         raise ModelError(
             "the loop has no frequency response",
             found=type(source).__name__,

@@ -13,7 +13,7 @@ from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.sampled import predict_sampled
 from flightid.models import InnovationsModel, LinearSystem, NarxModel, PolynomialModel
 from flightid.models.linear.hold_equivalent import Hold
-from flightid.models.model import LinearModel, model_of
+from flightid.models.model import LinearModel, Model, model_of
 from flightid.record import Record
 from flightid.record.chosen_hold import chosen_hold
 from flightid.units import canonical
@@ -181,6 +181,9 @@ def predictor_of(source: object) -> tuple[Any, Predictor]:
     for kind, way in PREDICTORS:
         if isinstance(model, kind):
             return model, way
+    if isinstance(model, Model):
+        # A kind without a line of its own is predicted by its linear system, or says why not.
+        return predictor_of(model.linear_system())
     raise ModelError(
         "the model cannot be simulated",
         found=type(source).__name__,
