@@ -10,9 +10,10 @@ import pytest
 
 import flightid as fid
 from flightid import errors
-from flightid.dynamics.modes.modes import UNFITTED, UNSIGNED
+from flightid.dynamics.modes.modes import UNFITTED
 from flightid.dynamics.modes.participation import eigenpairs
 from flightid.models.sampled.discrete_modes import NO_COUNTERPART
+from flightid.uncertainty.roots import UNSIGNED
 from tests.closeness import assert_close
 
 

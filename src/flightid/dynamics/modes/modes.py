@@ -17,12 +17,10 @@ from flightid.dynamics.modes.state_matrix import StateMatrix, read_states
 from flightid.findings import Finding
 from flightid.models.sampled.discrete_modes import AT_ORIGIN, NO_COUNTERPART
 from flightid.uncertainty.estimate import Estimate, Reading
-from flightid.uncertainty.quantiles import half_width
-from flightid.uncertainty.uneven import turned
+from flightid.uncertainty.roots import UNSIGNED, UncertainRoot
 
 Array = NDArray[np.float64]
 UNFITTED = "does not depend on what was fitted"
-UNSIGNED = "the interval of the real part holds zero: growth and decay are both possible"
 SEEN = 1e-6
 """Size in an output, against the largest, below which the output does not show a mode."""
 
@@ -99,7 +97,9 @@ def _mode(read: StateMatrix, pair: Eigenpair) -> Mode:
     reason = lacking or read.reason or pair.reason
     if moves is not None and not np.any(np.abs(moves) > 0.0):
         moves, reason = None, UNFITTED
-    numbers = _Numbers(value, moves, reason)
+    rows = None if moves is None else np.array([moves.real, moves.imag])
+    covariance = None if rows is None else np.asarray(rows @ rows.T)
+    numbers = UncertainRoot(value, covariance, reason)
     parts = tuple(_participations(read, pair)) if read.physical else ()
     return Mode(
         value,
@@ -113,7 +113,7 @@ def _mode(read: StateMatrix, pair: Eigenpair) -> Mode:
         numbers.time_constant(),
         *numbers.halving(),
         parts,
-        numbers.covariance(),
+        covariance,
         lacking or pair.reason,
     )
 
@@ -172,91 +172,6 @@ def _plain(
     if stderr == 0.0:
         return Estimate(name, value, unit, None, UNFITTED)
     return Estimate(name, value, unit, stderr)
-
-
-class _Numbers:
-    """Quantities of one eigenvalue from its moves along the directions of the uncertainty."""
-
-    def __init__(
-        self, value: complex | None, moves: NDArray[np.complex128] | None, reason: str
-    ) -> None:
-        self.value, self.moves, self.reason = value, moves, reason
-
-    def _made(self, name: str, unit: str, value: float | None, moves: Array | None) -> Reading:
-        if value is None or moves is None:
-            return Estimate(name, value, unit, None, self.reason)
-        return Estimate(name, value, unit, float(np.sqrt(np.sum(moves**2))))
-
-    def covariance(self) -> Array | None:
-        if self.moves is None:
-            return None
-        rows = np.array([self.moves.real, self.moves.imag])
-        return np.asarray(rows @ rows.T)
-
-    def real(self) -> Reading:
-        value = None if self.value is None else self.value.real
-        return self._made("real", "rad/s", value, None if self.moves is None else self.moves.real)
-
-    def imaginary(self) -> Reading:
-        if self.value is None:
-            return Estimate("imaginary", None, "rad/s", None, self.reason)
-        if not self.value.imag:
-            return Estimate("imaginary", 0.0, "rad/s", None, "real eigenvalue")
-        moves = None if self.moves is None else self.moves.imag
-        return self._made("imaginary", "rad/s", self.value.imag, moves)
-
-    def natural_frequency(self) -> Reading:
-        name, unit = "natural frequency", "rad/s"
-        if self.value is None:
-            return Estimate(name, None, unit, None, self.reason)
-        size = abs(self.value)
-        if self.moves is None or size == 0.0:
-            return Estimate(name, size, unit, None, self.reason or "an integrator")
-        moves = np.real(np.conj(self.value) * self.moves) / size
-        if not self.value.imag and half_width() * np.sqrt(np.sum(moves**2)) >= size:
-            return Estimate(name, size, unit, None, UNSIGNED)
-        return self._made(name, unit, size, moves)
-
-    def damping_ratio(self) -> Reading:
-        name = "damping ratio"
-        if self.value is None or self.value == 0.0:
-            reason = "an integrator has no damping" if self.value == 0.0 else self.reason
-            return Estimate(name, None, "1", None, reason)
-        size = abs(self.value)
-        ratio = -self.value.real / size
-        if not self.value.imag:
-            return Estimate(name, ratio, "1", None, "real eigenvalue")
-        if self.moves is None:
-            return Estimate(name, ratio, "1", None, self.reason)
-        grown = np.real(np.conj(self.value) * self.moves) / size
-        return self._made(
-            name, "1", ratio, -self.moves.real / size + self.value.real * grown / size**2
-        )
-
-    def period(self) -> Reading:
-        return _time("period", self.imaginary(), 2.0 * math.pi, "no oscillation")
-
-    def time_constant(self) -> Reading:
-        return _time("time constant", self.real(), -1.0, "no decay")
-
-    def halving(self) -> tuple[Reading, Reading]:
-        """Time to half and to double."""
-        rate = self.real()
-        decays = rate.value is not None and rate.value < 0.0
-        grows = rate.value is not None and rate.value > 0.0
-        half = _time("time to half", rate, -math.log(2.0), "no decay")
-        double = _time("time to double", rate, math.log(2.0), "no growth")
-        return (
-            half if decays else Estimate(half.name, None, "s", None, self.reason or "no decay"),
-            double if grows else Estimate(double.name, None, "s", None, self.reason or "no growth"),
-        )
-
-
-def _time(name: str, rate: Reading, factor: float, without: str) -> Reading:
-    """A time from a rate, and its interval from the rate's, turned over."""
-    if not rate.value:
-        return Estimate(name, None, "s", None, rate.reason if rate.value is None else without)
-    return turned(name, "s", factor, rate, UNSIGNED)
 
 
 def _judge(found: list[Mode]) -> Iterator[Finding]:

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.sampled.discrete_modes import discrete_modes, zero_note
-from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.roots import UncertainRoot
 
 Array = NDArray[np.float64]
 POLE, ZERO = "pole", "zero"
+NO_FIRST_ORDER = "no error to first order"
+NO_ERRORS = "the coefficients have no errors"
 DOUBLE = 1e-6
 """Roots closer than this share of their size have no first-order error."""
 
@@ -179,23 +183,34 @@ def fitted_root(
     mode = discrete_modes([z], errors.sample_time_s)[0] if kind == POLE else None
     if mode is not None:
         note = "; ".join(filter(None, (mode.reason, "unstable" if abs(z) > 1.0 else "")))
-    covariance = None
-    if gradient is not None and errors.covariance is not None:
-        rows = np.array([gradient.real, gradient.imag])
-        covariance = np.asarray(rows @ errors.covariance @ rows.T)
+    covariance = _covariance_of(gradient, 1.0, errors)
     omega = zeta = None
     if mode is not None and mode.s is not None and mode.s != 0.0 and mode.damping is not None:
-        s, size = mode.s, abs(mode.s)
-        rate = None if gradient is None else gradient / (z * errors.sample_time_s)
-        towards = None if rate is None else np.real(np.conj(s) * rate) / size
-        sideways = (
-            None
-            if rate is None or towards is None or not mode.is_pair
-            else -rate.real / size + s.real * towards / size**2
+        root = UncertainRoot(
+            mode.s,
+            _covariance_of(gradient, 1.0 / (z * errors.sample_time_s), errors),
+            NO_FIRST_ORDER if gradient is None else NO_ERRORS,
+            errors.degrees,
         )
-        omega = propagated(f"natural frequency at z = {z:.4g}", "rad/s", size, towards, errors)
-        zeta = propagated(f"damping at z = {z:.4g}", "1", mode.damping, sideways, errors)
+        omega = derived(root.natural_frequency(f"natural frequency at z = {z:.4g}"))
+        zeta = derived(root.damping_ratio(f"damping at z = {z:.4g}"))
     return FittedRoot(response, kind, z, covariance, omega, zeta, note, gradient)
+
+
+def _covariance_of(
+    gradient: NDArray[np.complex128] | None, factor: complex, errors: Errors
+) -> Array | None:
+    """Covariance of real and imaginary part of what moves as the gradient times a factor."""
+    if gradient is None or errors.covariance is None:
+        return None
+    rows = np.array([(gradient * factor).real, (gradient * factor).imag])
+    return np.asarray(rows @ errors.covariance @ rows.T)
+
+
+def derived(reading: Reading) -> Estimate:
+    """A reading that has a value, marked as computed from what was fitted."""
+    assert reading.value is not None
+    return cast("Estimate", replace(reading, status="derived"))
 
 
 def propagated(
@@ -206,9 +221,7 @@ def propagated(
     Reference: Ljung, *System Identification*, 2nd ed., eq. 9.56 (Gauss' approximation).
     """
     if gradient is None or errors.covariance is None:
-        reason = (
-            "no error to first order" if gradient is None else "the coefficients have no errors"
-        )
+        reason = NO_FIRST_ORDER if gradient is None else NO_ERRORS
         return Estimate(name, value, unit, None, reason, status="derived")
     variance = float(gradient @ errors.covariance @ gradient)
     stderr = max(variance, 0.0) ** 0.5
