@@ -16,7 +16,7 @@ from flightid.version import VERSION
 
 ORDER = ("inspect", "design", "response", "identify", "verify", "tune", "simulate", "report", "run")
 """Verbs in the order of the work, as help lists them; others follow in alphabetical order."""
-NOT_VERBS = frozenset({"bar", "output", "pairs", "program"})
+NOT_VERBS = frozenset({"bar", "option_fields", "output", "pairs", "program"})
 
 
 class Verbs(click.Group):

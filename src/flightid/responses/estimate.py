@@ -8,7 +8,7 @@ from dataclasses import replace
 from numpy.typing import ArrayLike
 
 from flightid.conventions import Light
-from flightid.errors import DataError, OptionError
+from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.record.history import Step
@@ -21,6 +21,7 @@ from flightid.responses.estimators.windowed import (
     windowed_response,
 )
 from flightid.responses.feedback import feedback_findings, feedback_of
+from flightid.responses.options import ResponseOptions
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.windows.planning import plan_frequencies, plan_windows
 from flightid.responses.windows.samples import Samples, gather
@@ -28,9 +29,6 @@ from flightid.responses.windows.windows import DEFAULT_FREQUENCIES, shifts_of
 from flightid.table import Cell
 from flightid.uncertainty.feedback import FeedbackTest
 from flightid.version import VERSION
-
-ESTIMATORS = ("composite", "instrument", "local_polynomial")
-DETRENDS = ("none", "mean", "line")
 
 
 def estimate_response(
@@ -123,7 +121,7 @@ def estimate_response(
     >>> bool(np.all(np.abs(np.abs(response.response) - 2.0) < 0.05))
     True
     """
-    _check_options(estimator, detrend)
+    ResponseOptions(estimator, n_omega, window_s, overlap, detrend, covariance)
     listed = [records] if isinstance(records, Record) else list(records)
     if estimator == "instrument" and excitations is None and listed:
         excitations = listed[0].excitations
@@ -173,12 +171,3 @@ def _with_inputs(
         loop=test,
         input_shape=InputShape(common_hold(shapes), loop=common_loop(shapes)),
     )
-
-
-def _check_options(estimator: str, detrend: str) -> None:
-    for name, value, known in (
-        ("estimator", estimator, ESTIMATORS),
-        ("detrend", detrend, DETRENDS),
-    ):
-        if value not in known:
-            raise OptionError(name, found=repr(value), needed="one of " + ", ".join(known))

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
-from flightid.errors import OptionError
+from flightid.errors import StudyError
 from flightid.identification.methods import METHODS, RECORDS
 from flightid.models import StateSpaceModel
-from flightid.study.reading import TableReader, unknown_key
+from flightid.options import options_of, read_options
+from flightid.study.reading import TableReader
 
 FREQUENCY_DOMAIN = "frequency_domain"
-COUNTS = ("starts", "maximum_iterations", "n_omega")
-"""Options that count something: at least one."""
 METHOD_NAMES = tuple(way.name for way in METHODS if StateSpaceModel in way.kinds)
 
 
@@ -80,48 +79,12 @@ def read_fit(reader: TableReader, usual: FitSettings | None = None) -> FitSettin
     usual = usual or FitSettings()
     method = reader.choice("method", METHOD_NAMES, usual.method)
     kind = next(way.options for way in METHODS if way.name == method)
-    known = [each.name for each in fields(kind)]
-    given = {key: _plain(value) for key, value in reader.rest().items() if key != "method"}
-    for key in given:
-        if key not in known:
-            raise unknown_key(reader.where, key, ["method", *known])
-    kept = (
-        dict(usual.options)
-        if method == usual.method
-        else {key: value for key, value in usual.options.items() if key in known}
-    )
-    options = {**kept, **given}
-    _require_types(reader, kind, given)
-    try:
-        kind(**options)
-    except OptionError as error:
-        raise reader.error(
-            ", ".join(given) or "an option", "does not fit", found=str(error), needed="see docs"
-        ) from error
-    return FitSettings(method, options)
-
-
-def _plain(value: object) -> object:
-    return tuple(value) if isinstance(value, list) else value
-
-
-def _require_types(reader: TableReader, kind: type[Any], given: Mapping[str, Any]) -> None:
-    """A number, flag or word where the option's usual value is one."""
-    for each in fields(kind):
-        if each.name not in given or each.default is MISSING or each.default is None:
-            continue
-        value, usual = given[each.name], each.default
-        simple = {bool: (bool,), int: (int,), float: (int, float)}
-        wanted = simple.get(type(usual))
-        wrong = wanted is not None and (
-            not isinstance(value, wanted) or (isinstance(value, bool) and type(usual) is not bool)
-        )
-        wrong = wrong or (each.name in COUNTS and value < 1)
-        # Freedom and the initial state take names or a table beside their usual word or flag.
-        if wrong and not (isinstance(usual, bool) and isinstance(value, tuple | str)):
-            raise reader.error(
-                each.name, "does not fit", found=value, needed=f"a value like {usual!r}"
-            )
+    known = [each.name for each in options_of(kind)]
+    given = {key: value for key, value in reader.rest().items() if key != "method"}
+    kept = {key: value for key, value in usual.options.items() if key in known}
+    where = f"study file, {reader.where}"
+    read = read_options(kind, {**kept, **given}, where, error=StudyError)
+    return FitSettings(method, {name: getattr(read, name) for name in {**kept, **given}})
 
 
 def read_verify(reader: TableReader, usual: VerifySettings | None = None) -> VerifySettings:

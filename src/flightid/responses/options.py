@@ -1,0 +1,30 @@
+"""Options of an estimate of frequency responses; see `flightid.estimate_response`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flightid.options import Options, option
+from flightid.responses.windows.windows import DEFAULT_FREQUENCIES
+
+ESTIMATORS = ("composite", "instrument", "local_polynomial")
+DETRENDS = ("none", "mean", "line")
+
+
+@dataclass(frozen=True)
+class ResponseOptions(Options):
+    """Options of `flightid.estimate_response`."""
+
+    estimator: str = option(
+        "composite",
+        choices=ESTIMATORS,
+        doc="Direct; by way of the excitation, for closed loops; or without windows.",
+    )
+    n_omega: int = option(DEFAULT_FREQUENCIES, minimum=2, doc="Log-spaced frequencies in the band.")
+    window_s: str | float | Sequence[float] = option(
+        "auto", unit="s", above=0.0, choices=("auto",), doc="Window lengths."
+    )
+    overlap: float = option(0.5, minimum=0.0, below=1.0, doc="Overlap of neighbouring windows.")
+    detrend: str = option("mean", choices=DETRENDS, doc="What is removed from each window.")
+    covariance: bool = option(True, doc="Keep what the covariance of errors needs.")
