@@ -25,6 +25,7 @@ from flightid.study import fit_settings
 from flightid.study.fit_settings import read_fit
 from flightid.study.reading import TableReader
 
+
 @dataclass(frozen=True)
 class WithToy(EquationErrorOptions):
     """What a method's options are after one line more."""
