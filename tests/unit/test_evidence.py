@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+import flightid as fid
 from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.evidence import Check, Evidence, inspection_check, residual_check
@@ -104,3 +106,17 @@ def test_residual_tests_and_inspections_become_checks() -> None:
 
     check = inspection_check(Inspected())  # type: ignore[arg-type]
     assert (check.light, check.what) == (Light.AMBER, "too narrow")
+
+
+def test_a_loop_declared_to_the_fit_is_its_evidence() -> None:
+    u = np.random.default_rng(0).standard_normal(400)
+    record = fid.Record.from_arrays(
+        np.arange(400) / 10, inputs={"u": u}, outputs={"y": np.convolve(u, [0.0, 1.0, 0.5])[:400]}
+    )
+    asked = fid.PolynomialModel.arx(("u",), "y", na=1, nb=2)
+    for loop, light in (("open", "green"), ("closed", "amber")):
+        check = fid.identify(asked, record, loop=loop).evidence.check("loop")
+        assert check is not None
+        assert (check.what, check.light) == (f"loop {loop}, as declared", light)
+    with pytest.raises(OptionError, match="loop is not known"):
+        fid.identify(asked, record, loop="half")

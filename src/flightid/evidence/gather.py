@@ -6,7 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from flightid.conventions import Light
-from flightid.evidence.data_checks import loop_of_records, loop_of_responses, power_of_records
+from flightid.evidence.data_checks import (
+    loop_check,
+    loop_of_records,
+    loop_of_responses,
+    power_of_records,
+)
 from flightid.evidence.evidence import (
     ALWAYS,
     BAND,
@@ -23,7 +28,9 @@ from flightid.evidence.spans import Span, judge_coherence, judge_span
 from flightid.findings import Finding, worst
 from flightid.inspection import Inspection
 from flightid.record import Record
+from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
+from flightid.uncertainty.feedback import declared_loop
 
 FROM_LOG = "Log.record"
 CONVERGED = frozenset({"gradient", "step", "cost", "zero", "bounds"})
@@ -62,6 +69,8 @@ class Made:
         Why the iteration ended; empty where nothing was iterated.
     signs : mapping of str to (sign, value, interval or None, status)
         Parameters whose bounds declare a sign.
+    loop : {"open", "closed"} or None
+        The caller's word.
     """
 
     data: Sequence[FrequencyResponse | Record]
@@ -71,6 +80,7 @@ class Made:
     findings: Sequence[Finding]
     termination: str
     signs: Mapping[str, tuple[int, float, tuple[float, float] | None, str]]
+    loop: Loop | None = None
 
 
 def gather_evidence(made: Made) -> Evidence:
@@ -92,7 +102,8 @@ def gather_evidence(made: Made) -> Evidence:
         checks += [judge_span(made.spans), judge_coherence(made.spans)]
     elif records:
         checks += power_of_records(tuple(records), made.inputs, made.outputs)
-    loop = loop_of_responses(responses) if responses else None
+    declared = None if made.loop is None else loop_check(declared_loop(made.loop))
+    loop = declared or (loop_of_responses(responses) if responses else None)
     if loop is None and records:
         loop = loop_of_records(tuple(records), made.inputs, made.outputs)
     checks += [] if loop is None else [loop]

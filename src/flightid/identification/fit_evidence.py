@@ -14,13 +14,14 @@ from flightid.evidence.spans import Span
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_response import FittedResponse
 from flightid.models.parameters import Parameters
+from flightid.record.hold import Loop
 from flightid.uncertainty.estimate import Estimate
 
 NOT_NEGATIVE_BY_NATURE = "s"
 """Delays and time constants: a bound at zero declares no sign."""
 
 
-def evidence_of(fit: Fit, data: Sequence[Any]) -> Evidence:
+def evidence_of(fit: Fit, data: Sequence[Any], loop: Loop | None = None) -> Evidence:
     """Examine a fit as far as its own data and end allow.
 
     Parameters
@@ -28,6 +29,8 @@ def evidence_of(fit: Fit, data: Sequence[Any]) -> Evidence:
     fit : Fit
     data : sequence of FrequencyResponse or Record
         What it was made from.
+    loop : {"open", "closed"}, optional
+        The caller's word.
 
     Returns
     -------
@@ -43,6 +46,7 @@ def evidence_of(fit: Fit, data: Sequence[Any]) -> Evidence:
             fit.findings,
             fit.termination,
             _signs(asked, fit.parameters) if isinstance(asked, Parameters) else {},
+            loop,
         )
     )
 

@@ -15,6 +15,7 @@ from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.narx.structure import NarxStructure
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
+from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
 
 JointData = tuple[FrequencyResponse, Record | Sequence[Record]]
@@ -25,6 +26,7 @@ def identify(
     data: FrequencyResponse | Record | Sequence[Record] | JointData,
     *,
     method: str | None = None,
+    loop: Loop | None = None,
     **options: Any,  # noqa: ANN401 - the method checks them
 ) -> Fit:
     """Fit the free parameters of a model to data.
@@ -57,6 +59,9 @@ def identify(
         Measured, with the model's channels, in the model's units.
     method : str, optional
         See above.
+    loop : {"open", "closed"}, optional
+        Whether anything moved the inputs after what the outputs did, for the evidence; default:
+        what the data know, else a test.
     **options
         The method's own, any of these:
     starts : int
@@ -170,4 +175,4 @@ def identify(
     given = options if held is None else {**options, "hold": held.hold}
     fit = replace(chosen.run(model, data, given), structure=model, method=chosen.name)
     fit = fit if held is None else with_hold_said(fit, held)
-    return replace(fit, evidence=evidence_of(fit, flat(data)))
+    return replace(fit, evidence=evidence_of(fit, flat(data), loop))

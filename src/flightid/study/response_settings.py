@@ -5,10 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from flightid.record.hold import LOOPS, Loop
 from flightid.study.reading import TableReader
 
 ESTIMATORS = ("composite", "local_polynomial", "instrument")
 EXCITATION = "excitation"
+
+
+TEST = "test"
+"""Word of the key ``loop`` where nobody declares it."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +38,8 @@ class ResponseSettings:
         Frequencies below it take no part in a fit.
     minimum_decades : float
         Width of the coherent band that a response needs where coherence chooses responses.
+    loop : str
+        "open" or "closed" where it is known, else "test".
     """
 
     estimator: str = "composite"
@@ -43,6 +50,12 @@ class ResponseSettings:
     window_s: tuple[float, ...] = ()
     minimum_coherence: float = 0.6
     minimum_decades: float = 0.3
+    loop: str = TEST
+
+    @property
+    def declared_loop(self) -> Loop | None:
+        """What is declared; None where the test decides."""
+        return "open" if self.loop == "open" else "closed" if self.loop == "closed" else None
 
     @property
     def estimators(self) -> tuple[str, ...]:
@@ -81,6 +94,7 @@ def read_response(reader: TableReader, usual: ResponseSettings | None = None) ->
         reader.numbers("window_s", usual.window_s),
         reader.positive("minimum_coherence", usual.minimum_coherence),
         reader.positive("minimum_decades", usual.minimum_decades),
+        reader.choice("loop", (TEST, *LOOPS), usual.loop),
     )
     reader.finish()
     return made

@@ -189,6 +189,7 @@ def estimate(task: Task, records: Flown) -> dict[str, FrequencyResponse]:
             n_omega=chosen.n_omega,
             window_s=list(chosen.window_s) or "auto",
             estimator=estimator,
+            loop=chosen.declared_loop,
         )
         for estimator in chosen.estimators
     }
