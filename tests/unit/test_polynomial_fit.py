@@ -73,8 +73,9 @@ def test_the_minimum_has_no_gradient_and_the_errors_belong_to_it():
     fit = fid.identify(P.armax("u", "y", na=2, nb=2, nc=2, initial_state="zero"), record)
 
     def loss(theta):
-        model = P.from_theta(fit.structure, theta, 0.1)
-        return np.sum(model.predict(record, 1, initial_state="zero").residual ** 2)
+        point = fit.model.operating_point
+        model = P.from_theta(fit.structure, theta, 0.1, operating_point=point)
+        return np.sum(fid.predict(model, record, 1, initial_state="zero").residual("y") ** 2)
 
     here = loss(fit.model.theta)
     assert_close(here, fit.details.criteria.loss * 500, rtol=1e-12, why="the same errors")
@@ -162,7 +163,8 @@ def test_an_unstable_plant_is_legal_and_can_be_held_stable():
 
 def test_roots_gains_and_modes_carry_intervals():
     fit = fid.identify(
-        P.armax("u", "y", na=2, nb=2, nc=2), [flown(ARMAX, s, n=1500, noise=0.5) for s in (14, 15)]
+        P.armax("u", "y", na=2, nb=2, nc=2, offsets="none"),
+        [flown(ARMAX, s, n=1500, noise=0.5) for s in (14, 15)],
     )
     (mode,) = fit.details.modes
     truth = ARMAX.modes()["y/u"][0]
@@ -195,7 +197,7 @@ def test_a_fit_states_horizon_and_initial_state_and_keeps_everything_plain():
     np.testing.assert_array_equal(again.covariance, fit.covariance)
     assert "free-run fit" in repr(fit)
     assert "<table" in fit._repr_html_()
-    assert fit.model.predict(flown(ARMAX, 17), "free_run").error_rms < 1.0
+    assert fid.predict(fit.model, flown(ARMAX, 17, offset=3.0), "free_run").rms_error["y"] < 1.0
 
 
 def test_starts_are_systematic_first_then_random_and_reproducible():

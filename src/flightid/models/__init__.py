@@ -4,7 +4,6 @@ State space: `model_tape.rs`, `state_space_response.rs`.
 """
 
 from flightid.models.innovations.model import InnovationsModel
-from flightid.models.innovations.prediction import InnovationsPrediction
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.interchange import from_control, from_scipy, to_control, to_scipy
 from flightid.models.kinds import GreyBoxModel
@@ -16,12 +15,10 @@ from flightid.models.linear.system_files import read_system, write_system
 from flightid.models.load import library_names, load_model, load_structure
 from flightid.models.model import LinearModel, Model, linear_system, model_of
 from flightid.models.narx.model import NarxModel
-from flightid.models.narx.prediction import NarxPrediction
 from flightid.models.narx.structure import NarxStructure
 from flightid.models.narx.terms import Lag, Term
 from flightid.models.parameters import Parameter, Parameters
 from flightid.models.polynomial.model import PolynomialModel
-from flightid.models.polynomial.prediction import PolynomialPrediction
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.save import write_model
 from flightid.models.state_space.builder import ModelBuilder
@@ -34,20 +31,17 @@ __all__ = [
     "Block",
     "GreyBoxModel",
     "InnovationsModel",
-    "InnovationsPrediction",
     "Lag",
     "LinearModel",
     "LinearSystem",
     "Model",
     "ModelBuilder",
     "NarxModel",
-    "NarxPrediction",
     "NarxStructure",
     "Output",
     "Parameter",
     "Parameters",
     "PolynomialModel",
-    "PolynomialPrediction",
     "PolynomialStructure",
     "RecordValue",
     "ResponsePair",

@@ -31,7 +31,6 @@ from flightid.identification.narx.details import ChosenTerm, NarxDetails
 from flightid.identification.narx.findings import collinear_finding, free_run_findings
 from flightid.identification.narx.regressors import Regressors, regressors_of, scaling_of
 from flightid.models.narx.model import NarxModel
-from flightid.models.narx.prediction import NarxPrediction
 from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.structure import NarxStructure
 from flightid.record import Record
@@ -49,6 +48,26 @@ class Selection:
     chosen: tuple[ChosenTerm, ...]
     collinear: int
     covariance: Array
+
+
+@dataclass(frozen=True, eq=False)
+class NarxRun:
+    """A model through a training record: measured and predicted output, and its start."""
+
+    measured: Array
+    predicted: Array
+    start: int
+    diverged_at: int | None
+
+    @classmethod
+    def of(cls, model: NarxModel, record: Record, horizon: int | str) -> NarxRun:
+        """Run a record so many samples ahead."""
+        return cls(record[model.output], *model.run(record, horizon))
+
+    @property
+    def scored(self) -> tuple[Array, Array]:
+        """Measured and predicted samples after the start."""
+        return self.measured[self.start :], self.predicted[self.start :]
 
 
 def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
@@ -70,7 +89,7 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
     baseline = _baseline(structure, scaling, records)
     flown = tuple(record for record in records if record.n_samples > structure.longest_lag)
     one_step, free, linear = (
-        [each.predict(record, horizon) for record in flown]
+        [NarxRun.of(each, record, horizon) for record in flown]
         for each, horizon in ((model, 1), (model, "free_run"), (baseline, "free_run"))
     )
     details = NarxDetails(
@@ -219,13 +238,13 @@ def _spread(factor: Array, penalties: Array, squares: float, n: int) -> Array:
     return np.asarray(residual * (np.linalg.inv(factor) * np.sqrt(determined)))
 
 
-def _rms(runs: Sequence[NarxPrediction]) -> float:
+def _rms(runs: Sequence[NarxRun]) -> float:
     """Error over all records after the lags."""
     errors = np.concatenate([np.subtract(*run.scored) for run in runs])
     return float(np.sqrt(np.mean(errors**2)))
 
 
-def _held(records: Sequence[Record], runs: Sequence[NarxPrediction]) -> str | None:
+def _held(records: Sequence[Record], runs: Sequence[NarxRun]) -> str | None:
     """Where the guard first held a run."""
     for record, run in zip(records, runs, strict=True):
         if run.diverged_at is not None:

@@ -31,20 +31,20 @@ def predict_narx(
         )
     if request.state_bias or request.output_bias:
         raise OptionError("a NARX model takes no bias off", found="a bias", needed="none")
-    run = model.predict(record, request.horizon)
+    run, began, diverged_at = model.run(record, request.horizon)
     (name,) = outputs
     known = record.channels
     channels = [known[each] for each in model.inputs]
     channels.append(Channel(name, known[name].unit, known[name].role, "predicted"))
-    predicted = record.replace({name: run.predicted}, channels=channels, step=Step("predict", {}))
+    predicted = record.replace({name: run}, channels=channels, step=Step("predict", {}))
     settle = request.settle_samples(record.n_samples, record.sample_time_s) or 0
-    start = run.start if request.horizon != FREE_RUN else max(run.start, settle)
+    start = began if request.horizon != FREE_RUN else max(began, settle)
     return Prediction(
         record,
         predicted,
         outputs,
         request.horizon,
-        f"{run.start} measured samples",
+        f"{began} measured samples",
         start,
-        diverged_at=run.diverged_at,
+        diverged_at=diverged_at,
     )

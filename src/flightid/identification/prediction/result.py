@@ -186,9 +186,16 @@ class Prediction:
             },
         }
 
+    def _fit_words(self, name: str) -> str:
+        """Fit of one output; of one that does not change its error, since it has no fit."""
+        measured, predicted = self.scored(name)
+        if np.ptp(measured) == 0.0:
+            return f"{name} rms error {float(metrics.rms_error(measured, predicted)):.4g}"
+        return f"{name} {float(metrics.fit_percent(measured, predicted)):.1f} %"
+
     def __repr__(self) -> str:
         """Horizon, start, size and fits on one line."""
-        fits = ", ".join(f"{name} {fit:.1f} %" for name, fit in self.fit_percent.items())
+        fits = ", ".join(map(self._fit_words, self.outputs))
         left = "" if self.diverged_at is None else f", held from sample {self.diverged_at}"
         return f"Prediction({self.words}, {self.measured.n_samples} samples, fit {fits}{left})"
 

@@ -18,13 +18,11 @@ from flightid.identification.prediction.result import Prediction, Shifts
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.innovations import prediction as innovations
 from flightid.models.polynomial import prediction as polynomial
-from flightid.models.sampled.channels import require_same
+from flightid.models.sampled.channels import hold_diverged, require_same
 from flightid.record import Channel, Record, Step
 
 Array = NDArray[np.float64]
 SampledModel = PolynomialModel | InnovationsModel
-LARGEST = 1e100
-"""A run beyond this is held at the last sample before it: its squares still are numbers."""
 RANK = 1e-10
 """Directions of the initial state weaker than this share of the strongest are left at rest."""
 
@@ -67,13 +65,13 @@ def predict_sampled(
         {name: record.unit(name) for name in (*names, *model.inputs)},
         record.sample_time_s,
     )
-    data = _deviations(model, record, names, from_trim=request.initial_state == "trim")
+    data = _deviations(model, record, names)
     with np.errstate(over="ignore", invalid="ignore"):
         if request.horizon == FREE_RUN:
             run, start, shifts = _free_run(model, data, record, request)
         else:
-            run, start, shifts = _ahead(model, data, int(request.horizon)), 0, None
-    diverged_at = _hold(run)
+            run, start, shifts = _ahead(model, data, request), 0, None
+    diverged_at = hold_diverged(run)
     made = run + data.point[:, None]
     rows = dict(zip(names, made, strict=True))
     known = record.channels
@@ -127,10 +125,9 @@ def _outputs(model: SampledModel) -> tuple[str, ...]:
     return (model.output,) if isinstance(model, PolynomialModel) else model.outputs
 
 
-def _deviations(
-    model: SampledModel, record: Record, names: tuple[str, ...], *, from_trim: bool
-) -> Deviations:
-    point = {**model.operating_point, **(record.trim if from_trim else {})}
+def _deviations(model: SampledModel, record: Record, names: tuple[str, ...]) -> Deviations:
+    # A trim that the record declares is its own, and goes before that of the training records.
+    point = {**model.operating_point, **record.trim}
 
     def about(channels: tuple[str, ...]) -> Array:
         rows = [record[name] - point.get(name, 0.0) for name in channels]
@@ -147,28 +144,31 @@ def _free_run(
     forced = _forced(model, data.inputs)
     p, n_samples = data.outputs.shape
     settle = request.settle_samples(n_samples, record.sample_time_s)
-    motion = np.zeros((0, p, n_samples))
-    if request.initial_state not in ("zero", "trim"):
-        motion = _motion(model, n_samples)
-    columns = [*motion, *(_constants(p, n_samples) if request.output_bias else ())]
-    if not columns:
+    solved = request.initial_state not in ("zero", "trim")
+    n_free = (_order(model) if solved else 0) + (p if request.output_bias else 0)
+    if not n_free:
         return forced, settle or 0, Shifts(np.zeros(0), np.zeros(p), np.zeros(0), 0, 0)
-    stretch = settle or _stretch(request, n_samples, p, len(columns))
-    if stretch * p < len(columns):
+    stretch = settle or _stretch(request, n_samples, p, n_free)
+    if stretch * p < n_free:
         raise DataError(
             "the first stretch is too short to tell the start",
             found=f"{stretch} samples of {p} outputs",
-            needed=f"{len(columns)} numbers or more",
+            needed=f"{n_free} numbers or more",
             action="give a longer settle_s, or initial_state='zero'",
         )
-    told = np.array(columns)[:, :, :stretch].reshape(len(columns), -1).T
+    motion = _motion(model, stretch) if solved else np.zeros((0, p, stretch))
+    columns = [*motion, *(_constants(p, stretch) if request.output_bias else ())]
+    told = np.array(columns).reshape(len(columns), -1).T
     error = (data.outputs - forced)[:, :stretch].ravel()
     if not (np.all(np.isfinite(told)) and np.all(np.isfinite(error))):
         return forced, stretch, Shifts(np.zeros(0), np.zeros(p), np.zeros(len(motion)), 0, 0)
     weights, _, rank, _ = np.linalg.lstsq(told, error, rcond=RANK)
-    run = forced + np.tensordot(weights, np.array(columns), axes=1)
     k = len(motion)
     bias = weights[k:] if request.output_bias else np.zeros(p)
+    # One recursion from the start that was found, not one for each number of it.
+    run = forced + bias[:, None]
+    if k:
+        run = run + _motion_from(model, weights[:k], n_samples)
     return run, stretch, Shifts(np.zeros(0), bias, weights[:k], len(columns), int(rank))
 
 
@@ -196,18 +196,26 @@ def _motion(model: SampledModel, n_samples: int) -> Array:
     return innovations.free_motion(a, c, n_samples)
 
 
-def _ahead(model: SampledModel, data: Deviations, horizon: int) -> Array:
-    """y(t) minus the part of the noise that is younger than the horizon."""
+def _motion_from(model: SampledModel, start: Array, n_samples: int) -> Array:
+    """What a whole initial state makes of the outputs, shape (p, n_samples)."""
     if isinstance(model, PolynomialModel):
-        return polynomial.ahead(model, data.outputs[0], data.inputs, horizon)[None]
-    return innovations.ahead(model, data.outputs, data.inputs, horizon)
+        return polynomial.motion_from(model, start, n_samples)[None]
+    a, _, c, _, _ = model.matrices
+    return innovations.motion_from(a, c, start, n_samples)
 
 
-def _hold(run: Array) -> int | None:
-    """Hold a run that leaves the range of numbers, in place; the sample at which it did."""
-    usable = np.all(np.abs(run) < LARGEST, axis=0)
-    if np.all(usable):
-        return None
-    first = int(np.argmin(usable))
-    run[:, first:] = run[:, first - 1 : first] if first else 0.0
-    return first
+def _order(model: SampledModel) -> int:
+    """Numbers of the initial state."""
+    if isinstance(model, PolynomialModel):
+        return np.size(model.a) - 1 + sum(np.size(row) - 1 for row in model.f)
+    return model.order
+
+
+def _ahead(model: SampledModel, data: Deviations, request: Request) -> Array:
+    """y(t) minus the part of the noise that is younger than the horizon."""
+    horizon = int(request.horizon)
+    # Before the record: rest where that is said, else the past that fits its errors best.
+    past = "zero" if request.initial_state in ("zero", "trim") else "estimate"
+    if isinstance(model, PolynomialModel):
+        return polynomial.ahead(model, data.outputs[0], data.inputs, horizon, past)[None]
+    return innovations.ahead(model, data.outputs, data.inputs, horizon, past)

@@ -34,9 +34,9 @@ from flightid.identification.prediction_error.linear_regression import regress, 
 from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
 from flightid.identification.prediction_error.starts import polynomial_starts
 from flightid.models.polynomial.model import PolynomialModel
-from flightid.models.polynomial.prediction import PolynomialPrediction
+from flightid.models.polynomial.prediction import free_run
 from flightid.models.polynomial.structure import PolynomialStructure
-from flightid.models.sampled.channels import SampledChannels, gather_channels
+from flightid.models.sampled.channels import SampledChannels, gather_channels, hold_diverged
 from flightid.record import Record
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.residual_covariance import colour_findings
@@ -255,12 +255,15 @@ def _assemble(
     parameters = _parameters(model, found)
     degrees = found.degrees if found.freedom is None else float(np.min(found.freedom))
     roots = fitted_roots(model, degrees)
-    runs = [model.predict(record, "free_run", offsets=structure.offsets) for record in records]
+    runs = _free_runs(model, data)
     return black_box_fit(
         model,
         BlackBoxRuns(
             records,
-            tuple(run.predicted[None] for run in runs),
+            tuple(
+                (run + offsets[structure.output])[None]
+                for run, offsets in zip(runs, data.offsets, strict=True)
+            ),
             tuple(row[None] for row in counted),
             # Output error and instruments promise no white errors.
             white=structure.kind != "OE" and structure.method != "iv4",
@@ -317,9 +320,19 @@ def _parameters(model: PolynomialModel, found: _Found) -> dict[str, Estimate]:
     return made
 
 
+def _free_runs(model: PolynomialModel, data: SampledChannels) -> list[Array]:
+    """Free runs through the training records, about their operating points."""
+    runs = []
+    for span in data.spans:
+        run = free_run(model, data.output[span], data.inputs[:, span], initial_state="estimate")
+        hold_diverged(run[None])
+        runs.append(run)
+    return runs
+
+
 def _scores(
     structure: PolynomialStructure,
-    runs: Sequence[PolynomialPrediction],
+    runs: Sequence[Array],
     data: SampledChannels,
     counted: Sequence[Array],
 ) -> tuple[FitScore, FitScore]:
@@ -327,7 +340,7 @@ def _scores(
     about = np.concatenate([data.output[span] - data.output[span].mean() for span in data.spans])
     size = float(np.sqrt(about @ about))
     one_step = np.concatenate(counted)
-    free = np.concatenate([run.residual for run in runs])
+    free = np.concatenate([data.output[s] - run for s, run in zip(data.spans, runs, strict=True)])
     started = {
         "estimate": "an estimated state",
         "zero": "rest",
@@ -341,7 +354,7 @@ def _scores(
 
     return (
         score(f"one step ahead from {started}, records of the fit", one_step),
-        score(f"{runs[0].words}, records of the fit", free),
+        score("free run from an estimated state, records of the fit", free),
     )
 
 

@@ -25,8 +25,9 @@ from flightid.identification.subspace.order import OrderChoice, choose_order, de
 from flightid.identification.subspace.prediction_errors import Refined, refine
 from flightid.identification.subspace.roots import innovations_gains, innovations_roots
 from flightid.models.innovations.model import InnovationsModel
-from flightid.models.innovations.prediction import InnovationsPrediction, one_step_errors
+from flightid.models.innovations.prediction import free_run, one_step_errors
 from flightid.models.innovations.structure import SubspaceStructure
+from flightid.models.sampled.channels import hold_diverged
 from flightid.record import Record
 from flightid.uncertainty.estimate import Estimate
 
@@ -96,13 +97,13 @@ def _assemble(
     spread = Errors(model.sample_time_s, covariance, found.degrees)
     roots = innovations_roots(model, spread, direct=structure.direct)
     measures = determinant_criteria(joint, size[:, None], structure.n_parameters(model.order))
-    runs = [model.predict(record, "free_run", offsets=structure.offsets) for record in records]
+    runs = _free_runs(model, data)
     parameters = _parameters(model)
     values = {name: item.value for name, item in parameters.items()}
     names = [name for name in parameters if structure.direct or not name.startswith("d")]
     return black_box_fit(
         model,
-        BlackBoxRuns(records, tuple(run.predicted for run in runs), errors),
+        BlackBoxRuns(records, _about(structure, data, runs), errors),
         BlackBoxEstimates(parameters, tuple(names), covariance),
         (LocalMinimum(measures.loss, 1, values, found.termination),),
         iterations=found.iterations,
@@ -113,7 +114,7 @@ def _assemble(
             roots,
             innovations_gains(model, spread, direct=structure.direct),
             measures,
-            _scores(structure, runs, errors),
+            _scores(structure, data, runs, errors),
             repr(choice),
             # Poles and gains of the predictor shape each correlation; input matrices the other.
             spent=(2 * model.order, model.order),
@@ -142,17 +143,40 @@ def _in_units(structure: SubspaceStructure, found: Refined, size: Array) -> Arra
     return np.asarray(factor[:, None] * found.covariance * factor)
 
 
+def _free_runs(model: InnovationsModel, data: SubspaceData) -> list[Array]:
+    """Free runs through the training records, about their operating points."""
+    runs = []
+    with np.errstate(over="ignore", invalid="ignore"):
+        for y, u in zip(data.outputs, data.inputs, strict=True):
+            run = free_run(model, data.scales[:, None] * y, u, initial_state="estimate")
+            hold_diverged(run)
+            runs.append(run)
+    return runs
+
+
+def _about(
+    structure: SubspaceStructure, data: SubspaceData, runs: Sequence[Array]
+) -> tuple[Array, ...]:
+    """Runs in the units of the outputs, what was taken off put on again."""
+    return tuple(
+        run + np.array([[offsets[name]] for name in structure.outputs])
+        for run, offsets in zip(runs, data.channels.offsets, strict=True)
+    )
+
+
 def _scores(
     structure: SubspaceStructure,
-    runs: Sequence[InnovationsPrediction],
+    data: SubspaceData,
+    runs: Sequence[Array],
     errors: Sequence[Array],
 ) -> dict[str, tuple[FitScore, FitScore]]:
-    free = np.hstack([run.residual for run in runs])
+    measured = [data.scales[:, None] * y for y in data.outputs]
+    free = np.hstack([y - run for y, run in zip(measured, runs, strict=True)])
     step = np.hstack(list(errors))
     started = "rest" if structure.initial_state == "zero" else "an estimated state"
     found = {}
     for place, name in enumerate(structure.outputs):
-        about = np.concatenate([run.measured[place] - run.measured[place].mean() for run in runs])
+        about = np.concatenate([y[place] - y[place].mean() for y in measured])
         size = float(np.linalg.norm(about))
 
         def score(words: str, row: Array, size: float = size) -> FitScore:
@@ -161,7 +185,7 @@ def _scores(
 
         found[name] = (
             score(f"{name} one step ahead from {started}, records of the fit", step[place]),
-            score(f"{name} {runs[0].words}, records of the fit", free[place]),
+            score(f"{name} free run from an estimated state, records of the fit", free[place]),
         )
     return found
 

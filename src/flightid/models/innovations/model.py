@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Self, Unpack
 
+import numpy as np
+
 from flightid.models.innovations.description import innovations_from_table, innovations_to_table
 from flightid.models.innovations.form import Array, InnovationsForm
-from flightid.models.innovations.prediction import InnovationsPrediction, predict
+from flightid.models.innovations.prediction import forced_run
 from flightid.models.innovations.structure import SubspaceOptions, SubspaceStructure
+from flightid.models.sampled.channels import gather_channels, hold_diverged, require_same
 from flightid.models.sampled.discrete_modes import zero_note
 from flightid.record import Record
 from flightid.table import Cell, Column, Table
@@ -77,51 +80,15 @@ class InnovationsModel(InnovationsForm):
         )
         return SubspaceStructure(names[0], names[1], order, **options)
 
-    def predict(
-        self,
-        record: Record,
-        horizon: int | str = "free_run",
-        *,
-        initial_state: str = "estimate",
-        offsets: str = "mean",
-    ) -> InnovationsPrediction:
-        """Predict the outputs of a record k steps ahead (1, 2, …) or in ``"free_run"``.
-
-        Parameters
-        ----------
-        record : Record
-            With the model's channels, units and sample time.
-        horizon : int or "free_run"
-        initial_state : {"estimate", "zero"}
-            State at the first sample: the one that makes this prediction's errors smallest (k
-            ahead: those one step ahead), or rest.
-        offsets : {"mean", "trim", "none"}
-            Operating point of each channel.
-
-        Returns
-        -------
-        InnovationsPrediction
-
-        Raises
-        ------
-        OptionError
-            An unknown horizon, initial state or offset.
-        DataError
-            Another sample time.
-        UnitError
-            A channel in another unit.
-        UnknownNameError
-            A channel is missing.
-
-        Reference
-        ---------
-        Ljung, *System Identification*, 2nd ed., eqs. 4.86 and 3.31.
-        """
-        return predict(self, record, horizon, initial_state=initial_state, offsets=offsets)
-
     def simulate(self, record: Record) -> Array:
         """Free run from rest on the inputs as they are, shape (p, n_samples), outputs' units."""
-        return self.predict(record, "free_run", initial_state="zero", offsets="none").predicted
+        first, *others = (*self.outputs, *self.inputs)
+        data = gather_channels([record], first, others, "none")
+        require_same(self, data.units, data.sample_time_s)
+        with np.errstate(over="ignore", invalid="ignore"):
+            run = forced_run(self, data.inputs[len(self.outputs) - 1 :])
+        hold_diverged(run)
+        return run
 
     def summary(self) -> Table:
         """Table of poles, and of the zeros of each response."""

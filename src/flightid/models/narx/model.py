@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
-from flightid.errors import ModelError, OptionError
+from flightid.errors import ModelError
 from flightid.models.linear.linear_system import LinearSystem
-from flightid.models.narx.prediction import NarxPrediction
 from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.structure import NarxStructure
 from flightid.models.narx.terms import Lag, Term
@@ -112,8 +111,8 @@ class NarxModel:
             action="identify a PolynomialModel.arx of the same lags beside it",
         )
 
-    def predict(self, record: Record, horizon: int | str = "free_run") -> NarxPrediction:
-        """Predict the output one step, k steps or the whole record ahead.
+    def run(self, record: Record, horizon: int | str = "free_run") -> tuple[Array, int, int | None]:
+        """Run one step, k steps or the whole record ahead; `flightid.predict` is for people.
 
         Parameters
         ----------
@@ -123,12 +122,12 @@ class NarxModel:
 
         Returns
         -------
-        NarxPrediction
+        tuple of ndarray, int and int or None
+            The output, shape (n_samples,), in its unit; samples at the start that are measured; the
+            first sample at which the guard held the run.
 
         Raises
         ------
-        OptionError
-            A horizon that is neither.
         DataError
             Another sample time, or fewer samples than lags.
         UnitError
@@ -138,15 +137,13 @@ class NarxModel:
         ModelError
             A term with a lag that the model does not have.
         """
-        if horizon != "free_run" and not (isinstance(horizon, int) and horizon > 0):
-            raise OptionError("unknown horizon", found=horizon, needed="1, 2, … or 'free_run'")
         name, scaling = self.output, self.scaling
         scaled = [scaling.scaled(record, channel) for channel in (name, *self.inputs)]
         ahead = 0 if horizon == "free_run" else int(horizon)
         values, start, diverged = self._run(scaled[0], np.array(scaled[1:]), ahead)
         predicted = values * scaling.deviation[name] + scaling.mean[name]
         predicted[:start] = record[name][:start]
-        return NarxPrediction(record[name], predicted, horizon, start, diverged)
+        return predicted, start, diverged
 
     def from_rest(self, inputs: Array, sample_time_s: float) -> Array:
         """Free run from lags at the training mean, shape (1, n_samples), in the output's unit.

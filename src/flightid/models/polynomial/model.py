@@ -9,7 +9,8 @@ from flightid.models.polynomial.description import model_from_table, model_to_ta
 from flightid.models.polynomial.display import difference_equation, roots_table
 from flightid.models.polynomial.makers import StructureMakers
 from flightid.models.polynomial.polynomials import Array, Polynomials
-from flightid.models.polynomial.prediction import PolynomialPrediction, predict
+from flightid.models.polynomial.prediction import forced_run
+from flightid.models.sampled.channels import gather_channels, hold_diverged, require_same
 from flightid.record import Record
 from flightid.table import Table
 
@@ -57,51 +58,13 @@ class PolynomialModel(Polynomials, StructureMakers):
     theta(t) = 1.5 theta(t-1) - 0.7 theta(t-2) + 1 voltage(t-1) + 0.5 voltage(t-2) + e(t)
     """
 
-    def predict(
-        self,
-        record: Record,
-        horizon: int | str = "free_run",
-        *,
-        initial_state: str = "estimate",
-        offsets: str = "mean",
-    ) -> PolynomialPrediction:
-        """Predict the output of a record k steps ahead (1, 2, …) or in ``"free_run"``.
-
-        Parameters
-        ----------
-        record : Record
-            With the model's channels, units and sample time.
-        horizon : int or "free_run"
-        initial_state : {"estimate", "zero"}
-            Before the record: the values that make this prediction's errors smallest (a prediction
-            k ahead: those one step ahead), or rest.
-        offsets : {"mean", "trim", "none"}
-            Operating point of each channel.
-
-        Returns
-        -------
-        PolynomialPrediction
-
-        Raises
-        ------
-        OptionError
-            An unknown horizon, initial state or offset.
-        DataError
-            Another sample time.
-        UnitError
-            A channel in another unit.
-        UnknownNameError
-            A channel is missing.
-
-        Reference
-        ---------
-        Ljung, *System Identification*, 2nd ed., eqs. 3.20 and 3.31.
-        """
-        return predict(self, record, horizon, initial_state=initial_state, offsets=offsets)
-
     def simulate(self, record: Record) -> Array:
         """Free run from rest on the inputs as they are, shape (n_samples,), output's unit."""
-        return self.predict(record, "free_run", initial_state="zero", offsets="none").predicted
+        data = gather_channels([record], self.output, self.inputs, "none")
+        require_same(self, data.units, data.sample_time_s)
+        run = forced_run(self, data.inputs)
+        hold_diverged(run[None])
+        return run
 
     def difference_equation(self) -> str:
         """The model as an equation in samples, for ARX and ARMAX; else in polynomials."""

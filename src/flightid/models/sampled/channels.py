@@ -190,3 +190,18 @@ def _offsets(record: Record, names: Sequence[str], kind: str) -> dict[str, float
             action="declare them with the record, or take offsets='mean'",
         )
     return {name: float(record.trim[name]) for name in names}
+
+
+def hold_diverged(run: Array) -> int | None:
+    """Hold a run that leaves the range of numbers, in place; the sample at which it did.
+
+    Parameters
+    ----------
+    run : ndarray, shape (p, n_samples)
+    """
+    usable = np.all(np.abs(run) < LARGEST, axis=0)
+    if np.all(usable):
+        return None
+    first = int(np.argmin(usable))
+    run[:, first:] = run[:, first - 1 : first] if first else 0.0
+    return first

@@ -13,6 +13,7 @@ from flightid.errors import FitError, OptionError
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
+from flightid.identification.prediction.predict import predict
 from flightid.models.narx.model import NarxModel
 from flightid.models.narx.structure import NarxStructure
 from flightid.progress import track
@@ -203,9 +204,10 @@ def _trial(
 def _score(
     model: NarxModel, records: Sequence[Record], start: int, horizon: int | str
 ) -> FreeRunScore:
-    runs = [model.predict(record, horizon) for record in records]
-    measured = np.concatenate([run.measured[start:] for run in runs])
-    predicted = np.concatenate([run.predicted[start:] for run in runs])
+    runs = predict(model, list(records), horizon)
+    name = model.output
+    measured = np.concatenate([run.measured[name][start:] for run in runs])
+    predicted = np.concatenate([run.predicted[name][start:] for run in runs])
     return FreeRunScore(
         float(rms_error(measured, predicted)),
         float(fit_percent(measured, predicted)),

@@ -14,12 +14,15 @@ from flightid import _native
 from flightid.errors import DataError, FitError, OptionError
 from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
-from flightid.identification.prediction_error.information_criteria import criteria
+from flightid.identification.prediction.predict import predict
+from flightid.identification.prediction.request import usual_stretch
+from flightid.identification.prediction_error.information_criteria import Criteria, criteria
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialOptions, PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.progress import progress, track
 from flightid.record import Record
+from flightid.simulation.metrics import fit_percent, rms_error
 from flightid.validation.order_scan.result import OrderScan, OrderTrial
 
 Array = NDArray[np.float64]
@@ -122,9 +125,9 @@ def scan_orders(
             action="resample them with conditioning.resample",
         )
     trials = (
-        _native_trials(structures, data, check)
+        _native_trials(structures, data, check, unseen)
         if kind in ("arx", "armax")
-        else _fitted_trials(structures, fitted, unseen)
+        else _fitted_trials(structures, fitted, unseen, _settle_s(structures, unseen))
     )
     trials.sort(key=lambda trial: np.inf if trial.free_run_rms is None else trial.free_run_rms)
     best = _best(trials, fitted)
@@ -184,7 +187,10 @@ def _structures(
 
 
 def _native_trials(
-    structures: Sequence[PolynomialStructure], data: SampledChannels, check: SampledChannels
+    structures: Sequence[PolynomialStructure],
+    data: SampledChannels,
+    check: SampledChannels,
+    unseen: Sequence[Record],
 ) -> list[OrderTrial]:
     start = max(max(s.longest_lag + 1, s.nc) for s in structures)
     shortest = min(*data.lengths, *check.lengths)
@@ -213,25 +219,23 @@ def _native_trials(
         )
     skip = _common_skip(structures)
     n = sum(length - skip for length in data.lengths)
-    n_check = sum(length - skip for length in check.lengths)
-    about = np.concatenate([check.output[s][skip:] for s in check.spans])
-    size = float(np.linalg.norm(about - about.mean()))
+    settle_s = _settle_s(structures, unseen)
     trials = []
     for structure, each in zip(structures, found, strict=True):
         if each is None:
             trials.append(OrderTrial(structure, None, None, None, None, "collinear regressors"))
             continue
-        theta, squares, free, _, converged = each
+        theta, squares, _, _, converged = each
+        model = PolynomialModel.from_theta(
+            structure,
+            theta,
+            data.sample_time_s,
+            units=data.units,
+            operating_point=data.operating_point,
+        )
         measures = criteria(squares, n, structure.n_parameters)
         note = "" if converged else "not converged"
-        model = PolynomialModel.from_theta(structure, theta, data.sample_time_s)
-        if not np.isfinite(free):
-            note = "free run diverged"
-            trials.append(OrderTrial(structure, model, measures, None, None, note))
-            continue
-        rms = float(np.sqrt(free / n_check))
-        percent = 100.0 * (1.0 - float(np.sqrt(free)) / size)
-        trials.append(OrderTrial(structure, model, measures, rms, percent, note))
+        trials.append(_judged(structure, model, measures, unseen, settle_s, note))
     return trials
 
 
@@ -243,7 +247,10 @@ def _common_skip(structures: Sequence[PolynomialStructure]) -> int:
 
 
 def _fitted_trials(
-    structures: Sequence[PolynomialStructure], fitted: Sequence[Record], unseen: Sequence[Record]
+    structures: Sequence[PolynomialStructure],
+    fitted: Sequence[Record],
+    unseen: Sequence[Record],
+    settle_s: float,
 ) -> list[OrderTrial]:
     trials = []
     for structure in track(structures, "Scanning orders"):
@@ -252,23 +259,35 @@ def _fitted_trials(
         except FitError as error:
             trials.append(OrderTrial(structure, None, None, None, None, str(error)))
             continue
-        runs = [fit.model.predict(record, offsets=structure.offsets) for record in unseen]
-        errors = np.concatenate([run.residual for run in runs])
-        about = np.concatenate([run.measured - run.measured.mean() for run in runs])
-        rms = float(np.sqrt(np.mean(errors**2)))
-        percent = 100.0 * (1.0 - float(np.linalg.norm(errors) / np.linalg.norm(about)))
-        diverged = any(run.diverged for run in runs)
-        trials.append(
-            OrderTrial(
-                structure,
-                fit.model,
-                fit.details.criteria,
-                None if diverged else rms,
-                None if diverged else percent,
-                "free run diverged" if diverged else "",
-            )
-        )
+        trials.append(_judged(structure, fit.model, fit.details.criteria, unseen, settle_s))
     return trials
+
+
+def _judged(
+    structure: PolynomialStructure,
+    model: PolynomialModel,
+    measures: Criteria,
+    unseen: Sequence[Record],
+    settle_s: float,
+    note: str = "",
+) -> OrderTrial:
+    """A trial with its free runs: as `flightid.predict` and `flightid.verify` run models."""
+    runs = predict(model, list(unseen), settle_s=settle_s)
+    if any(run.diverged_at is not None for run in runs):
+        return OrderTrial(structure, model, measures, None, None, "free run diverged")
+    pairs = [run.scored(structure.output) for run in runs]
+    measured, predicted = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
+    rms = float(rms_error(measured, predicted))
+    return OrderTrial(
+        structure, model, measures, rms, float(fit_percent(measured, predicted)), note
+    )
+
+
+def _settle_s(structures: Sequence[PolynomialStructure], unseen: Sequence[Record]) -> float:
+    """One first stretch for all structures, so that all are scored on the same samples, s."""
+    most = max(s.na + sum(s.nf) for s in structures)
+    shortest = min(record.n_samples for record in unseen)
+    return usual_stretch(shortest, most) * unseen[0].sample_time_s
 
 
 def _best(trials: Sequence[OrderTrial], fitted: Sequence[Record]) -> Fit:

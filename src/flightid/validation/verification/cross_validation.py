@@ -10,6 +10,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
+from flightid.identification.prediction.predict import predict
 from flightid.models import NarxModel
 from flightid.record import Record
 from flightid.validation.verification.cross_validation_result import (
@@ -100,17 +101,16 @@ def cross_validate(
 
 def _runs(fit: Fit, record: Record, horizon: int | str) -> list[CrossRun]:
     output, words = fit.model.output, horizon_words(horizon)
-    if not isinstance(fit.model, NarxModel):
-        made = fit.model.predict(record, horizon, offsets=fit.structure.offsets)
-        start = "state solved for"
-        return [CrossRun(record, output, MODEL, words, start, made.predicted, 0, made.diverged)]
+    named: list[tuple[str, object]] = [(MODEL, fit.model)]
+    if isinstance(fit.model, NarxModel):
+        named.append((LINEAR, fit.details.baseline))
     runs = []
-    for name, equation in ((MODEL, fit.model), (LINEAR, fit.details.baseline)):
-        found = equation.predict(record, horizon)
-        start = f"{found.start} measured samples"
-        held = found.diverged_at is not None
+    for name, model in named:
+        made = predict(model, record, horizon)
+        held = made.diverged_at is not None
+        values = made.predicted[output]
         runs.append(
-            CrossRun(record, output, name, words, start, found.predicted, found.start, held)
+            CrossRun(record, output, name, words, made.initial_state, values, made.start, held)
         )
     return runs
 
