@@ -178,8 +178,8 @@ GROUPS = {
             "Replay",
             "px4_autotune_gains",
             "read_parameters",
-            "write_param",
-            "write_params",
+            "write_ardupilot_parameters",
+            "write_px4_parameters",
         ),
     ),
     "export": Group(

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from flightid.control.autopilots.make import axis_loop
     from flightid.control.autopilots.parameter_files import (
         read_parameters,
-        write_param,
-        write_params,
+        write_ardupilot_parameters,
+        write_px4_parameters,
     )
     from flightid.control.autopilots.px4_autotune import px4_autotune_gains
     from flightid.control.autopilots.replay import replay
@@ -131,8 +131,8 @@ _HOMES = {
     "px4_autotune_gains": "flightid.control.autopilots.px4_autotune",
     "read_parameters": "flightid.control.autopilots.parameter_files",
     "replay": "flightid.control.autopilots.replay",
-    "write_param": "flightid.control.autopilots.parameter_files",
-    "write_params": "flightid.control.autopilots.parameter_files",
+    "write_ardupilot_parameters": "flightid.control.autopilots.parameter_files",
+    "write_px4_parameters": "flightid.control.autopilots.parameter_files",
     "Advice": "flightid.identification",
     "ImpulseResponse": "flightid.identification",
     "OrderScan": "flightid.validation",
@@ -359,9 +359,9 @@ __all__ = [
     "tune_pid",
     "validation",
     "verify",
+    "write_ardupilot_parameters",
     "write_model",
-    "write_param",
-    "write_params",
+    "write_px4_parameters",
     "write_records",
     "write_system",
 ]

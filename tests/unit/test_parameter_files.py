@@ -13,8 +13,8 @@ from flightid import errors
 from flightid.control.autopilots.parameter_files import (
     GainChange,
     read_parameters,
-    write_param,
-    write_params,
+    write_ardupilot_parameters,
+    write_px4_parameters,
 )
 
 NAMES = st.from_regex(r"[A-Z][A-Z0-9_]{0,15}", fullmatch=True)
@@ -26,7 +26,7 @@ CHANGES = [
 
 
 @given(values=st.dictionaries(NAMES, VALUES, min_size=1, max_size=20))
-@pytest.mark.parametrize("write", [write_param, write_params])
+@pytest.mark.parametrize("write", [write_ardupilot_parameters, write_px4_parameters])
 def test_round_trip_keeps_single_precision(
     write, values: dict[str, float], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
@@ -37,7 +37,7 @@ def test_round_trip_keeps_single_precision(
     }
 
 
-@pytest.mark.parametrize("write", [write_param, write_params])
+@pytest.mark.parametrize("write", [write_ardupilot_parameters, write_px4_parameters])
 def test_rollback_holds_the_old_values_that_are_known(write, tmp_path: Path) -> None:
     written = write(tmp_path / "roll.param", CHANGES, notes=["from log 7\nand a model"])
     assert written.rollback == tmp_path / "roll.rollback.param"
@@ -49,23 +49,23 @@ def test_rollback_holds_the_old_values_that_are_known(write, tmp_path: Path) -> 
 
 
 def test_no_rollback_without_old_values(tmp_path: Path) -> None:
-    assert write_param(tmp_path / "a.param", {"A": 1.0}).rollback is None
+    assert write_ardupilot_parameters(tmp_path / "a.param", {"A": 1.0}).rollback is None
     assert [p.name for p in tmp_path.iterdir()] == ["a.param"]
 
 
 def test_a_file_that_exists_is_kept(tmp_path: Path) -> None:
-    write_param(tmp_path / "a.param", CHANGES)
+    write_ardupilot_parameters(tmp_path / "a.param", CHANGES)
     with pytest.raises(errors.OptionError, match="already there"):
-        write_param(tmp_path / "a.param", {"A": 2.0})
+        write_ardupilot_parameters(tmp_path / "a.param", {"A": 2.0})
     (tmp_path / "a.param").unlink()
     with pytest.raises(errors.OptionError, match=r"a\.rollback\.param"):
-        write_param(tmp_path / "a.param", CHANGES)
-    write_param(tmp_path / "a.param", CHANGES[1:], overwrite=True)
+        write_ardupilot_parameters(tmp_path / "a.param", CHANGES)
+    write_ardupilot_parameters(tmp_path / "a.param", CHANGES[1:], overwrite=True)
 
 
 def test_qgroundcontrol_columns_and_types(tmp_path: Path) -> None:
     changes = {"MC_ROLLRATE_P": 0.15, "IMU_GYRO_RATEMAX": 400.0}
-    text = write_params(tmp_path / "a.params", changes, integers=["IMU_GYRO_RATEMAX"]).path
+    text = write_px4_parameters(tmp_path / "a.params", changes, integers=["IMU_GYRO_RATEMAX"]).path
     rows = [line.split("\t") for line in text.read_text().splitlines() if line[0] != "#"]
     assert rows == [
         ["1", "1", "MC_ROLLRATE_P", "0.15", "9"],
@@ -83,7 +83,7 @@ def test_refuses_what_is_not_a_number_and_nothing_at_all(tmp_path: Path) -> None
     with pytest.raises(errors.OptionError, match="finite"):
         GainChange("A", float("nan"))
     with pytest.raises(errors.OptionError, match="no parameter"):
-        write_param(tmp_path / "a.param", {})
+        write_ardupilot_parameters(tmp_path / "a.param", {})
 
 
 @pytest.mark.parametrize(

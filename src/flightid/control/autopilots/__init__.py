@@ -7,8 +7,8 @@ from flightid.control.autopilots.parameter_files import (
     GainChange,
     WrittenParameters,
     read_parameters,
-    write_param,
-    write_params,
+    write_ardupilot_parameters,
+    write_px4_parameters,
 )
 from flightid.control.autopilots.parameter_table import AXES, GainRange, defaults, gain_ranges
 from flightid.control.autopilots.px4_autotune import Px4AutotuneGains, px4_autotune_gains
@@ -36,6 +36,6 @@ __all__ = [
     "px4_autotune_gains",
     "read_parameters",
     "replay",
-    "write_param",
-    "write_params",
+    "write_ardupilot_parameters",
+    "write_px4_parameters",
 ]

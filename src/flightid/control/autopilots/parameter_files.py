@@ -116,7 +116,7 @@ def _write(path: str | Path, text: str, rollback: str | None, overwrite: bool) -
     return WrittenParameters(final, back)
 
 
-def write_param(
+def write_ardupilot_parameters(
     path: str | Path, changes: Changes, *, notes: Iterable[str] = (), overwrite: bool = False
 ) -> WrittenParameters:
     """Write an ArduPilot parameter file: one ``NAME,value`` a line, reasons as comments.
@@ -154,7 +154,7 @@ def write_param(
     -------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     written = write_param(f"{folder}/roll.param",
+    ...     written = write_ardupilot_parameters(f"{folder}/roll.param",
     ...                           [GainChange("ATC_RAT_RLL_P", 0.12, 0.135, "phase margin")])
     ...     print(written.path.read_text(), written.rollback.read_text(), sep="")
     ATC_RAT_RLL_P,0.12 # phase margin; was 0.135
@@ -168,7 +168,7 @@ def write_param(
     return _write(path, "\n".join(lines) + "\n", "\n".join(old) + "\n" if old else None, overwrite)
 
 
-def write_params(
+def write_px4_parameters(
     path: str | Path,
     changes: Changes,
     *,
@@ -210,7 +210,7 @@ def write_params(
     -------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     written = write_params(f"{folder}/roll.params", {"MC_ROLLRATE_P": 0.15})
+    ...     written = write_px4_parameters(f"{folder}/roll.params", {"MC_ROLLRATE_P": 0.15})
     ...     read_parameters(written.path)
     {'MC_ROLLRATE_P': 0.15}
     """
@@ -250,7 +250,7 @@ def read_parameters(path: str | Path) -> dict[str, float]:
 
     Reference
     ---------
-    As `write_param` and `write_params`.
+    As `write_ardupilot_parameters` and `write_px4_parameters`.
 
     Example
     -------

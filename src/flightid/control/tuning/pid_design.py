@@ -7,7 +7,12 @@ from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
 
-from flightid.control.autopilots import AxisLoop, GainChange, write_param, write_params
+from flightid.control.autopilots import (
+    AxisLoop,
+    GainChange,
+    write_ardupilot_parameters,
+    write_px4_parameters,
+)
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.promises import Promise
 from flightid.control.tuning.requirements import TuningRequirements
@@ -338,7 +343,11 @@ def write_steps(
                 action="relax a requirement that cannot be met, or identify better",
             )
     final, count = Path(path), max(len(design.stages) for design in designs)
-    write = write_params if designs[0].flown.autopilot.startswith("px4") else write_param
+    write = (
+        write_px4_parameters
+        if designs[0].flown.autopilot.startswith("px4")
+        else write_ardupilot_parameters
+    )
     written = []
     for k in range(count):
         changes = chain.from_iterable(
