@@ -12,7 +12,7 @@ import flightid as fid
 from flightid.control.autopilots import axis_loop
 from flightid.control.margins.stability_count import unstable_poles
 from flightid.control.tuning.controller_paths import ControllerPaths
-from flightid.control.tuning.gain_search import HEADROOM, Found, search
+from flightid.control.tuning.gain_search import HEADROOM, GainSearchResult, search
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.responses import responses
 from flightid.control.tuning.sampled_plants import loop_grid, sample_plants
@@ -26,7 +26,7 @@ DELAY_S, GAIN = 0.03, 140.0
 STEP_S = 0.0025
 
 
-def _solve(problem: LoopProblem) -> Found:
+def _solve(problem: LoopProblem) -> GainSearchResult:
     return search(problem, [0], lambda _: None)
 
 

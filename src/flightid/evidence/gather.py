@@ -52,7 +52,7 @@ BELONGS = {
 
 
 @dataclass(frozen=True)
-class Made:
+class FitFacts:
     """What a fit hands over.
 
     Attributes
@@ -83,12 +83,12 @@ class Made:
     loop: Loop | None = None
 
 
-def gather_evidence(made: Made) -> Evidence:
+def gather_evidence(made: FitFacts) -> Evidence:
     """Examine a fit as far as its own data and end allow.
 
     Parameters
     ----------
-    made : Made
+    made : FitFacts
 
     Returns
     -------
@@ -114,7 +114,7 @@ def gather_evidence(made: Made) -> Evidence:
 
 
 def _required(
-    made: Made, responses: Sequence[FrequencyResponse], records: Sequence[Record]
+    made: FitFacts, responses: Sequence[FrequencyResponse], records: Sequence[Record]
 ) -> tuple[str, ...]:
     histories = [*(each.history for each in responses), *(each.history for each in records)]
     logged = any(step.operation == FROM_LOG for history in histories for step in history)
@@ -122,7 +122,7 @@ def _required(
     return (*((INSPECTION,) if logged else ()), *ALWAYS, *signs)
 
 
-def _with_findings(checks: list[Check], made: Made) -> list[Check]:
+def _with_findings(checks: list[Check], made: FitFacts) -> list[Check]:
     """The checks with the fit's findings among them, the worst word of each name first."""
     groups: dict[str, list[Finding]] = {SETTLED: [], GUIDELINES: []}
     for finding in made.findings:

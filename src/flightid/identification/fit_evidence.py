@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from flightid.evidence import Evidence, gather_evidence
-from flightid.evidence.gather import Made
+from flightid.evidence.gather import FitFacts
 from flightid.evidence.parameter_checks import Signed
 from flightid.evidence.spans import Span
 from flightid.identification.fit import Fit
@@ -38,7 +38,7 @@ def evidence_of(fit: Fit, data: Sequence[Any], loop: Loop | None = None) -> Evid
     """
     asked = getattr(fit.structure, "parameters", None)
     return gather_evidence(
-        Made(
+        FitFacts(
             data,
             tuple(fit.model.inputs),
             tuple(fit.model.outputs),

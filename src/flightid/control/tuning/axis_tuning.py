@@ -12,7 +12,7 @@ from flightid.control.autopilots import AxisLoop
 from flightid.control.autopilots.axis_loop import Gyro
 from flightid.control.tuning.controller_paths import ControllerPaths, loop_responses, standing
 from flightid.control.tuning.evidence import Evidence
-from flightid.control.tuning.gain_search import Found, search
+from flightid.control.tuning.gain_search import GainSearchResult, search
 from flightid.control.tuning.gain_search import steps as search_steps
 from flightid.control.tuning.loop_problem import ANGLE, LoopProblem, Plants
 from flightid.control.tuning.pid_design import Stage, TunedGain
@@ -99,7 +99,7 @@ class AxisResult:
 
     Attributes
     ----------
-    found : Found
+    found : GainSearchResult
     loop : AxisLoop
         With the gains found, rounded.
     promises : tuple of Promise
@@ -111,7 +111,7 @@ class AxisResult:
         With the fresh plants.
     """
 
-    found: Found
+    found: GainSearchResult
     loop: AxisLoop
     promises: tuple[Promise, ...]
     met: NDArray[np.bool_]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from flightid.control.tuning.loop_problem import TARGET, Judged, LoopProblem
+from flightid.control.tuning.loop_problem import TARGET, LoopAssessment, LoopProblem
 
 Array = NDArray[np.float64]
 Linear = tuple[Array, Array, Array, Array]
@@ -41,7 +41,7 @@ EDGE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class GainSearchResult:
     """Where a search ended.
 
     Attributes
@@ -63,7 +63,9 @@ class Found:
     slack: dict[str, float]
 
 
-def search(problem: LoopProblem, active: list[int], advance: Callable[[int], None]) -> Found:
+def search(
+    problem: LoopProblem, active: list[int], advance: Callable[[int], None]
+) -> GainSearchResult:
     """Find the gains of the highest objective, or of the largest margins for a target.
 
     Parameters
@@ -76,7 +78,7 @@ def search(problem: LoopProblem, active: list[int], advance: Callable[[int], Non
 
     Returns
     -------
-    Found
+    GainSearchResult
 
     Reference
     ---------
@@ -217,7 +219,7 @@ def _merits(problem: LoopProblem, gains: Array, rows: list[int]) -> Array:
     return np.asarray(levels.min(axis=1) - PENALTY * np.maximum(0.0, -limits.min(axis=1)))
 
 
-def _split(judged: Judged) -> tuple[Array, Array]:
+def _split(judged: LoopAssessment) -> tuple[Array, Array]:
     """What must not be negative, and what is to be raised, each (n_candidates, …).
 
     With a target the margins are raised and the target is a limit, else the objective is raised
@@ -319,7 +321,7 @@ def _linear_step(linear: Linear, low: Array, high: Array) -> Array | None:
     return None if found.x is None else np.asarray(found.x[:n])
 
 
-def _violating(judged: Judged, rows: list[int]) -> list[int]:
+def _violating(judged: LoopAssessment, rows: list[int]) -> list[int]:
     """Plants outside `rows` that are worst in a requirement that fails, or in the objective."""
     new: list[int] = []
     known = set(rows)
@@ -335,7 +337,7 @@ def _violating(judged: Judged, rows: list[int]) -> list[int]:
     return list(dict.fromkeys(new))
 
 
-def _report(problem: LoopProblem, gains: Array) -> Found:
+def _report(problem: LoopProblem, gains: Array) -> GainSearchResult:
     judged = problem.judge(gains[None])
     least = dict(zip(judged.names, judged.slack[:, 0].min(axis=1), strict=True))
     exists = bool(min(least.values()) >= 0.0)
@@ -349,4 +351,4 @@ def _report(problem: LoopProblem, gains: Array) -> Found:
         if value >= high * (1.0 - 1e-3) or (kind == "P" and value <= low * (1.0 + 1e-3))
     )
     slack = {name: float(each) for name, each in least.items()}
-    return Found(gains, exists, (*binding, *at_range), slack)
+    return GainSearchResult(gains, exists, (*binding, *at_range), slack)

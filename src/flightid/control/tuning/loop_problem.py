@@ -114,7 +114,7 @@ class Loops:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class LoopAssessment:
     """Candidates judged by each plant.
 
     Attributes
@@ -202,7 +202,7 @@ class LoopProblem:
         outer = (gains[:, -1:] * forward * unit)[:, None] * plants.angle
         return Loops(control, rate, rate + outer, outer / (1.0 + rate))
 
-    def judge(self, gains: Array, rows: list[int] | None = None) -> Judged:
+    def judge(self, gains: Array, rows: list[int] | None = None) -> LoopAssessment:
         """Judge candidates.
 
         Parameters
@@ -223,7 +223,7 @@ class LoopProblem:
         }
         noise = self._noise(omega, np.abs(loops.control)[:, None] / np.abs(1.0 + loops.whole))
         parts = self._slack(metrics, stable, noise, highest_crossover(omega, loops.rate))
-        return Judged(
+        return LoopAssessment(
             tuple(parts),
             np.array([*parts.values()]),
             self._objective(plants, metrics[RATE], 1.0 + loops.whole),

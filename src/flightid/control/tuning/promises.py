@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.tuning.loop_problem import ANGLE, TARGET, Judged, LoopProblem
+from flightid.control.tuning.loop_problem import ANGLE, TARGET, LoopAssessment, LoopProblem
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import DrawnEnds
 
@@ -103,7 +103,7 @@ KINDS = (
 
 
 def promises(
-    problem: LoopProblem, gains: Array, old: Judged | None
+    problem: LoopProblem, gains: Array, old: LoopAssessment | None
 ) -> tuple[tuple[Promise, ...], NDArray[np.bool_]]:
     """Numbers of all loops, and which plants meet every requirement.
 
@@ -113,7 +113,7 @@ def promises(
         Its plants are those to promise for, the estimate first.
     gains : ndarray, shape (n_gains,)
         New gains.
-    old : Judged or None
+    old : LoopAssessment or None
         The flown gains on the same plants; None where nothing was flown.
 
     Returns
@@ -143,14 +143,16 @@ def promises(
     return tuple(made), np.asarray(new.slack[:, 0].min(axis=0) >= 0.0)
 
 
-def _wanted(judged: Judged) -> Iterator[tuple[str, _Kind]]:
+def _wanted(judged: LoopAssessment) -> Iterator[tuple[str, _Kind]]:
     for loop in judged.metrics:
         for kind in KINDS:
             if loop != ANGLE or not kind.field.startswith("disturbance"):
                 yield loop, kind
 
 
-def _requirement(problem: LoopProblem, judged: Judged, loop: str, kind: _Kind) -> tuple[str, bool]:
+def _requirement(
+    problem: LoopProblem, judged: LoopAssessment, loop: str, kind: _Kind
+) -> tuple[str, bool]:
     """What was asked of a number, in words, and whether all plants meet it."""
     need, texts, names = problem.requirements, [], []
     if kind.requirement:
@@ -181,7 +183,7 @@ def _requirement(problem: LoopProblem, judged: Judged, loop: str, kind: _Kind) -
     return " and ".join(texts), all(bool((row >= 0.0).all()) for row in rows)
 
 
-def _noise(problem: LoopProblem, new: Judged, old: Judged | None) -> Promise:
+def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None) -> Promise:
     known = problem.noise_psd is not None
     values = new.noise[0]
     limit = problem.noise_limit

@@ -50,7 +50,7 @@ BEFORE = {"estimate": "unknown", "zero": "rest", "backcast": "given"}
 
 
 @dataclass(frozen=True, eq=False)
-class _Found:
+class _SearchResult:
     """Coefficients with what the search left; `skip` first errors of each record do not count."""
 
     theta: Array
@@ -91,7 +91,7 @@ def _require_samples(structure: PolynomialStructure, data: SampledChannels) -> N
         )
 
 
-def _search(structure: PolynomialStructure, data: SampledChannels) -> _Found:
+def _search(structure: PolynomialStructure, data: SampledChannels) -> _SearchResult:
     if structure.is_regression and not structure.backcast:
         found = _regression(structure, data)
         unstable = np.max(np.abs(np.roots([1.0, *found.theta[: structure.na]])), initial=0.0) >= 1.0
@@ -102,7 +102,7 @@ def _search(structure: PolynomialStructure, data: SampledChannels) -> _Found:
     return _iterate(structure, data, polynomial_starts(structure, data), [])
 
 
-def _regression(structure: PolynomialStructure, data: SampledChannels) -> _Found:
+def _regression(structure: PolynomialStructure, data: SampledChannels) -> _SearchResult:
     """ARX: linear in the coefficients, so no iteration."""
     skip = 0 if structure.initial_state == "zero" else structure.longest_lag
     made = regress(
@@ -128,10 +128,10 @@ def _linear(
     degrees: int,
     ending: str,
     skip: int,
-) -> _Found:
+) -> _SearchResult:
     values = dict(zip(structure.names, theta.tolist(), strict=True))
     minimum = LocalMinimum(0.0, 1, values, ending)
-    return _Found(theta, covariance, degrees, (minimum,), 0, [], skip)
+    return _SearchResult(theta, covariance, degrees, (minimum,), 0, [], skip)
 
 
 def _inverse_square(factor: Array) -> Array:
@@ -145,7 +145,7 @@ def _iterate(
     data: SampledChannels,
     starts: Array,
     memory: list[list[float]],
-) -> _Found:
+) -> _SearchResult:
     """Gauss-Newton with the damping of Levenberg and Marquardt from every start."""
     skip = structure.longest_lag if structure.is_regression and not memory else 0
     outcomes = _native.polynomial_fit(
@@ -180,7 +180,9 @@ def _iterate(
     covariance = None
     if _is_determined(factor):
         covariance = squares / degrees * _inverse_square(factor)
-    return _Found(theta, covariance, degrees, _minima(structure, ends), iterations, memory, skip)
+    return _SearchResult(
+        theta, covariance, degrees, _minima(structure, ends), iterations, memory, skip
+    )
 
 
 def _is_determined(factor: Array) -> bool:
@@ -201,7 +203,7 @@ def _minima(
     return tuple(groups)
 
 
-def _backcast_rounds(structure: PolynomialStructure, data: SampledChannels) -> _Found:
+def _backcast_rounds(structure: PolynomialStructure, data: SampledChannels) -> _SearchResult:
     """The past follows from the model and the model from the past, until both rest."""
     of_inputs, of_noise = _native.polynomial_memory(structure.native)
     memory = [[0.0] * (sum(of_inputs) + of_noise) for _ in data.lengths]
@@ -223,7 +225,7 @@ def _assemble(
     structure: PolynomialStructure,
     records: tuple[Record, ...],
     data: SampledChannels,
-    found: _Found,
+    found: _SearchResult,
 ) -> Fit:
     errors = _native.polynomial_errors(
         data.output,
@@ -297,8 +299,8 @@ def _assemble(
 
 
 def _coloured(
-    structure: PolynomialStructure, data: SampledChannels, found: _Found, errors: Array
-) -> _Found:
+    structure: PolynomialStructure, data: SampledChannels, found: _SearchResult, errors: Array
+) -> _SearchResult:
     """Errors of the coefficients by the colour of residuals that no noise model answers for."""
     if found.covariance is None or structure.kernel is not None or has_noise_model(structure):
         return found
@@ -306,7 +308,7 @@ def _coloured(
     return replace(found, covariance=known.covariance, freedom=known.freedom, colour=known.colour)
 
 
-def _parameters(model: PolynomialModel, found: _Found) -> dict[str, Estimate]:
+def _parameters(model: PolynomialModel, found: _SearchResult) -> dict[str, Estimate]:
     made = {}
     for place, (name, coefficient) in enumerate(model.parameters.items()):
         unit, value = coefficient.unit, float(found.theta[place])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Role
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.regression.equation_regression import EquationRegression
-from flightid.identification.regression.rounds import Rows, Settled
+from flightid.identification.regression.rounds import Rows, SettledRounds
 from flightid.models import StateSpaceModel
 from flightid.record import Channel, Record
 from flightid.units import canonical
@@ -42,7 +42,7 @@ def equation_unit(model: StateSpaceModel, name: str) -> str:
 
 
 def compared_records(
-    problem: EquationRegression, settled: Settled, records: Sequence[Record]
+    problem: EquationRegression, settled: SettledRounds, records: Sequence[Record]
 ) -> list[FittedRecord]:
     """Measured and computed sides of the equations in time; of Fourier rows, the band's content."""
     names = problem.names()

@@ -32,7 +32,7 @@ from flightid.identification.regression.options import (
     FourierOptions,
     RegressionOptions,
 )
-from flightid.identification.regression.rounds import Limits, Settled, settle, solve, stack
+from flightid.identification.regression.rounds import Limits, SettledRounds, settle, solve, stack
 from flightid.identification.regression.sampled_equations import (
     MeasuredMotion,
     Reconstruction,
@@ -155,7 +155,7 @@ def _finish(
     problem: EquationRegression,
     data: Record | Sequence[Record],
     options: RegressionOptions,
-    settled: Settled,
+    settled: SettledRounds,
     limits: Limits,
     inner: Inner,
     known: Knowledge,

@@ -25,7 +25,7 @@ from flightid.identification.regression.fourier_output_error import (
     TransformedRecord,
 )
 from flightid.identification.regression.options import FourierOutputErrorOptions
-from flightid.identification.regression.rounds import Rows, Settled, settle, stack
+from flightid.identification.regression.rounds import Rows, SettledRounds, settle, stack
 from flightid.identification.regression.weights import fourier_covariance, spectral_weights
 from flightid.models import StateSpaceModel
 from flightid.record import Record, Step
@@ -71,7 +71,7 @@ def fit_fourier_output_error(
 
 def _search(
     problem: FourierOutputError, omegas: Sequence[Array], options: FourierOutputErrorOptions
-) -> list[Settled]:
+) -> list[SettledRounds]:
     model, count = problem.model, len(problem.records)
     _, limits = limits_of(model, options.maximum_iterations)
     starts = draw_starts(model.parameters.free, options.starts, options.seed)

@@ -59,7 +59,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Settled:
+class SettledRounds:
     """Where the rounds ended.
 
     Attributes
@@ -121,7 +121,9 @@ def solve(
     return end, stacked(end.x)[0]
 
 
-def settle(problem: Regression, start: Array, weigh: Weigh, limits: Limits, count: int) -> Settled:
+def settle(
+    problem: Regression, start: Array, weigh: Weigh, limits: Limits, count: int
+) -> SettledRounds:
     """Alternate weights and parameters until the weights stay.
 
     Parameters
@@ -151,4 +153,4 @@ def settle(problem: Regression, start: Array, weigh: Weigh, limits: Limits, coun
         end, rows = solve(problem, end.x, weights, limits)
         if change < SETTLED:
             break
-    return Settled(end, rows, weights, used)
+    return SettledRounds(end, rows, weights, used)

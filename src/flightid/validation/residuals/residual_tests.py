@@ -258,7 +258,9 @@ class _Setup:
         measures = white_portmanteau(values, self.n_samples, fitted)
         judged = np.ones(lags.size, dtype=np.bool_)
         return self._judged(
-            _Found(kind, output, name, counts, note, lags, values, judged), 1.0, measures
+            _CorrelationValues(kind, output, name, counts, note, lags, values, judged),
+            1.0,
+            measures,
         )
 
     def _independent(self, kind: Kind, output: str, name: str | None, note: str) -> CorrelationTest:
@@ -275,11 +277,11 @@ class _Setup:
         if measures[1] < 1:
             reason = "the input's band is too narrow for so many fitted parameters; use more lags"
             return _not_testable(kind, output, name, True, reason)
-        found = _Found(kind, output, name, True, note, lags, values, judged)
+        found = _CorrelationValues(kind, output, name, True, note, lags, values, judged)
         return self._judged(found, float(covariance[0]), measures)
 
     def _judged(
-        self, found: _Found, variance: float, measures: tuple[float, int, float]
+        self, found: _CorrelationValues, variance: float, measures: tuple[float, int, float]
     ) -> CorrelationTest:
         error = float(np.sqrt(max(variance, 0.0) / self.n_samples))
         sizes = np.abs(found.values[found.judged])
@@ -312,7 +314,7 @@ class _Setup:
 
 
 @dataclass(frozen=True)
-class _Found:
+class _CorrelationValues:
     kind: Kind
     output: str
     input: str | None
