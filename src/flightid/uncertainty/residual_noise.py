@@ -22,6 +22,8 @@ SEPARATIONS = 20
 RESTORATIONS = 2
 TONE = 1.0 - 1e-9
 """Reflection above which a residual predicts itself to rounding, as a pure tone does."""
+SHARPEST = 1e6
+"""Power of one line over the whole power that no sound model reaches."""
 LEAST_FREEDOM = 1.0
 """Below it Student's distribution has no mean, and its interval no meaning."""
 
@@ -91,9 +93,12 @@ class Autoregression:
     def spectrum(self) -> Array:
         """Spectrum at the frequencies of `periodogram`."""
         order = self.weights.size
-        innovation = float(self.lags[0] - self.weights @ self.lags[1 : order + 1])
+        innovation = max(float(self.lags[0] - self.weights @ self.lags[1 : order + 1]), 0.0)
         gain = fft.rfft(np.concatenate(([1.0], -self.weights)), self.length)
-        return np.asarray(max(innovation, 0.0) / np.abs(gain) ** 2)
+        # A pole that rounding puts onto the circle: no line holds more than all power, by far.
+        most = SHARPEST * self.length * max(float(self.lags[0]), np.finfo(float).tiny)
+        least = max(innovation / most, np.finfo(float).tiny)
+        return np.asarray(innovation / np.maximum(np.abs(gain) ** 2, least))
 
 
 def autoregression(
