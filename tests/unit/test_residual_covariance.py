@@ -89,7 +89,7 @@ def _unsound(count: int, longest: int) -> list[int]:
     offenders = []
     for place in range(count):
         found = residual_covariance(_fitted(random, place % 9, longest))
-        absurd = found.colour[1] > 100.0
+        absurd = found.colour[1] > 1000.0
         if absurd or not _is_sound(found):
             offenders.append(place)
     return offenders
