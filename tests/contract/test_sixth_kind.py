@@ -22,7 +22,7 @@ from flightid.identification.black_box import (
 )
 from flightid.identification.details import Details
 from flightid.identification.local_minimum import LocalMinimum
-from flightid.models import LinearSystem, Model
+from flightid.models import Estimated, LinearSystem, Model
 from flightid.models.kinds import KINDS, Kind
 from flightid.models.sampled.coefficients import coefficients
 from flightid.uncertainty.estimate import Estimate
@@ -46,6 +46,7 @@ class LeakModel:
     leak: float
     units: Mapping[str, str] = field(default_factory=dict)
     name: str = "leak"
+    estimated: Estimated | None = None
 
     @property
     def parameters(self):
@@ -139,6 +140,7 @@ def test_a_sixth_kind_needs_its_folder_and_its_lines_in_the_tables(tmp_path: Pat
     fid.export(fit, tmp_path / "leak.c")
     back = fid.load_model(fid.write_model(fit, tmp_path / "leak.toml"))
     assert back.leak == fit.model.leak
+    assert np.array_equal(uncertain_of(back).covariance, fit.covariance)
     assert "leak" in fit.summary().to_text()
     with pytest.raises(fid.FlightidError, match="no such option"):
         fid.identify(LeakStructure(("u",), ("y",)), record, starts=3)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from flightid.conventions import Light
-from flightid.errors import OptionError
+from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
 from flightid.table import Column, Table
 
@@ -196,12 +196,25 @@ class Evidence:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Evidence:
-        """Evidence from its plain values."""
-        checks = tuple(
-            Check(item["name"], Light(item["light"]), item["what"], item["action"])
-            for item in values["checks"]
-        )
-        return cls(checks, tuple(values["required"]))
+        """Evidence from its plain values.
+
+        Raises
+        ------
+        DataError
+            They are none, as in a file that was changed by hand.
+        """
+        try:
+            checks = tuple(
+                Check(item["name"], Light(item["light"]), item["what"], item.get("action", ""))
+                for item in values["checks"]
+            )
+            return cls(checks, tuple(values["required"]))
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise DataError(
+                "these values are no evidence",
+                found=f"{type(error).__name__}: {error}"[:200],
+                needed=f"what {SCHEMA!r} holds",
+            ) from error
 
     def __repr__(self) -> str:
         """Light and numbers of checks on one line."""

@@ -162,9 +162,10 @@ def _matrices(source: object, model: object, path: Path, format: str) -> Exporte
 
 def _parameters(source: object) -> dict[str, object]:
     """Names, values, units, standard errors and covariance, as far as they are known."""
+    found: dict[str, object]
     if isinstance(source, Fit):
         items = list(source.parameters.values())
-        found: dict[str, object] = {
+        found = {
             "names": [item.name for item in items],
             "values": [item.value for item in items],
             "units": [item.unit for item in items],
@@ -175,11 +176,15 @@ def _parameters(source: object) -> dict[str, object]:
             found["covariance"] = np.asarray(source.covariance)
         return found
     model = model_of(source)
+    found = {}
     if isinstance(model, TransferFunctionModel | StateSpaceModel):
         free = model.parameters.independent
-        return {
+        found = {
             "names": [item.name for item in free],
             "values": [float(value) for value in model.parameters.independent_values()],
             "units": [item.unit for item in free],
         }
-    return {}
+    known = getattr(model, "estimated", None)
+    if known is not None and known.covariance is not None:
+        found |= {"free": list(known.names), "covariance": known.covariance}
+    return found

@@ -16,7 +16,7 @@ from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.fitted_response import FittedResponse
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.training import TrainingChannel, training_channels
-from flightid.models import Model
+from flightid.models import Estimated, Model
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.record import Record
 from flightid.table import Cell, Column, Table
@@ -152,6 +152,19 @@ class Fit:
             f"{', '.join(seen)}, average cost {self.average_cost:.2f}{unit}{words})"
         )
 
+    @property
+    def estimated(self) -> Estimated:
+        """What is known of the estimates, as a model's file keeps it."""
+        return Estimated(
+            self.names,
+            self.covariance,
+            self.method,
+            self.intervals_from,
+            {each.name: each.band_rad_s for each in self.responses},
+            self.evidence.to_dict(),
+            self.provenance,
+        )
+
     def uncertain(self) -> Uncertain[Model]:
         """The fitted model with the covariance of its parameters, for what is computed from it.
 
@@ -169,11 +182,7 @@ class Fit:
         >>> fid.identify(truth, data).uncertain()
         Uncertain(3 numbers, covariance known)
         """
-        if self.covariance is None:
-            return Uncertain.exact(self.model, "the fit knows no errors of its data")
-        free = [self.model.parameters[name] for name in self.names]
-        bounds = np.array([p.minimum for p in free]), np.array([p.maximum for p in free])
-        return uncertain_model(self.model, self.names, self.covariance, bounds)
+        return uncertain_model(self.model, self.names, self.covariance)
 
     def summary(self, *, level: float = LEVEL) -> Table:
         """Table of the parameters, with costs and findings below.
@@ -260,22 +269,23 @@ class Fit:
         return "".join(table._repr_html_() for table in (self.summary(), *beside))
 
 
+def _row(p: Estimate, level: float) -> tuple[Cell, ...]:
+    low, high = p.interval(level) or (None, None)
+    guides = (p.cramer_rao_percent, p.insensitivity_percent)
+    return (p.name, p.value, p.unit, p.stderr, low, high, *guides, p.status, p.reason)
+
+
 def uncertain_model(
-    model: Model,
-    names: Sequence[str],
-    covariance: NDArray[np.float64],
-    bounds: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
+    model: Model, names: Sequence[str], covariance: NDArray[np.float64] | None
 ) -> Uncertain[Model]:
-    """A model with the covariance of some of its parameters."""
-    numbers = np.array([model.parameters[name].value for name in names], dtype=np.float64)
+    """A model with the covariance of some of its parameters, inside their bounds."""
+    if covariance is None:
+        return Uncertain.exact(model, "the fit knows no errors of its data")
+    free = [model.parameters[name] for name in names]
+    bounds = np.array([p.minimum for p in free]), np.array([p.maximum for p in free])
+    numbers = np.array([p.value for p in free], dtype=np.float64)
 
     def make(values: NDArray[np.float64]) -> Model:
         return model.with_values(dict(zip(names, map(float, values), strict=True)))
 
     return Uncertain(numbers, covariance, make, bounds)
-
-
-def _row(p: Estimate, level: float) -> tuple[Cell, ...]:
-    low, high = p.interval(level) or (None, None)
-    guides = (p.cramer_rao_percent, p.insensitivity_percent)
-    return (p.name, p.value, p.unit, p.stderr, low, high, *guides, p.status, p.reason)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import OptionError
 from flightid.identification.fit import Fit, uncertain_model
-from flightid.models import PolynomialModel
+from flightid.models import Model, PolynomialModel
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.uncertain import Uncertain
 
@@ -26,8 +26,8 @@ def uncertain_of(
     Parameters
     ----------
     source : Fit, FrequencyResponse, or a model or system
-        A model without fit has no covariance: what is computed from it has no interval. Of a
-        polynomial model its own covariance is taken.
+        A model from the file of a fit has that fit's covariance. A model without fit has none:
+        what is computed from it has no interval. Of a polynomial model its own is taken.
     output, input : str, optional
         Pair of a response; left out, it must have one output.
 
@@ -66,8 +66,11 @@ def uncertain_of(
         return source
     if isinstance(source, Fit):
         return source.uncertain()
+    known = getattr(source, "estimated", None)
+    if isinstance(source, Model) and known is not None:
+        return uncertain_model(source, known.names, known.covariance)
     if isinstance(source, PolynomialModel) and source.covariance is not None:
-        return uncertain_model(source, source.names, source.covariance, None)
+        return uncertain_model(source, source.names, source.covariance)
     if isinstance(source, FrequencyResponse):
         return _of_response(source, output, input)
     return Uncertain.exact(source, NO_COVARIANCE)

@@ -20,6 +20,7 @@ def uncertain_parameters(source: object) -> Uncertain[dict[str, float]]:
     Parameters
     ----------
     source : Fit, StateSpaceModel or TransferFunctionModel
+        A model from the file of a fit has that fit's covariance.
 
     Returns
     -------
@@ -45,8 +46,9 @@ def uncertain_parameters(source: object) -> Uncertain[dict[str, float]]:
         )
     parameters = model.parameters
     tape = parameters.tape(parameters.names)
-    names = source.names if isinstance(source, Fit) else ()
-    covariance = source.covariance if isinstance(source, Fit) else None
+    known = source if isinstance(source, Fit) else model.estimated
+    names = () if known is None else known.names
+    covariance = None if known is None else known.covariance
 
     def make(numbers: NDArray[np.float64]) -> dict[str, float]:
         given: Mapping[str, float] = dict(zip(names, map(float, numbers), strict=True))
@@ -55,6 +57,6 @@ def uncertain_parameters(source: object) -> Uncertain[dict[str, float]]:
 
     centre = np.array([parameters[name].value for name in names], dtype=np.float64)
     reason = "" if covariance is not None else NO_COVARIANCE
-    if isinstance(source, Fit) and covariance is None:
+    if known is not None and covariance is None:
         reason = "the fit knows no errors of its data"
     return Uncertain(centre, covariance, make, None, reason)

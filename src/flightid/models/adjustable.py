@@ -10,13 +10,13 @@ from flightid.models.parameters import Parameters
 
 
 class Adjustable:
-    """Base of frozen models that hold `parameters`."""
+    """Base of frozen models that hold `parameters`; a copy with others is no fit's any more."""
 
     parameters: Parameters
 
     def _with_parameters(self, parameters: Parameters) -> Self:
         # Every model is a dataclass; this base alone is not.
-        return cast("Self", replace(cast("Any", self), parameters=parameters))
+        return cast("Self", replace(cast("Any", self), parameters=parameters, estimated=None))
 
     def with_values(self, values: Mapping[str, float]) -> Self:
         """Copy with other parameter values.

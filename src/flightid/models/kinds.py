@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any, cast
 
 from flightid.errors import ModelError
+from flightid.models.estimated import Estimated
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.linear.description import system_from_table
 from flightid.models.linear.linear_system import LinearSystem
-from flightid.models.model import Model
+from flightid.models.model import Model, model_of
 from flightid.models.narx.description import narx_from_table
 from flightid.models.narx.model import NarxModel
 from flightid.models.polynomial.model import PolynomialModel
@@ -82,20 +84,33 @@ def model_from_description(content: Mapping[str, object]) -> Model:
     if kind is None:
         known = ", ".join(map(repr, KINDS))
         raise ModelError("kind of model is not known", found=repr(word), needed=f"one of {known}")
-    return kind.read(content)
+    plain = dict(content)
+    written = plain.pop("estimated", None)
+    model = kind.read(plain)
+    if written is None:
+        return model
+    if not isinstance(written, Mapping):
+        raise ModelError("estimated must be a table", found=repr(written)[:80])
+    estimated = Estimated.from_dict(written, list(model.parameters))
+    return cast("Model", replace(cast("Any", model), estimated=estimated))
 
 
-def model_to_description(model: object) -> dict[str, object]:
+def model_to_description(source: object) -> dict[str, object]:
     """Plain values of a model with its kind, which `model_from_description` reads.
+
+    Of a fit, and of a model that came from the file of one, also what was known of its parameters.
 
     Raises
     ------
     ModelError
         This is no model.
     """
+    model = model_of(source)
     for kind in KINDS.values():
         if isinstance(model, kind.model):
-            return kind.write(model)
+            known = getattr(source, "estimated", None)
+            table = kind.write(model)
+            return table if known is None else {**table, "estimated": known.to_dict()}
     raise ModelError(
         "this cannot be written as a model",
         found=type(model).__name__,

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol, Self, runtime_checkable
 
 from flightid.errors import ModelError
+from flightid.models.estimated import Estimated
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.realisation import Matrices
 from flightid.models.parameters import Parameter
@@ -43,6 +44,11 @@ class Model(Protocol):
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         """Its numbers by name; coefficients of a black box, none of bare matrices."""
+        ...
+
+    @property
+    def estimated(self) -> Estimated | None:
+        """What a fit knew of the parameters; None for numbers without a fit."""
         ...
 
     @property

@@ -10,7 +10,6 @@ from pathlib import Path
 from flightid.errors import ModelError
 from flightid.files import write_atomically
 from flightid.models.kinds import model_to_description
-from flightid.models.model import model_of
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -21,7 +20,8 @@ def write_model(source: object, path: str | Path) -> Path:
     Parameters
     ----------
     source : Fit or model
-        Of any kind.
+        Of any kind. A fit's covariance, evidence and provenance go along: `load_model` gives a
+        model with them as `estimated`, so that what is computed from it has intervals.
     path : str or Path
         File ending in ``.toml``; its folder must exist. It is written whole or not at all.
 
@@ -64,11 +64,7 @@ def model_as_toml(source: object) -> str:
     >>> print(model_as_toml(load_model("quadrotor_yaw")).splitlines()[1])
     name = "Quadrotor on a rig, yaw"
     """
-    plain = {
-        key: value
-        for key, value in model_to_description(model_of(source)).items()
-        if key != "schema"
-    }
+    plain = {key: value for key, value in model_to_description(source).items() if key != "schema"}
     kind = {"kind": plain.pop("kind", "transfer")}
     single = {k: v for k, v in plain.items() if not isinstance(v, Mapping) and v not in ("", [])}
     lines = [f"{_key(key)} = {_value(value)}" for key, value in {**kind, **single}.items()]

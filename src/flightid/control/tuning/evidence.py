@@ -164,7 +164,10 @@ def _listed(given: Verdicts | Iterable[Verdicts] | None) -> Sequence[Verdicts]:
 
 def _judged(source: object) -> tuple[Finding, ...]:
     """The light of a fit's evidence: red is refused, amber goes on with its gains."""
+    known = getattr(source, "estimated", None)
     examined = getattr(source, "evidence", None)
+    if examined is None and known is not None and known.evidence:
+        examined = GateEvidence.from_dict(known.evidence)
     if not isinstance(examined, GateEvidence):
         return ()
     verdict = examined.verdict
@@ -194,7 +197,8 @@ def _refuse_red(what: str, result: object) -> None:
 
 def _band(source: object) -> Band | None:
     """What all fitted responses have in common."""
-    bands = [getattr(each, "band_rad_s", None) for each in getattr(source, "responses", ())]
+    known_of = getattr(source, "estimated", None)
+    bands = list(known_of.bands.values()) if known_of is not None else []
     known = [band for band in bands if band is not None]
     if not known or len(known) < len(bands):
         return None
@@ -204,7 +208,7 @@ def _band(source: object) -> Band | None:
 
 def _hold_in_model(source: object) -> bool:
     """A fit that was told of held inputs keeps the half sample out of its delay."""
-    provenance = getattr(source, "provenance", {})
+    provenance = getattr(getattr(source, "estimated", source), "provenance", {})
     options = provenance.get("options", provenance) if isinstance(provenance, Mapping) else {}
     hold = options.get("hold", provenance.get("hold")) if isinstance(options, Mapping) else None
     return hold != "zero"

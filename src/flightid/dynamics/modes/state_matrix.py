@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -124,19 +124,21 @@ def _directions(source: object) -> tuple[Array | None, str]:
     uncertain = uncertain_of(source)
     if uncertain.covariance is None:
         return None, uncertain.reason
-    if isinstance(source, Fit) and isinstance(source.model, StateSpaceModel):
-        return _exact_directions(source, source.model), ""
+    model = model_of(source)
+    known = source if isinstance(source, Fit) else getattr(model, "estimated", None)
+    if known is not None and isinstance(model, StateSpaceModel):
+        return _exact_directions(model, known.names, np.asarray(known.covariance)), ""
     order = linear_system(source).order
     slopes = uncertain.slopes(lambda model: np.asarray(linear_system(model).a).ravel())
     return slopes.reshape(-1, order, order), ""
 
 
-def _exact_directions(fit: Fit, model: StateSpaceModel) -> Array:
+def _exact_directions(model: StateSpaceModel, names: Sequence[str], covariance: Array) -> Array:
     """From dA = M⁻¹(dF − dM A), without differences."""
     a, m, by_name = model.state_space()[0], model.matrices().m, model.matrix_derivatives()
     slopes = np.array(
-        [np.linalg.solve(m, by_name[name].f - by_name[name].m @ a) for name in fit.names]
-    ).reshape(len(fit.names), *a.shape)
-    sizes, turned = np.linalg.eigh(np.asarray(fit.covariance))
+        [np.linalg.solve(m, by_name[name].f - by_name[name].m @ a) for name in names]
+    ).reshape(len(names), *a.shape)
+    sizes, turned = np.linalg.eigh(covariance)
     factor = turned * np.sqrt(np.maximum(sizes, 0.0))
     return np.asarray(np.einsum("pk,pst->kst", factor, slopes))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import ModelError
+from flightid.models.estimated import Estimated
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.parameters import Parameter
 from flightid.models.sampled.coefficients import coefficients, replaced
@@ -38,6 +39,7 @@ class InnovationsForm:
     units: Mapping[str, str] = field(default_factory=dict)
     name: str = "innovations model"
     operating_point: Mapping[str, float] = field(default_factory=dict)
+    estimated: Estimated | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", tuple(self.outputs))
@@ -166,7 +168,7 @@ class InnovationsForm:
         cuts = np.cumsum([matrix.size for matrix in self.matrices])[:-1]
         pieces = np.split(np.array(replaced(self.parameters, values)), cuts)
         a, b, c, d, k = (row.reshape(shape) for row, shape in zip(pieces, shapes, strict=True))
-        return replace(self, a=a, b=b, c=c, d=d, k=k)
+        return replace(self, a=a, b=b, c=c, d=d, k=k, estimated=None)
 
     def linear_system(self) -> LinearSystem:
         """The response to the inputs as a recursion; the innovations are left out."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from flightid.errors import FlightidError, ModelError
 from flightid.models.language.reading import (
@@ -44,9 +45,12 @@ def system_from_table(content: Mapping[str, object]) -> LinearSystem:
     delays = [
         read_number(each, "delays_s") for each in read_list(content.get("delays_s", []), "delays_s")
     ]
+    matrices: dict[str, Any] = {
+        key: read_matrix(content.get(key), key, shape) for key, shape in shapes.items()
+    }
     try:
         return LinearSystem(
-            **{key: read_matrix(content.get(key), key, shape) for key, shape in shapes.items()},
+            **matrices,
             inputs=inputs,
             outputs=outputs,
             delays_s=delays,

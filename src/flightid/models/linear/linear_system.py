@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
+from flightid.models.estimated import Estimated
 from flightid.models.linear.delay_states import delays_as_states, shift_registers
 from flightid.models.linear.hold_equivalent import Hold, hold_equivalent
 from flightid.models.linear.rational import Rational
@@ -45,6 +46,8 @@ class LinearSystem(Rational):
     units : mapping of str to str
         Unit by channel and state name; what is left out is dimensionless.
     name : str
+    estimated : Estimated or None
+        What a fit knew of the parameters, where the model comes from its file.
 
     Raises
     ------
@@ -75,6 +78,7 @@ class LinearSystem(Rational):
     sample_time_s: float | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     name: str = "linear system"
+    estimated: Estimated | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         inputs, outputs = tuple(self.inputs), tuple(self.outputs)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Self
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import ModelError
+from flightid.models.estimated import Estimated
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.structure import NarxStructure
@@ -38,6 +39,8 @@ class NarxModel:
     scaling : Scaling
         Of the training records.
     name : str
+    estimated : Estimated or None
+        What a fit knew of the parameters, where the model comes from its file.
 
     Example
     -------
@@ -54,6 +57,7 @@ class NarxModel:
     weights: tuple[float, ...]
     scaling: Scaling
     name: str = "NARX model"
+    estimated: Estimated | None = field(default=None, compare=False)
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -94,7 +98,7 @@ class NarxModel:
         UnknownNameError
             There is no such one.
         """
-        return replace(self, weights=tuple(replaced(self.parameters, values)))
+        return replace(self, weights=tuple(replaced(self.parameters, values)), estimated=None)
 
     def linear_system(self) -> LinearSystem:
         """A NARX model has none.

@@ -42,6 +42,8 @@ class PolynomialModel(Polynomials, StructureMakers):
     operating_point : mapping of str to float
         Value of each channel about which the model holds, in its unit: where the training records
         were. A channel left out counts from zero.
+    estimated : Estimated or None
+        What a fit knew of the parameters, where the model comes from its file.
 
     Raises
     ------

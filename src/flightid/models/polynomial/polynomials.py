@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import ModelError
+from flightid.models.estimated import Estimated
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.parameters import Parameter
 from flightid.models.polynomial.structure import PolynomialStructure
@@ -39,6 +40,7 @@ class Polynomials:
     units: Mapping[str, str] = field(default_factory=dict)
     name: str = "polynomial model"
     operating_point: Mapping[str, float] = field(default_factory=dict)
+    estimated: Estimated | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         inputs = tuple(self.inputs)
@@ -232,7 +234,7 @@ class Polynomials:
         made = self.from_theta(
             self.structure, replaced(self.parameters, values), self.sample_time_s
         )
-        return replace(self, a=made.a, b=made.b, c=made.c, d=made.d, f=made.f)
+        return replace(self, a=made.a, b=made.b, c=made.c, d=made.d, f=made.f, estimated=None)
 
     def linear_system(self) -> LinearSystem:
         """The response to the inputs as a recursion; the noise model is left out."""

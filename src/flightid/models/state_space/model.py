@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 from flightid import _native
 from flightid.errors import ModelError
+from flightid.models.estimated import Estimated
 from flightid.models.language.blocks import Block
 from flightid.models.language.record_values import RecordValue
 from flightid.models.language.tables import TableFunction
@@ -63,6 +64,8 @@ class StateSpaceModel(Linearised):
         Actuators, sensors and filters that are already written out in states and equations.
     bare : StateSpaceModel or None
         The model without its blocks.
+    estimated : Estimated or None
+        What a fit knew of the parameters, where the model comes from its file.
 
     Raises
     ------
@@ -112,6 +115,7 @@ class StateSpaceModel(Linearised):
     biases: Mapping[str, RecordValue] = field(default_factory=dict)
     blocks: tuple[Block, ...] = ()
     bare: StateSpaceModel | None = field(default=None, compare=False)
+    estimated: Estimated | None = field(default=None, compare=False)
     native: _native.StateSpace = field(init=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid import _native
 from flightid.errors import DataError, ModelError, UnknownNameError
 from flightid.models.adjustable import Adjustable
+from flightid.models.estimated import Estimated
 from flightid.models.language.dimensions import require_unit
 from flightid.models.language.formula import formula_names
 from flightid.models.linear.linear_system import LinearSystem
@@ -88,6 +89,8 @@ class TransferFunctionModel(Adjustable):
         Unit by channel name; a channel left out is dimensionless.
     name, source, note : str
         What it is, where it comes from, what to know.
+    estimated : Estimated or None
+        What a fit knew of the parameters, where the model comes from its file.
 
     Raises
     ------
@@ -114,6 +117,7 @@ class TransferFunctionModel(Adjustable):
     name: str = "transfer functions"
     source: str = ""
     note: str = ""
+    estimated: Estimated | None = field(default=None, compare=False)
     native: _native.TransferFunctions = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
