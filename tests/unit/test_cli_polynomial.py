@@ -34,7 +34,7 @@ def test_a_fit_with_validation(files, capsys):
     )
     assert code == 0, err
     values = json.loads(out)
-    assert values["schema"] == "flightid.polynomial_fit/1"
+    assert values["schema"] == "flightid.fit/1"
     assert abs(values["parameters"]["a1"]["value"] + 1.5) < 0.05
     assert "free run" in err
 

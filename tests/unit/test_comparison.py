@@ -73,7 +73,7 @@ def test_a_better_rival_is_amber_and_the_verdicts_on_the_rival_do_not_count() ->
 
 def test_equal_models_cannot_be_told_apart() -> None:
     result = fid.verify([_lag(2.0), _lag(2.0)], _flown(0.05))
-    assert result.names == ("LinearSystem (1)", "LinearSystem (2)")
+    assert result.names == ("linear system (1)", "linear system (2)")
     assert result.contrast("p").p_value == 1.0
     assert result.contrast("p").better is None
     assert "cannot tell" in str(result.summary())
