@@ -71,8 +71,8 @@ def table_1(study: fid.Study) -> Table:
         Column("structure"),
     )
     rows: list[tuple[Cell, ...]] = []
-    for item in study.black_boxes:
-        channel = f"{item.settings.output}/{item.settings.inputs[0]}"
+    for item in study.identified:
+        channel = f"{item.settings.structure.outputs[0]}/{item.settings.structure.inputs[0]}"
         if item.fit is None:
             rows.append((channel, PUBLISHED_HZ[channel], None, None, None, "left out"))
             continue
@@ -191,7 +191,7 @@ def analyse(folder: Path, seed: int) -> fid.Study:
     print(study.summary().to_text(), "\n")
     print(table_1(study).to_text(), "\n")
     print("Equations (3) to (6) from these records")
-    for item in study.black_boxes:
+    for item in study.identified:
         if item.fit is not None:
             print(equation(item.fit))
     print()

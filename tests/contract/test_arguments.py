@@ -151,13 +151,13 @@ OWN = {
     ),
     "simulation": ("parts of a run; two signals that are compared", "measured n_samples place "
                    "predicted substeps weights"),
-    "study": ("a folder, and a stage to run", "output tune"),
+    "study": ("a folder, and a stage to run", "cache output tune"),
     "table": ("a column by number", "index"),
     "uncertainty": ("a function that carries a covariance", "count factor function missing place "
                     "reason scale thing"),
     "validation": (
         "orders of a scan; correlations of residuals by output and input",
-        "criterion fitted_input fitted_noise horizons input lags maximum_lag measured na nb nc nd "
+        "criterion fitted_input fitted_noise input lags maximum_lag measured na nb nc nd "
         "nf nk output predicted residuals rival rows verdict widths",
     ),
 }  # fmt: skip

@@ -32,7 +32,7 @@ band_rad_s = [2.0, 20.0]
 name = "Recursion"
 structure = "arx"
 inputs = ["tau_phi"]
-output = "p"
+outputs = "p"
 identify = "flown"
 band_rad_s = [2.0, 20.0]
 na = 1
@@ -60,8 +60,7 @@ def study(flown: Path) -> fid.Study:
 
 
 def test_a_study_shows_the_light_of_its_fits_on_every_page(study: fid.Study) -> None:
-    verdicts = [item.fit.evidence.verdict for item in study.identified]
-    verdicts += [box.fit.evidence.verdict for box in study.black_boxes if box.fit is not None]
+    verdicts = [item.fit.evidence.verdict for item in study.identified if item.fit is not None]
     assert len(verdicts) == 2
     text, page = to_text(study.document), to_html(study.document)
     stored = json.loads((study.output / "results.json").read_text(encoding="utf-8"))

@@ -285,16 +285,18 @@ def test_the_linear_twin_rotor_study_finds_the_published_modes(tmp_path: Path) -
     run = _script(script, "rig", "--seed", "1", folder=tmp_path)
     assert run.returncode == 0, run.stderr[-3000:]
     results = json.loads((tmp_path / "rig" / "output" / "results.json").read_text("utf-8"))
-    boxes = {box["name"]: box for box in results["black_boxes"]}
+    boxes = {box["name"]: box for box in results["models"]}
     left = boxes.pop("Pitch from the tail rotor")
-    assert left["fit"] is None
+    assert left["fits"] == {}
     assert "too narrow to fit" in left["left_out"][0]["message"]
     assert len(boxes) == 3
     for box in boxes.values():
-        assert box["coherence"]["pairs"][0]["kept"], box["name"]
-        free = [r for r in box["cross_validation"]["runs"] if r["horizon"] == "free run"]
+        assert box["coherent"]["pairs"][0]["kept"], box["name"]
+        runs = box["verifications"].values()
+        free = [run["outputs"] for run in runs if run["horizon"] == "free_run"]
         assert len(free) == 2
-        assert max(each["theil"] for each in free) < 0.3, box["name"]
+        worst = max(each["theil"] for run in free for each in run.values())
+        assert worst < 0.3, box["name"]
     rows = [line.split() for line in run.stdout.splitlines() if line.startswith("y")]
     pitch = [float(row[4]) for row in rows if row[0] == "y1/u1" and row[1:3] == ["0.1", "and"]]
     assert min(abs(value - 0.337) for value in pitch) < 0.01
@@ -315,16 +317,17 @@ def test_noise_trains_a_narx_model_of_the_rig_better_than_two_levels(tmp_path: P
     results = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
     fits = {
         box["name"]: {
-            (each["record"], each["model"]): each["fit_percent"]
-            for each in box["cross_validation"]["runs"]
-            if each["horizon"] == "free run"
+            (record, name): run["outputs"]["y1"]["fit_percent"]
+            for record in ("3-2-1-1", "doublet")
+            for name, run in box["verifications"][record]["verifications"].items()
         }
-        for box in results["black_boxes"]
+        for box in results["models"]
     }
-    noise, levels = fits["Trained by noise"], fits["Trained by PRBS"]
+    noise, levels = "Trained by noise", "Trained by PRBS"
     for record in ("3-2-1-1", "doublet"):
-        assert noise[record, "model"] > 80.0
-        assert noise[record, "model"] > noise[record, "linear, same lags"]
-        assert noise[record, "model"] > levels[record, "model"] + 5.0
+        ours = fits[noise][record, noise]
+        assert ours > 80.0
+        assert ours > fits[noise][record, "linear, same lags"]
+        assert ours > fits[levels][record, levels] + 5.0
     assert "the goal of 0.002 was not reached" in run.stdout
     assert "not testable" in run.stdout

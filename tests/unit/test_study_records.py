@@ -41,7 +41,7 @@ units = { drive = "V" }
 name = "Angle"
 structure = "armax"
 inputs = ["drive", "idle"]
-output = "angle"
+outputs = "angle"
 identify = "fitted"
 select = "choice"
 verify = "unseen"
@@ -95,7 +95,7 @@ def study(folder: Path) -> fid.Study:
 
 
 def test_the_input_without_coherence_is_left_out_and_the_rest_is_found(study: fid.Study) -> None:
-    item = study.black_boxes[0]
+    item = study.identified[0]
     assert [finding.code for finding in item.left_out] == ["left-out"]
     assert "angle/idle is left out: coherence reaches" in item.left_out[0].message
     assert isinstance(item.fit.model, fid.PolynomialModel)
@@ -109,15 +109,17 @@ def test_the_input_without_coherence_is_left_out_and_the_rest_is_found(study: fi
 
 
 def test_every_stage_stands_in_results_and_report(study: fid.Study) -> None:
-    item = study.black_boxes[0]
+    item = study.identified[0]
     assert item.tests is not None
-    assert item.cross is not None
+    assert list(item.verifications) == ["unseen", "unseen, 1 ahead"]
     assert item.spectra is not None
-    assert {run.record.name for run in item.cross.runs} == {"unseen"}
     results = json.loads((study.output / "results.json").read_text(encoding="utf-8"))
-    box = results["black_boxes"][0]
-    for stage in ("coherence", "choice", "fit", "residual_tests", "cross_validation", "spectra"):
+    box = results["models"][0]
+    for stage in ("coherent", "choice", "residual_tests", "spectra"):
         assert box[stage]["schema"].startswith("flightid.")
+    for group in ("fits", "responses", "verifications"):
+        for value in box[group].values():
+            assert value["schema"].startswith("flightid.")
     assert results["inspection"] is None
     text = to_text(study.document)
     for title in ("Coherence", "Choice of the structure", "Residual tests", "Spectra", "Records"):
@@ -127,12 +129,12 @@ def test_every_stage_stands_in_results_and_report(study: fid.Study) -> None:
     series = [name for figure in figures for name in figure.series]
     assert any(name.startswith("taken: na 2, ") for name in series)
     assert "1 model" in repr(study)
-    assert study.summary().title == "Black-box models"
+    assert study.summary().title == "Models"
     assert set(study.files) == {"study.toml", "rig.csv", "rig.mat"}
 
 
 def test_a_balanced_choice_takes_the_noise_model_that_whitens(study: fid.Study) -> None:
-    item = study.black_boxes[0]
+    item = study.identified[0]
     assert isinstance(item.choice, fid.OrderScan)
     assert item.tests is not None
     assert item.tests.test("εε", "angle").verdict == "pass"
@@ -144,7 +146,7 @@ def test_a_balanced_choice_takes_the_noise_model_that_whitens(study: fid.Study) 
 def test_the_other_rules_choose_as_they_say(choose: str, folder: Path) -> None:
     text = units_in_mat(LINEAR).replace("na = ", f'choose = "{choose}"\nna = ')
     found = fid.run_study(written(folder, text), output=folder / "rules")
-    item = found.black_boxes[0]
+    item = found.identified[0]
     scan, fit = item.choice, item.fit
     assert isinstance(scan, fid.OrderScan)
     assert isinstance(fit.model, fid.PolynomialModel)
@@ -160,7 +162,7 @@ def test_the_other_rules_choose_as_they_say(choose: str, folder: Path) -> None:
 NARX = """
 structure = "narx"
 inputs = "drive"
-output = "angle"
+outputs = "angle"
 identify = "fitted"
 select = "choice"
 verify = "unseen"
@@ -175,12 +177,13 @@ stop = "bic"
 def test_a_narx_model_is_searched_and_tested(folder: Path) -> None:
     head = units_in_mat(LINEAR).split("structure")[0]
     found = fid.run_study(written(folder, head + NARX), output=folder / "narx")
-    item = found.black_boxes[0]
+    item = found.identified[0]
     assert isinstance(item.choice, fid.validation.NarxSearch)
     assert len(item.choice.trials) == 4
     assert isinstance(item.fit.model, fid.NarxModel)
-    assert item.cross is not None
-    assert {run.model for run in item.cross.runs} == {"model", "linear, same lags"}
+    beside = item.verifications["unseen"]
+    assert isinstance(beside, fid.Comparison)
+    assert beside.names == ("Angle", "linear, same lags")
     assert item.tests is not None
     assert str(item.tests.horizon) == "one step ahead"
     text = to_text(found.document)
@@ -190,7 +193,7 @@ def test_a_narx_model_is_searched_and_tested(folder: Path) -> None:
 def test_one_structure_needs_no_choice(folder: Path) -> None:
     text = units_in_mat(LINEAR).replace('select = "choice"\n', "")
     text = re.sub(r"na = .*\nnb = .*\nnc = .*\nnk = .*", "na = 2\nnb = 1\nnc = 2\nnk = 2", text)
-    item = fid.run_study(written(folder, text), output=folder / "one").black_boxes[0]
+    item = fid.run_study(written(folder, text), output=folder / "one").identified[0]
     assert item.choice is None
     assert item.fit is not None
 

@@ -7,25 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flightid.findings import Finding
+from flightid.findings import Finding, worst
 from flightid.plot.fit import EstimateBar, parameter_intervals
 from flightid.report.blocks import provenance
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.handling_qualities import handling_qualities_blocks
 from flightid.report.tuning import tuning_section
-from flightid.study.black_box_section import (
-    black_box_in_short,
-    black_box_section,
-    black_box_table,
-)
+from flightid.study.estimate_tables import model_table, structure_words
 from flightid.study.model_section import model_section
 from flightid.study.truth import recovered
 from flightid.table import Cell, Column, Table
 from flightid.version import VERSION
 
 if TYPE_CHECKING:
-    from flightid.study.stages import Identified
+    from flightid.study.identified import Identified
     from flightid.study.study import Study
     from flightid.uncertainty.estimate import Estimate
 
@@ -44,7 +40,6 @@ def study_document(study: Study) -> Document:
     """
     settings = study.settings
     models = [model_section(item, study.truth) for item in study.identified]
-    models += map(black_box_section, study.black_boxes)
     gains = () if study.tuning is None else (tuning_section(study.tuning),)
     return Document(
         settings.title,
@@ -117,6 +112,8 @@ def _beside(study: Study) -> str:
 
 def _parameters(study: Study) -> Iterator[tuple[Identified, Estimate, float | None]]:
     for item in study.identified:
+        if item.fit is None or item.settings.structure is not None:
+            continue
         truth = {} if study.truth is None else study.truth.parameters(item.fit.model)
         if item.reference is not None:
             truth = {
@@ -137,8 +134,7 @@ def _inside(parameter: Estimate, true_value: float | None) -> bool | None:
 def _result(study: Study) -> list[Block]:
     notes = study.settings.notes
     blocks: list[Block] = [Paragraph(notes)] if notes else []
-    short = [*map(_in_short, study.identified), *map(black_box_in_short, study.black_boxes)]
-    blocks.append(Lights(tuple(short), repeats=True))
+    blocks.append(Lights(tuple(map(_in_short, study.identified)), repeats=True))
     # A tied parameter follows another: it would count the same miss twice.
     inside = [
         _inside(parameter, true)
@@ -148,18 +144,21 @@ def _result(study: Study) -> list[Block]:
     judged = np.array([value for value in inside if value is not None], dtype=bool)
     if judged.size:
         blocks.append(Lights((recovered(judged),)))
-    if study.identified:
+    if len(study.identified) > 1 or not study.has_equations:
+        blocks.append(TableBlock(model_table(study.identified)))
+    if study.has_equations:
         blocks.append(TableBlock(parameter_table(study)))
-    if study.black_boxes:
-        blocks.append(TableBlock(black_box_table(study.black_boxes)))
     return [*blocks, *_interval_figure(study)]
 
 
 def _in_short(item: Identified) -> Finding:
     """One line about a model: the light of its evidence, and the first reason for it."""
+    if item.fit is None:
+        return Finding("model", worst(item.findings), f"{item.name}: {item.left_out[0].message}")
     verdict = item.fit.evidence.verdict
-    name, fitted = item.settings.name, item.fit
-    first = f"{name}: average cost {fitted.average_cost:.3g}"
+    first = f"{item.name}: average cost {item.fit.average_cost:.3g}"
+    if item.settings.structure is not None:
+        first = f"{item.name}: {structure_words(item.fit)}"
     return Finding("model", verdict.light, f"{first}; {verdict.message}", verdict.action)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from flightid.errors import StudyError
 from flightid.identification.methods import METHODS, RECORDS
+from flightid.identification.prediction.request import FREE_RUN
 from flightid.models import StateSpaceModel
 from flightid.options import options_of, read_options
 from flightid.study.reading import TableReader
@@ -49,16 +50,25 @@ class VerifySettings:
     state_bias, output_bias : bool or None
     against_responses : bool
         Whether models are also judged against the measured responses.
-    residual_tests : bool
-        Whether residuals of fits to records are tested.
+    horizons : tuple of int or "free_run"
+        Samples ahead; empty: a free run, and of models without equations one sample as well.
+    residual_tests : bool or None
+        Whether residuals of fits to records are tested; None: of models without equations.
+    spectra : bool or None
+        Whether the spectrum of a free run stands beside the measured one; None: the same.
+    without_equations : bool
+        What of a model is usual where nothing is said.
     """
 
     initial_state: str | None = None
     settle_s: float | None = None
     state_bias: bool | None = None
     output_bias: bool | None = None
-    residual_tests: bool = False
+    horizons: tuple[int | str, ...] = ()
+    residual_tests: bool | None = None
+    spectra: bool | None = None
     against_responses: bool = False
+    without_equations: bool = False
 
     @property
     def options(self) -> dict[str, Any]:
@@ -66,6 +76,21 @@ class VerifySettings:
         names = ("initial_state", "settle_s", "state_bias", "output_bias")
         given = {name: getattr(self, name) for name in names}
         return {name: value for name, value in given.items() if value is not None}
+
+    @property
+    def ahead(self) -> tuple[int | str, ...]:
+        """Horizons of the predictions, the one that counts first."""
+        return self.horizons or ((FREE_RUN, 1) if self.without_equations else (FREE_RUN,))
+
+    @property
+    def tests_residuals(self) -> bool:
+        """Whether residuals are tested."""
+        return self.without_equations if self.residual_tests is None else self.residual_tests
+
+    @property
+    def compares_spectra(self) -> bool:
+        """Whether spectra stand side by side."""
+        return self.without_equations if self.spectra is None else self.spectra
 
 
 def read_fit(reader: TableReader, usual: FitSettings | None = None) -> FitSettings:
@@ -107,8 +132,18 @@ def read_verify(reader: TableReader, usual: VerifySettings | None = None) -> Ver
         given(reader.positive, "settle_s", usual.settle_s),
         given(reader.flag, "state_bias", usual.state_bias),
         given(reader.flag, "output_bias", usual.output_bias),
-        reader.flag("residual_tests", usual.residual_tests),
+        _horizons(reader, usual.horizons),
+        given(reader.flag, "residual_tests", usual.residual_tests),
+        given(reader.flag, "spectra", usual.spectra),
         reader.flag("against_responses", usual.against_responses),
     )
     reader.finish()
     return made
+
+
+def _horizons(reader: TableReader, usual: tuple[int | str, ...]) -> tuple[int | str, ...]:
+    def fits(value: object) -> bool:
+        counted = isinstance(value, int) and not isinstance(value, bool) and value > 0
+        return counted or value == FREE_RUN
+
+    return reader.several("horizons", fits, "'free_run' or a number of samples", usual)

@@ -1,18 +1,21 @@
-"""What a study file may say about a model with equations."""
+"""What a study file may say about a model: equations, or a structure without them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
 from flightid.study.reading import TableReader
 from flightid.study.response_settings import ResponseSettings, read_response
+from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings, read_structure
 
 COHERENT, UNBROKEN = "coherent", "unbroken"
 """Responses by coherence: over all coherent frequencies, or over the widest band without a gap."""
+METHODS = {NARX: "orthogonal_least_squares", SUBSPACE: "subspace"}
+"""How a structure is fitted; the others by prediction errors."""
 
 
 @dataclass(frozen=True)
@@ -23,8 +26,8 @@ class ModelSettings:
     ----------
     name : str
         Title in the report.
-    template : str
-        Name of a library model, or path of a model file.
+    template : str or None
+        Name of a library model, or path of a model file; None for a structure.
     axis : str or None
         Axis of a library model that is written for any.
     identify, verify : tuple of str
@@ -59,10 +62,12 @@ class ModelSettings:
         Whether the reduction that the study asks for is meant for this model.
     reference : str or None
         Model whose parameters and modes stand beside the estimates: library name or model file.
+    structure : StructureSettings or None
+        A structure without equations, whose order is looked for.
     """
 
     name: str
-    template: str
+    template: str | None
     axis: str | None
     identify: tuple[str, ...]
     verify: tuple[str, ...]
@@ -81,16 +86,18 @@ class ModelSettings:
     reference: str | None = None
     values_from: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     reduce: bool = True
+    structure: StructureSettings | None = None
 
     @property
     def segments(self) -> tuple[str, ...]:
         """Every record that the model uses."""
-        return (*self.identify, *self.joint, *self.verify)
+        beside = (*self.structure.select, *self.structure.coherence) if self.structure else ()
+        return (*self.identify, *self.joint, *self.verify, *beside)
 
     @property
-    def template_path(self) -> Path | None:
-        """Path of the model file; None for a library model."""
-        return Path(self.template) if self.template.endswith(".toml") else None
+    def flown(self) -> tuple[str, ...]:
+        """Records of the frequency responses."""
+        return self.identify if self.structure is None else self.structure.coherence
 
     @property
     def by_coherence(self) -> bool:
@@ -107,17 +114,19 @@ def read_model(
     check: VerifySettings,
     reduced: bool,
 ) -> ModelSettings:
-    """Check one table ``[[model]]`` with equations; what it says of stages goes over the study's.
+    """Check one table ``[[model]]``; what it says of stages goes over the study's.
 
     Raises
     ------
     StudyError
         A key is unknown or a value does not fit.
     """
-    template = reader.text("template")
     response = read_response(reader.table("response"), response)
-    fit = read_fit(reader.table("fit"), fit)
     check = read_verify(reader.table("check"), check)
+    if "structure" in reader:
+        return _without_equations(reader, folder, response=response, check=check)
+    template = reader.text("template")
+    fit = read_fit(reader.table("fit"), fit)
     joint = reader.names("joint", ())
     if joint and fit.method != "joint":
         raise reader.error(
@@ -127,13 +136,6 @@ def read_model(
         raise reader.error(
             "joint", "is missing", found="none", needed="records beside those of the responses"
         )
-    band = (
-        reader.interval("band_rad_s")
-        if fit.on_responses
-        else reader.maybe(reader.interval, "band_rad_s")
-    )
-    if band is not None and band[0] <= 0:
-        raise reader.error("band_rad_s", "does not fit", found=band, needed="positive frequencies")
     reference = reader.maybe(reader.text, "reference")
     made = ModelSettings(
         reader.text("name"),
@@ -141,7 +143,7 @@ def read_model(
         reader.maybe(reader.text, "axis"),
         reader.names("identify"),
         reader.names("verify", ()),
-        band,
+        _band(reader, required=fit.on_responses),
         response,
         fit,
         check,
@@ -149,7 +151,7 @@ def read_model(
         reader.names("responses", ()),
         reader.names("outputs", ()),
         read_overrides(reader),
-        {rival: _placed(folder, rival) for rival in reader.names("rivals", ())},
+        _rivals(reader, folder),
         *((reader.names("keep", ()), reader.names("drop", ())) if reduced else ((), ())),
         condition=reader.maybe(reader.text, "condition"),
         reference=None if reference is None else _placed(folder, reference),
@@ -158,6 +160,42 @@ def read_model(
     )
     reader.finish()
     return made
+
+
+def _without_equations(
+    reader: TableReader, folder: Path, *, response: ResponseSettings, check: VerifySettings
+) -> ModelSettings:
+    identify = reader.names("identify")
+    structure = read_structure(reader, identify)
+    made = ModelSettings(
+        reader.text("name"),
+        None,
+        None,
+        identify,
+        reader.names("verify", ()),
+        _band(reader, required=True),
+        response,
+        FitSettings(METHODS.get(structure.kind, "prediction_error")),
+        replace(check, without_equations=True),
+        rivals=_rivals(reader, folder),
+        condition=reader.maybe(reader.text, "condition"),
+        structure=structure,
+    )
+    reader.finish()
+    return made
+
+
+def _band(reader: TableReader, *, required: bool) -> tuple[float, float] | None:
+    band = (
+        reader.interval("band_rad_s") if required else reader.maybe(reader.interval, "band_rad_s")
+    )
+    if band is not None and band[0] <= 0:
+        raise reader.error("band_rad_s", "does not fit", found=band, needed="positive frequencies")
+    return band
+
+
+def _rivals(reader: TableReader, folder: Path) -> dict[str, str]:
+    return {rival: _placed(folder, rival) for rival in reader.names("rivals", ())}
 
 
 def _values_from(reader: TableReader) -> dict[str, tuple[str, ...]]:

@@ -17,7 +17,8 @@ from flightid.errors import StudyError
 from flightid.study.reading import TableReader
 
 if TYPE_CHECKING:
-    from flightid.study.stages import Identified, Task
+    from flightid.study.identified import Identified
+    from flightid.study.task import Task
 
 BAND_RAD_S = (0.1, 100.0)
 CONDITIONS: dict[str, dict[str, tuple[str, ...]]] = {
@@ -132,7 +133,7 @@ def require_pairs(tasks: Iterable[Task], settings: QualitiesSettings) -> None:
     StudyError
         There is no model with equations, or none with the output and control of an axis.
     """
-    models = [task.model for task in tasks]
+    models = [task.model for task in tasks if task.model is not None]
     if not models:
         raise StudyError(
             "handling qualities are read off models with equations",
@@ -164,6 +165,8 @@ def rate_models(
     """
     found = {}
     for item in identified:
+        if item.fit is None or item.settings.structure is not None:
+            continue
         model, axes = item.fit.model, settings.axes
         if axes is not None:
             axes = {

@@ -116,6 +116,18 @@ class TableReader:
         found = self._take(key, default, fits, "a list of different texts")
         return (found,) if isinstance(found, str) else tuple(found)
 
+    def several(
+        self, key: str, fits: Callable[[Any], bool], needed: str, default: Iterable[Any] = REQUIRED
+    ) -> tuple[Any, ...]:
+        """Different values that each fit; one alone may stand for a list of one."""
+
+        def each_fits(value: object) -> bool:
+            listed = value if isinstance(value, list) else [value]
+            return bool(listed) and all(map(fits, listed)) and len(set(listed)) == len(listed)
+
+        found = self._take(key, default, each_fits, f"{needed}, or a list of them")
+        return tuple(found) if isinstance(found, list | tuple) else (found,)
+
     def numbers(
         self, key: str, default: Iterable[float] = REQUIRED, *, length: int | None = None
     ) -> tuple[float, ...]:

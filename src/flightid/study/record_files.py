@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from flightid.conventions import Role
 from flightid.errors import StudyError
-from flightid.record import Record, read_records
+from flightid.record import InputShape, Record, read_records
+from flightid.record.hold import HOLDS, LOOPS
 from flightid.study.reading import TableReader
 
+UNKNOWN = InputShape()
 ALL = "*"
 """Manoeuvre that stands for all of a file."""
 
@@ -40,6 +43,8 @@ class RecordFile:
         Column of a channel, where it has another name.
     units : mapping of str to str
         Unit of a channel, where the file does not say.
+    shape : InputShape
+        What is known of the inputs beyond their samples.
     """
 
     name: str
@@ -51,6 +56,7 @@ class RecordFile:
     resample_to_s: float | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    shape: InputShape = UNKNOWN
 
 
 def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
@@ -71,9 +77,27 @@ def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
         reader.maybe(reader.positive, "resample_to_s"),
         _texts(reader.table("columns"), reader.values("columns")),
         _texts(reader.table("units"), reader.values("units")),
+        read_shape(reader),
     )
     reader.finish()
     return made
+
+
+def read_shape(reader: TableReader) -> InputShape:
+    """Take what a table says of the inputs between samples, their repetition and the loop."""
+    given: dict[str, Any] = {
+        "hold": reader.maybe(lambda key: reader.choice(key, HOLDS), "hold"),
+        "period_s": reader.maybe(reader.positive, "period_s"),
+        "loop": reader.maybe(lambda key: reader.choice(key, LOOPS), "loop"),
+    }
+    return InputShape(**given)
+
+
+def declared(record: Record, shape: InputShape) -> Record:
+    """The record with what the study knows of its inputs; what is left out stays."""
+    if shape == UNKNOWN:
+        return record
+    return record.declare(hold=shape.hold, period_s=shape.period_s, loop=shape.loop)
 
 
 def _texts(reader: TableReader, values: Mapping[str, object]) -> dict[str, str]:
@@ -138,6 +162,7 @@ def load_records(file: RecordFile, roles: Mapping[str, Role]) -> list[Record]:
 
 
 def _named(file: RecordFile, record: Record, name: str) -> Record:
-    if file.span_s is None:
-        return record.replace(name=name)
-    return record.segment(*file.span_s, name=name)
+    known = declared(record, file.shape)
+    return (
+        known.replace(name=name) if file.span_s is None else known.segment(*file.span_s, name=name)
+    )

@@ -22,11 +22,15 @@ class ReduceSettings:
     rough : bool
         The path needs neither intervals nor corrections of bias: the reduced structure is fitted
         once more with both.
+    keep, drop : tuple of str
+        Parameters that stay, or go first; each model says its own.
     """
 
     limits: ReductionLimits
     after_rise: str
     rough: bool = False
+    keep: tuple[str, ...] = ()
+    drop: tuple[str, ...] = ()
 
 
 def read_reduce(reader: TableReader) -> ReduceSettings:

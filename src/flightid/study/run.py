@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import MutableMapping
 from pathlib import Path
+from typing import Any
 
 from flightid.files import sha256_of_file
 from flightid.progress import progress
 from flightid.report.html import to_html
 from flightid.report.text import to_text
-from flightid.study.black_box import identify_black_box
-from flightid.study.evidence import examined
 from flightid.study.output import RESULTS, require_replaceable, whole_folder
+from flightid.study.pipeline import identify_models
 from flightid.study.qualities import rate_models, require_pairs
-from flightid.study.settings import Settings, read_settings
-from flightid.study.stages import (
-    Identified,
-    Task,
-    check,
-    choose_responses,
-    estimate,
-    examine_residuals,
-    fit,
-    load_task,
-    start_from,
-)
+from flightid.study.settings import read_settings
+from flightid.study.stage_runner import StageRunner
 from flightid.study.study import Study
-from flightid.study.taking import Taken, take
+from flightid.study.taking import take
+from flightid.study.task import load_task
 from flightid.study.tuning import TuneSettings, tune_models
 
 
@@ -37,6 +28,7 @@ def run_study(
     output: str | Path | None = None,
     log: str | Path | None = None,
     tune: bool = False,
+    cache: MutableMapping[str, Any] | None = None,
 ) -> Study:
     """Carry out a study file: log or records, responses, models, verification, report.
 
@@ -52,6 +44,9 @@ def run_study(
         Log to read instead of the one that the study names.
     tune : bool
         Tune gains with the usual requirements where the study does not say any.
+    cache : mutable mapping of str to object, optional
+        Results of stages by the hash of all that they depend on. Whoever gives the same mapping
+        to the next run pays only for the stages behind what has changed.
 
     Returns
     -------
@@ -76,70 +71,38 @@ def run_study(
     settings = read_settings(source)
     final = Path(output) if output is not None else source.with_name(f"{source.stem}-output")
     require_replaceable(final)
-    tasks = [load_task(model) for model in settings.models]
+    names = tuple(model.name for model in settings.models)
+    tasks = [load_task(model, names) for model in settings.models]
     rated = settings.qualities
     if rated is not None:
         require_pairs(tasks, rated)
+    runner = StageRunner(cache)
     # Reading and cutting, three steps for each model, writing; a flight before all of it.
-    steps = 3 + 3 * (len(tasks) + len(settings.black_boxes))
-    with whole_folder(final) as folder, progress(steps, source.stem) as advance:
-        taken = take(settings, tasks, None if log is None else Path(log), folder)
+    with whole_folder(final) as folder, progress(3 + 3 * len(tasks), source.stem) as advance:
+        taken = take(settings, tasks, None if log is None else Path(log), folder, runner)
         advance(2)
-        identified: tuple[Identified, ...] = ()
-        for task in tasks:
-            begun = start_from(task, identified)
-            identified = (*identified, _identify(begun, taken, settings, advance))
-        boxes = []
-        for asked in settings.black_boxes:
-            boxes.append(identify_black_box(asked, taken.records, taken.inspection))
-            advance(3)
+        identified, _ = identify_models(
+            tasks, taken.records, taken.inspection, settings.reduce, runner, advance
+        )
         wanted = settings.tune or (TuneSettings() if tune else None)
-        tuning = None if wanted is None else tune_models(identified, taken.log, wanted)
+        flown = None if taken.log is None else taken.log.value
         files = {item.name: sha256_of_file(item) for item in (source, *taken.files)}
         study = Study(
             settings,
             final,
             taken.inspection,
-            taken.records,
+            {str(each.name): each for group in taken.records.values() for each in group.value},
             identified,
-            tuple(boxes),
             taken.truth,
             files,
-            tuning,
+            None if wanted is None else tune_models(identified, flown, wanted),
             {} if rated is None else rate_models(identified, rated),
+            tuple(runner.carried_out),
+            tuple(runner.from_cache),
         )
         _write(study, folder)
         advance()
     return study
-
-
-def _identify(
-    task: Task, taken: Taken, settings: Settings, advance: Callable[..., None]
-) -> Identified:
-    records = taken.records
-    responses = estimate(task, records)
-    task, coherent = choose_responses(task, responses)
-    advance()
-    fits, reduction = fit(task, responses, records, settings.reduce, coherent)
-    advance()
-    counts = next(iter(fits.values()))
-    verifications = check(task, counts, records, next(iter(responses.values()), None))
-    tests = examine_residuals(task, counts)
-    found = [*(() if tests is None else tests.findings)]
-    found += [finding for each in verifications.values() for finding in each.findings]
-    first = next(iter(fits))
-    fits = {**fits, first: examined(counts, taken.inspection, found)}
-    advance()
-    return Identified(
-        task.settings,
-        responses,
-        fits,
-        verifications,
-        reduction,
-        coherent,
-        tests,
-        task.reference,
-    )
 
 
 def _write(study: Study, folder: Path) -> None:

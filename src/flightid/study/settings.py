@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Any
 
 from flightid.errors import StudyError
-from flightid.study.black_box_settings import BlackBoxSettings, read_black_box
+from flightid.record import InputShape
 from flightid.study.conditioning import Conditioning, read_conditioning, require_records
 from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
 from flightid.study.flight import FlightPlan, read_flight
 from flightid.study.model_settings import ModelSettings, read_model
 from flightid.study.qualities import QualitiesSettings, read_qualities
 from flightid.study.reading import TOP, TableReader
-from flightid.study.record_files import RecordFile, read_record_file
+from flightid.study.record_files import UNKNOWN, RecordFile, read_record_file, read_shape
 from flightid.study.reducing import ReduceSettings, read_reduce
 from flightid.study.references import require_references
 from flightid.study.response_settings import ResponseSettings, read_response
@@ -42,12 +42,15 @@ class Segment:
         Or: the system-identification run of this ``SID_AXIS``.
     run : int
         Which of the runs of that axis, from 0.
+    shape : InputShape
+        What is known of the inputs beyond their samples.
     """
 
     name: str
     span_s: tuple[float, float] | None = None
     sid_axis: int | None = None
     run: int = 0
+    shape: InputShape = UNKNOWN
 
 
 @dataclass(frozen=True)
@@ -75,9 +78,7 @@ class Settings:
     record_files : tuple of RecordFile
         Or: records that are read from files, without a log.
     models : tuple of ModelSettings
-        Models with equations to identify.
-    black_boxes : tuple of BlackBoxSettings
-        Models without.
+        Models to identify, with equations or without.
     response : ResponseSettings
         How to estimate responses, where a model does not say.
     fit : FitSettings
@@ -106,7 +107,6 @@ class Settings:
     segments: tuple[Segment, ...]
     record_files: tuple[RecordFile, ...]
     models: tuple[ModelSettings, ...]
-    black_boxes: tuple[BlackBoxSettings, ...]
     response: ResponseSettings
     fit: FitSettings
     check: VerifySettings
@@ -162,7 +162,6 @@ def read_settings(path: Path) -> Settings:
     qualities = root.maybe(
         lambda key: read_qualities(root.table(key), path.parent), "handling_qualities"
     )
-    readers = root.tables("model")
     models = tuple(
         read_model(
             reader,
@@ -172,10 +171,8 @@ def read_settings(path: Path) -> Settings:
             check=check,
             reduced=reducing is not None,
         )
-        for reader in readers
-        if "structure" not in reader
+        for reader in root.tables("model")
     )
-    boxes = tuple(read_black_box(reader) for reader in readers if "structure" in reader)
     root.finish()
     if files and segments:
         raise StudyError(
@@ -183,7 +180,7 @@ def read_settings(path: Path) -> Settings:
             needed="span_s in a [[record]]",
         )
     kind = "record" if files else "segment"
-    require_references(files or segments, (*models, *boxes), kind=kind)
+    require_references(files or segments, models, kind=kind)
     require_records(conditioning, [each.name for each in files or segments])
     return Settings(
         *words,
@@ -196,7 +193,6 @@ def read_settings(path: Path) -> Settings:
         segments,
         files,
         models,
-        boxes,
         response,
         fit,
         check,
@@ -239,9 +235,10 @@ def _segment(reader: TableReader) -> Segment:
     span = reader.maybe(reader.interval, "span_s")
     axis = reader.maybe(reader.integer, "sid_axis")
     run = reader.integer("run", 0)
+    shape = read_shape(reader)
     reader.finish()
     if (span is None) == (axis is None):
         raise reader.error(
             "span_s or sid_axis", "must be given, not both", found=name, needed="one of them"
         )
-    return Segment(name, span, axis, run)
+    return Segment(name, span, axis, run, shape)

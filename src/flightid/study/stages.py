@@ -1,281 +1,172 @@
-"""The stages of a study, one function each, from the records to the verified models."""
+"""The stages of one model, each a function of records, settings and earlier results."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
-from flightid.errors import DataError, StudyError, UnknownNameError
-from flightid.findings import Finding
+from flightid.errors import DataError
 from flightid.identification import Fit, Reduction, identify, reduce
-from flightid.models import GreyBoxModel, StateSpaceModel, load_structure
-from flightid.responses import (
-    CoherentPairs,
-    FrequencyResponse,
-    coherent_pairs,
-    estimate_response,
-)
-from flightid.study.flown import Flown
-from flightid.study.model_settings import UNBROKEN, ModelSettings
+from flightid.identification.prediction.predict import output_names
+from flightid.models import GreyBoxModel, Model
+from flightid.record import Record
+from flightid.responses import CoherentPairs, FrequencyResponse, coherent_pairs, estimate_response
+from flightid.study.fit_settings import FitSettings
+from flightid.study.identified import Fitted
 from flightid.study.reducing import ReduceSettings
-from flightid.validation import Comparison, ResidualTests, Verification, residual_tests, verify
+from flightid.study.response_settings import ResponseSettings
+from flightid.study.structure_settings import StructureSettings
+from flightid.study.structures import fit_structure
+from flightid.study.task import Task, narrowed, with_responses
+from flightid.validation import (
+    Comparison,
+    ResidualTests,
+    SpectrumComparison,
+    Verification,
+    compare_spectra,
+    residual_tests,
+    verify,
+)
+from flightid.validation.verification.baseline import baseline_of
+
+Group = Sequence[Record]
+"""What a name in a study stands for: one record, or all manoeuvres of a file."""
+BASELINE = "linear, same lags"
+"""Name of the linear model that stands beside a NARX model."""
 
 
-@dataclass(frozen=True, eq=False)
-class Task:
-    """One model to identify, loaded.
+def flat(groups: Sequence[Group]) -> list[Record]:
+    """The records of groups, one after the other."""
+    return [record for group in groups for record in group]
 
-    Attributes
+
+def estimate(
+    records: Sequence[Group],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    band_rad_s: tuple[float, float],
+    estimator: str,
+    settings: ResponseSettings,
+) -> FrequencyResponse:
+    """Frequency responses of one model's records by one estimator."""
+    flown = flat(records)
+    held = [name for name in outputs if all(name in record for record in flown)]
+    return estimate_response(
+        flown,
+        inputs=inputs,
+        outputs=held,
+        excitations=settings.instruments if estimator == "instrument" else None,
+        band_rad_s=band_rad_s,
+        n_omega=settings.n_omega,
+        window_s=list(settings.window_s) or "auto",
+        estimator=estimator,
+        loop=settings.declared_loop,
+    )
+
+
+def select_coherent(
+    response: FrequencyResponse,
+    minimum_coherence: float,
+    minimum_decades: float,
+    unbroken: bool,
+) -> CoherentPairs:
+    """Which responses are coherent over a band wide enough to fit.
+
+    Parameters
     ----------
-    settings : ModelSettings
-        What was asked.
-    model : TransferFunctionModel or StateSpaceModel
-        Structure and start values, overrides applied.
-    rivals : mapping of str to TransferFunctionModel or StateSpaceModel
-        Models to verify side by side with the fit, by name.
-    reference : TransferFunctionModel or StateSpaceModel, optional
-        Model that stands beside the estimates.
+    response : FrequencyResponse
+    minimum_coherence, minimum_decades : float
+    unbroken : bool
+        Take each response's widest coherent band without a gap in place of all its frequencies.
     """
-
-    settings: ModelSettings
-    model: GreyBoxModel
-    rivals: Mapping[str, GreyBoxModel] = field(default_factory=dict)
-    reference: GreyBoxModel | None = None
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Channels that the model names."""
-        return (*self.model.inputs, *self.model.outputs)
-
-
-@dataclass(frozen=True, eq=False)
-class Identified:
-    """What a study made of one model.
-
-    Attributes
-    ----------
-    settings : ModelSettings
-        What was asked.
-    responses : mapping of str to FrequencyResponse
-        By estimator; the first is the one that counts.
-    fits : mapping of str to Fit
-        By estimator.
-    verifications : mapping of str to Verification or Comparison
-        By segment, none of which the fit has seen; side by side where there are rivals.
-    reduction : Reduction or None
-        How the structure of the fits came about, where the study asks for a reduction.
-    coherent : CoherentPairs or None
-        Which responses were fitted, where coherence chose them.
-    tests : ResidualTests or None
-        Of the residuals of a fit to records, where the study asks for them.
-    reference : TransferFunctionModel or StateSpaceModel, optional
-        Model that stands beside the estimates.
-    """
-
-    settings: ModelSettings
-    responses: Mapping[str, FrequencyResponse]
-    fits: Mapping[str, Fit]
-    verifications: Mapping[str, Verification | Comparison]
-    reduction: Reduction | None = None
-    coherent: CoherentPairs | None = None
-    tests: ResidualTests | None = None
-    reference: GreyBoxModel | None = None
-
-    @property
-    def response(self) -> FrequencyResponse | None:
-        """The response that was fitted; None where records were."""
-        return next(iter(self.responses.values()), None)
-
-    @property
-    def fit(self) -> Fit:
-        """The fit that counts."""
-        return next(iter(self.fits.values()))
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Verdicts on the response, the fit, its structure and each verification that count."""
-        checks = (finding for each in self.verifications.values() for finding in each.findings)
-        first = () if self.response is None else self.response.findings
-        path = () if self.reduction is None else self.reduction.path_findings
-        tests = () if self.tests is None else self.tests.findings
-        return (*first, *self.fit.findings, *path, *tests, *checks)
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values of every result."""
-        return {
-            "name": self.settings.name,
-            "responses": {key: value.to_dict() for key, value in self.responses.items()},
-            "fits": {key: value.to_dict() for key, value in self.fits.items()},
-            "reduction": None if self.reduction is None else self.reduction.to_dict(),
-            "coherent": None if self.coherent is None else self.coherent.to_dict(),
-            "residual_tests": None if self.tests is None else self.tests.to_dict(),
-            "verifications": {key: value.to_dict() for key, value in self.verifications.items()},
-        }
+    found = coherent_pairs(
+        response, minimum_coherence=minimum_coherence, minimum_decades=minimum_decades
+    )
+    if not unbroken:
+        return found
+    judged = []
+    for pair in found.pairs:
+        band = response.pair(*pair.name.split("/")).usable_band(minimum_coherence)
+        decades = 0.0 if band is None else math.log10(band[1] / band[0])
+        kept = pair.kept and decades >= minimum_decades
+        reason = pair.reason if kept or not pair.kept else "no unbroken band is wide enough"
+        judged.append(replace(pair, band_rad_s=band, decades=decades, kept=kept, reason=reason))
+    return replace(found, pairs=tuple(judged))
 
 
-def load_task(settings: ModelSettings) -> Task:
-    """Load a model and apply the overrides of the study.
-
-    Raises
-    ------
-    UnknownNameError
-        There is no such library model, or no such parameter in it.
-    ModelError
-        A response that the model does not have.
-    """
-    path = settings.template_path
-    model = load_structure(settings.template if path is None else path, axis=settings.axis)
-    parameters = model.parameters
-    for name, given in settings.parameters.items():
-        parameters = parameters.with_parameter(replace(parameters[name], **given))
-    model = replace(model, parameters=parameters)
-    if settings.outputs:
-        model = _with_responses(model, _of_outputs(model, settings.outputs))
-    if settings.responses and not settings.by_coherence:
-        model = _with_responses(model, settings.responses)
-    rivals = {
-        name: load_structure(path if path.endswith(".toml") else name, axis=settings.axis)
-        for name, path in settings.rivals.items()
-    }
-    reference = settings.reference
-    beside = None if reference is None else load_structure(reference, axis=settings.axis)
-    return Task(settings, model, rivals, beside)
-
-
-def _of_outputs(model: GreyBoxModel, outputs: tuple[str, ...]) -> tuple[str, ...]:
-    """Responses of some outputs."""
-    for name in outputs:
-        if name not in model.outputs:
-            raise UnknownNameError(
-                "the model has no such output", found=name, needed=", ".join(model.outputs)
-            )
-    return tuple(name for name in model.response_names if name.split("/")[0] in outputs)
-
-
-def _with_responses(model: GreyBoxModel, names: tuple[str, ...]) -> GreyBoxModel:
-    """The model of which a fit takes these responses alone."""
-    if isinstance(model, StateSpaceModel):
-        return model.with_responses(*names)
-    kept = tuple(each for each in model.responses if each.name in names)
-    missing = [name for name in names if name not in model.response_names]
-    if missing:
-        raise DataError(
-            "the model has no such response",
-            found=", ".join(missing),
-            needed=", ".join(model.response_names),
-        )
-    return replace(model, responses=kept)
-
-
-def estimate(task: Task, records: Flown) -> dict[str, FrequencyResponse]:
-    """Frequency responses of one model's records by each estimator, the one that counts first."""
-    settings = task.settings
-    chosen, band = settings.response, settings.band_rad_s
-    if not settings.fit.on_responses or band is None:
-        return {}
-    flown = records.of(settings.identify)
-    # Outputs beside those that are fitted help to tell initial states when bias is taken out.
-    wanted = settings.outputs or task.model.outputs
-    held = [name for name in wanted if all(name in record for record in flown)]
-    return {
-        estimator: estimate_response(
-            flown,
-            inputs=chosen.moved(task.model.inputs),
-            outputs=held,
-            excitations=chosen.instruments if estimator == "instrument" else None,
-            band_rad_s=band,
-            n_omega=chosen.n_omega,
-            window_s=list(chosen.window_s) or "auto",
-            estimator=estimator,
-            loop=chosen.declared_loop,
-        )
-        for estimator in chosen.estimators
-    }
-
-
-def choose_responses(
-    task: Task, responses: Mapping[str, FrequencyResponse]
-) -> tuple[Task, CoherentPairs | None]:
-    """Where coherence says which responses are fitted: the model with those alone.
+def chosen_by(task: Task, coherent: CoherentPairs) -> Task:
+    """The model with its coherent responses alone, or a structure with its coherent inputs.
 
     Raises
     ------
     DataError
-        No response is coherent.
+        No response of a model with equations is coherent.
     """
-    settings = task.settings
-    if not settings.by_coherence or not responses:
-        return task, None
-    response = next(iter(responses.values()))
-    coherent = coherent_pairs(
-        response,
-        minimum_coherence=settings.response.minimum_coherence,
-        minimum_decades=settings.response.minimum_decades,
-    )
-    if settings.responses == (UNBROKEN,):
-        coherent = unbroken(response, coherent)
+    if task.model is None:
+        driving = {name.split("/")[1] for name in coherent.names}
+        return replace(task, inputs=tuple(name for name in task.inputs if name in driving))
     names = tuple(name for name in coherent.names if name in task.model.response_names)
     if not names:
         raise DataError(
-            f"no response of model {settings.name!r} is coherent",
+            f"no response of model {task.settings.name!r} is coherent",
             found="; ".join(f"{pair.name}: {pair.reason}" for pair in coherent.pairs),
-            needed=f"coherence {settings.response.minimum_coherence:g} over "
-            f"{settings.response.minimum_decades:g} decades",
+            needed=f"coherence {coherent.minimum_coherence:g} over "
+            f"{coherent.minimum_decades:g} decades",
             action="lower [response] minimum_coherence, or fly the inputs harder",
         )
-    return replace(task, model=_with_responses(task.model, names)), coherent
+    return replace(task, model=with_responses(task.model, names))
 
 
-def unbroken(response: FrequencyResponse, coherent: CoherentPairs) -> CoherentPairs:
-    """The choice with each response's widest coherent band without a gap in place of all."""
-    judged = []
-    for pair in coherent.pairs:
-        band = response.pair(*pair.name.split("/")).usable_band(coherent.minimum_coherence)
-        decades = 0.0 if band is None else math.log10(band[1] / band[0])
-        kept = pair.kept and decades >= coherent.minimum_decades
-        reason = pair.reason if kept or not pair.kept else "no unbroken band is wide enough"
-        judged.append(replace(pair, band_rad_s=band, decades=decades, kept=kept, reason=reason))
-    return replace(coherent, pairs=tuple(judged))
-
-
-def fit(
-    task: Task,
-    responses: Mapping[str, FrequencyResponse],
-    records: Flown,
+def fit_equations(
+    model: GreyBoxModel,
+    sources: Mapping[str, Any],
+    settings: FitSettings,
+    minimum_coherence: float,
+    coherent: CoherentPairs | None,
     reducing: ReduceSettings | None,
-    coherent: CoherentPairs | None = None,
-) -> tuple[dict[str, Fit], Reduction | None]:
-    """Fit the model to the response of each estimator, or to the records.
+) -> Fitted:
+    """Fit a model with equations to the response of each estimator, or to the records.
 
     Where the study asks for it, the structure is reduced by the data that count; all other
     estimates are then fitted with that structure.
+
+    Parameters
+    ----------
+    model : TransferFunctionModel or StateSpaceModel
+    sources : mapping of str to FrequencyResponse, sequence of Group, or tuple of both
+        By estimator or method, what counts first.
+    settings : FitSettings
+    minimum_coherence : float
+        Of the frequencies that a fit of responses takes.
+    coherent : CoherentPairs or None
+        Bands of the responses, where coherence chose them.
+    reducing : ReduceSettings or None
     """
-    settings = task.settings
-    options: dict[str, Any] = {"method": settings.fit.method, **settings.fit.options}
-    if settings.fit.on_responses:
-        options.setdefault("minimum_coherence", settings.response.minimum_coherence)
+    options: dict[str, Any] = {"method": settings.method, **settings.options}
+    if settings.on_responses:
+        options.setdefault("minimum_coherence", minimum_coherence)
         if coherent is not None:
-            fitted = set(task.model.response_names)
+            fitted = set(model.response_names)
             bands = {name: band for name, band in coherent.bands.items() if name in fitted}
             options.setdefault("band_rad_s", bands)
-    (counts, data), *others = _sources(task, responses, records).items()
-    model, reduction = task.model, None
-    if reducing is None or not settings.reduce:
+    (counts, data), *others = [(name, _data(source)) for name, source in sources.items()]
+    reduction = None
+    if reducing is None:
         counted = identify(model, data, **options)
     else:
-        reduction = _reduced(task, data, options, reducing)
+        reduction = _reduced(model, data, options, reducing)
         counted, model = reduction.fit, model.with_fixed(**reduction.dropped)
         if reducing.rough:
             counted = identify(reduction.fit.model, data, **options)
     rest = {name: identify(model, other, **options) for name, other in others}
-    return {counts: counted, **rest}, reduction
+    return Fitted({counts: counted, **rest}, reduction)
 
 
 def _reduced(
-    task: Task,
-    data: Any,  # noqa: ANN401  # whatever identify takes
+    model: GreyBoxModel,
+    data: Any,  # noqa: ANN401 - whatever identify takes
     options: Mapping[str, Any],
     reducing: ReduceSettings,
 ) -> Reduction:
@@ -285,81 +176,76 @@ def _reduced(
         data = replace(data, errors=None, linear=None)
         given["correct_bias"] = False
     return reduce(
-        identify(task.model, data, **given),
+        identify(model, data, **given),
         data,
-        keep=task.settings.keep,
-        drop=task.settings.drop,
+        keep=reducing.keep,
+        drop=reducing.drop,
         after_rise=reducing.after_rise,
         **vars(reducing.limits),
     )
 
 
-def _sources(
-    task: Task, responses: Mapping[str, FrequencyResponse], records: Flown
-) -> dict[str, Any]:
-    """What the model is fitted to, by estimator or method, what counts first."""
-    settings = task.settings
-    if not settings.fit.on_responses:
-        return {settings.fit.method: records.of(settings.identify)}
-    if settings.joint:
-        beside = records.of(settings.joint)
-        return {name: (response, beside) for name, response in responses.items()}
-    return dict(responses)
+def _data(source: Any) -> Any:  # noqa: ANN401 - as `identify` takes it
+    """Responses as they are, groups of records as one list."""
+    if isinstance(source, tuple):
+        response, groups = source
+        return response, flat(groups)
+    return source if isinstance(source, FrequencyResponse) else flat(source)
 
 
-def start_from(task: Task, earlier: Sequence[Identified]) -> Task:
-    """The model with start values that earlier models of the study gave.
-
-    Raises
-    ------
-    StudyError
-        No model of that name comes before this one.
-    UnknownNameError
-        A model has no such parameter.
-    """
-    model = task.model
-    for name, wanted in task.settings.values_from.items():
-        given = [item for item in earlier if item.settings.name == name]
-        if not given:
-            raise StudyError(
-                f"study file, model {task.settings.name!r}: values_from names no earlier model",
-                found=name,
-                needed=", ".join(item.settings.name for item in earlier) or "an earlier [[model]]",
-            )
-        model = model.with_values(
-            {each: given[0].fit.model.parameters[each].value or 0.0 for each in wanted}
-        )
-    return replace(task, model=model)
+def fit_without_equations(
+    settings: StructureSettings,
+    inputs: tuple[str, ...],
+    flown: Sequence[Group],
+    unseen: Sequence[Group],
+) -> Fitted:
+    """Fit a structure to records, or the best of several; nothing where no input is coherent."""
+    if not inputs:
+        return Fitted()
+    told, ranked = (
+        [narrowed(record, inputs, settings.outputs) for record in flat(records)]
+        for records in (flown, unseen)
+    )
+    fit, choice = fit_structure(settings, inputs, told, ranked)
+    return Fitted({fit.method: fit}, choice=choice)
 
 
 def check(
-    task: Task,
+    name: str,
     fitted: Fit,
-    records: Flown,
-    response: FrequencyResponse | None = None,
-) -> dict[str, Verification | Comparison]:
-    """Predict each record that the fit has not seen, beside the rivals where there are any."""
-    outputs, options = task.model.outputs, task.settings.check.options
-    if task.settings.check.against_responses and response is not None:
-        options["responses"] = response
-    if task.settings.outputs:
-        outputs = task.settings.outputs
-    checked: dict[str, Verification | Comparison] = {}
-    for name in task.settings.verify:
-        flown = records.of([name])
-        held = [output for output in outputs if all(output in record for record in flown)]
-        if task.rivals:
-            models = {task.settings.name: fitted, **task.rivals}
-            checked[name] = verify(
-                [*models.values()], flown, names=[*models], outputs=held, **options
-            )
-        else:
-            checked[name] = verify(fitted, flown, outputs=held, **options)
-    return checked
+    rivals: Mapping[str, Fit | Model],
+    records: Group,
+    outputs: Sequence[str],
+    options: Mapping[str, Any],
+    horizon: int | str,
+) -> Verification | Comparison:
+    """Predict records that the fit has not seen, beside the rivals where there are any."""
+    baseline = baseline_of(fitted)
+    beside = {**({} if baseline is None else {BASELINE: baseline}), **rivals}
+    held = [output for output in outputs if all(output in record for record in records)]
+    if not beside:
+        return verify(fitted, records, outputs=held, horizon=horizon, **options)
+    shared = [
+        output for output in held if all(output in output_names(each) for each in beside.values())
+    ]
+    return verify(
+        [fitted, *beside.values()],
+        records,
+        names=[name, *beside],
+        outputs=shared or held,
+        horizon=horizon,
+        **options,
+    )
 
 
-def examine_residuals(task: Task, fitted: Fit) -> ResidualTests | None:
-    """Residual tests of a fit to records, where the study asks for them."""
-    if not task.settings.check.residual_tests or not fitted.records:
-        return None
-    return residual_tests(fitted)
+def examine_residuals(fitted: Fit) -> ResidualTests | None:
+    """Residual tests of a fit to records; a fit of responses alone has no residuals."""
+    return residual_tests(fitted) if fitted.records else None
+
+
+def compare_free_run(fitted: Fit, records: Group, options: Mapping[str, Any]) -> SpectrumComparison:
+    """The spectrum of a free run through the first record beside the measured one."""
+    record = records[0]
+    held = [output for output in fitted.model.outputs if output in record]
+    seen = narrowed(record, fitted.model.inputs, held)
+    return compare_spectra(verify(fitted, seen, outputs=held, **options))

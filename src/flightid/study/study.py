@@ -14,12 +14,11 @@ from flightid.inspection import Inspection
 from flightid.record import Record
 from flightid.report.content import Document
 from flightid.report.json import to_dict
-from flightid.study.black_box import BlackBox
-from flightid.study.black_box_section import black_box_table
 from flightid.study.document import parameter_table, study_document
+from flightid.study.estimate_tables import model_table
+from flightid.study.identified import Identified
 from flightid.study.output import SCHEMA
 from flightid.study.settings import Settings
-from flightid.study.stages import Identified
 from flightid.study.truth import Truth
 from flightid.table import Table
 
@@ -39,9 +38,7 @@ class Study:
     records : mapping of str to Record
         By segment.
     identified : tuple of Identified
-        Responses, fits and verifications, one for each model with equations.
-    black_boxes : tuple of BlackBox
-        Every stage of each model without.
+        Every stage of each model.
     truth : Truth or None
         What should have been found, where the flight was simulated.
     files : mapping of str to str
@@ -50,6 +47,8 @@ class Study:
         Gains, where the study asks for them.
     qualities : mapping of str to HandlingQualities
         By model, where the study asks for them.
+    carried_out, from_cache : tuple of str
+        Stages that this run carried out, and those whose results the cache held.
 
     Example
     -------
@@ -63,11 +62,17 @@ class Study:
     inspection: Inspection | None
     records: Mapping[str, Record]
     identified: tuple[Identified, ...]
-    black_boxes: tuple[BlackBox, ...] = ()
     truth: Truth | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     tuning: Tuning | None = None
     qualities: Mapping[str, HandlingQualities] = field(default_factory=dict)
+    carried_out: tuple[str, ...] = ()
+    from_cache: tuple[str, ...] = ()
+
+    @property
+    def has_equations(self) -> bool:
+        """Whether any model has equations, and so parameters with a meaning."""
+        return any(item.settings.structure is None for item in self.identified)
 
     @cached_property
     def document(self) -> Document:
@@ -80,8 +85,8 @@ class Study:
         return self.document.findings
 
     def summary(self) -> Table:
-        """Table of all parameters with their intervals, or of the black-box models."""
-        return parameter_table(self) if self.identified else black_box_table(self.black_boxes)
+        """Table of all parameters with their intervals, or of models where none has equations."""
+        return parameter_table(self) if self.has_equations else model_table(self.identified)
 
     def to_dict(self) -> dict[str, object]:
         """Every result as plain values, the report's content tree among them.
@@ -89,9 +94,8 @@ class Study:
         Returns
         -------
         dict
-            Keys ``schema``, ``title``, ``files``, ``inspection``, ``models``,
-            ``black_boxes``, ``tuning``, ``handling_qualities``, ``truth``, ``findings``,
-            ``report``.
+            Keys ``schema``, ``title``, ``files``, ``inspection``, ``models``, ``tuning``,
+            ``handling_qualities``, ``truth``, ``findings``, ``report``.
         """
         return {
             "schema": SCHEMA,
@@ -99,7 +103,6 @@ class Study:
             "files": dict(self.files),
             "inspection": None if self.inspection is None else self.inspection.to_dict(),
             "models": [item.to_dict() for item in self.identified],
-            "black_boxes": [item.to_dict() for item in self.black_boxes],
             "tuning": None if self.tuning is None else self.tuning.to_dict(),
             "handling_qualities": {name: each.to_dict() for name, each in self.qualities.items()},
             "truth": None if self.truth is None else self.truth.to_dict(),
@@ -109,7 +112,7 @@ class Study:
 
     def __repr__(self) -> str:
         """Title, number of models and verdicts on one line."""
-        n = len(self.identified) + len(self.black_boxes)
+        n = len(self.identified)
         return (
             f"Study({self.settings.title!r}, {n} model{'' if n == 1 else 's'}, "
             f"{self.document.tally})"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from flightid.conventions import Role
 from flightid.errors import StudyError
@@ -12,12 +13,13 @@ from flightid.inspection import Inspection, inspect_log
 from flightid.logs import Log, read_log
 from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.record import Record
-from flightid.study.conditioning import condition
-from flightid.study.flown import Flown
-from flightid.study.record_files import ALL, load_records
+from flightid.study.conditioning import Conditioning, condition
+from flightid.study.flight import FlightPlan
+from flightid.study.record_files import declared, load_records
 from flightid.study.response_settings import EXCITATION
 from flightid.study.settings import Segment, Settings
-from flightid.study.stages import Task
+from flightid.study.stage_runner import Staged, StageRunner
+from flightid.study.task import Task
 from flightid.study.truth import Truth
 from flightid.vehicles import write_ardupilot_log
 
@@ -30,23 +32,29 @@ class Taken:
 
     Attributes
     ----------
-    records : Flown
-        Conditioned, by name.
+    records : mapping of str to Staged list of Record
+        Conditioned, by name, which may stand for all manoeuvres of a file.
     files : tuple of Path
         What was read.
     inspection : Inspection or None
     truth : Truth or None
-    log : Log or None
+    log : Staged Log or None
     """
 
-    records: Flown
+    records: Mapping[str, Staged[list[Record]]]
     files: tuple[Path, ...]
     inspection: Inspection | None = None
     truth: Truth | None = None
-    log: Log | None = None
+    log: Staged[Log] | None = None
 
 
-def take(settings: Settings, tasks: list[Task], given: Path | None, folder: Path) -> Taken:
+def take(
+    settings: Settings,
+    tasks: list[Task],
+    given: Path | None,
+    folder: Path,
+    runner: StageRunner,
+) -> Taken:
     """Records from files, from the log given or named, or from one that is flown now.
 
     Raises
@@ -61,41 +69,59 @@ def take(settings: Settings, tasks: list[Task], given: Path | None, folder: Path
                 "the study reads records, not a log", found=str(given), action="leave out --log"
             )
         paths = dict.fromkeys(file.path for file in settings.record_files)
-        wanted = [file for file in settings.record_files if file.name in needed]
-        read = {file.name: load_records(file, needed[file.name]) for file in wanted}
-        groups = {
-            file.name: tuple(record.name for record in read[file.name])
-            for file in wanted
-            if file.manoeuvre == ALL
+        files = {
+            file.name: runner.stage(f"record: {file.name}", load_records, file, needed[file.name])
+            for file in settings.record_files
+            if file.name in needed
         }
-        flat = {record.name: record for found in read.values() for record in found}
-        return Taken(_conditioned(flat, groups, settings), tuple(paths))
-    flown, truth = _obtain_log(settings, given, folder)
-    opened = read_log(flown)
+        return Taken(_conditioned(files, settings, runner), tuple(paths))
+    flown, truth = _obtain_log(settings, given, folder, runner)
+    opened = runner.stage("log", read_log, flown)
+    mapped = settings.channel_map
+    channels = {
+        "channels": Path(mapped) if mapped is not None and mapped.endswith(".toml") else mapped,
+        "sample_rate_hz": settings.sample_rate_hz,
+        "gaps": settings.gaps,
+        "max_gap_s": settings.max_gap_s,
+    }
     cut = {
-        segment.name: _cut(opened, segment, settings, needed[segment.name])
+        segment.name: runner.stage(
+            f"record: {segment.name}", _cut, opened, segment, channels, needed[segment.name]
+        )
         for segment in settings.segments
         if segment.name in needed
     }
-    return Taken(_conditioned(cut, {}, settings), (flown,), inspect_log(opened), truth, opened)
+    inspection = runner.stage("inspection", inspect_log, opened).value
+    return Taken(_conditioned(cut, settings, runner), (flown,), inspection, truth, opened)
 
 
 def _conditioned(
-    records: Mapping[str, Record], groups: Mapping[str, tuple[str, ...]], settings: Settings
-) -> Flown:
-    group_of = {member: name for name, members in groups.items() for member in members}
-    done = {
-        name: condition(record, settings.conditioning, group_of.get(name, name))
-        for name, record in records.items()
-    }
-    return Flown(done, groups)
+    records: Mapping[str, Staged[list[Record]]], settings: Settings, runner: StageRunner
+) -> dict[str, Staged[list[Record]]]:
+    """Records after the steps that are meant for them."""
+    made = dict(records)
+    for name, record in records.items():
+        steps = tuple(
+            replace(step, records=())
+            for step in settings.conditioning
+            if not step.records or name in step.records
+        )
+        if steps:
+            made[name] = runner.stage(f"conditioning: {name}", _prepare, record, steps)
+    return made
 
 
-def _obtain_log(settings: Settings, given: Path | None, folder: Path) -> tuple[Path, Truth | None]:
+def _prepare(records: list[Record], steps: tuple[Conditioning, ...]) -> list[Record]:
+    return [condition(record, steps, str(record.name)) for record in records]
+
+
+def _obtain_log(
+    settings: Settings, given: Path | None, folder: Path, runner: StageRunner
+) -> tuple[Path, Truth | None]:
     """Path of the log: the one given, the one the study names, or one that is flown now."""
     if given is not None or settings.flight is None:
         return given or _required(settings.log), None
-    flight = settings.flight.fly()
+    flight = runner.stage("flight", FlightPlan.fly, settings.flight).value
     write_ardupilot_log(flight, folder / FLIGHT_LOG)
     return folder / FLIGHT_LOG, Truth.of_flight(flight)
 
@@ -119,7 +145,7 @@ def channels_needed(settings: Settings, tasks: Iterable[Task]) -> dict[str, dict
     settings : Settings
         The study.
     tasks : iterable of Task
-        Its models with equations.
+        Its models.
 
     Returns
     -------
@@ -128,13 +154,12 @@ def channels_needed(settings: Settings, tasks: Iterable[Task]) -> dict[str, dict
     """
     needed: dict[str, dict[str, Role]] = {}
     tasks = list(tasks)
-    users = [(task.settings.segments, task.model.inputs, task.model.outputs) for task in tasks]
-    users += [(box.segments, box.inputs, (box.output,)) for box in settings.black_boxes]
+    users = [(task.settings.segments, task.inputs, task.outputs) for task in tasks]
     for task in tasks:
         # A log's system-identification run brings its injection along, under this name.
         brought = (EXCITATION,) if settings.segments else ()
         instruments = [each for each in task.settings.response.channels if each not in brought]
-        for name in task.settings.identify:
+        for name in task.settings.flown:
             needed.setdefault(name, {}).update(dict.fromkeys(instruments, Role.EXCITATION))
             beside = dict.fromkeys(task.settings.response.inputs, Role.INPUT)
             needed[name].update(beside)
@@ -150,18 +175,18 @@ def channels_needed(settings: Settings, tasks: Iterable[Task]) -> dict[str, dict
     return needed
 
 
-def _cut(log: Log, segment: Segment, settings: Settings, roles: Mapping[str, Role]) -> Record:
-    return log.record(
-        settings.channel_map,
+def _cut(
+    log: Log, segment: Segment, channels: Mapping[str, Any], roles: Mapping[str, Role]
+) -> list[Record]:
+    record = log.record(
         names=list(roles),
         span_s=segment.span_s,
         sid_run=None if segment.sid_axis is None else sid_run(log, segment),
-        sample_rate_hz=settings.sample_rate_hz,
         roles=roles,
-        gaps=settings.gaps,
-        max_gap_s=settings.max_gap_s,
         name=segment.name,
+        **channels,
     )
+    return [declared(record, segment.shape)]
 
 
 def sid_run(log: Log, segment: Segment) -> SidRun:

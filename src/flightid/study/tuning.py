@@ -17,7 +17,7 @@ from flightid.study.reading import TableReader
 
 if TYPE_CHECKING:
     from flightid.logs import Log
-    from flightid.study.stages import Identified
+    from flightid.study.identified import Identified
 
 
 @dataclass(frozen=True)
@@ -92,8 +92,10 @@ def tune_models(
     """
     fits, checks = {}, {}
     for item in identified:
+        if item.fit is None:
+            continue
+        model = item.fit.model
         for axis, (command, rate) in CHANNELS.items():
-            model = item.fit.model
             if command in model.inputs and rate in model.outputs and axis not in fits:
                 fits[axis] = item.fit
                 checks[axis] = tuple(

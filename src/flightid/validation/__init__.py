@@ -30,8 +30,6 @@ from flightid.validation.residuals.result import ResidualTests
 from flightid.validation.spectra.result import Peak, ResidualSpectra, SpectrumComparison
 from flightid.validation.spectra.spectra import compare_spectra, residual_spectra
 from flightid.validation.verification.comparison import Comparison, Contrast
-from flightid.validation.verification.cross_validation import cross_validate
-from flightid.validation.verification.cross_validation_result import CrossRun, CrossValidation
 from flightid.validation.verification.muad import Envelopes, Mismatch, mismatch, muad_envelopes
 from flightid.validation.verification.result import Verification
 from flightid.validation.verification.verify import verify
@@ -40,8 +38,6 @@ __all__ = [
     "Comparison",
     "Contrast",
     "CorrelationTest",
-    "CrossRun",
-    "CrossValidation",
     "Envelopes",
     "Horizon",
     "Kind",
@@ -59,7 +55,6 @@ __all__ = [
     "Verdict",
     "Verification",
     "compare_spectra",
-    "cross_validate",
     "fit_percent",
     "mismatch",
     "mse",

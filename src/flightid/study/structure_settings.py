@@ -1,49 +1,48 @@
-"""What a study file may say about a black-box model: structure, orders to try, records."""
+"""What a study file may say about a model without equations: structure, and orders to try."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from flightid.models import NarxStructure
-from flightid.models.narx.structure import CANDIDATES, STOPS
+from flightid.models import NarxStructure, SubspaceStructure
+from flightid.models.innovations.structure import METHODS as SUBSPACE_METHODS
+from flightid.models.narx.structure import CANDIDATES, REGULARISATIONS, STOPS
 from flightid.models.narx.terms import KERNELS, WIDTH_FACTORS
 from flightid.models.polynomial.structure import INITIAL_STATES
 from flightid.models.sampled.channels import OFFSETS
 from flightid.study.reading import TableReader
 
-ORDERS = {
+NARX, SUBSPACE = "narx", "subspace"
+ORDERS: dict[str, tuple[str, ...]] = {
     "arx": ("na", "nb", "nk"),
     "armax": ("na", "nb", "nc", "nk"),
     "oe": ("nb", "nf", "nk"),
     "bj": ("nb", "nc", "nd", "nf", "nk"),
+    NARX: ("output_lags", "input_lags"),
+    SUBSPACE: (),
 }
-NARX = "narx"
-STRUCTURES = (*ORDERS, NARX)
+"""Orders of each structure, of which several may be tried."""
 CHOICES = ("balanced", "free_run", "simplest", "bic")
 
 
 @dataclass(frozen=True)
-class BlackBoxSettings:
-    """One black-box model to identify.
+class StructureSettings:
+    """A structure whose model is found from records alone.
 
     Attributes
     ----------
-    name : str
-        Title in the report.
-    structure : str
-        ``"arx"``, ``"armax"``, ``"oe"``, ``"bj"`` or ``"narx"``.
+    kind : str
+        ``"arx"``, ``"armax"``, ``"oe"``, ``"bj"``, ``"narx"`` or ``"subspace"``.
     inputs : tuple of str
         Those whose response has no coherence are left out.
-    output : str
-    identify, select, verify, coherence : tuple of str
-        Records of the fit, of the choice among structures, of the verification, and of the
-        coherence test and the spectra.
-    band_rad_s : tuple of float
-        Band of the coherence test, rad/s.
-    minimum_coherence, minimum_decades : float
-        What a response must have to be fitted.
+    outputs : tuple of str
+        One; of ``"subspace"`` one or more.
+    select : tuple of str
+        Records on which free runs rank several structures.
+    coherence : tuple of str
+        Records of the coherence test and of the spectra.
     orders : mapping of str to tuple of int
         Orders to try by name; for ``"narx"`` output_lags and input_lags.
     widths : tuple of float
@@ -56,66 +55,52 @@ class BlackBoxSettings:
         Further options of the structure.
     """
 
-    name: str
-    structure: str
+    kind: str
     inputs: tuple[str, ...]
-    output: str
-    identify: tuple[str, ...]
+    outputs: tuple[str, ...]
     select: tuple[str, ...]
-    verify: tuple[str, ...]
     coherence: tuple[str, ...]
-    band_rad_s: tuple[float, float]
-    minimum_coherence: float
-    minimum_decades: float
     orders: Mapping[str, tuple[int, ...]]
     widths: tuple[float, ...] = ()
     choose: str = CHOICES[0]
     options: Mapping[str, Any] = field(default_factory=dict)
 
     @property
-    def segments(self) -> tuple[str, ...]:
-        """Every record that the model uses."""
-        return (*self.identify, *self.select, *self.verify, *self.coherence)
-
-    @property
     def is_scanned(self) -> bool:
         """Whether several structures are tried."""
         counts = [len(values) for values in self.orders.values()]
-        return max([*counts, len(self.widths)]) > 1
+        return max([*counts, len(self.widths)], default=1) > 1
 
 
-def read_black_box(reader: TableReader) -> BlackBoxSettings:
-    """Check a table ``[[model]]`` that has a ``structure``.
+def read_structure(reader: TableReader, identify: tuple[str, ...]) -> StructureSettings:
+    """Take the keys of a ``[[model]]`` with a ``structure``; its other keys are left to the caller.
+
+    Parameters
+    ----------
+    reader : TableReader
+    identify : tuple of str
+        Records of the fit, on which coherence is tested where nothing else is said.
 
     Raises
     ------
     StudyError
-        A key is unknown or a value does not fit; several structures without records to choose on.
+        A value does not fit; several structures without records to choose on.
     """
-    structure = reader.choice("structure", STRUCTURES)
-    identify = reader.names("identify")
-    is_narx = structure == NARX
-    band = reader.interval("band_rad_s")
-    if band[0] <= 0:
-        raise reader.error("band_rad_s", "does not fit", found=band, needed="positive frequencies")
-    made = BlackBoxSettings(
-        reader.text("name"),
-        structure,
+    kind = reader.choice("structure", ORDERS)
+    is_narx = kind == NARX
+    made = StructureSettings(
+        kind,
         reader.names("inputs"),
-        reader.text("output"),
-        identify,
+        reader.names("outputs"),
         reader.names("select", ()),
-        reader.names("verify", ()),
         reader.names("coherence", identify),
-        band,
-        reader.positive("minimum_coherence", 0.6),
-        reader.positive("minimum_decades", 0.3),
-        _orders(reader, ("output_lags", "input_lags") if is_narx else ORDERS[structure]),
+        {name: reader.integers(name, (1,) if name == "nk" else None) for name in ORDERS[kind]},
         reader.numbers("width", (NarxStructure.width,)) if is_narx else (),
         reader.choice("choose", CHOICES, "free_run" if is_narx else CHOICES[0]),
-        _narx_options(reader) if is_narx else _polynomial_options(reader),
+        OPTIONS.get(kind, _polynomial_options)(reader),
     )
-    reader.finish()
+    if kind != SUBSPACE and len(made.outputs) != 1:
+        raise reader.error("outputs", "does not fit", found=made.outputs, needed="one output")
     if made.is_scanned and not made.select:
         raise reader.error(
             "select",
@@ -130,16 +115,26 @@ def read_black_box(reader: TableReader) -> BlackBoxSettings:
     return made
 
 
-def _orders(reader: TableReader, names: tuple[str, ...]) -> dict[str, tuple[int, ...]]:
-    return {name: reader.integers(name, (1,) if name == "nk" else None) for name in names}
-
-
 def _polynomial_options(reader: TableReader) -> dict[str, Any]:
     return {
         "initial_state": reader.choice("initial_state", INITIAL_STATES, INITIAL_STATES[0]),
         "backcast": reader.flag("backcast", False),
         "offsets": reader.choice("offsets", OFFSETS, OFFSETS[0]),
         "enforce_stability": reader.flag("enforce_stability", False),
+    }
+
+
+def _subspace_options(reader: TableReader) -> dict[str, Any]:
+    usual = SubspaceStructure
+    return {
+        "order": reader.maybe(lambda key: reader.integer(key, minimum=1), "order"),
+        "method": reader.choice("method", SUBSPACE_METHODS, usual.method),
+        "horizon": reader.maybe(lambda key: reader.integer(key, minimum=1), "horizon"),
+        "direct": reader.flag("direct", usual.direct),
+        "refine": reader.flag("refine", usual.refine),
+        "initial_state": reader.choice("initial_state", INITIAL_STATES, INITIAL_STATES[0]),
+        "offsets": reader.choice("offsets", OFFSETS, OFFSETS[0]),
+        "maximum_order": reader.integer("maximum_order", usual.maximum_order, minimum=1),
     }
 
 
@@ -151,6 +146,7 @@ def _narx_options(reader: TableReader) -> dict[str, Any]:
         "width_convention": reader.choice("width_convention", WIDTH_FACTORS, "beta"),
         "candidates": reader.choice("candidates", CANDIDATES, usual.candidates),
         "n_candidates": reader.integer("n_candidates", usual.n_candidates, minimum=1),
+        "seed": reader.integer("seed", usual.seed),
         "delay": reader.integer("delay", usual.delay),
         "constant": reader.flag("constant", usual.constant),
         "linear": reader.flag("linear", usual.linear),
@@ -158,5 +154,15 @@ def _narx_options(reader: TableReader) -> dict[str, Any]:
         "stop": reader.choice("stop", STOPS, usual.stop),
         "goal": reader.number("goal", usual.goal),
         "maximum_terms": reader.integer("maximum_terms", usual.maximum_terms, minimum=1),
+        "regularisation": reader.choice("regularisation", REGULARISATIONS, usual.regularisation),
+        "penalty": reader.number("penalty", usual.penalty),
+        "held_back": reader.number("held_back", usual.held_back),
         "guard": reader.number("guard", usual.guard),
     }
+
+
+OPTIONS: dict[str, Callable[[TableReader], dict[str, Any]]] = {
+    NARX: _narx_options,
+    SUBSPACE: _subspace_options,
+}
+"""Readers of the options of a kind; the others are polynomials."""

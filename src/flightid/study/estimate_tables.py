@@ -1,0 +1,158 @@
+"""Estimates of a study as tables: one model by several estimators, and all models together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from flightid.identification import PolynomialDetails
+from flightid.models import NarxStructure, PolynomialStructure
+from flightid.table import Cell, Column, Table
+from flightid.validation import Comparison, Verdict
+
+if TYPE_CHECKING:
+    from flightid.identification import Fit
+    from flightid.study.identified import Identified
+    from flightid.study.truth import Truth
+    from flightid.uncertainty.estimate import Estimate
+    from flightid.validation import Verification
+
+HZ = 1 / (2 * math.pi)
+WORDS = {
+    "composite": "direct estimate",
+    "local_polynomial": "local polynomial estimate",
+    "instrument": "instrument estimate",
+    "output_error": "output error on the records",
+    "equation_error": "equation error on the records",
+    "fourier_regression": "regression on Fourier integrals",
+    "fourier_output_error": "output error at the harmonics",
+    "filter_error": "filter error on the records",
+}
+"""Estimators and methods in words, as legends and tables name them."""
+
+
+def estimates_table(item: Identified, truth: Truth | None) -> Table:
+    """The same model fitted to each estimate of the response.
+
+    Parameters
+    ----------
+    item : Identified
+        With several fits.
+    truth : Truth or None
+        What should have been found, where the flight was simulated.
+
+    Returns
+    -------
+    Table
+    """
+    (first, *_) = item.fits.values()
+    known = {} if truth is None else truth.parameters(first.model)
+    columns = [Column("parameter"), Column("unit")]
+    columns += [Column(WORDS[method]) for method in item.fits]
+    columns += [Column("truth")] if known else []
+    rows: list[tuple[Cell, ...]] = []
+    for name, parameter in first.parameters.items():
+        cells: list[Cell] = [name, parameter.unit]
+        cells += [_with_interval(other.parameters[name]) for other in item.fits.values()]
+        cells += [known[name]] if known else []
+        rows.append(tuple(cells))
+    return Table(
+        "The same model fitted to each estimate, with 95 % intervals", tuple(columns), tuple(rows)
+    )
+
+
+def _with_interval(parameter: Estimate) -> str:
+    if parameter.interval95 is None:
+        return f"{parameter.value:.4g}"
+    low, high = parameter.interval95
+    return f"{parameter.value:.4g} ({low:.4g} … {high:.4g})"
+
+
+def model_table(items: Iterable[Identified]) -> Table:
+    """All models: structure, modes, residual tests and free runs.
+
+    Parameters
+    ----------
+    items : iterable of Identified
+        Of one study.
+
+    Returns
+    -------
+    Table
+    """
+    columns = (
+        Column("model"),
+        Column("structure"),
+        Column("average cost", digits=3),
+        Column("modes"),
+        Column("residual tests passed"),
+        Column("worst free-run fit", "%", 3),
+        Column("worst TIC", digits=2),
+        Column("note"),
+    )
+    notes = (
+        "modes: natural frequency in Hz with the half-width of its 95 % interval, and damping "
+        "ratio; 1 is a real pole. Free runs: on the records of the verification.",
+    )
+    made = Table("Models", columns, tuple(map(_row, items)), notes)
+    return made.without_empty_columns()
+
+
+def _row(item: Identified) -> tuple[Cell, ...]:
+    if item.fit is None:
+        pairs = () if item.coherent is None else item.coherent.pairs
+        reasons = "; ".join(pair.reason for pair in pairs)
+        return (item.name, "left out", None, None, None, None, None, reasons)
+    fit = item.fit
+    free = [run for run in map(_on_trial, item.verifications.values()) if run.horizon == "free_run"]
+    return (
+        item.name,
+        structure_words(fit),
+        fit.average_cost if fit.responses else None,
+        modes_words(fit.details) if isinstance(fit.details, PolynomialDetails) else None,
+        _passed(item),
+        min((value for run in free for value in run.fit_percent.values()), default=None),
+        max((value for run in free for value in run.theil.values()), default=None),
+        "; ".join(finding.message for finding in item.left_out) or None,
+    )
+
+
+def _on_trial(verified: Verification | Comparison) -> Verification:
+    return verified.first if isinstance(verified, Comparison) else verified
+
+
+def _passed(item: Identified) -> str | None:
+    if item.tests is None:
+        return None
+    passed = len(item.tests.counted(Verdict.PASS))
+    return f"{passed} of {passed + len(item.tests.counted(Verdict.FAIL))}"
+
+
+def structure_words(fit: Fit) -> str:
+    """Structure of a fit in a few words."""
+    structure = fit.structure
+    if isinstance(structure, PolynomialStructure):
+        return f"{structure.kind}, {structure.orders_text}"
+    if isinstance(structure, NarxStructure):
+        lags = f"{structure.output_lags} + {structure.input_lags} lags"
+        return f"NARX {lags}, {structure.kernel or 'polynomial'}, {len(fit.parameters)} terms"
+    if isinstance(fit.details, PolynomialDetails):
+        return f"innovations form, {fit.model.order} states"
+    free = sum(parameter.status == "free" for parameter in fit.parameters.values())
+    return f"{fit.model.name}, {free} free parameters"
+
+
+def modes_words(details: PolynomialDetails) -> str:
+    """Natural frequencies in Hz with half-widths, and dampings, in words."""
+    said = []
+    for root in details.modes:
+        frequency, damping = root.natural_frequency, root.damping
+        if frequency is None or damping is None:
+            continue
+        wide = ""
+        if frequency.interval95 is not None:
+            half = 0.5 * (frequency.interval95[1] - frequency.interval95[0])
+            wide = f" ± {half * HZ:.2g}"
+        said.append(f"{frequency.value * HZ:.3g}{wide} Hz (ζ {damping.value:.2g})")
+    return "; ".join(said) or "none"

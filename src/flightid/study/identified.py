@@ -1,0 +1,161 @@
+"""What a study made of one model, of any kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.identification import Fit, Reduction
+from flightid.models import GreyBoxModel
+from flightid.responses import CoherentPairs, FrequencyResponse
+from flightid.study.model_settings import ModelSettings
+from flightid.study.structures import Choice, goal_findings
+from flightid.validation import Comparison, ResidualTests, SpectrumComparison, Verification
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Result of the fit of one model.
+
+    Attributes
+    ----------
+    fits : mapping of str to Fit
+        By estimator of the response, or by method; the first counts. None where no input is left.
+    reduction : Reduction or None
+        How the structure of the fits came about, where the study asks for a reduction.
+    choice : OrderScan, NarxSearch or None
+        Structures that were tried, where there were several.
+    """
+
+    fits: Mapping[str, Fit] = field(default_factory=dict)
+    reduction: Reduction | None = None
+    choice: Choice | None = None
+
+    @property
+    def fit(self) -> Fit | None:
+        """The fit that counts."""
+        return next(iter(self.fits.values()), None)
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What a study made of one model.
+
+    Attributes
+    ----------
+    settings : ModelSettings
+        What was asked.
+    responses : mapping of str to FrequencyResponse
+        By estimator; the first is the one that counts.
+    coherent : CoherentPairs or None
+        Which responses were fitted, or which inputs, where coherence chose them.
+    fitted : Fitted
+        The fits and how they came about.
+    tests : ResidualTests or None
+        Of the residuals of a fit to records.
+    verifications : mapping of str to Verification or Comparison
+        By record, none of which the fit has seen; side by side where there are rivals.
+    spectra : SpectrumComparison or None
+        Of the first record of the responses, measured and in free run.
+    reference : TransferFunctionModel, StateSpaceModel or None
+        Model that stands beside the estimates.
+    """
+
+    settings: ModelSettings
+    responses: Mapping[str, FrequencyResponse]
+    coherent: CoherentPairs | None = None
+    fitted: Fitted = field(default_factory=Fitted)
+    tests: ResidualTests | None = None
+    verifications: Mapping[str, Verification | Comparison] = field(default_factory=dict)
+    spectra: SpectrumComparison | None = None
+    reference: GreyBoxModel | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the model in the study."""
+        return self.settings.name
+
+    @property
+    def response(self) -> FrequencyResponse | None:
+        """The response that counts; None where there is none."""
+        return next(iter(self.responses.values()), None)
+
+    @property
+    def fits(self) -> Mapping[str, Fit]:
+        """By estimator of the response, or by method; the first counts."""
+        return self.fitted.fits
+
+    @property
+    def fit(self) -> Fit | None:
+        """The fit that counts; None where no input of a structure is coherent."""
+        return self.fitted.fit
+
+    @property
+    def reduction(self) -> Reduction | None:
+        """How the structure of the fits came about."""
+        return self.fitted.reduction
+
+    @property
+    def choice(self) -> Choice | None:
+        """Structures that were tried."""
+        return self.fitted.choice
+
+    @property
+    def left_out(self) -> tuple[Finding, ...]:
+        """Inputs of a structure without coherence, with the reason."""
+        if self.coherent is None or self.settings.structure is None:
+            return ()
+        return tuple(
+            Finding("left-out", Light.UNKNOWN, f"{pair.name} is left out: {pair.reason}")
+            for pair in self.coherent.pairs
+            if not pair.kept and pair.name.split("/")[1] in self.settings.structure.inputs
+        )
+
+    @property
+    def choice_findings(self) -> tuple[Finding, ...]:
+        """Verdicts of the search on its first structure, where that one is taken."""
+        structure = self.settings.structure
+        if self.choice is None or structure is None or structure.choose != "free_run":
+            return ()
+        return self.choice.findings
+
+    @property
+    def findings_beyond(self) -> tuple[Finding, ...]:
+        """Verdicts of what came before and after the fit."""
+        checks = (self.tests, *self.verifications.values())
+        found = [each for part in checks if part is not None for each in part.findings]
+        if self.settings.structure is None:
+            return tuple(found)
+        chosen = (*self.left_out, *self.choice_findings, *goal_findings(self.fit))
+        return (*chosen, *found, *(() if self.spectra is None else self.spectra.findings))
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Verdicts of every stage that counts."""
+        has_equations = self.settings.structure is None
+        first = self.response.findings if has_equations and self.response is not None else ()
+        parts = (self.fit, self.tests, *self.verifications.values(), self.spectra)
+        path = () if self.reduction is None else self.reduction.path_findings
+        found = (each for part in parts if part is not None for each in part.findings)
+        chosen = (*self.left_out, *self.choice_findings, *goal_findings(self.fit))
+        return (*first, *chosen, *path, *found)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values of every result."""
+        stages = {
+            "coherent": self.coherent,
+            "choice": self.choice,
+            "reduction": self.reduction,
+            "residual_tests": self.tests,
+            "spectra": self.spectra,
+        }
+        return {
+            "name": self.name,
+            "left_out": [finding.to_dict() for finding in self.left_out],
+            "responses": {key: value.to_dict() for key, value in self.responses.items()},
+            "fits": {key: value.to_dict() for key, value in self.fits.items()},
+            **{key: None if part is None else part.to_dict() for key, part in stages.items()},
+            "verifications": {key: value.to_dict() for key, value in self.verifications.items()},
+        }

@@ -1,0 +1,277 @@
+"""All models of a study through the same stages: responses, fit, tests, verification."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from flightid.errors import StudyError
+from flightid.inspection import Inspection
+from flightid.record import Record
+from flightid.responses import CoherentPairs, FrequencyResponse
+from flightid.study.evidence import examined
+from flightid.study.identified import Fitted, Identified
+from flightid.study.model_settings import UNBROKEN
+from flightid.study.reducing import ReduceSettings
+from flightid.study.response_settings import ResponseSettings
+from flightid.study.stage_runner import Staged, StageRunner
+from flightid.study.stages import (
+    check,
+    chosen_by,
+    compare_free_run,
+    estimate,
+    examine_residuals,
+    fit_equations,
+    fit_without_equations,
+    select_coherent,
+)
+from flightid.study.task import Task
+from flightid.validation import Comparison, Verification
+
+Records = Mapping[str, Staged[list[Record]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One model up to its fit.
+
+    Attributes
+    ----------
+    task : Task
+        With the responses or inputs that coherence has chosen.
+    responses : mapping of str to Staged FrequencyResponse
+        By estimator, the one that counts first.
+    coherent : Staged CoherentPairs or None
+    fitted : Staged Fitted
+    """
+
+    task: Task
+    responses: Mapping[str, Staged[FrequencyResponse]]
+    coherent: Staged[CoherentPairs] | None
+    fitted: Staged[Fitted]
+
+
+def identify_models(
+    tasks: Sequence[Task],
+    records: Records,
+    inspection: Inspection | None,
+    reducing: ReduceSettings | None,
+    runner: StageRunner,
+    advance: Callable[..., None],
+) -> tuple[tuple[Identified, ...], dict[str, Staged[Fitted]]]:
+    """Carry every model through its stages.
+
+    All fits come first: models may be rivals of each other in the verification.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+    records : mapping of str to Staged list of Record
+        By name, which may stand for all manoeuvres of a file.
+    inspection : Inspection or None
+        Of the log that they come from.
+    reducing : ReduceSettings or None
+    runner : StageRunner
+    advance : callable
+        Is called three times for each model.
+
+    Returns
+    -------
+    tuple of Identified, and dict of str to Staged Fitted
+        What was found, and the fits with their keys by name of the model.
+    """
+    parts: list[Part] = []
+    for asked in tasks:
+        task = start_from(asked, parts)
+        responses = _responses(task, records, runner)
+        advance()
+        parts.append(_fit(task, responses, records, reducing, runner))
+        advance()
+    fitted = {part.task.settings.name: part.fitted for part in parts}
+    found = []
+    for part in parts:
+        found.append(_examined(_examine(part, records, fitted, runner), inspection))
+        advance()
+    return tuple(found), fitted
+
+
+def start_from(task: Task, earlier: Sequence[Part]) -> Task:
+    """The model with start values that earlier models of the study gave.
+
+    Raises
+    ------
+    StudyError
+        No model of that name comes before this one.
+    UnknownNameError
+        A model has no such parameter.
+    """
+    model = task.model
+    if model is None:
+        return task
+    for name, wanted in task.settings.values_from.items():
+        fits = [part.fitted.value.fit for part in earlier if part.task.settings.name == name]
+        if not fits or fits[0] is None:
+            known = [part.task.settings.name for part in earlier]
+            raise StudyError(
+                f"study file, model {task.settings.name!r}: values_from names no earlier model",
+                found=name,
+                needed=", ".join(known) or "an earlier [[model]]",
+            )
+        given = fits[0].model.parameters
+        model = model.with_values({each: given[each].value or 0.0 for each in wanted})
+    return replace(task, model=model)
+
+
+def _examined(item: Identified, inspection: Inspection | None) -> Identified:
+    """The fit that counts with all that the study knows of it, so that one light shows."""
+    fit = item.fit
+    if fit is None:
+        return item
+    beyond = [finding for finding in item.findings_beyond if finding not in fit.findings]
+    first, *others = item.fits.items()
+    fits = dict([(first[0], examined(fit, inspection, beyond)), *others])
+    return replace(item, fitted=replace(item.fitted, fits=fits))
+
+
+def _responses(
+    task: Task, records: Records, runner: StageRunner
+) -> dict[str, Staged[FrequencyResponse]]:
+    settings = task.settings
+    if settings.band_rad_s is None or (task.model is not None and not settings.fit.on_responses):
+        return {}
+    asked = settings.response
+    flown = [records[name] for name in settings.flown]
+    found = {}
+    for estimator in asked.estimators:
+        # Only what the estimator reads: other limits of coherence make no other estimate.
+        reads = ResponseSettings(
+            instruments=asked.instruments,
+            n_omega=asked.n_omega,
+            window_s=asked.window_s,
+            loop=asked.loop,
+        )
+        found[estimator] = runner.stage(
+            f"response: {settings.name}, {estimator}",
+            estimate,
+            flown,
+            asked.moved(task.inputs),
+            # Outputs beside those that are fitted help to tell initial states: bias is taken out.
+            settings.outputs or task.outputs,
+            settings.band_rad_s,
+            estimator,
+            reads,
+        )
+    return found
+
+
+def _fit(
+    task: Task,
+    responses: Mapping[str, Staged[FrequencyResponse]],
+    records: Records,
+    reducing: ReduceSettings | None,
+    runner: StageRunner,
+) -> Part:
+    settings, coherent = task.settings, None
+    first = next(iter(responses.values()), None)
+    if first is not None and (settings.by_coherence or task.model is None):
+        coherent = runner.stage(
+            f"coherence: {settings.name}",
+            select_coherent,
+            first,
+            settings.response.minimum_coherence,
+            settings.response.minimum_decades,
+            settings.responses == (UNBROKEN,),
+        )
+        task = chosen_by(task, coherent.value)
+    flown = [records[name] for name in settings.identify]
+    if task.model is None:
+        structure = settings.structure
+        assert structure is not None
+        told = replace(structure, coherence=(), select=())
+        unseen = [records[name] for name in structure.select]
+        fitted = runner.stage(
+            f"fit: {settings.name}", fit_without_equations, told, task.inputs, flown, unseen
+        )
+        return Part(task, responses, coherent, fitted)
+    if reducing is not None and not settings.reduce:
+        reducing = None
+    if reducing is not None:
+        reducing = replace(reducing, keep=settings.keep, drop=settings.drop)
+    sources: dict[str, Any] = {settings.fit.method: flown}
+    if settings.fit.on_responses:
+        beside = [records[name] for name in settings.joint]
+        sources = {
+            name: (response, beside) if beside else response for name, response in responses.items()
+        }
+    fitted = runner.stage(
+        f"fit: {settings.name}",
+        fit_equations,
+        task.model,
+        sources,
+        settings.fit,
+        settings.response.minimum_coherence,
+        coherent,
+        reducing,
+    )
+    return Part(task, responses, coherent, fitted)
+
+
+def _examine(
+    part: Part, records: Records, fitted: Mapping[str, Staged[Fitted]], runner: StageRunner
+) -> Identified:
+    """Residual tests, spectra and verification of the fit that counts."""
+    settings = part.task.settings
+    responses = {name: each.value for name, each in part.responses.items()}
+    coherent = None if part.coherent is None else part.coherent.value
+    beside = part.task.reference
+    found = Identified(settings, responses, coherent, part.fitted.value, reference=beside)
+    fit = part.fitted.value.fit
+    if fit is None:
+        return found
+    counts = Staged(fit, part.fitted.key)
+    tests = spectra = None
+    if settings.check.tests_residuals:
+        tests = runner.stage(f"residual tests: {settings.name}", examine_residuals, counts).value
+    if settings.check.compares_spectra:
+        seen = records[settings.flown[0]]
+        spectra = runner.stage(
+            f"spectra: {settings.name}", compare_free_run, counts, seen, settings.check.options
+        ).value
+    verified = _verifications(part, counts, records, fitted, runner)
+    return replace(found, tests=tests, spectra=spectra, verifications=verified)
+
+
+def _verifications(
+    part: Part,
+    counts: Staged[Any],
+    records: Records,
+    fitted: Mapping[str, Staged[Fitted]],
+    runner: StageRunner,
+) -> dict[str, Verification | Comparison]:
+    settings = part.task.settings
+    rivals: dict[str, Any] = dict(part.task.rivals)
+    for name in settings.rivals:
+        rival = fitted[name].value.fit if name in fitted else None
+        if rival is not None:
+            rivals[name] = Staged(rival, fitted[name].key)
+    options: dict[str, Any] = settings.check.options
+    if settings.check.against_responses and part.responses:
+        options["responses"] = next(iter(part.responses.values()))
+    outputs = settings.outputs or counts.value.model.outputs
+    checked = {}
+    for horizon in settings.check.ahead:
+        ahead = "" if horizon == "free_run" else f", {horizon} ahead"
+        for name in settings.verify:
+            checked[name + ahead] = runner.stage(
+                f"verification: {settings.name}, {name}{ahead}",
+                check,
+                settings.name,
+                counts,
+                rivals,
+                records[name],
+                outputs,
+                options,
+                horizon,
+            ).value
+    return checked

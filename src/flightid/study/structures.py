@@ -1,0 +1,117 @@
+"""The fit of a model without equations: one structure, or the best of several by free run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.identification import Fit, identify
+from flightid.models import InnovationsModel, NarxStructure, PolynomialModel
+from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.record import Record
+from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
+from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
+
+Choice = OrderScan | NarxSearch
+AS_GOOD = 0.10
+"""Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
+
+
+def fit_structure(
+    settings: StructureSettings,
+    inputs: tuple[str, ...],
+    flown: Sequence[Record],
+    unseen: Sequence[Record],
+) -> tuple[Fit, Choice | None]:
+    """Fit a structure; of several the one that the study's rule takes.
+
+    Parameters
+    ----------
+    settings : StructureSettings
+    inputs : tuple of str
+        Those with coherence.
+    flown, unseen : sequence of Record
+        Records of the fit, and of the choice.
+
+    Returns
+    -------
+    tuple of Fit and (OrderScan, NarxSearch or None)
+        The fit, and what was tried.
+    """
+    if settings.kind == SUBSPACE:
+        asked = InnovationsModel.subspace(inputs, settings.outputs, **settings.options)
+        return identify(asked, list(flown)), None
+    if settings.kind == NARX:
+        return _narx(settings, inputs, list(flown), list(unseen))
+    return _polynomial(settings, inputs, list(flown), list(unseen))
+
+
+def _polynomial(
+    settings: StructureSettings, inputs: tuple[str, ...], flown: list[Record], unseen: list[Record]
+) -> tuple[Fit, OrderScan | None]:
+    (output,) = settings.outputs
+    if not settings.is_scanned:
+        orders: dict[str, Any] = {name: values[0] for name, values in settings.orders.items()}
+        asked = PolynomialModel.general(inputs, output, **orders, **settings.options)
+        return identify(asked, flown), None
+    tried: dict[str, Any] = {"kind": settings.kind, **settings.orders, **settings.options}
+    scan = scan_orders(flown, unseen, outputs=output, inputs=inputs, **tried)
+    chosen = _chosen(scan, settings.choose)
+    fit = scan.best if chosen == scan.trials[0].structure else identify(chosen, flown)
+    return fit, scan
+
+
+def _chosen(scan: OrderScan, how: str) -> PolynomialStructure:
+    if how == "simplest":
+        return scan.simplest.structure
+    if how == "bic":
+        return scan.smallest("bic").structure
+    first = scan.trials[0]
+    if how == "free_run" or first.free_run_rms is None:
+        return first.structure
+    limit = (1 + AS_GOOD) * first.free_run_rms
+    alike = [
+        (trial.criteria.bic, place)
+        for place, trial in enumerate(scan.trials)
+        if trial.criteria is not None
+        and trial.free_run_rms is not None
+        and trial.free_run_rms <= limit
+    ]
+    return scan.trials[min(alike)[1]].structure if alike else first.structure
+
+
+def _narx(
+    settings: StructureSettings, inputs: tuple[str, ...], flown: list[Record], unseen: list[Record]
+) -> tuple[Fit, NarxSearch | None]:
+    outputs_back, inputs_back = settings.orders["output_lags"], settings.orders["input_lags"]
+    asked = NarxStructure(
+        settings.outputs[0],
+        inputs,
+        outputs_back[0],
+        inputs_back[0],
+        width=settings.widths[0],
+        **settings.options,
+    )
+    if not settings.is_scanned:
+        return identify(asked, flown), None
+    pairs = [(a, b) for a in outputs_back for b in inputs_back]
+    search = search_narx(asked, flown, unseen, lags=pairs, widths=settings.widths)
+    return search.best, search
+
+
+def goal_findings(fit: Fit | None) -> tuple[Finding, ...]:
+    """Whether the sum of squares that a NARX structure was asked for was reached."""
+    structure = None if fit is None else fit.structure
+    if fit is None or not isinstance(structure, NarxStructure) or structure.stop != "sse":
+        return ()
+    reached = fit.objective
+    if reached <= structure.goal:
+        return ()
+    message = (
+        f"the sum of squares is {reached:.3g} after {len(fit.parameters)} terms; the goal of "
+        f"{structure.goal:.3g} was not reached"
+    )
+    action = "sensor noise may lie above the goal: stop by 'press', or allow more terms"
+    return (Finding("goal-not-reached", Light.AMBER, message, action),)

@@ -1,0 +1,156 @@
+"""Stages of a study: what a change re-runs, what it leaves alone, and what a key depends on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.study.stage_runner import digest
+from tests.unit.test_study_records import OWN, rig
+
+STUDY = """
+[study]
+title = "Rig"
+[[record]]
+name = "fitted"
+path = "rig.csv"
+span_s = [0.0, 40.0]
+[[record]]
+name = "unseen"
+path = "rig.csv"
+span_s = [40.0, 80.0]
+[fit]
+starts = 1
+[[model]]
+name = "Lag"
+template = "own.toml"
+identify = "fitted"
+verify = "unseen"
+band_rad_s = [0.6, 10.0]
+rivals = "Black"
+[[model]]
+name = "Black"
+structure = "arx"
+inputs = "drive"
+outputs = "angle"
+identify = "fitted"
+verify = "unseen"
+band_rad_s = [0.6, 10.0]
+na = 2
+nb = 1
+nk = 2
+"""
+LAG = {"response: Lag, composite", "fit: Lag", "verification: Lag, unseen"}
+BLACK = {
+    "response: Black, composite",
+    "coherence: Black",
+    "fit: Black",
+    "residual tests: Black",
+    "spectra: Black",
+    "verification: Black, unseen",
+    "verification: Black, unseen, 1 ahead",
+}
+RECORDS = {"record: fitted", "record: unseen"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("stages")
+    data = rig(0)
+    rows = ["time [s],drive [V],idle [V],angle [rad]"]
+    rows += [",".join(map(repr, map(float, row))) for row in zip(*data.values(), strict=True)]
+    (place / "rig.csv").write_text("\n".join(rows), encoding="utf-8")
+    (place / "own.toml").write_text(OWN, encoding="utf-8")
+    return place
+
+
+@pytest.fixture(scope="module")
+def cache(folder: Path) -> dict[str, Any]:
+    made: dict[str, Any] = {}
+    path = folder / "study.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    first = fid.run_study(path, output=folder / "out", cache=made)
+    # Both models fly the same inputs in the same band: the response is estimated once.
+    assert set(first.carried_out) == RECORDS | LAG | BLACK - {"response: Black, composite"}
+    return made
+
+
+def run(folder: Path, text: str, cache: dict[str, Any]) -> fid.Study:
+    path = folder / "study.toml"
+    path.write_text(text, encoding="utf-8")
+    return fid.run_study(path, output=folder / "out", cache=dict(cache))
+
+
+def test_nothing_changed_runs_nothing(folder: Path, cache: dict[str, Any]) -> None:
+    path = folder / "study.toml"
+    path.write_text(STUDY, encoding="utf-8")
+    known: dict[str, Any] = {}
+    first = fid.run_study(path, output=folder / "out", cache=known)
+    again = fid.run_study(path, output=folder / "out", cache=known)
+    assert again.carried_out == ()
+    assert set(again.from_cache) == RECORDS | LAG | BLACK
+    assert again.identified[0].fit.model is first.identified[0].fit.model
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rerun"),
+    [
+        ('title = "Rig"', 'title = "Another"', set()),
+        ('name = "Lag"', 'name = "Grey"', {"verification: Grey, unseen"}),
+        ("na = 2", "na = 1", BLACK - {"coherence: Black", "response: Black, composite"}),
+        ("starts = 1", "starts = 2", LAG - {"response: Lag, composite"}),
+        (
+            "[40.0, 80.0]",
+            "[40.0, 70.0]",
+            {"record: unseen", *(name for name in LAG | BLACK if "unseen" in name)},
+        ),
+        (
+            "[fit]",
+            "[verify]\nsettle_s = 2.0\n[fit]",
+            {"spectra: Black", *(name for name in LAG | BLACK if "unseen" in name)},
+        ),
+        (
+            "[fit]",
+            "[response]\nminimum_decades = 0.2\n[fit]",
+            {"coherence: Black"},
+        ),
+        ("[fit]", '[verify]\nhorizons = "free_run"\n[fit]', set()),
+    ],
+)
+def test_a_change_runs_what_lies_behind_it(
+    old: str, new: str, rerun: set[str], folder: Path, cache: dict[str, Any]
+) -> None:
+    found = run(folder, STUDY.replace(old, new, 1), cache)
+    # A fit of the black box is verified beside the lag, so the lag is verified again.
+    beside = {"verification: Lag, unseen"} if "fit: Black" in rerun else set()
+    assert set(found.carried_out) == rerun | beside
+
+
+def test_a_changed_file_is_read_again(folder: Path, cache: dict[str, Any]) -> None:
+    own = folder / "own.toml"
+    own.write_text(OWN.replace("value = 3.0", "value = 2.5"), encoding="utf-8")
+    assert set(run(folder, STUDY, cache).carried_out) == LAG - {"response: Lag, composite"}
+    own.write_text(OWN, encoding="utf-8")
+
+
+def test_grey_and_black_stand_side_by_side(folder: Path, cache: dict[str, Any]) -> None:
+    lag = run(folder, STUDY, cache).identified[0]
+    beside = lag.verifications["unseen"]
+    assert isinstance(beside, fid.Comparison)
+    assert beside.names == ("Lag", "Black")
+    assert lag.fit is not None
+    assert beside.first.predictions[0].start == beside.verifications["Black"].predictions[0].start
+
+
+def test_digests_tell_all_that_differs() -> None:
+    values: list[object] = [
+        1, 1.0, True, "1", None, (1,), [1], {"1": 1}, (1, (2,)), ((1,), 2), np.ones(2),
+        np.ones((1, 2)), Path("nowhere"), ("ab", "c"), ("a", "bc"),
+    ]  # fmt: skip
+    assert len({digest(value) for value in values}) == len(values)
+    with pytest.raises(TypeError, match="no stage can depend on a object"):
+        digest(object())
