@@ -31,7 +31,7 @@ def test_values_make_the_model_and_the_code_is_the_verdict(
     assert run(["verify", "rate_first_order", str(flown), "--value", "Lp=-4", "--json",
                 "--html", str(page)]) == 0  # fmt: skip
     plain = json.loads(capsys.readouterr().out)
-    assert_close(plain["outputs"]["p"]["theil"], 0.0, atol=1e-9, why="the model is the truth")
+    assert_close(plain["theil"]["p"], 0.0, atol=1e-9, why="the model is the truth")
     assert "Verification" in page.read_text()
     assert run(["verify", "rate_first_order", str(flown), "--value", "Lp=-60"]) == 1
     assert "[red] p: Theil coefficient" in capsys.readouterr().out

@@ -106,7 +106,7 @@ def test_views():
     assert "<table>" in found._repr_html_()
     plain = found.to_dict()
     assert plain["schema"] == "flightid.margins/1"
-    assert plain["quantities"]["phase margin"]["interval95"][0] < found.phase_margin.value
+    assert plain["phase_margin"]["interval95"][0] < found.phase_margin.value
     assert len(found.curve.stderr_deg) == len(found.curve.omega_rad_s)
 
 

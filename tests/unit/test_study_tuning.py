@@ -63,12 +63,12 @@ def test_a_study_is_tuned_from_its_log_and_the_steps_are_written(
     told = json.loads(capsys.readouterr().out)
     assert code == 0, told["findings"]
     assert told["schema"] == "flightid.tuning/1"
-    gains = told["axes"]["roll"]["gains"]
+    gains = told["designs"]["roll"]["gains"]
     assert gains["ATC_RAT_RLL_P"]["flown"] == pytest.approx(0.09)
     assert gains["ATC_RAT_RLL_P"]["new"] > 0.1
     assert list(tmp_path.glob("gains*.rollback.param"))
     results = json.loads((tmp_path / "roll-output" / "results.json").read_text(encoding="utf-8"))
-    assert results["tuning"]["axes"]["roll"]["exists"]
+    assert results["tuning"]["designs"]["roll"]["exists"]
     assert "Roll gains" in (tmp_path / "roll-output" / "report.txt").read_text(encoding="utf-8")
 
 

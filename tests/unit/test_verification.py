@@ -108,7 +108,7 @@ def test_result_shows_itself_and_its_horizon() -> None:
     assert "state biases and output biases solved for" in text
     plain = json.loads(json.dumps(result.to_dict(), allow_nan=False))
     assert plain["schema"] == "flightid.verification/1"
-    assert plain["outputs"]["p"]["unit"] == "rad/s"
+    assert plain["units"]["p"] == "rad/s"
     assert "<table>" in result._repr_html_()
     assert {finding.light for finding in result.findings} == {Light.GREEN}
     assert result.predicted.history[-1].operation == "predict"

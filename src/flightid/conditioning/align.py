@@ -14,6 +14,7 @@ from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
 from flightid.record import Record, Step
 from flightid.record.interpolation import windowed_sinc
+from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.quantiles import LEVEL, interval_words
@@ -30,7 +31,7 @@ ROUNDS = 4
 
 
 @dataclass(frozen=True)
-class Skew:
+class Skew(Result, schema="flightid.skew/1"):
     """By how much one channel lags another.
 
     Attributes
@@ -90,28 +91,12 @@ class Skew:
         )
         return Table("Skew", columns, (row,), tuple(map(str, self.findings)))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {
-            "schema": "flightid.skew/1",
-            "reference": self.reference,
-            "channel": self.channel,
-            "lag": self.lag.to_dict(),
-            "coherence": self.coherence,
-            "band_rad_s": list(self.band_rad_s),
-            "sample_time_s": self.sample_time_s,
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
     def __repr__(self) -> str:
         """Skew with its interval on one line."""
         return (
             f"Skew({self.channel!r} behind {self.reference!r}: {self.lag.text}, "
             f"coherence {self.coherence:.2g})"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def estimate_skew(

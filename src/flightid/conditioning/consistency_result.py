@@ -10,13 +10,18 @@ from numpy.typing import NDArray
 
 from flightid.findings import Finding
 from flightid.record import Record
+from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.quantiles import LEVEL, interval_words
 
 
 @dataclass(frozen=True)
-class KinematicConsistency:
+class KinematicConsistency(
+    Result,
+    schema="flightid.kinematic_consistency/1",
+    untold={"reconstructed": "time histories", "corrected": "a record"},
+):
     """How well rates, attitude, accelerations and velocities belong to one motion.
 
     Attributes
@@ -81,18 +86,6 @@ class KinematicConsistency:
         rows = tuple((name, rms, self.fit_percent[name]) for name, rms in self.residual_rms.items())
         return Table("Outputs rebuilt from rates and accelerations", columns, rows)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values, signals left out."""
-        return {
-            "schema": "flightid.kinematic_consistency/1",
-            "parameters": {key: p.to_dict() for key, p in self.parameters.items()},
-            "covariance": self.covariance.tolist(),
-            "correlation": self.correlation.tolist(),
-            "residual_rms": dict(self.residual_rms),
-            "fit_percent": dict(self.fit_percent),
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
     def __repr__(self) -> str:
         """Size and the worst fit on one line."""
         n = next(iter(self.reconstructed.values())).size
@@ -100,5 +93,5 @@ class KinematicConsistency:
         worst = f"worst fit {min(fits)[0]:.3g} % ({min(fits)[1]})" if fits else "nothing moves"
         return f"KinematicConsistency({n} samples, {len(self.parameters)} parameters, {worst})"
 
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_() + self.fits()._repr_html_()
+    def _tables(self) -> tuple[Table, ...]:
+        return (self.summary(), self.fits())

@@ -23,11 +23,11 @@ from flightid.identification.prediction_error.roots import (
 from flightid.identification.subspace.roots import ALL, innovations_roots
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.sampled.discrete_modes import AT_ORIGIN, NO_COUNTERPART
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.uneven import turned
 
-SCHEMA = "flightid.interpretation/1"
 LIGHT_DAMPING = 0.3
 """Pairs damped less show a resonance peak that stands out."""
 NEAR = 0.05
@@ -84,7 +84,7 @@ class InterpretedRoot:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Interpretation:
+class Interpretation(Result, schema="flightid.interpretation/1"):
     """Result of `interpret`.
 
     Attributes
@@ -154,17 +154,8 @@ class Interpretation:
         )
         return Table(repr(self), columns, tuple(rows), notes)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "name": self.name,
-            "sample_time_s": self.sample_time_s,
-            "transfer_functions": self.transfer_functions,
-            "roots": [item.to_dict() for item in self.roots],
-            "sentences": list(self.sentences),
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
+    def _computed(self) -> dict[str, object]:
+        return {"sentences": self.sentences}
 
     def __repr__(self) -> str:
         """Size and number of resonances on one line."""
@@ -177,9 +168,6 @@ class Interpretation:
             f"Interpretation({self.name}: {count(kinds.count(POLE), 'pole')}, "
             f"{count(kinds.count(ZERO), 'zero')}, {count(len(self.resonances), 'resonance')})"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def interpret(

@@ -9,9 +9,8 @@ from typing import Any
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Column, Table
-
-SCHEMA = "flightid.evidence/1"
 
 INSPECTION = "inspection"
 BAND = "excitation band"
@@ -89,7 +88,7 @@ class Check:
 
 
 @dataclass(frozen=True, repr=False)
-class Evidence:
+class Evidence(Result, schema="flightid.evidence/1"):
     """Checks of a result, and its light.
 
     Red where a check is red. Green where every required check is there and green, and no other is
@@ -184,14 +183,10 @@ class Evidence:
                 rows.append((name, "not examined", *_ABSENT[name]))
         return Table(repr(self), columns, tuple(rows))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": SCHEMA,
-            "light": str(self.light),
-            "checks": [check.to_dict() for check in self.checks],
-            "required": list(self.required),
-            "missing": list(self.missing),
+            "light": self.light,
+            "missing": self.missing,
         }
 
     @classmethod
@@ -213,16 +208,13 @@ class Evidence:
             raise DataError(
                 "these values are no evidence",
                 found=f"{type(error).__name__}: {error}"[:200],
-                needed=f"what {SCHEMA!r} holds",
+                needed=f"what {cls.schema!r} holds",
             ) from error
 
     def __repr__(self) -> str:
         """Light and numbers of checks on one line."""
         absent = f", not examined: {', '.join(self.missing)}" if self.missing else ""
         return f"Evidence({self.light}, {len(self.checks)} checks{absent})"
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
     @staticmethod
     def _worst(findings: Iterable[Finding]) -> Light:

@@ -16,6 +16,7 @@ from flightid.excitation.spectrum import (
     smoothed_matrix,
 )
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.units import canonical
 
@@ -24,7 +25,7 @@ COVERAGE_POINTS = 400
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Excitation:
+class Excitation(Result, schema="flightid.excitation/1"):
     """Designed inputs on a uniform time base that starts at zero.
 
     Attributes
@@ -241,22 +242,12 @@ class Excitation:
             )
         return Table(repr(self), columns, rows, (*notes, *map(str, self.findings)))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values, samples included."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": "flightid.excitation/1",
-            "kind": self.kind,
-            "names": list(self.names),
-            "unit": self.unit,
-            "sample_time_s": self.sample_time_s,
-            "band_rad_s": list(self.band_rad_s),
-            "options": dict(self.options),
-            "signals": self.signals.tolist(),
-            "peak_factor": self.peak_factor.tolist(),
-            "coverage_percent": self.coverage().tolist(),
-            "correlation": self.correlation().tolist(),
-            "coherence": self.coherence().tolist(),
-            "findings": [finding.to_dict() for finding in self.findings],
+            "peak_factor": self.peak_factor,
+            "coverage_percent": self.coverage(),
+            "correlation": self.correlation(),
+            "coherence": self.coherence(),
         }
 
     def __repr__(self) -> str:
@@ -268,9 +259,6 @@ class Excitation:
             f"{1 / self.sample_time_s:.6g} Hz, {self.duration_s:.6g} s, "
             f"relative peak factor {worst})"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
     def _all_frequencies(self) -> NDArray[np.float64]:
         lowest = 2 * np.pi / self.duration_s

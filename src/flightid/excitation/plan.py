@@ -15,6 +15,7 @@ from flightid.excitation.checks import require_positive
 from flightid.excitation.excitation import Excitation
 from flightid.excitation.vehicle import RateAxis
 from flightid.findings import Finding, worst
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
 PARAMETERS = (("gain", "rad/s"), ("time constant", "s"), ("delay", "s"))
@@ -92,7 +93,7 @@ class AxisForecast:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Plan:
+class Plan(Result, schema="flightid.excitation.plan/1"):
     """What a manoeuvre would give, and a go/no-go list.
 
     Attributes
@@ -172,33 +173,12 @@ class Plan:
         notes = (f"Windows [s]: {windows}.", *map(str, self.findings))
         return Table(repr(self), columns, tuple(rows), notes)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values, without the samples of the excitation."""
-        excitation = self.excitation.to_dict()
-        excitation.pop("signals")
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": "flightid.excitation.plan/1",
             "go": self.is_go,
-            "excitation": excitation,
-            "band_rad_s": list(self.band_rad_s),
-            "n_records": self.n_records,
-            "windows_s": list(self.windows_s),
-            "omega_rad_s": self.omega_rad_s.tolist(),
-            "axes": [
-                {
-                    "name": axis.name,
-                    "input_density": axis.input_density.tolist(),
-                    "coherence": axis.coherence.tolist(),
-                    "random_error": axis.random_error.tolist(),
-                    "peak_control": axis.peak_control,
-                    "peak_control_rate": axis.peak_control_rate,
-                    "peak_rate_rad_s": axis.peak_rate_rad_s,
-                    "peak_attitude_rad": axis.peak_attitude_rad,
-                    "stderr": None if axis.stderr is None else list(axis.stderr),
-                }
-                for axis in self.axes
-            ],
-            "findings": [finding.to_dict() for finding in self.findings],
+            "excitation": {
+                key: value for key, value in self.excitation.to_dict().items() if key != "signals"
+            },
         }
 
     def __repr__(self) -> str:
@@ -208,6 +188,3 @@ class Plan:
             f"Plan({self.excitation.kind!r}, {self.n_records} × {self.excitation.duration_s:.4g} s,"
             f" {self.band_rad_s[0]:.3g} to {self.band_rad_s[1]:.3g} rad/s, {verdict})"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()

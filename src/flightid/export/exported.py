@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
-
-SCHEMA = "flightid.exported/1"
 
 
 @dataclass(frozen=True)
-class Exported:
+class Exported(Result, schema="flightid.exported/1"):
     """Files written by `export`.
 
     Attributes
@@ -54,16 +52,3 @@ class Exported:
         return Table(
             f"Exported as {self.format}", (Column("what"), Column("value")), tuple(rows), notes
         )
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "format": self.format,
-            "files": [str(path) for path in self.files],
-            "facts": dict(self.facts),
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_() or escape(repr(self))

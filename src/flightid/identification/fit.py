@@ -19,16 +19,15 @@ from flightid.identification.training import TrainingChannel, training_channels
 from flightid.models import Estimated, Model
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.record import Record
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.quantiles import LEVEL, interval_words
 from flightid.uncertainty.uncertain import Uncertain
 
-SCHEMA = "flightid.fit/1"
-
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Fit:
+class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time histories"}):
     """Result of `flightid.identify`.
 
     Attributes
@@ -232,41 +231,16 @@ class Fit:
             *self.evidence.lines,
         )
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "method": self.method,
-            "structure": repr(self.structure),
-            "model": self.model.to_dict(),
-            "parameters": {name: p.to_dict() for name, p in self.parameters.items()},
-            "cost": self.cost,
-            "average_cost": self.average_cost,
-            "costs": dict(self.costs),
-            "names": list(self.names),
-            "covariance": None if self.covariance is None else self.covariance.tolist(),
-            "correlation": self.correlation.tolist(),
-            "responses": {each.name: each.to_dict() for each in self.responses},
-            "records": [each.to_dict() for each in self.records],
-            "noise_covariance": (
-                None if self.noise_covariance is None else self.noise_covariance.tolist()
-            ),
-            "minima": [minimum.to_dict() for minimum in self.minima],
-            "objective": self.objective,
-            "termination": self.termination,
-            "iterations": self.iterations,
-            "intervals_from": self.intervals_from,
-            "residual_horizon": self.residual_horizon,
-            "training": {name: channel.to_dict() for name, channel in self.training.items()},
-            "details": None if self.details is None else self.details.to_dict(),
-            "findings": [finding.to_dict() for finding in self.findings],
-            "evidence": self.evidence.to_dict(),
-            "provenance": dict(self.provenance),
-        }
-
-    def _repr_html_(self) -> str:
+    def _tables(self) -> tuple[Table, ...]:
         beside = () if self.details is None else self.details.tables()
-        return "".join(table._repr_html_() for table in (self.summary(), *beside))
+        return (self.summary(), *beside)
+
+    def _computed(self) -> dict[str, object]:
+        return {
+            "structure": repr(self.structure),
+            "responses": {each.name: each for each in self.responses},
+            "training": self.training,
+        }
 
 
 def _row(p: Estimate, level: float) -> tuple[Cell, ...]:

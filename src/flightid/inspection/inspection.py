@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from textwrap import fill
 
 from flightid.conventions import Light
@@ -13,6 +13,7 @@ from flightid.inspection.rates import StreamRate
 from flightid.inspection.saturation import Saturation
 from flightid.inspection.skew import Skew
 from flightid.inspection.usable_band import AxisBand
+from flightid.result import Result
 from flightid.table import Column, Table
 
 WIDTH = 100
@@ -25,7 +26,7 @@ WORDS = {
 
 
 @dataclass(frozen=True, repr=False)
-class Inspection:
+class Inspection(Result, schema="flightid.inspection/1"):
     """What a log holds, and whether it can support identification.
 
     Attributes
@@ -203,34 +204,14 @@ class Inspection:
         )
         return Table("Rates", columns, rows)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values.
+    def _tables(self) -> tuple[Table, ...]:
+        return self.tables()
 
-        Returns
-        -------
-        dict
-            Key ``schema`` and one for each attribute, ``verdict`` and ``usable_band_rad_s``.
-        """
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": "flightid.inspection/1",
-            "name": self.name,
-            "kind": self.kind,
-            "firmware": self.firmware,
-            "vehicle": self.vehicle,
-            "duration_s": self.duration_s,
-            "verdict": str(self.verdict),
-            "usable_band_rad_s": {
-                axis: None if band is None else list(band)
-                for axis, band in self.usable_band_rad_s.items()
-            },
+            "verdict": self.verdict,
+            "usable_band_rad_s": self.usable_band_rad_s,
             "airborne_s": self.phases.airborne_s,
-            "phases": asdict(self.phases),
-            "rates": [asdict(rate) for rate in self.rates],
-            "excitations": [asdict(excitation) for excitation in self.excitations],
-            "saturations": [asdict(saturation) for saturation in self.saturations],
-            "skews": [asdict(skew) for skew in self.skews],
-            "bands": [asdict(band) for band in self.bands],
-            "findings": [finding.to_dict() for finding in self.findings],
         }
 
     def __repr__(self) -> str:
@@ -239,6 +220,3 @@ class Inspection:
             f"Inspection({self.name!r}, {self.duration_s:.4g} s, "
             f"{self.phases.airborne_s:.4g} s airborne, {self.verdict})"
         )
-
-    def _repr_html_(self) -> str:
-        return "".join(table._repr_html_() for table in self.tables())

@@ -18,13 +18,14 @@ from flightid.logs.to_record import make_record
 from flightid.record import InputHold, InputShape, Record
 from flightid.record.hold import Loop
 from flightid.record.timebase import GapPolicy
+from flightid.result import Result
 from flightid.table import Column, Table
 
 SUGGESTIONS = 12
 """How many message names an error lists before it stops."""
 
 
-class Log:
+class Log(Result, schema="flightid.log/1"):
     """A flight log: message tables with their own stamps, units, parameters, events and gaps.
 
     Opening reads the file once to index it; a column is extracted when it is asked for. Use
@@ -252,17 +253,8 @@ class Log:
         )
         return Table(repr(self), columns, rows, tuple(str(finding) for finding in self.findings))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values: what the log holds, without its samples.
-
-        Returns
-        -------
-        dict
-            Keys ``schema``, ``path``, ``kind``, ``vehicle``, ``firmware``, ``messages``,
-            ``parameters``, ``events``, ``skipped``, ``gaps``, ``findings``.
-        """
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": "flightid.log/1",
             "path": str(self._path),
             "kind": self.kind,
             "vehicle": self.vehicle,
@@ -293,9 +285,6 @@ class Log:
             f"Log({self._path.name!r}, {self.firmware or self.kind}, {rows} rows of "
             f"{len(self.messages)} messages, {self.duration_s:.4g} s, {lost} bytes skipped)"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
     def _near(self, name: str) -> str:
         """Names that exist: those that share the beginning first, then the others, shortened."""

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from flightid.errors import MissingColumnError
 from flightid.logs.source import LogSource
+from flightid.result import Result
 from flightid.table import Column, Table
 
 if TYPE_CHECKING:
     import pandas as pd
 
 
-class LogTable:
+class LogTable(Result, schema="flightid.log_table/1"):
     """Rows of one message type (or one of its instances), by column.
 
     Columns are read on demand and kept. Numbers are scaled by the log's own multipliers and carry
@@ -211,9 +212,6 @@ class LogTable:
         rate_hz = self._source.messages[self.name].rate_hz
         rate = "no rate" if rate_hz is None else f"{rate_hz:.4g} Hz"
         return f"LogTable({self.name}{instance}, {len(self)} rows x {len(self.columns)}, {rate})"
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
     def _require_numbers(self, column: str) -> None:
         self._require(column)

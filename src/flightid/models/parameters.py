@@ -14,6 +14,7 @@ from flightid import _native
 from flightid.errors import ModelError, UnknownNameError
 from flightid.models.language.dimensions import require_unit
 from flightid.models.language.formula import RESERVED, formula_names
+from flightid.result import Tabled
 from flightid.table import Column, Table
 from flightid.units import canonical
 
@@ -121,7 +122,7 @@ class Parameter:
         }
 
 
-class Parameters(Mapping[str, Parameter]):
+class Parameters(Mapping[str, Parameter], Tabled):
     """Named parameters, checked against each other: ties known, not circular, right in their units.
 
     Parameters
@@ -315,6 +316,3 @@ class Parameters(Mapping[str, Parameter]):
     def to_dict(self) -> dict[str, object]:
         """Plain values by name."""
         return {name: parameter.to_dict() for name, parameter in self._items.items()}
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()

@@ -24,11 +24,12 @@ from flightid.record.validation import (
     uniform_sample_time,
     unknown_channel,
 )
+from flightid.result import Result
 from flightid.table import Cell, Table
 from flightid.version import VERSION
 
 
-class Record:
+class Record(Result, schema="flightid.record/1"):
     """One manoeuvre: named channels with unit and role on one uniform time base.
 
     Records are immutable: every operation returns a new one and appends to `history`. Time runs
@@ -391,9 +392,6 @@ class Record:
     def __repr__(self) -> str:
         """Size, rate and channel names on one line."""
         return one_line(self)
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
     def _require(self, name: str) -> None:
         if name not in self._channels:

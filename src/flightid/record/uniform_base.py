@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
 
@@ -58,7 +59,7 @@ class ChannelResampling:
 
 
 @dataclass(frozen=True)
-class UniformBase:
+class UniformBase(Result, schema="flightid.uniform_base/1"):
     """Channels on one uniform grid, in one or several spans, with an account of how.
 
     Attributes
@@ -132,18 +133,12 @@ class UniformBase:
         )
         return Table(repr(self), columns, rows, tuple(map(str, self.findings)))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values: grid, spans without samples, account by channel, findings."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": "flightid.uniform_base/1",
-            "sample_time_s": self.sample_time_s,
             "spans": [
                 [float(span.time_s[0]), float(span.time_s[-1]), span.time_s.size]
                 for span in self.spans
             ],
-            "channels": [dict(vars(channel)) for channel in self.channels],
-            "options": dict(self.options),
-            "findings": [finding.to_dict() for finding in self.findings],
         }
 
     def __repr__(self) -> str:
@@ -154,9 +149,6 @@ class UniformBase:
             f"UniformBase({len(self.spans)} spans, {total} samples, "
             f"{1 / self.sample_time_s:.6g} Hz, channels [{names}])"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def doubts(

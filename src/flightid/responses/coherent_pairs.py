@@ -10,6 +10,7 @@ from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.responses.pair import PairResponse
 from flightid.responses.response import FrequencyResponse
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
 
@@ -47,7 +48,7 @@ class CoherentPair:
 
 
 @dataclass(frozen=True, repr=False)
-class CoherentPairs:
+class CoherentPairs(Result, schema="flightid.coherent_pairs/1"):
     """The coherence test of every response of a set.
 
     Attributes
@@ -112,24 +113,12 @@ class CoherentPairs:
         ]
         return Table(repr(self), columns, tuple(rows))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {
-            "schema": "flightid.coherent_pairs/1",
-            "minimum_coherence": self.minimum_coherence,
-            "minimum_decades": self.minimum_decades,
-            "pairs": [vars(pair) for pair in self.pairs],
-        }
-
     def __repr__(self) -> str:
         """How many are kept, on one line."""
         return (
             f"CoherentPairs({len(self.names)} of {len(self.pairs)} responses kept, "
             f"coherence ≥ {self.minimum_coherence:g} over {self.minimum_decades:g} decades)"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def coherent_pairs(

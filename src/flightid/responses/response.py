@@ -16,6 +16,7 @@ from flightid.responses.bands import choose_frequencies, nearest
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource, Selected
 from flightid.responses.pair import PairResponse, quotient_unit
+from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.feedback import FeedbackTest
 from flightid.units import DIMENSIONLESS
@@ -25,7 +26,11 @@ SMALL_COVARIANCE = 1 << 25
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FrequencyResponse:
+class FrequencyResponse(
+    Result,
+    schema="flightid.frequency_response/1",
+    untold={"errors": "what computes the covariance of a fit", "linear": "what arithmetic needs"},
+):
     """Frequency responses of all outputs to all inputs with coherence, error and spectra.
 
     Attributes
@@ -339,28 +344,8 @@ class FrequencyResponse:
                 )
         return Table(repr(self), columns, tuple(rows), tuple(map(str, self.findings)))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values, complex arrays as real and imaginary parts; the covariance is left out."""
-        values: dict[str, object] = {
-            "schema": "flightid.frequency_response/1",
-            "inputs": list(self.inputs),
-            "outputs": list(self.outputs),
-            "units": dict(self.units),
-            "estimator": self.estimator,
-            "n_windows": list(self.n_windows),
-            "window_s": list(self.window_s),
-            "loop": None if self.loop is None else self.loop.to_dict(),
-            "input_shape": self.input_shape.to_dict(),
-            "findings": [finding.to_dict() for finding in self.findings],
-            "history": [str(step) for step in self.history],
-        }
-        for name in AXES:
-            array = getattr(self, name)
-            if array is not None and np.iscomplexobj(array):
-                values[name] = {"real": array.real.tolist(), "imaginary": array.imag.tolist()}
-            else:
-                values[name] = None if array is None else array.tolist()
-        return values
+    def _computed(self) -> dict[str, object]:
+        return {"history": [str(step) for step in self.history]}
 
     def __repr__(self) -> str:
         """Size, band and mean coherence on one line."""
@@ -370,9 +355,6 @@ class FrequencyResponse:
             f" {self.n_frequencies} frequencies {self.omega_rad_s[0]:.4g} to"
             f" {self.omega_rad_s[-1]:.4g} rad/s, mean coherence {np.mean(self.coherence):.2f})"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
     def _index(self, kind: str, name: str) -> int:
         names = self.outputs if kind == "output" else self.inputs

@@ -15,12 +15,12 @@ import numpy as np
 
 from flightid.errors import DataError, OptionError
 from flightid.record import Record
+from flightid.result import Result
 from flightid.simulation.stepper import Stepper
 from flightid.table import Column, Table
 
 MAXIMUM_DATAGRAM = 8192
 MAXIMUM_FRAMES = 10_000_000
-SCHEMA = "flightid.flown_session/1"
 
 
 class Clock(Protocol):
@@ -46,7 +46,7 @@ class SystemClock:
 
 
 @dataclass(frozen=True, eq=False)
-class FlownSession:
+class FlownSession(Result, schema="flightid.flown_session/1", untold={"record": "time histories"}):
     """A flight in real time.
 
     Attributes
@@ -76,14 +76,8 @@ class FlownSession:
         )
         return Table(repr(self), (Column("what"), Column("value"), Column("unit")), rows)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "frames": self.record.n_samples,
-            "late_frames": self.late_frames,
-            "worst_late_s": self.worst_late_s,
-        }
+    def _computed(self) -> dict[str, object]:
+        return {"frames": self.record.n_samples}
 
 
 def fly_in_real_time(

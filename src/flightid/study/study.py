@@ -14,6 +14,7 @@ from flightid.inspection import Inspection
 from flightid.record import Record
 from flightid.report.content import Document
 from flightid.report.json import to_dict
+from flightid.result import Result
 from flightid.study.document import parameter_table, study_document
 from flightid.study.estimate_tables import model_table
 from flightid.study.identified import Identified
@@ -24,7 +25,19 @@ from flightid.table import Table
 
 
 @dataclass(frozen=True, eq=False)
-class Study:
+class Study(
+    Result,
+    schema=SCHEMA,
+    untold={
+        "settings": "what was asked",
+        "records": "time histories",
+        "output": "a folder",
+        "identified": "told as models",
+        "qualities": "told as handling_qualities",
+        "carried_out": "of this run",
+        "from_cache": "of this run",
+    },
+):
     """What a study file made.
 
     Attributes
@@ -88,25 +101,12 @@ class Study:
         """Table of all parameters with their intervals, or of models where none has equations."""
         return parameter_table(self) if self.has_equations else model_table(self.identified)
 
-    def to_dict(self) -> dict[str, object]:
-        """Every result as plain values, the report's content tree among them.
-
-        Returns
-        -------
-        dict
-            Keys ``schema``, ``title``, ``files``, ``inspection``, ``models``, ``tuning``,
-            ``handling_qualities``, ``truth``, ``findings``, ``report``.
-        """
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": SCHEMA,
             "title": self.settings.title,
-            "files": dict(self.files),
-            "inspection": None if self.inspection is None else self.inspection.to_dict(),
-            "models": [item.to_dict() for item in self.identified],
-            "tuning": None if self.tuning is None else self.tuning.to_dict(),
-            "handling_qualities": {name: each.to_dict() for name, each in self.qualities.items()},
-            "truth": None if self.truth is None else self.truth.to_dict(),
-            "findings": [finding.to_dict() for finding in self.findings],
+            "models": self.identified,
+            "handling_qualities": self.qualities,
+            "findings": self.findings,
             "report": to_dict(self.document),
         }
 
@@ -117,6 +117,3 @@ class Study:
             f"Study({self.settings.title!r}, {n} model{'' if n == 1 else 's'}, "
             f"{self.document.tally})"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()

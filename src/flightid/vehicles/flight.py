@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flightid import _native
 from flightid.errors import OptionError, UnknownNameError
 from flightid.record import Record, Step
+from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.vehicles.autopilot import Autopilot, PilotDoublet, SidRun
 from flightid.vehicles.quadrotor import QuadrotorParameters, Sensors, Turbulence
@@ -24,7 +25,7 @@ MIXER_AXES = (10, 11, 12)
 
 
 @dataclass(frozen=True)
-class Flight:
+class Flight(Result, schema="flightid.flight/1", untold={"rows": "time histories"}):
     """Everything that a simulated flight left behind.
 
     Attributes
@@ -180,20 +181,8 @@ class Flight:
             ),
         )
 
-    def to_dict(self) -> dict[str, object]:
-        """Settings and truth as plain values, without the samples."""
-        return {
-            "schema": "flightid.flight/1",
-            "vehicle": asdict(self.vehicle),
-            "autopilot": asdict(self.autopilot),
-            "sensors": asdict(self.sensors),
-            "turbulence": asdict(self.turbulence),
-            "runs": [asdict(run) for run in self.runs],
-            "doublets": [asdict(doublet) for doublet in self.doublets],
-            "log_every": self.log_every,
-            "seed": self.seed,
-            "truth": {axis: self.truth(axis).to_dict() for axis in AXES},
-        }
+    def _computed(self) -> dict[str, object]:
+        return {"truth": {axis: self.truth(axis) for axis in AXES}}
 
 
 def fly(

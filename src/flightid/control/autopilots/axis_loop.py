@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
@@ -19,6 +19,7 @@ from flightid.control.autopilots.filters import (
 )
 from flightid.control.autopilots.parameter_table import Axis, GainRange, gain_ranges
 from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
+from flightid.result import Result
 from flightid.table import Column, Table
 
 Gyro = Literal["raw", "filtered"]
@@ -97,7 +98,7 @@ class LoopRun:
 
 
 @dataclass(frozen=True)
-class AxisLoop(ABC):
+class AxisLoop(Result, schema="flightid.axis_loop/1"):
     """One axis of an autopilot. Made by `axis_loop` or `axis_loop_of`.
 
     Signs and units: rates in rad/s, outputs in `output_unit`. `feedback` is positive for negative
@@ -336,18 +337,10 @@ class AxisLoop(ABC):
         columns = tuple(map(Column, ("parameter", "value", "low", "high", "unit", "note")))
         return Table(repr(self), columns, rows, self.unmodelled)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": "flightid.axis_loop/1",
             "autopilot": self.autopilot,
-            "axis": self.axis,
-            "loop_rate_hz": self.loop_rate_hz,
-            "gyro_rate_hz": self.gyro_rate_hz,
-            "computation_delay_s": self.computation_delay_s,
             "gains": self.gains,
-            "assumed": list(self.assumed),
-            "unmodelled": list(self.unmodelled),
         }
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.conventions import Light
 from flightid.findings import Finding, worst
+from flightid.result import Result
 from flightid.table import Column, Table
 
 Samples = NDArray[np.float64]
@@ -50,7 +51,11 @@ def compare(name: str, logged: Samples, replayed: Samples) -> TermReplay:
 
 
 @dataclass(frozen=True)
-class Replay:
+class Replay(
+    Result,
+    schema="flightid.replay/1",
+    untold={"time_s": "time histories", "logged": "time histories", "replayed": "time histories"},
+):
     """A controller run on a log's set-point and rate, beside what the log says it put out.
 
     Attributes
@@ -132,21 +137,8 @@ class Replay:
         )
         return Table(repr(self), columns, rows, tuple(map(str, self.findings)))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values, without samples."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": "flightid.replay/1",
-            "log": self.log,
-            "loop": self.loop.to_dict(),
             "span_s": [float(self.time_s[0]), float(self.time_s[-1])],
             "rows": int(self.time_s.size),
-            "log_rate_hz": self.log_rate_hz,
-            "exact": self.exact,
-            "setpoint_lag_s": self.setpoint_lag_s,
-            "rate_lag_s": self.rate_lag_s,
-            "terms": [vars(term) for term in self.terms],
-            "findings": [finding.to_dict() for finding in self.findings],
         }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()

@@ -9,11 +9,10 @@ from flightid.control.loops.interconnection import Interconnection
 from flightid.control.margins.margins import Margins, margins
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.uncertain import Uncertain
-
-SCHEMA = "flightid.closed_loop/1"
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,9 @@ class ClosedPole:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ClosedLoop:
+class ClosedLoop(
+    Result, schema="flightid.closed_loop/1", untold={"uncertain": "the loops with their covariance"}
+):
     """A controller closed around a model.
 
     Made by `flightid.close_loop`.
@@ -162,24 +163,8 @@ class ClosedLoop:
             notes.append(f"No intervals: {self.reason}.")
         return Table(f"Poles of {self.name}", columns, rows, tuple(notes)).without_empty_columns()
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "name": self.name,
-            "actuators": list(self.actuators),
-            "stable": self.is_stable,
-            "poles": [
-                {key: getattr(each, key).to_dict() for key in vars(each)} for each in self.poles
-            ],
-            "draws": self.draws,
-            "unstable_draws": self.unstable_draws,
-            "loops": self.loops.to_dict(),
-            "findings": [each.to_dict() for each in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
+    def _computed(self) -> dict[str, object]:
+        return {"stable": self.is_stable}
 
 
 def _interval(quantity: Reading) -> str:

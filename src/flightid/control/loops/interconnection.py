@@ -29,15 +29,17 @@ from flightid.findings import Finding
 from flightid.models.linear.hold_equivalent import Hold as InputHold
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.record import Record
+from flightid.result import Result
 from flightid.table import Column, Table
 
-SCHEMA = "flightid.interconnection/1"
 DEFAULT_PADE_ORDER = 3
 STABILITY_ORDER = 6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Interconnection:
+class Interconnection(
+    Result, schema="flightid.interconnection/1", untold={"wiring": "follows from the blocks"}
+):
     """Blocks joined by the names of their signals.
 
     Made by `flightid.connect`. All signals are departures from trim.
@@ -359,28 +361,20 @@ class Interconnection:
         )
         return Table(self.name, columns, rows, notes)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": SCHEMA,
-            "name": self.name,
-            "inputs": list(self.inputs),
-            "outputs": list(self.outputs),
             "units": self.units,
             "blocks": [
                 {
                     "name": block.name,
-                    "inputs": list(block.inputs),
-                    "outputs": list(block.outputs),
+                    "inputs": block.inputs,
+                    "outputs": block.outputs,
                     "what": str(block),
                 }
                 for block in self.blocks
             ],
-            "findings": [each.to_dict() for each in self.findings],
+            "findings": self.findings,
         }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def _given_as(block: Block, signal: str, other: str) -> Block:

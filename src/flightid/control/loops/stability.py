@@ -15,12 +15,12 @@ from flightid.control.loops.delayed_roots import (
 from flightid.control.loops.linear_core import Core
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Column, Table
 
 Complex = NDArray[np.complex128]
 Array = NDArray[np.float64]
 Parts = tuple[Array, Array, Array, Array, Array]
-SCHEMA = "flightid.loop_stability/1"
 SEEDS_A_DELAY = 4
 """Poles looked for beside those of the states, for each delay."""
 NEUTRAL = 1e-9
@@ -28,7 +28,7 @@ NEUTRAL = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Stability:
+class Stability(Result, schema="flightid.loop_stability/1"):
     """Whether closed loops are stable, by their poles and by a count that knows no poles.
 
     Attributes
@@ -105,19 +105,8 @@ class Stability:
             "Poles of the closed loops", columns, tuple(rows), tuple(map(str, self.findings))
         )
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "stable": self.is_stable,
-            "unstable_poles": self.n_unstable,
-            "sample_time_s": self.sample_time_s,
-            "poles": [[float(p.real), float(p.imag)] for p in self.poles],
-            "findings": [each.to_dict() for each in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
+    def _computed(self) -> dict[str, object]:
+        return {"stable": self.is_stable}
 
 
 def by_poles(poles: Complex, sample_time_s: float | None) -> Stability:

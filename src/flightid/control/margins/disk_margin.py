@@ -26,11 +26,11 @@ from flightid.control.margins.structured_gain import structured_gain
 from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
 from flightid.uncertainty.quantiles import LEVEL
 
-SCHEMA = "flightid.disk_margin/1"
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 GRID = 160
@@ -49,7 +49,7 @@ UNSTABLE = "the closed loop is unstable"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DiskMargin:
+class DiskMargin(Result, schema="flightid.disk_margin/1"):
     """Result of `disk_margin`.
 
     Attributes
@@ -117,21 +117,6 @@ class DiskMargin:
         """
         title = f"Disk margin at {', '.join(self.channels)}, skew {self.skew:g}"
         return estimate_table(title, self.quantities, tuple(map(str, self.findings)), level=level)
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "channels": list(self.channels),
-            "skew": self.skew,
-            "quantities": {each.name: each.to_dict() for each in self.quantities},
-            "omega_rad_s": self.omega_rad_s.tolist(),
-            "alphas": self.alphas.tolist(),
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def disk_margin(

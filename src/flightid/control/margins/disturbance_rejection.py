@@ -15,11 +15,11 @@ from flightid.control.margins.loop_source import Controller, Given, read_loop
 from flightid.control.margins.margins import LoopCurve, drawn_points, measured_up
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Reading, estimate_table
 from flightid.uncertainty.quantiles import LEVEL
 
-SCHEMA = "flightid.disturbance_rejection/1"
 Array = NDArray[np.float64]
 PEAK_GUIDE_DB = 5.0
 QUANTITIES = (
@@ -33,7 +33,7 @@ NO_BANDWIDTH = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DisturbanceRejection:
+class DisturbanceRejection(Result, schema="flightid.disturbance_rejection/1"):
     """Result of `disturbance_rejection`.
 
     Attributes
@@ -90,19 +90,6 @@ class DisturbanceRejection:
         return estimate_table(
             f"Disturbance rejection of {self.name}", self.quantities, notes, level=level
         )
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "loop": self.name,
-            "quantities": {each.name: each.to_dict() for each in self.quantities},
-            "crossings_rad_s": list(self.crossings_rad_s),
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def disturbance_rejection(

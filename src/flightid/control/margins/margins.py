@@ -14,11 +14,11 @@ from flightid.control.margins.loop_grid import zoomed
 from flightid.control.margins.loop_metrics import LoopMetrics
 from flightid.control.margins.loop_source import Controller, Given, Loop, read_loop
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading, estimate_table
 from flightid.uncertainty.quantiles import LEVEL
 
-SCHEMA = "flightid.margins/1"
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 PHASE_GUIDE_DEG = 45.0
@@ -92,7 +92,7 @@ class Crossing:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Margins:
+class Margins(Result, schema="flightid.margins/1"):
     """Result of `margins`.
 
     Attributes
@@ -185,21 +185,8 @@ class Margins:
         ]
         return Table(f"Crossings of {self.name}", columns, tuple(sorted(rows)))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "loop": self.name,
-            "stable": self.is_stable,
-            "unstable_poles": self.unstable_poles,
-            "quantities": {each.name: each.to_dict() for each in self.quantities},
-            "crossovers": [[c.omega_rad_s, c.margin] for c in self.crossovers],
-            "phase_crossovers": [[c.omega_rad_s, c.margin] for c in self.phase_crossovers],
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
+    def _computed(self) -> dict[str, object]:
+        return {"stable": self.is_stable}
 
 
 def margins(

@@ -19,9 +19,8 @@ from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import ResponseBand
 from flightid.errors import DataError, UnknownNameError
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
-
-SCHEMA = "flightid.pid_design/1"
 
 
 @dataclass(frozen=True)
@@ -76,7 +75,11 @@ class Stage:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PidDesign:
+class PidDesign(
+    Result,
+    schema="flightid.pid_design/1",
+    untold={"problem": "the search: every plant at every frequency"},
+):
     """Result of `flightid.tune_pid`.
 
     Attributes
@@ -296,33 +299,18 @@ class PidDesign:
         """
         return write_steps(path, [self], overwrite=overwrite)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": SCHEMA,
             "autopilot": self.flown.autopilot,
             "axis": self.axis,
-            "exists": self.exists,
             "gains": {
                 c.name: {"flown": c.flown, "new": c.new if self.exists else None, "unit": c.unit}
                 for c in self.changes
             },
-            "requirements": self.requirements.to_dict(),
-            "promises": [each.to_dict() for each in self.promises],
-            "binding": list(self.binding),
-            "stages": [
-                {"gains": dict(s.gains), "stable": s.stable, "phase_margin_deg": s.phase_margin_deg}
-                for s in self.stages
-            ],
-            "content": self.content,
-            "share_met": self.share_met,
-            "n_plants": self.n_plants,
-            "findings": [finding.to_dict() for finding in self.findings],
-            "provenance": dict(self.provenance),
         }
 
-    def _repr_html_(self) -> str:
-        return self.gain_table()._repr_html_() + self.promise_table()._repr_html_()
+    def _tables(self) -> tuple[Table, ...]:
+        return (self.gain_table(), self.promise_table())
 
 
 def write_steps(

@@ -10,9 +10,8 @@ from flightid.control.tuning.pid_design import PidDesign, write_steps
 from flightid.conventions import Light
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
-
-SCHEMA = "flightid.tuning/1"
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ class Together:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Tuning:
+class Tuning(Result, schema="flightid.tuning/1"):
     """Result of `flightid.tune`.
 
     Attributes
@@ -189,18 +188,15 @@ class Tuning:
         """
         return write_steps(path, self.designs, overwrite=overwrite)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": SCHEMA,
             "exists": self.exists,
-            "axes": {design.axis: design.to_dict() for design in self.designs},
-            "together": [each.to_dict() for each in self.together],
-            "findings": [finding.to_dict() for finding in self.findings],
+            "designs": {design.axis: design for design in self.designs},
+            "findings": self.findings,
         }
 
-    def _repr_html_(self) -> str:
-        return "".join(design._repr_html_() for design in self.designs)
+    def _tables(self) -> tuple[Table, ...]:
+        return tuple(table for design in self.designs for table in design._tables())
 
 
 def _in_short(design: PidDesign) -> str:

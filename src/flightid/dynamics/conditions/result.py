@@ -9,10 +9,9 @@ from flightid.conventions import Light
 from flightid.dynamics.modes.result import Mode
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
-
-SCHEMA = "flightid.condition_comparison/1"
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,7 @@ class ComparedMode:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class ConditionComparison:
+class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
     """Result of `flightid.compare_conditions`.
 
     Attributes
@@ -184,20 +183,11 @@ class ConditionComparison:
             f"parameters, {len(self.modes)} common modes, {changed} significant changes)"
         )
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "conditions": list(self.conditions),
-            "parameters": {number.name: number.to_dict() for number in self.parameters},
-            "modes": [mode.to_dict() for mode in self.modes],
-            "only_parameters": {n: list(v) for n, v in self.only_parameters.items()},
-            "only_modes": {n: list(v) for n, v in self.only_modes.items()},
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
+    def _computed(self) -> dict[str, object]:
+        return {"parameters": {number.name: number for number in self.parameters}}
 
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_() + self.modes_table()._repr_html_()
+    def _tables(self) -> tuple[Table, ...]:
+        return (self.summary(), self.modes_table())
 
 
 def _value(quantity: Reading | None) -> list[Cell]:

@@ -14,13 +14,13 @@ from flightid.errors import ModelError, UnitError
 from flightid.findings import Finding
 from flightid.identification import Fit
 from flightid.models import StateSpaceModel
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import LEVEL, interval_words
 from flightid.units import convert, same_dimension
 
 Array = NDArray[np.float64]
-SCHEMA = "flightid.derivatives/1"
 AXES: Mapping[str, str] = {
     "u": "X", "V": "X", "v": "Y", "beta": "Y", "w": "Z", "alpha": "Z", "p": "L", "q": "M", "r": "N",
 }  # fmt: skip
@@ -101,7 +101,7 @@ class Derivative:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class DerivativeTable:
+class DerivativeTable(Result, schema="flightid.derivatives/1"):
     """Result of `flightid.derivatives`.
 
     Attributes
@@ -188,19 +188,8 @@ class DerivativeTable:
             f"{controls} control)"
         )
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "name": self.name,
-            "derivatives": {each.name: each.to_dict() for each in self.derivatives},
-            "others": list(self.others),
-            "normalisation": self.normalisation,
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
+    def _computed(self) -> dict[str, object]:
+        return {"derivatives": {each.name: each for each in self.derivatives}}
 
 
 def derivatives(source: object, normalisation: Normalisation | None = None) -> DerivativeTable:

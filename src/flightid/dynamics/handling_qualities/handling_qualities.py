@@ -17,10 +17,10 @@ from flightid.errors import DataError, ModelError, OptionError
 from flightid.findings import Finding
 from flightid.models.model import linear_system, model_of
 from flightid.responses import FrequencyResponse
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
 
-SCHEMA = "flightid.handling_qualities/1"
 ATTITUDES = {"roll": ("phi", "p"), "pitch": ("theta", "q"), "yaw": ("psi", "r")}
 CONTROLS = {
     "roll": ("lat", "delta_lat", "aileron", "tau_phi", "phi_command"),
@@ -33,7 +33,7 @@ Pairs = Mapping[str, tuple[str, str]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class HandlingQualities:
+class HandlingQualities(Result, schema="flightid.handling_qualities/1"):
     """Result of `handling_qualities`.
 
     Attributes
@@ -105,21 +105,6 @@ class HandlingQualities:
         case = ", ".join(f"{name} {value}" for name, value in self.conditions.items())
         notes = (f"{self.vehicle}: {case}.", FOR_PILOTS, *sorted(doubts), *map(str, self.findings))
         return Table("Handling qualities", columns, tuple(rows), notes).without_empty_columns()
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "vehicle": self.vehicle,
-            "conditions": dict(self.conditions),
-            "bandwidths": {axis: found.to_dict() for axis, found in self.bandwidths.items()},
-            "modes": None if self.modes is None else self.modes.to_dict(),
-            "ratings": [rating.to_dict() for rating in self.ratings],
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 FOR_PILOTS = (

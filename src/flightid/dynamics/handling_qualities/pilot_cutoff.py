@@ -16,12 +16,12 @@ from flightid.excitation.spectrum import power_spectrum
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.responses.spectrum_measures import band_rms, cutoff_frequency
+from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
 from flightid.uncertainty.quantiles import LEVEL
 from flightid.uncertainty.uneven import LogarithmicEnds
 
-SCHEMA = "flightid.pilot_cutoff/1"
 TAPER = 0.1
 """Share of a record in its two cosine ends: steep spectra leak without it."""
 NEIGHBOURHOOD = 1.6
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PilotCutoff:
+class PilotCutoff(Result, schema="flightid.pilot_cutoff/1"):
     """Result of `pilot_cutoff`.
 
     Attributes
@@ -75,22 +75,6 @@ class PilotCutoff:
         return estimate_table(
             f"Pilot's use of {self.channel}", (self.cutoff, self.rms), notes, level=level
         )
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "channel": self.channel,
-            "unit": self.unit,
-            "cutoff": self.cutoff.to_dict(),
-            "rms": self.rms.to_dict(),
-            "omega_rad_s": self.omega_rad_s.tolist(),
-            "density": self.density.tolist(),
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import UnknownNameError
+from flightid.result import Result
 from flightid.table import Column, Table
 
-SCHEMA = "flightid.rating_chart/1"
 Samples = Mapping[str, NDArray[np.float64]]
 Limits = Mapping[str, tuple[float, float]]
 
@@ -52,7 +52,7 @@ class Region:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RatingChart:
+class RatingChart(Result, schema="flightid.rating_chart/1"):
     """One requirement of a standard for one case of its use.
 
     Attributes
@@ -164,30 +164,6 @@ class RatingChart:
         if self.confirmed:
             return ""
         return "Boundaries not confirmed: check them against your copy of the standard."
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key; infinite limits are None."""
-        return {
-            "schema": SCHEMA,
-            "key": self.key,
-            "standard": self.standard,
-            "title": self.title,
-            "source": self.source,
-            "conditions": dict(self.conditions),
-            "regions": [
-                {
-                    "limits": _finite(region.limits),
-                    "boundary": None if region.boundary is None else region.boundary.tolist(),
-                }
-                for region in self.regions
-            ],
-            "valid": _finite(self.valid),
-            "confirmed": self.confirmed,
-            "note": self.note,
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def _finite(limits: Limits) -> dict[str, list[float | None]]:

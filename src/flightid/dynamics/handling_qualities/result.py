@@ -11,19 +11,23 @@ from flightid.dynamics.handling_qualities.curve import Curve
 from flightid.dynamics.handling_qualities.rating import Rating, normal_draws, rate
 from flightid.dynamics.handling_qualities.rating_charts import RatingChart
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
 from flightid.uncertainty.quantiles import LEVEL
 from flightid.uncertainty.uncertain import LOST, Uncertain
 from flightid.uncertainty.uneven import drawn_estimate
 
-SCHEMA = "flightid.attitude_bandwidth/2"
 PLACES = {"omega_180": 0, "phase": 1, "gain": 2, "delay": 3, "slope": 4}
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AttitudeBandwidth:
+class AttitudeBandwidth(
+    Result,
+    schema="flightid.attitude_bandwidth/2",
+    untold={"uncertain": "the covariance that quantities carry", "curve": "what a plot draws"},
+):
     """Result of `attitude_bandwidth`.
 
     Attributes
@@ -174,13 +178,8 @@ class AttitudeBandwidth:
         title = f"Attitude bandwidth of {self.name}, {self.response_type} command"
         return estimate_table(title, self.quantities, tuple(map(str, self.findings)), level=level)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": SCHEMA,
-            "output": self.output,
-            "input": self.input,
-            "response_type": self.response_type,
             "omega_180_rad_s": self.omega_180_rad_s,
             "phase_bandwidth_rad_s": self.phase_bandwidth_rad_s,
             "gain_bandwidth_rad_s": self.gain_bandwidth_rad_s,
@@ -188,10 +187,5 @@ class AttitudeBandwidth:
             "phase_delay_s": self.phase_delay_s,
             "phase_slope_delay_s": self.phase_slope_delay_s,
             "gain_limited": self.gain_limited,
-            "nonlinear": self.nonlinear,
-            "quantities": {each.name: each.to_dict() for each in self.quantities},
-            "findings": [finding.to_dict() for finding in self.findings],
+            "quantities": {each.name: each for each in self.quantities},
         }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()

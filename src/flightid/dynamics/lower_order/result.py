@@ -16,6 +16,7 @@ from flightid.findings import Finding
 from flightid.identification import Fit
 from flightid.models import TransferFunctionModel
 from flightid.responses import FrequencyResponse
+from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
 from flightid.uncertainty.quantiles import LEVEL
@@ -23,12 +24,15 @@ from flightid.uncertainty.uncertain import LOST, Uncertain
 from flightid.uncertainty.uneven import drawn_estimate
 from flightid.validation.verification.muad import Mismatch
 
-SCHEMA = "flightid.lower_order/1"
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LowerOrder:
+class LowerOrder(
+    Result,
+    schema="flightid.lower_order/1",
+    untold={"uncertain": "the covariance that quantities carry", "response": "the data"},
+):
     """Result of `lower_order`.
 
     Attributes
@@ -205,23 +209,11 @@ class LowerOrder:
             title, self.quantities, (*notes, *map(str, self.findings)), level=level
         )
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": SCHEMA,
-            "kind": self.kind,
-            "output": self.output,
-            "input": self.input,
-            "model": self.model.to_dict(),
-            "band_rad_s": list(self.band_rad_s),
-            "mismatch_cost": self.mismatch_cost,
-            "mismatch": self.mismatch.to_dict(),
-            "quantities": {each.name: each.to_dict() for each in self.quantities},
-            "findings": [finding.to_dict() for finding in self.findings],
+            "model": self.model,
+            "quantities": {each.name: each for each in self.quantities},
         }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 DERIVED = (

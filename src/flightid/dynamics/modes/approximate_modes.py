@@ -16,12 +16,12 @@ from flightid.dynamics.modes.result import Mode, Modes
 from flightid.dynamics.modes.state_matrix import StateMatrix, read_states
 from flightid.errors import ModelError
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uncertain import Uncertain
 from flightid.units import convert, same_dimension
 
-SCHEMA = "flightid.approximate_modes/1"
 HOVER_M_S = 5.0
 """Trim speed below which the formulas of hover are meant, not those of forward flight."""
 OWN = 0.5
@@ -98,7 +98,7 @@ class ApproximateMode:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class ApproximateModes:
+class ApproximateModes(Result, schema="flightid.approximate_modes/1"):
     """Result of `flightid.approximate_modes`.
 
     Attributes
@@ -178,20 +178,6 @@ class ApproximateModes:
         worst = f", worst frequency {max(apart):.1f} %" if apart else ""
         n = len(self.approximations)
         return f"ApproximateModes({self.name!r}: {n} approximation{'' if n == 1 else 's'}{worst})"
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "name": self.name,
-            "flight": self.flight,
-            "approximations": [each.to_dict() for each in self.approximations],
-            "quasi_static": list(self.quasi_static),
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def approximate_modes(

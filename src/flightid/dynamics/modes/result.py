@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from flightid.dynamics.modes.names import NamedMode
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
 
-SCHEMA = "flightid.modes/1"
 LEAST_SHOWN = 0.01
 """Participation below which the table of participations leaves a state out."""
 
@@ -171,7 +171,7 @@ def _place(mode: Mode) -> str:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Modes:
+class Modes(Result, schema="flightid.modes/1"):
     """Result of `flightid.modes`.
 
     Attributes
@@ -333,20 +333,6 @@ class Modes:
         stable = "stable" if self.is_stable else "unstable"
         plural = "" if count == 1 else "s"
         return f"Modes({self.name!r}: {count} eigenvalue{plural}{least}, {stable})"
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "name": self.name,
-            "sample_time_s": self.sample_time_s,
-            "modes": [mode.to_dict() for mode in self.modes],
-            "reason": self.reason,
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.table()._repr_html_()
 
 
 def _values(quantities: list[Reading]) -> NDArray[np.float64]:

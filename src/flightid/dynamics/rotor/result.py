@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 from flightid.errors import ModelError
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import LEVEL, interval_words
 
-SCHEMA = "flightid.rotor_physics/1"
 THEORY, GIVEN, FULL = "theory", "given", "full model's mode"
 """Where an expected number comes from."""
 
@@ -54,7 +54,7 @@ class RotorFact:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class RotorPhysics:
+class RotorPhysics(Result, schema="flightid.rotor_physics/1"):
     """Result of `flightid.rotor_physics`.
 
     Attributes
@@ -122,18 +122,8 @@ class RotorPhysics:
         far = f", farthest from theory {100.0 * max(apart):.0f} %" if apart else ""
         return f"RotorPhysics({self.name!r}: {len(self.facts)} numbers{far})"
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "name": self.name,
-            "rotor_speed_rad_s": self.rotor_speed_rad_s,
-            "facts": {fact.identified.name: fact.to_dict() for fact in self.facts},
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
+    def _computed(self) -> dict[str, object]:
+        return {"facts": {fact.identified.name: fact for fact in self.facts}}
 
 
 def _row(fact: RotorFact, level: float) -> tuple[Cell, ...]:

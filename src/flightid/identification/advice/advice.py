@@ -17,6 +17,7 @@ from flightid.identification.advice.impulse_response import ImpulseResponse, imp
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 from flightid.record.hold import Loop
+from flightid.result import Result
 from flightid.table import Column, Table
 
 Array = NDArray[np.float64]
@@ -30,7 +31,7 @@ LAGS_BEFORE = 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Advice:
+class Advice(Result, schema="flightid.advice/1"):
     """Result of `flightid.advise`.
 
     Attributes
@@ -81,20 +82,6 @@ class Advice:
         notes = (f"{loop[0].upper()}{loop[1:]}.", *map(str, self.findings))
         return Table(repr(self), columns, rows, notes)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": "flightid.advice/1",
-            "output": self.output,
-            "inputs": list(self.inputs),
-            "n_samples": self.n_samples,
-            "n_records": self.n_records,
-            "excitation_orders": dict(self.excitation_orders),
-            "response": None if self.response is None else self.response.to_dict(),
-            "feedback": self.feedback.to_dict(),
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
     def __repr__(self) -> str:
         """Channels, size and the poorest excitation on one line."""
         records = f"{self.n_records} record{'' if self.n_records == 1 else 's'}"
@@ -103,9 +90,6 @@ class Advice:
             f"Advice({self.output!r} from {', '.join(self.inputs)}, {self.n_samples} samples in "
             f"{records}, excitation order {least})"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def advise(

@@ -15,6 +15,7 @@ from flightid.identification.prediction_error.linear_regression import Regressio
 from flightid.models.polynomial.structure import KERNELS
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
+from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.quantiles import half_width
 
@@ -25,7 +26,7 @@ SAMPLES_PER_COEFFICIENT = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ImpulseResponse:
+class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
     """Response of one output to a pulse of one sample on each input.
 
     Attributes
@@ -113,28 +114,13 @@ class ImpulseResponse:
             repr(self), columns, tuple(rows), ("delay: first lag that chance does not explain",)
         )
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": "flightid.impulse_response/1",
-            "output": self.output,
-            "inputs": list(self.inputs),
-            "sample_time_s": self.sample_time_s,
-            "lags": self.lags.tolist(),
-            "values": self.values.tolist(),
-            "stderr": self.stderr.tolist(),
-            "kernel": self.kernel,
-            "n_samples": self.n_samples,
-            "delays": dict(self.delays),
-        }
+    def _computed(self) -> dict[str, object]:
+        return {"stderr": self.stderr}
 
     def __repr__(self) -> str:
         """Channels, lags and delays on one line."""
         found = ", ".join(f"{name} delay {delay}" for name, delay in self.delays.items())
         return f"ImpulseResponse({self.output!r}, {self.lags.size} lags, {found})"
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def impulse_response(

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.record import Record
+from flightid.result import Result
 from flightid.simulation import metrics
 from flightid.table import Cell, Column, Table
-
-SCHEMA = "flightid.prediction/1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +55,11 @@ NOTHING = Shifts(np.zeros(0), np.zeros(0), np.zeros(0), 0, 0)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Prediction:
+class Prediction(
+    Result,
+    schema="flightid.prediction/1",
+    untold={"measured": "time histories", "predicted": "time histories"},
+):
     """One record and what a model makes of its inputs.
 
     Attributes
@@ -159,31 +161,12 @@ class Prediction:
             notes.append(f"The run left its range at sample {self.diverged_at} and was held.")
         return Table(repr(self), columns, tuple(rows), tuple(notes))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key, without the time histories."""
-        scores: Mapping[str, Mapping[str, float]] = {
+    def _computed(self) -> dict[str, object]:
+        return {
+            "record": self.measured.name,
             "fit_percent": self.fit_percent,
             "theil": self.theil,
             "rms_error": self.rms_error,
-        }
-        bias = self.shifts.input_bias
-        return {
-            "schema": SCHEMA,
-            "record": self.measured.name,
-            "outputs": list(self.outputs),
-            "horizon": self.horizon,
-            "initial_state": self.initial_state,
-            "start": self.start,
-            "diverged_at": self.diverged_at,
-            **{key: dict(value) for key, value in scores.items()},
-            "shifts": {
-                "state_bias": self.shifts.state_bias.tolist(),
-                "output_bias": self.shifts.output_bias.tolist(),
-                "input_bias": None if bias is None else bias.tolist(),
-                "initial_state": self.shifts.initial_state.tolist(),
-                "n_free": self.shifts.n_free,
-                "rank": self.shifts.rank,
-            },
         }
 
     def _fit_words(self, name: str) -> str:
@@ -198,6 +181,3 @@ class Prediction:
         fits = ", ".join(map(self._fit_words, self.outputs))
         left = "" if self.diverged_at is None else f", held from sample {self.diverged_at}"
         return f"Prediction({self.words}, {self.measured.n_samples} samples, fit {fits}{left})"
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()

@@ -10,9 +10,8 @@ from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.reduction.rules import ReductionLimits
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
-
-SCHEMA = "flightid.reduction/1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +67,7 @@ class ReductionStep:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Reduction:
+class Reduction(Result, schema="flightid.reduction/1", untold={"data": "responses or records"}):
     """Result of `flightid.reduce`.
 
     Attributes
@@ -216,23 +215,11 @@ class Reduction:
         notes = (f"Ended: {self.stopped}.", legend, *remarks, *map(str, self.findings))
         return Table(f"Reduction of {self.start.model.name}", columns, tuple(rows), notes)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key, without the data."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": SCHEMA,
-            "start": self.start.to_dict(),
-            "path": [each.to_dict() for each in self.path],
-            "fit": self.fit.to_dict(),
-            "stopped": self.stopped,
-            "limits": vars(self.limits).copy(),
-            "keep": list(self.keep),
-            "at": dict(self.at),
-            "after_rise": self.after_rise,
-            "findings": [finding.to_dict() for finding in self.findings],
+            "fit": self.fit,
+            "findings": self.findings,
         }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def worst_percents(fit: Fit) -> tuple[float | None, float | None]:

@@ -17,9 +17,8 @@ from flightid.identification.fit_findings import (
     INSENSITIVITY_GUIDE_PERCENT,
 )
 from flightid.identification.reduction.result import worst_percents
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
-
-SCHEMA = "flightid.structure_comparison/1"
 
 
 def information_criterion(fit: Fit) -> float | None:
@@ -97,7 +96,7 @@ class StructureRow:
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class StructureComparison:
+class StructureComparison(Result, schema="flightid.structure_comparison/1"):
     """Result of `flightid.compare_structures`.
 
     Attributes
@@ -165,17 +164,8 @@ class StructureComparison:
         ]
         return Table("Structures", columns, tuple(rows), tuple(map(str, self.findings)))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values with a ``schema`` key."""
-        return {
-            "schema": SCHEMA,
-            "structures": {name: vars(row).copy() for name, row in self.rows.items()},
-            "best": self.best,
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
+    def _computed(self) -> dict[str, object]:
+        return {"best": self.best}
 
 
 def compare_structures(fits: Mapping[str, Fit]) -> StructureComparison:

@@ -14,13 +14,14 @@ from flightid.identification.subspace.estimate import RANK, Matrices, Subspace, 
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.prediction import one_step_errors
 from flightid.models.innovations.structure import SubspaceStructure
+from flightid.result import Result
 from flightid.table import Column, Table
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class OrderChoice:
+class OrderChoice(Result, schema="flightid.order_choice/1"):
     """Evidence for an order, one entry for each candidate 1, 2, ….
 
     Attributes
@@ -92,19 +93,6 @@ class OrderChoice:
             "before refinement; the smallest value counts",
         )
         return Table(repr(self), columns, tuple(rows), notes)
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {
-            "chosen": self.chosen,
-            "asked": self.asked,
-            "singular_values": self.singular_values.tolist(),
-            "correlations": self.correlations.tolist(),
-            "gap": self.gap,
-            "svc": list(self.svc),
-            "criteria": [each.to_dict() for each in self.criteria],
-            "horizon": self.horizon,
-        }
 
     def __repr__(self) -> str:
         """Chosen order and what the criteria say on one line."""

@@ -14,10 +14,11 @@ from flightid.models.innovations.structure import SubspaceOptions, SubspaceStruc
 from flightid.models.sampled.channels import gather_channels, hold_diverged, require_same
 from flightid.models.sampled.discrete_modes import zero_note
 from flightid.record import Record
+from flightid.result import Tabled
 from flightid.table import Cell, Column, Table
 
 
-class InnovationsModel(InnovationsForm):
+class InnovationsModel(InnovationsForm, Tabled):
     """x(t+1) = A x(t) + B u(t) + K e(t), y(t) = C x(t) + D u(t) + e(t).
 
     Channels are deviations from an operating point, in the channels' units; the states have no
@@ -135,6 +136,3 @@ class InnovationsModel(InnovationsForm):
         states = f"{self.order} state{'' if self.order == 1 else 's'}"
         channels = f"{', '.join(self.outputs)} from {', '.join(self.inputs)}"
         return f"InnovationsModel({states}, {channels}, T {self.sample_time_s:.4g} s)"
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()

@@ -16,6 +16,7 @@ from flightid.models.linear.hold_equivalent import Hold, hold_equivalent
 from flightid.models.linear.rational import Rational
 from flightid.models.linear.realisation import Matrices
 from flightid.models.parameters import Parameter
+from flightid.result import Tabled
 from flightid.table import Column, Table
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ DEFAULT_PADE_ORDER = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LinearSystem(Rational):
+class LinearSystem(Rational, Tabled):
     """A linear system given by its matrices: dx/dt = A x + B u(t − τ), y = C x + D u(t − τ).
 
     With a sample time it is a recursion: x[k+1] in place of dx/dt.
@@ -343,9 +344,6 @@ class LinearSystem(Rational):
         late = ", ".join(f"{delay:g} s" for delay in np.asarray(self.delays_s))
         kind = f"poles in the {plane}, one line for each conjugate pair"
         return Table(repr(self), columns, rows, (kind, f"delays of inputs: {late}"))
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
     def __repr__(self) -> str:
         """Size on one line."""

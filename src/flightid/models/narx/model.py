@@ -19,6 +19,7 @@ from flightid.models.narx.terms import Lag, Term
 from flightid.models.parameters import Parameter
 from flightid.models.sampled.coefficients import coefficients, replaced
 from flightid.record import Record
+from flightid.result import Tabled
 from flightid.table import Column, Table
 
 SCHEMA = "flightid.narx_equation/1"
@@ -26,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
-class NarxModel:
+class NarxModel(Tabled):
     """y(t) = Σ weight · term of lagged outputs and inputs, channels scaled.
 
     Attributes
@@ -246,6 +247,3 @@ class NarxModel:
         terms = f"{len(self.terms)} term{'' if len(self.terms) == 1 else 's'}"
         channels = f"{self.output!r} from {', '.join(self.inputs)}"
         return f"NarxModel({channels}, {terms}, T {self.sample_time_s:.4g} s)"
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()

@@ -12,10 +12,11 @@ from flightid.models.polynomial.polynomials import Array, Polynomials
 from flightid.models.polynomial.prediction import forced_run
 from flightid.models.sampled.channels import gather_channels, hold_diverged, require_same
 from flightid.record import Record
+from flightid.result import Tabled
 from flightid.table import Table
 
 
-class PolynomialModel(Polynomials, StructureMakers):
+class PolynomialModel(Polynomials, StructureMakers, Tabled):
     """A(q) y(t) = Σ Bᵢ(q)/Fᵢ(q) uᵢ(t - nkᵢ) + C(q)/D(q) e(t), polynomials in q⁻¹.
 
     Channels are deviations from an operating point, in the channels' units.
@@ -95,6 +96,3 @@ class PolynomialModel(Polynomials, StructureMakers):
         """Kind, orders and sample time on one line."""
         text = repr(self.structure).removeprefix("PolynomialStructure(").removesuffix(")")
         return f"PolynomialModel({text}, T {self.sample_time_s:.4g} s)"
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()

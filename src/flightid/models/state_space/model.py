@@ -23,6 +23,7 @@ from flightid.models.state_space.display import MatrixDisplay, matrices_as_latex
 from flightid.models.state_space.linear import Linearised
 from flightid.models.state_space.parts import Output, ResponsePair
 from flightid.models.state_space.trimming import find_trim
+from flightid.result import Tabled
 from flightid.table import Table
 from flightid.units import canonical
 
@@ -31,7 +32,7 @@ SCHEMA = "flightid.state_space_model/1"
 
 
 @dataclass(frozen=True, repr=False)
-class StateSpaceModel(Linearised):
+class StateSpaceModel(Linearised, Tabled):
     """Equations of motion with named, bounded, tied parameters.
 
     Attributes
@@ -303,6 +304,9 @@ class StateSpaceModel(Linearised):
         notes = (*description.lines(self), *filter(None, [self.source, self.note]))
         return Table(self.name, table.columns, table.rows, notes)
 
+    def _repr_html_(self) -> str:
+        return self.displayed().html() + super()._repr_html_()
+
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key; `from_dict` reads them."""
         return {"schema": SCHEMA, **description.to_plain(self)}
@@ -332,6 +336,3 @@ class StateSpaceModel(Linearised):
         bare = cls(**{**described, "trim": trim, "initial": initial})  # type: ignore[arg-type]
         found = insert_blocks(bare, blocks)
         return replace(found, trim={**found.trim, **own}, initial={**found.initial, **own_initial})
-
-    def _repr_html_(self) -> str:
-        return self.displayed().html() + self.summary()._repr_html_()

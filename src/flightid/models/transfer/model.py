@@ -21,6 +21,7 @@ from flightid.models.language.formula import formula_names
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.realisation import Matrices, canonical_form, one_delay_for_each_input
 from flightid.models.parameters import Parameters
+from flightid.result import Tabled
 from flightid.table import Table
 from flightid.units import DIMENSIONLESS, canonical
 
@@ -76,7 +77,7 @@ class TransferFunction:
 
 
 @dataclass(frozen=True, repr=False)
-class TransferFunctionModel(Adjustable):
+class TransferFunctionModel(Adjustable, Tabled):
     """Transfer functions of the same parameters.
 
     Attributes
@@ -346,9 +347,6 @@ class TransferFunctionModel(Adjustable):
             "source": self.source,
             "note": self.note,
         }
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def _quotient(above: str, below: str) -> str:

@@ -18,6 +18,7 @@ from flightid.models.narx.model import NarxModel
 from flightid.models.narx.structure import NarxStructure
 from flightid.progress import track
 from flightid.record import Record
+from flightid.result import Result
 from flightid.simulation.metrics import fit_percent, rms_error
 from flightid.table import Cell, Column, Table
 
@@ -48,7 +49,7 @@ class NarxTrial:
 
 
 @dataclass(frozen=True)
-class NarxSearch:
+class NarxSearch(Result, schema="flightid.narx_search/1"):
     """Trials in the order of their free-run error on the validation records, the best first.
 
     Example
@@ -90,21 +91,15 @@ class NarxSearch:
         )
         return Table("NARX search", columns, tuple(map(_row, self.trials)), notes)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values: ``schema``, the table of trials, the best fit, findings."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": "flightid.narx_search/1",
             "trials": self.summary().to_dict(),
-            "best": self.best.to_dict(),
-            "findings": [finding.to_dict() for finding in self.findings],
+            "best": self.best,
         }
 
     def __repr__(self) -> str:
         """Number of trials and the best one on one line."""
         return f"NarxSearch({len(self.trials)} structures, best {self.best!r})"
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def search_narx(

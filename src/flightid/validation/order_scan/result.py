@@ -10,6 +10,7 @@ from flightid.identification.fit import Fit
 from flightid.identification.prediction_error.information_criteria import Criteria
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
 CRITERIA = ("aic", "aicc", "bic", "mdl", "fpe")
@@ -39,7 +40,7 @@ class OrderTrial:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class OrderScan:
+class OrderScan(Result, schema="flightid.order_scan/1"):
     """Result of `flightid.scan_orders`.
 
     Attributes
@@ -148,16 +149,10 @@ class OrderScan:
         )
         return Table(repr(self), columns, tuple(_row(trial, chosen) for trial in shown), notes)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values: ``schema``, all trials as a table, the best fit, findings."""
+    def _computed(self) -> dict[str, object]:
         return {
-            "schema": "flightid.order_scan/1",
-            "kind": self.kind,
-            "validation": list(self.validation),
-            "start": self.start,
             "trials": self.summary(len(self.trials)).to_dict(),
-            "best": self.best.to_dict(),
-            "findings": [finding.to_dict() for finding in self.findings],
+            "findings": self.findings,
         }
 
     def __repr__(self) -> str:
@@ -168,9 +163,6 @@ class OrderScan:
             f"OrderScan({self.kind}, {len(self.trials)} structures, best "
             f"{first.structure.orders_text}{fit})"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def _at_edge(scan: OrderScan) -> list[str]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.feedback import FeedbackTest
 from flightid.validation.residuals.correlation_result import (
@@ -23,7 +24,7 @@ RULE = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ResidualTests:
+class ResidualTests(Result, schema="flightid.residual_tests/1"):
     """Whether residuals are unpredictable from inputs and from their own past.
 
     Attributes
@@ -134,25 +135,8 @@ class ResidualTests:
         notes = (self.predictor, lags, RULE, *reasons, *map(str, self.findings))
         return Table(repr(self), columns, tuple(rows), notes)
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {
-            "schema": "flightid.residual_tests/1",
-            "outputs": list(self.outputs),
-            "inputs": list(self.inputs),
-            "horizon": str(self.horizon),
-            "predictor": self.predictor,
-            "loop": str(self.loop),
-            "feedback": self.feedback.to_dict(),
-            "rule": RULE,
-            "maximum_lag": self.maximum_lag,
-            "n_samples": self.n_samples,
-            "n_records": self.n_records,
-            "fitted_noise": self.fitted_noise,
-            "fitted_input": self.fitted_input,
-            "tests": [item.to_dict() for item in self.tests],
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
+    def _computed(self) -> dict[str, object]:
+        return {"rule": RULE}
 
     def __repr__(self) -> str:
         """Size, and how many of the tests that count and could be made have passed."""
@@ -164,6 +148,3 @@ class ResidualTests:
             f"ResidualTests({outputs}, {inputs}, {self.n_samples} samples, "
             f"{passed} of {made} tests passed)"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()

@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ResidualSpectra:
+class ResidualSpectra(Result, schema="flightid.residual_spectra/1"):
     """Spectra of residuals and their coherence with the inputs.
 
     Attributes
@@ -84,22 +85,6 @@ class ResidualSpectra:
                 )
         return Table(repr(self), columns, tuple(rows), tuple(map(str, self.findings)))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {
-            "schema": "flightid.residual_spectra/1",
-            "outputs": list(self.outputs),
-            "inputs": list(self.inputs),
-            "omega_rad_s": self.omega_rad_s.tolist(),
-            "density": self.density.tolist(),
-            "low": self.low.tolist(),
-            "high": self.high.tolist(),
-            "coherence": self.coherence.tolist(),
-            "coherence_limit": self.coherence_limit.tolist(),
-            "window_s": self.window_s,
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
     def __repr__(self) -> str:
         """Size and the largest share of coherent frequencies on one line."""
         return (
@@ -108,9 +93,6 @@ class ResidualSpectra:
             f"{len(self.omega_rad_s)} frequencies, at most {np.max(self.coherent_percent):.0f} "
             "% coherent)"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 @dataclass(frozen=True)
@@ -140,7 +122,7 @@ class Peak:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SpectrumComparison:
+class SpectrumComparison(Result, schema="flightid.spectrum_comparison/1"):
     """Spectra of measured and predicted outputs.
 
     Attributes
@@ -204,21 +186,6 @@ class SpectrumComparison:
         ]
         return Table(repr(self), columns, tuple(rows), tuple(map(str, self.findings)))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {
-            "schema": "flightid.spectrum_comparison/1",
-            "outputs": list(self.outputs),
-            "omega_rad_s": self.omega_rad_s.tolist(),
-            "measured": self.measured.tolist(),
-            "low": self.low.tolist(),
-            "high": self.high.tolist(),
-            "predicted": self.predicted.tolist(),
-            "peaks": [vars(peak) for peak in self.peaks],
-            "window_s": self.window_s,
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
-
     def __repr__(self) -> str:
         """Size and how many peaks measurement and model share, on one line."""
         shared = sum(
@@ -229,6 +196,3 @@ class SpectrumComparison:
             f"SpectrumComparison({outputs}, {len(self.omega_rad_s)} frequencies, "
             f"{shared} of {len(self.peaks)} peaks matched)"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.validation.verification.result import Verification
 
@@ -81,7 +82,7 @@ class Contrast:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison:
+class Comparison(Result, schema="flightid.comparison/1"):
     """Models side by side on records that none of them has seen; the first is on trial.
 
     Attributes
@@ -154,15 +155,8 @@ class Comparison:
         notes = [self.first.protocol, *notes, *map(str, self.findings)]
         return Table(repr(self), tuple(columns), tuple(rows), tuple(notes))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values, without the time histories."""
-        return {
-            "schema": "flightid.comparison/1",
-            "names": list(self.names),
-            "verifications": {name: each.to_dict() for name, each in self.verifications.items()},
-            "contrasts": [each.to_dict() for each in self.contrasts],
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
+    def _computed(self) -> dict[str, object]:
+        return {"names": self.names}
 
     def __repr__(self) -> str:
         """Size, and in how many outputs the first model is better than a rival, on one line."""
@@ -175,9 +169,6 @@ class Comparison:
             f"Comparison({len(self.names)} models, {outputs}, {records}, "
             f"{self.names[0]!r} better in {ahead}, worse in {behind})"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def compared(verifications: Mapping[str, Verification]) -> Comparison:

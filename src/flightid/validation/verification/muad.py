@@ -16,6 +16,7 @@ from flightid.errors import DataError, ModelError, OptionError
 from flightid.findings import Finding
 from flightid.models import model_of
 from flightid.responses import FrequencyResponse
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
 # Numerator and denominator in falling powers of s, and the delay of the phase bounds, s.
@@ -97,7 +98,7 @@ def muad_envelopes(omega_rad_s: ArrayLike) -> Envelopes:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Mismatch:
+class Mismatch(Result, schema="flightid.mismatch/1"):
     """A model's response over the measured one, judged by the envelopes.
 
     Attributes
@@ -169,18 +170,8 @@ class Mismatch:
             rows.append((name, share, *largest))
         return Table(repr(self), columns, tuple(rows), tuple(map(str, self.findings)))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {
-            "schema": "flightid.mismatch/1",
-            "names": list(self.names),
-            "omega_rad_s": self.envelopes.omega_rad_s.tolist(),
-            "gain_db": self.gain_db.tolist(),
-            "phase_deg": self.phase_deg.tolist(),
-            "judged": self.judged.tolist(),
-            "inside_percent": list(self.inside_percent),
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
+    def _computed(self) -> dict[str, object]:
+        return {"inside_percent": self.inside_percent}
 
     def __repr__(self) -> str:
         """Size and the worst share on one line."""
@@ -188,9 +179,6 @@ class Mismatch:
         shares = [share for share in self.inside_percent if share is not None]
         worst = f"worst {min(shares):.0f} % inside" if shares else "none judged"
         return f"Mismatch({pairs}, {self.envelopes.omega_rad_s.size} frequencies, {worst})"
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
 
 
 def mismatch(

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from flightid.findings import Finding
 from flightid.identification.prediction.result import Prediction
 from flightid.record import Record
+from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.validation.verification.muad import Mismatch
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Verification:
+class Verification(Result, schema="flightid.verification/1"):
     """How a model predicts records, by output.
 
     Attributes
@@ -141,47 +142,9 @@ class Verification:
             notes.append(f"Theil coefficient of all outputs together {self.overall_theil:.3f}.")
         return Table(repr(self), columns, tuple(rows), (*notes, *map(str, self.findings)))
 
-    def to_dict(self) -> dict[str, object]:
-        """Plain values, without the time histories."""
-        return {
-            "schema": "flightid.verification/1",
-            "protocol": self.protocol,
-            "horizon": self.horizon,
-            "initial_state": self.initial_state,
-            "state_bias": self.state_bias,
-            "output_bias": self.output_bias,
-            "hold": self.hold,
-            "overall_theil": self.overall_theil,
-            "j_rms": self.j_rms,
-            "outputs": {
-                name: {
-                    "unit": self.measured.unit(name),
-                    "theil": self.theil[name],
-                    "rms_error": self.rms_error[name],
-                    "mse": self.mse[name],
-                    "fit_percent": self.fit_percent[name],
-                    "vaf_percent": self.vaf[name],
-                    "r_squared": self.r_squared[name],
-                }
-                for name in self.outputs
-            },
-            "records": [
-                {
-                    "name": prediction.measured.name,
-                    "duration_s": prediction.measured.duration_s,
-                    "start": prediction.start,
-                    "diverged_at": prediction.diverged_at,
-                    "state_bias": prediction.shifts.state_bias.tolist(),
-                    "output_bias": dict(
-                        zip(self.outputs, prediction.shifts.output_bias.tolist(), strict=False)
-                    ),
-                    "initial_state": prediction.shifts.initial_state.tolist(),
-                }
-                for prediction in self.predictions
-            ],
-            "mismatch": None if self.mismatch is None else self.mismatch.to_dict(),
-            "findings": [finding.to_dict() for finding in self.findings],
-        }
+    def _computed(self) -> dict[str, object]:
+        units = {name: self.measured.unit(name) for name in self.outputs}
+        return {"protocol": self.protocol, "units": units}
 
     def __repr__(self) -> str:
         """Size and the worst Theil coefficient on one line."""
@@ -193,6 +156,3 @@ class Verification:
             f"Verification({outputs}, {records}, {length_s:.4g} s, "
             f"worst Theil coefficient {max(self.theil.values()):.3f})"
         )
-
-    def _repr_html_(self) -> str:
-        return self.summary()._repr_html_()
