@@ -114,6 +114,7 @@ GROUPS = {
             "Evidence",
             "Check",
             "validation",
+            "plot",
         ),
     ),
     "use": Group(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from flightid.version import VERSION as __version__
 
 if TYPE_CHECKING:
-    from flightid import conditioning, excitation, validation
+    from flightid import conditioning, excitation, plot, validation
     from flightid.control import loops
     from flightid.control.autopilots.axis_loop import AxisLoop
     from flightid.control.autopilots.from_log import axis_loop_of
@@ -231,6 +231,7 @@ _HOMES = {
     "library_names": "flightid.models",
     "load_model": "flightid.models",
     "Prediction": "flightid.identification.prediction.result",
+    "plot": "flightid.plot",
     "predict": "flightid.identification.prediction.predict",
     "read_log": "flightid.logs",
     "read_records": "flightid.record",
@@ -338,6 +339,7 @@ __all__ = [
     "modes",
     "open_loop",
     "pilot_cutoff",
+    "plot",
     "predict",
     "px4_autotune_gains",
     "read_log",

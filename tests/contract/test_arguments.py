@@ -115,6 +115,10 @@ OWN = {
         "expected fixed flight lock_number n_alpha normalisation output_is response_type "
         "rotor_speed_rad_s sign signs speed states t_theta2_s task",
     ),
+    "plot": (
+        "the result that is drawn, by its own noun, and guides in it",
+        "curves disk estimates found gain_guide_db loops margins panels phase_guide_deg size",
+    ),
     "evidence": ("checks of the gate", "checks required"),
     "excitation": (
         "the shape of a manoeuvre; injection clocks are stated in hertz by their firmware",

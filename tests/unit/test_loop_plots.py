@@ -32,7 +32,7 @@ def test_the_diagram_names_all_blocks_and_signals() -> None:
 
 
 def test_a_step_shows_the_limit() -> None:
-    made = step(loop(), "r", size=2.0, length_s=3.0, sample_time_s=0.02)
+    made = step(loop(), "r", size=2.0, duration_s=3.0, sample_time_s=0.02)
     names = [trace.name for trace in made.data]
     assert names == ["y", "v"]
     assert float(np.max(made.data[1].y)) == 1.0

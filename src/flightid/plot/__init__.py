@@ -8,3 +8,29 @@ unasked. Series keep their colour throughout a report: measured grey-black, mode
 estimate orange, truth green. Colours are Okabe and Ito's, which colour-blind readers tell apart,
 and no meaning rests on colour alone: series differ in dash or marker too.
 """
+
+from flightid.plot.fit import EstimateBar, parameter_intervals
+from flightid.plot.frequency_response import Curve, bode
+from flightid.plot.loops import diagram, step
+from flightid.plot.margins import loop_bode, loop_nichols, loop_nyquist
+from flightid.plot.modes import pole_map
+from flightid.plot.pictures import fit_picture, record_history
+from flightid.plot.record import Panel, Trace, time_histories
+
+__all__ = [
+    "Curve",
+    "EstimateBar",
+    "Panel",
+    "Trace",
+    "bode",
+    "diagram",
+    "fit_picture",
+    "loop_bode",
+    "loop_nichols",
+    "loop_nyquist",
+    "parameter_intervals",
+    "pole_map",
+    "record_history",
+    "step",
+    "time_histories",
+]

@@ -28,6 +28,11 @@ class EstimateBar:
         EstimateBar and its 95 % interval, any unit.
     truth : float or None
         True value where it is known.
+
+    Example
+    -------
+    >>> EstimateBar("Lp", -4.0, -4.2, -3.8).truth is None
+    True
     """
 
     name: str
@@ -50,6 +55,11 @@ def parameter_intervals(estimates: Sequence[EstimateBar], *, name: str = "estima
     Returns
     -------
     plotly.graph_objects.Figure
+
+    Example
+    -------
+    >>> len(parameter_intervals([EstimateBar("Lp", -4.0, -4.2, -3.8, truth=-4.1)]).data)
+    2
     """
     made = look.figure(height_px=FRAME_PX + ROW_PX * len(estimates))
     references = [item.value if item.truth is None else item.truth for item in estimates]

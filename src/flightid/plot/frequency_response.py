@@ -33,6 +33,11 @@ class Curve:
         Coherence; shown below where any curve has it.
     random_error : ndarray, shape (n_freqs,), optional
         Normalised 1 σ random error; shown as a 95 % band.
+
+    Example
+    -------
+    >>> Curve("model", np.array([1.0]), np.array([1.0 + 0.0j])).name
+    'model'
     """
 
     name: str
@@ -59,6 +64,12 @@ def bode(curves: Sequence[Curve], *, unit: str = "", minimum_coherence: float = 
     Returns
     -------
     plotly.graph_objects.Figure
+
+    Example
+    -------
+    >>> omega = np.array([1.0, 10.0])
+    >>> len(bode([Curve("model", omega, 1 / (1j * omega))]).data)
+    2
     """
     has_coherence = any(curve.coherence is not None for curve in curves)
     rows = 3 if has_coherence else 2

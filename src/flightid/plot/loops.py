@@ -27,6 +27,14 @@ def diagram(loops: Interconnection) -> go.Figure:
     Returns
     -------
     plotly.graph_objects.Figure
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> roll = fid.LinearSystem([[-4.0]], [[20.0]], [[1.0]], [[0.0]], ("lat",), ("p",))
+    >>> loop = fid.connect([roll, fid.loops.gain("p", "lat", -0.2)], inputs=[], outputs=["p"])
+    >>> type(diagram(loop)).__name__
+    'Figure'
     """
     made, columns = look.figure(1, 1), _columns(loops)
     places: dict[int, tuple[float, float]] = {}
@@ -148,7 +156,7 @@ def step(
     source: str,
     *,
     size: float = 1.0,
-    length_s: float = 10.0,
+    duration_s: float = 10.0,
     sample_time_s: float = 0.01,
     outputs: Sequence[str] | None = None,
 ) -> go.Figure:
@@ -161,7 +169,7 @@ def step(
         Input that steps; the others rest.
     size : float
         In the input's unit.
-    length_s, sample_time_s : float
+    duration_s, sample_time_s : float
         s.
     outputs : sequence of str, optional
         Signals to draw; those of the connection when left out.
@@ -169,9 +177,17 @@ def step(
     Returns
     -------
     plotly.graph_objects.Figure
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> roll = fid.LinearSystem([[-4.0]], [[20.0]], [[1.0]], [[0.0]], ("lat",), ("p",))
+    >>> loop = fid.connect([roll], inputs=["lat"], outputs=["p"])
+    >>> len(step(loop, "lat", duration_s=1.0).data)
+    1
     """
     shown = tuple(loops.outputs if outputs is None else outputs)
-    time_s = sample_time_s * np.arange(round(length_s / sample_time_s) + 1)
+    time_s = sample_time_s * np.arange(round(duration_s / sample_time_s) + 1)
     inputs = {name: np.full(len(time_s), size if name == source else 0.0) for name in loops.inputs}
     units = {name: unit for name, unit in loops.units.items() if name in inputs}
     record = Record.from_arrays(time_s, inputs=inputs, units=units)

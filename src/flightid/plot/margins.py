@@ -35,6 +35,13 @@ def loop_bode(margins: Margins) -> go.Figure:
     Returns
     -------
     plotly.graph_objects.Figure
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> loop = fid.LinearSystem([[0.0]], [[4.0]], [[1.0]], [[0.0]], ("e",), ("y",), [0.1])
+    >>> type(loop_bode(fid.margins(loop))).__name__
+    'Figure'
     """
     made = look.figure(rows=2, row_heights=(1.0, 1.0), height_px=500)
     omega, decibel, degrees = _curve(margins.curve, margins.crossover)
@@ -71,6 +78,13 @@ def loop_nyquist(margins: Margins, disk: DiskMargin | None = None) -> go.Figure:
     Returns
     -------
     plotly.graph_objects.Figure
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> loop = fid.LinearSystem([[0.0]], [[4.0]], [[1.0]], [[0.0]], ("e",), ("y",), [0.1])
+    >>> type(loop_nyquist(fid.margins(loop))).__name__
+    'Figure'
     """
     made = look.figure(height_px=520)
     values = margins.curve.response
@@ -124,6 +138,13 @@ def loop_nichols(
     Returns
     -------
     plotly.graph_objects.Figure
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> loop = fid.LinearSystem([[0.0]], [[4.0]], [[1.0]], [[0.0]], ("e",), ("y",), [0.1])
+    >>> type(loop_nichols(fid.margins(loop))).__name__
+    'Figure'
     """
     made = look.figure(height_px=500)
     _, decibel, degrees = _curve(margins.curve, margins.crossover)

@@ -40,6 +40,12 @@ def pole_map(found: Modes | Mapping[str, Modes]) -> go.Figure:
     Returns
     -------
     plotly.graph_objects.Figure
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> pole_map(fid.modes(fid.load_model("rate_first_order"))).layout.xaxis.type is None
+    True
     """
     several = {found.name: found} if isinstance(found, Modes) else dict(found)
     shown = [m for modes in several.values() for m in modes if m.eigenvalue is not None]

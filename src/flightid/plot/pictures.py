@@ -60,6 +60,11 @@ def fit_picture(fit: Fit, *, name: str | None = None, record: int = 0) -> go.Fig
         The fit has no such response.
     DataError
         The fit keeps neither responses nor records.
+
+    Example
+    -------
+    >>> fit = fid.identify(model, responses)                          # doctest: +SKIP
+    >>> fit_picture(fit).show()                                       # doctest: +SKIP
     """
     if fit.responses:
         return fit_figure(fit, name)

@@ -29,6 +29,11 @@ class Trace:
         Values, in the panel's unit.
     colour, dash : str
         Look of the line.
+
+    Example
+    -------
+    >>> Trace("p", np.array([0.0, 0.1]), np.array([0.0, 0.2])).dash
+    'solid'
     """
 
     name: str
@@ -48,6 +53,11 @@ class Panel:
         Title of its y axis, unit included.
     traces : tuple of Trace
         Signals.
+
+    Example
+    -------
+    >>> Panel("p [rad/s]", ()).title
+    'p [rad/s]'
     """
 
     title: str
@@ -65,6 +75,12 @@ def time_histories(panels: Sequence[Panel]) -> go.Figure:
     Returns
     -------
     plotly.graph_objects.Figure
+
+    Example
+    -------
+    >>> trace = Trace("p", np.array([0.0, 0.1]), np.array([0.0, 0.2]))
+    >>> len(time_histories([Panel("p [rad/s]", (trace,))]).data)
+    1
     """
     made = look.figure(len(panels))
     named: set[str] = set()
