@@ -46,6 +46,12 @@ ON_RESPONSES = "frequency_domain"
 @click.option(
     "--reduce", "reduced", is_flag=True, help="Drop the parameters that the data do not determine."
 )
+@click.option(
+    "--write",
+    "written",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Model file (.toml) to write: estimates with covariance and evidence.",
+)
 @json_option
 def command(
     file: Path,
@@ -56,6 +62,7 @@ def command(
     band_rad_s: tuple[float, float] | None,
     method: str,
     reduced: bool,
+    written: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields of the method's options
 ) -> None:
@@ -88,6 +95,8 @@ def command(
         emit(result.fit, as_json=False)
     emit(result, as_json=as_json)
     found = result.fit if isinstance(result, flightid.Reduction) else result
+    if written is not None:
+        note(f"Wrote {flightid.write_model(found, written)}")
     leave_by_verdict((*result.findings, *found.evidence.findings))
 
 

@@ -14,7 +14,18 @@ from flightid.cli.output import Exit, note
 from flightid.errors import FlightidError
 from flightid.version import VERSION
 
-ORDER = ("inspect", "design", "response", "identify", "verify", "tune", "simulate", "report", "run")
+ORDER = (
+    "inspect",
+    "design",
+    "response",
+    "identify",
+    "verify",
+    "modes",
+    "tune",
+    "simulate",
+    "report",
+    "run",
+)
 """Verbs in the order of the work, as help lists them; others follow in alphabetical order."""
 NOT_VERBS = frozenset({"bar", "option_fields", "output", "pairs", "program"})
 

@@ -33,11 +33,13 @@ if TYPE_CHECKING:
 )
 @click.option("--output", "outputs", multiple=True, help="Output to compare; default: all.")
 @click.option(
-    "--initial-state", type=click.Choice(["trim", "estimate"]), default="trim", show_default=True
+    "--initial-state",
+    type=click.Choice(["trim", "zero", "measured", "estimate"]),
+    help="Where runs start. Left out: as the kind of model starts.",
 )
 @click.option("--hold", type=click.Choice(["first", "zero"]), help=HOLD_HELP)
-@click.option("--state-bias/--no-state-bias", default=True, help="Solve for state biases.")
-@click.option("--output-bias/--no-output-bias", default=True, help="Solve for shifts of outputs.")
+@click.option("--state-bias/--no-state-bias", default=None, help="Solve for state biases.")
+@click.option("--output-bias/--no-output-bias", default=None, help="Solve for shifts of outputs.")
 @click.option(
     "--residuals",
     "with_residuals",
@@ -57,10 +59,10 @@ def command(
     values: tuple[str, ...],
     rivals: tuple[str, ...],
     outputs: tuple[str, ...],
-    initial_state: str,
+    initial_state: str | None,
     hold: Hold | None,
-    state_bias: bool,
-    output_bias: bool,
+    state_bias: bool | None,
+    output_bias: bool | None,
     with_residuals: bool,
     html: Path | None,
     as_json: bool,
@@ -70,13 +72,13 @@ def command(
     The records (CSV, Parquet, .mat, netCDF) hold the model's channels by name. The exit code is 1
     where a prediction of MODEL misses its guide, or a residual test that was asked for fails.
     """
-    from flightid import Comparison, read_records, residual_tests, verify
+    from flightid import Comparison, load_model, read_records, residual_tests, verify
     from flightid.models import load_structure
 
-    chosen = load_structure(model, axis=axis)
+    chosen = load_model(model, axis=axis)
     if values:
-        chosen = chosen.with_values(dict(map(_number, values)))
-    models = [chosen, *(load_structure(rival, axis=axis) for rival in rivals)]
+        chosen = load_structure(model, axis=axis).with_values(dict(map(_number, values)))
+    models = [chosen, *(load_model(rival, axis=axis) for rival in rivals)]
     shared = tuple(name for name in chosen.outputs if all(name in m.outputs for m in models))
     compared = outputs or shared
     flown = [
@@ -89,7 +91,7 @@ def command(
         flown,
         state_bias=state_bias,
         output_bias=output_bias,
-        initial_state="estimate" if initial_state == "estimate" else "trim",
+        initial_state=initial_state,
         outputs=compared,
         hold=hold,
     )

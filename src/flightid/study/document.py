@@ -9,7 +9,8 @@ import numpy as np
 
 from flightid.findings import Finding, worst
 from flightid.plot.fit import EstimateBar, parameter_intervals
-from flightid.report.blocks import provenance
+from flightid.report.blocks import provenance, result_blocks
+from flightid.report.closed_loop import closed_loop_section
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.handling_qualities import handling_qualities_blocks
@@ -48,6 +49,7 @@ def study_document(study: Study) -> Document:
             Section("Result", tuple(_result(study))),
             *models,
             *_qualities(study),
+            *_uses(study),
             *gains,
             Section(
                 "The records" if study.inspection is None else "The log",
@@ -57,6 +59,24 @@ def study_document(study: Study) -> Document:
         ),
         f"Made by flightid {VERSION} from {', '.join(study.files)}.",
     )
+
+
+def _uses(study: Study) -> Iterator[Section]:
+    """What was made with the models, where the study asks for it."""
+    uses = study.uses
+    if uses.conditions is not None:
+        yield Section("Flight conditions", result_blocks(uses.conditions))
+    if uses.rotor is not None:
+        yield Section("Rotor physics", result_blocks(uses.rotor))
+    for asked, closed in uses.loops:
+        yield closed_loop_section(closed, band_rad_s=asked.band_rad_s)
+    if uses.files:
+        rows = tuple((name, file) for name, file in uses.files.items())
+        table = Table(
+            "Models, with covariance and evidence", (Column("model"), Column("file")), rows
+        )
+        exported = (TableBlock(each.summary()) for each in uses.exported)
+        yield Section("Files", (TableBlock(table), *exported))
 
 
 def _qualities(study: Study) -> Iterator[Section]:

@@ -20,6 +20,7 @@ from flightid.study.study import Study
 from flightid.study.taking import take
 from flightid.study.task import load_task
 from flightid.study.tuning import TuneSettings, tune_models
+from flightid.study.uses import use_models
 
 
 def run_study(
@@ -97,6 +98,7 @@ def run_study(
             files,
             None if wanted is None else tune_models(identified, flown, wanted),
             {} if rated is None else rate_models(identified, rated),
+            use_models(identified, settings.uses, folder),
             tuple(runner.carried_out),
             tuple(runner.from_cache),
         )

@@ -7,7 +7,7 @@ are relative to the file.
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,7 @@ from flightid.study.reducing import ReduceSettings, read_reduce
 from flightid.study.references import require_references
 from flightid.study.response_settings import ResponseSettings, read_response
 from flightid.study.tuning import TuneSettings, read_tune
+from flightid.study.uses_settings import UsesSettings, read_uses
 
 MAXIMUM_BYTES = 1 << 20
 
@@ -91,6 +92,8 @@ class Settings:
         How structures are reduced after their fit; None: not at all.
     tune : TuneSettings or None
         How the autopilot's gains are tuned; None: not at all.
+    uses : UsesSettings
+        What is done with the fitted models.
     qualities : QualitiesSettings or None
         How handling qualities are read off the fits; None: not at all.
     """
@@ -114,6 +117,7 @@ class Settings:
     reduce: ReduceSettings | None = None
     tune: TuneSettings | None = None
     qualities: QualitiesSettings | None = None
+    uses: UsesSettings = field(default_factory=UsesSettings)
 
     def segment(self, name: str) -> Segment:
         """Segment of this name."""
@@ -173,6 +177,7 @@ def read_settings(path: Path) -> Settings:
         )
         for reader in root.tables("model")
     )
+    uses = read_uses(root, [model.name for model in models])
     root.finish()
     if files and segments:
         raise StudyError(
@@ -200,6 +205,7 @@ def read_settings(path: Path) -> Settings:
         reducing,
         tuning,
         qualities,
+        uses,
     )
 
 

@@ -21,6 +21,7 @@ from flightid.study.identified import Identified
 from flightid.study.output import SCHEMA
 from flightid.study.settings import Settings
 from flightid.study.truth import Truth
+from flightid.study.uses import Uses
 from flightid.table import Table
 
 
@@ -60,6 +61,8 @@ class Study(
         Gains, where the study asks for them.
     qualities : mapping of str to HandlingQualities
         By model, where the study asks for them.
+    uses : Uses
+        Model files, and what else was made with the models.
     carried_out, from_cache : tuple of str
         Stages that this run carried out, and those whose results the cache held.
 
@@ -79,6 +82,7 @@ class Study(
     files: Mapping[str, str] = field(default_factory=dict)
     tuning: Tuning | None = None
     qualities: Mapping[str, HandlingQualities] = field(default_factory=dict)
+    uses: Uses = field(default_factory=Uses)
     carried_out: tuple[str, ...] = ()
     from_cache: tuple[str, ...] = ()
 

@@ -1,0 +1,144 @@
+"""What a study does with its fitted models: files, conditions side by side, rotor, loops."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from flightid.control.closed_loop.close_loop import close_loop
+from flightid.control.closed_loop.result import ClosedLoop
+from flightid.dynamics.conditions.compare_conditions import compare_conditions
+from flightid.dynamics.conditions.result import ConditionComparison
+from flightid.dynamics.rotor.result import RotorPhysics
+from flightid.dynamics.rotor.rotor_physics import rotor_physics
+from flightid.errors import StudyError
+from flightid.export import Exported
+from flightid.export.to_file import export
+from flightid.identification import Fit
+from flightid.models import write_model
+from flightid.study.identified import Identified
+from flightid.study.uses_settings import LoopSettings, UsesSettings
+
+MODELS, EXPORTS = "models", "export"
+"""Folders of the output."""
+
+
+@dataclass(frozen=True, eq=False)
+class Uses:
+    """What was made with the fitted models.
+
+    Attributes
+    ----------
+    files : mapping of str to str
+        Model file in the output, by name of the model: estimates with covariance and evidence.
+    conditions : ConditionComparison or None
+        Flight conditions side by side, where two models or more name one.
+    rotor : RotorPhysics or None
+    loops : tuple of (LoopSettings, ClosedLoop)
+    exported : tuple of Exported
+    """
+
+    files: Mapping[str, str] = field(default_factory=dict)
+    conditions: ConditionComparison | None = None
+    rotor: RotorPhysics | None = None
+    loops: tuple[tuple[LoopSettings, ClosedLoop], ...] = ()
+    exported: tuple[Exported, ...] = ()
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "files": dict(self.files),
+            "conditions": None if self.conditions is None else self.conditions.to_dict(),
+            "rotor": None if self.rotor is None else self.rotor.to_dict(),
+            "loops": {asked.name: closed.to_dict() for asked, closed in self.loops},
+            "exported": [each.to_dict() for each in self.exported],
+        }
+
+
+def use_models(identified: Sequence[Identified], settings: UsesSettings, folder: Path) -> Uses:
+    """Write every fitted model, and do with them what the study asks.
+
+    Parameters
+    ----------
+    identified : sequence of Identified
+    settings : UsesSettings
+    folder : Path
+        Output of the study.
+
+    Returns
+    -------
+    Uses
+
+    Raises
+    ------
+    StudyError
+        A model that is to be used was left out, or two models name one flight condition.
+    FlightidError
+        A model that does not fit its use; the message is that of the verb.
+    """
+    fits = {item.name: item.fit for item in identified if item.fit is not None}
+    asked, loops = settings.rotor, []
+    rotor = None
+    if asked is not None:
+        rotor = rotor_physics(
+            _fit(fits, asked.model),
+            asked.rotor_speed_rad_s,
+            lock_number=asked.lock_number,
+            bar_lock_number=asked.bar_lock_number,
+            expected=dict(asked.expected) or None,
+            names=dict(asked.names) or None,
+        )
+    for loop in settings.loops:
+        closed = close_loop(
+            _fit(fits, loop.model), loop.gains, draws=loop.draws, seed=loop.seed, name=loop.name
+        )
+        loops.append((loop, closed))
+    exported = []
+    for each in settings.exports:
+        (folder / EXPORTS).mkdir(exist_ok=True)
+        place = folder / EXPORTS / each.file
+        made = export(_fit(fits, each.model), place, each.format, **each.options)
+        # The folder gets its own name when the study is whole: paths are told from there.
+        inside = tuple(path.relative_to(folder) for path in made.files)
+        exported.append(replace(made, files=inside))
+    return Uses(
+        _written(fits, folder), _conditions(identified), rotor, tuple(loops), tuple(exported)
+    )
+
+
+def _fit(fits: Mapping[str, Fit], name: str) -> Fit:
+    if name not in fits:
+        raise StudyError(
+            f"model {name!r} cannot be used: it was left out",
+            needed="inputs with coherence",
+            action="lower [response] minimum_coherence, or fly the inputs harder",
+        )
+    return fits[name]
+
+
+def _written(fits: Mapping[str, Fit], folder: Path) -> dict[str, str]:
+    """Every fit as a model file, under a name that any file system takes."""
+    written: dict[str, str] = {}
+    for name, fit in fits.items():
+        (folder / MODELS).mkdir(exist_ok=True)
+        stem = re.sub(r"\W+", "_", name.lower()).strip("_") or "model"
+        if f"{MODELS}/{stem}.toml" in written.values():
+            stem = f"{stem}_{len(written) + 1}"
+        write_model(fit, folder / MODELS / f"{stem}.toml")
+        written[name] = f"{MODELS}/{stem}.toml"
+    return written
+
+
+def _conditions(identified: Sequence[Identified]) -> ConditionComparison | None:
+    named = [(item.settings.condition, item.fit) for item in identified if item.settings.condition]
+    words = [str(word) for word, _ in named]
+    if len(set(words)) < len(words):
+        raise StudyError(
+            "study file: two models are of one flight condition",
+            found=", ".join(words),
+            needed="another `condition` for each model",
+        )
+    held = {str(word): fit for word, fit in named if fit is not None}
+    return compare_conditions(held) if len(held) > 1 else None

@@ -1,0 +1,180 @@
+"""What a study file may say about the use of its models: files, rotor physics, closed loops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from flightid.control.closed_loop.close_loop import DRAWS
+from flightid.errors import StudyError
+from flightid.study.reading import TableReader
+
+
+@dataclass(frozen=True)
+class ExportSettings:
+    """One file of another tool; see `flightid.export`.
+
+    Attributes
+    ----------
+    model : str
+        Name of the study's model.
+    file : str
+        Name of the file, in the folder ``export`` of the output.
+    format : str or None
+        None: by the suffix.
+    options : mapping
+        Of the format.
+    """
+
+    model: str
+    file: str
+    format: str | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RotorSettings:
+    """Rotor physics of one model; see `flightid.rotor_physics`.
+
+    Attributes
+    ----------
+    model : str
+    rotor_speed_rad_s : float
+    lock_number, bar_lock_number : float or None
+    expected : mapping of str to float
+    names : mapping of str to str
+    """
+
+    model: str
+    rotor_speed_rad_s: float
+    lock_number: float | None = None
+    bar_lock_number: float | None = None
+    expected: Mapping[str, float] = field(default_factory=dict)
+    names: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class LoopSettings:
+    """Feedback closed around one model; see `flightid.close_loop`.
+
+    Attributes
+    ----------
+    name : str
+        Title in the report.
+    model : str
+    gains : mapping of str to mapping of str to float
+        Negative feedback by input and output.
+    band_rad_s : tuple of float or None
+        Where margins are looked for.
+    draws, seed : int
+        Vehicles drawn from the fit's uncertainty.
+    """
+
+    name: str
+    model: str
+    gains: Mapping[str, Mapping[str, float]]
+    band_rad_s: tuple[float, float] | None = None
+    draws: int = DRAWS
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class UsesSettings:
+    """Everything that is done with fitted models.
+
+    Attributes
+    ----------
+    exports : tuple of ExportSettings
+    rotor : RotorSettings or None
+    loops : tuple of LoopSettings
+    """
+
+    exports: tuple[ExportSettings, ...] = ()
+    rotor: RotorSettings | None = None
+    loops: tuple[LoopSettings, ...] = ()
+
+
+def read_uses(root: TableReader, models: Sequence[str]) -> UsesSettings:
+    """Check the tables ``[[export]]``, ``[rotor]`` and ``[[loop]]``.
+
+    Parameters
+    ----------
+    root : TableReader
+        The whole study file.
+    models : sequence of str
+        Names of its models.
+
+    Raises
+    ------
+    StudyError
+        A key is unknown, a value does not fit, or there is no such model.
+    """
+    made = UsesSettings(
+        tuple(map(_export, root.tables("export"))),
+        root.maybe(lambda key: _rotor(root.table(key)), "rotor"),
+        tuple(map(_loop, root.tables("loop"))),
+    )
+    rotor = () if made.rotor is None else (made.rotor,)
+    for each in (*made.exports, *rotor, *made.loops):
+        if each.model not in models:
+            raise StudyError(
+                "study file: there is no such model to use",
+                found=repr(each.model),
+                needed="one of " + ", ".join(map(repr, models)),
+            )
+    for what, names in (
+        ("[[export]]s write one file", [each.file for each in made.exports]),
+        ("[[loop]]s have one name", [each.name for each in made.loops]),
+    ):
+        if len(set(names)) < len(names):
+            raise StudyError(f"study file: two {what}", found=", ".join(names))
+    return made
+
+
+def _export(reader: TableReader) -> ExportSettings:
+    file = reader.text("file")
+    if "/" in file or "\\" in file or file.startswith("."):
+        raise reader.error("file", "does not fit", found=file, needed="a name without a folder")
+    made = ExportSettings(
+        reader.text("model"),
+        file,
+        reader.maybe(reader.text, "format"),
+        reader.values("options"),
+    )
+    reader.finish()
+    return made
+
+
+def _rotor(reader: TableReader) -> RotorSettings:
+    expected, names = reader.table("expected"), reader.table("names")
+    made = RotorSettings(
+        reader.text("model"),
+        reader.positive("rotor_speed_rad_s"),
+        reader.maybe(reader.positive, "lock_number"),
+        reader.maybe(reader.positive, "bar_lock_number"),
+        {key: expected.number(key) for key in reader.values("expected")},
+        {key: names.text(key) for key in reader.values("names")},
+    )
+    reader.finish()
+    return made
+
+
+def _loop(reader: TableReader) -> LoopSettings:
+    gains = reader.table("gains")
+    by_input: dict[str, dict[str, float]] = {}
+    for name, row in reader.values("gains").items():
+        of_input = gains.table(name)
+        by_input[name] = {output: of_input.number(output) for output in dict(row)}
+    if not by_input:
+        raise reader.error("gains", "is missing", found="none", needed="gains by input and output")
+    made = LoopSettings(
+        reader.text("name"),
+        reader.text("model"),
+        by_input,
+        reader.maybe(reader.interval, "band_rad_s"),
+        reader.integer("draws", DRAWS, minimum=1),
+        reader.integer("seed", 0),
+    )
+    reader.finish()
+    return made
