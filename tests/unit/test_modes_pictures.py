@@ -10,9 +10,11 @@ from flightid.plot.modes import CHI_SQUARE_95, pole_map
 from flightid.report.content import Document, Figure, Lights, TableBlock
 from flightid.report.html import to_html
 from flightid.report.modes import modes_blocks, physics_blocks
+from flightid.study.fit_settings import FitSettings, VerifySettings
+from flightid.study.identified import Fitted, Identified
 from flightid.study.model_section import model_section
-from flightid.study.settings import ModelSettings
-from flightid.study.stages import Identified
+from flightid.study.model_settings import ModelSettings
+from flightid.study.response_settings import ResponseSettings
 from tests.closeness import assert_close
 
 
@@ -101,8 +103,11 @@ def test_studies_show_modes_of_state_space_fits(
         units=truth.units,
         random_error=np.full(exact.shape, 0.05),
     )
-    settings = ModelSettings(name, name, None, (), (), None)
-    item = Identified(settings, {"composite": data}, {"composite": fid.identify(truth, data)}, {})
+    settings = ModelSettings(
+        name, name, None, (), (), None, ResponseSettings(), FitSettings(), VerifySettings()
+    )
+    fitted = Fitted({"composite": fid.identify(truth, data)})
+    item = Identified(settings, {"composite": data}, fitted=fitted)
     page = to_html(Document("study", "", (model_section(item, None),)))
     assert all(f"{title} {truth.name}" in page for title in there)
     assert not any(title in page for title in missing)

@@ -57,7 +57,7 @@ def test_a_study_fits_the_records_themselves(tmp_path: Path) -> None:
     head, tail = STUDY.split("[response]")
     models = tail[tail.index("[[model]]") :].replace("band_rad_s = [4.0, 40.0]\n", "")
     path = tmp_path / "study.toml"
-    path.write_text(head + '[identify]\nmethod = "output_error"\n' + models)
+    path.write_text(head + '[fit]\nmethod = "output_error"\n' + models)
     study = fid.run_study(path)
     (item,) = study.identified
     assert item.fit.intervals_from == "coloured residuals"

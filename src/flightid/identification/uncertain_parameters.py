@@ -34,7 +34,7 @@ def uncertain_parameters(source: object) -> Uncertain[dict[str, float]]:
     Example
     -------
     >>> import flightid as fid
-    >>> uncertain_parameters(fid.load_model("r50_hover")).estimate["Krfb"]
+    >>> uncertain_parameters(fid.load_model("r50_hover")).value["Krfb"]
     -8.26
     """
     model = source.model if isinstance(source, Fit) else source

@@ -38,7 +38,8 @@ def guide_finding(
 
     Example
     -------
-    >>> pm = Estimate("phase margin", 50.0, "deg", (43.0, 57.0))
+    >>> from flightid.uncertainty.estimate import Estimate
+    >>> pm = Estimate("phase margin", 50.0, "deg", 3.5)
     >>> guide_finding(pm, 45.0, "phase-margin", "add lead").light.value
     'amber'
     """

@@ -50,7 +50,7 @@ def even_error(estimate: Reading) -> float | None:
 
     Example
     -------
-    >>> even_error(Estimate("a", 2.0, "1", 0.05))
+    >>> round(even_error(Estimate("a", 2.0, "1", 0.05)), 12)
     0.05
     """
     half = estimate.half_width95

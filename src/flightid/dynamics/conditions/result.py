@@ -30,6 +30,7 @@ class ComparedNumber:
 
     Example
     -------
+    >>> from flightid.uncertainty.estimate import Estimate
     >>> one = Estimate("Zw", -0.6, "1/s")
     >>> ComparedNumber("Zw", {"hover": one}, {}, {}).name
     'Zw'

@@ -54,7 +54,7 @@ class PilotCutoff(Result, schema="flightid.pilot_cutoff/1"):
     -------
     >>> PilotCutoff("lat", "1", Estimate("pilot cut-off frequency", 2.0, "rad/s", 0.2),
     ...             Estimate("rms", 0.1), np.ones(2), np.ones(2))
-    PilotCutoff(lat, 2 (1.6 to 2.4) rad/s)
+    PilotCutoff(lat, 2 (1.608 to 2.392) rad/s)
     """
 
     channel: str

@@ -38,6 +38,7 @@ class Participation:
 
     Example
     -------
+    >>> from flightid.uncertainty.estimate import Estimate
     >>> one = Estimate("share", 1.0)
     >>> Participation("q", "rad/s", 1 + 0j, one, one, 0.0)
     Participation(q: 100 %)
