@@ -5,26 +5,14 @@ from __future__ import annotations
 import platform
 from collections.abc import Mapping
 from importlib.metadata import version
-from typing import Protocol
 
 from flightid.evidence import Evidence
-from flightid.findings import Finding
 from flightid.report.content import Block, KeyValues, Lights, TableBlock
+from flightid.result import Result
 from flightid.table import Cell, Table
 from flightid.version import VERSION
 
 LIBRARIES = ("numpy", "scipy", "xarray", "plotly")
-
-
-class Result(Protocol):
-    """What every stage returns."""
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Verdicts."""
-
-    def summary(self) -> Table:
-        """Numbers."""
 
 
 def result_blocks(result: Result, *, title: str = "", folded: bool = False) -> tuple[Block, ...]:
@@ -32,7 +20,7 @@ def result_blocks(result: Result, *, title: str = "", folded: bool = False) -> t
 
     Parameters
     ----------
-    result : object with ``findings`` and ``summary()``
+    result : Result
         What a stage made.
     title : str
         Title of the table in place of its own.
