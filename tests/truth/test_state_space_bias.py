@@ -21,7 +21,7 @@ from tests.closeness import assert_close
 
 RATE_HZ = 50.0
 N = 3500
-OMEGA = (0.5, 12.0, 60)
+OMEGA = np.geomspace(0.5, 12.0, 60)
 # Without a pilot this helicopter diverges by e^20 over one record.
 HOVER = fid.StateSpaceModel(
     states={"u": "ft/s", "q": "rad/s", "theta": "rad", "w": "ft/s"},

@@ -122,7 +122,7 @@ def test_hold_is_a_choice_that_shows() -> None:
     stepped = fid.simulate(LAG, record, hold="zero", units={"p": "rad/s"})
     options = {"state_bias": False, "output_bias": False}
     right = fid.verify(LAG, stepped, hold="zero", **options)  # type: ignore[arg-type]
-    wrong = fid.verify(LAG, stepped, **options)  # type: ignore[arg-type]
+    wrong = fid.verify(LAG, stepped, hold="first", **options)  # type: ignore[arg-type]
     assert_close(right.rms_error["p"], 0.0, atol=1e-12, why="the same hold")
     # Half a sample of delay at 20 rad/s: an error of 0.2 of the signal.
     expected = 20 * 0.01 * np.std(stepped["p"])

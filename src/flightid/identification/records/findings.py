@@ -12,6 +12,8 @@ from flightid.findings import Finding
 from flightid.identification.records.setup import RecordSet
 from flightid.uncertainty.residual_covariance import colour_findings
 
+ROUNDING_PERCENT = 1e-18
+"""Share of an output's variance below which residuals are rounding."""
 GOOD_PERCENT, POOR_PERCENT = 10.0, 40.0
 _STILL = 1e-12
 _DEGREES = 180.0 / np.pi
@@ -81,4 +83,7 @@ def judge_fit(costs: Mapping[str, float], colour: tuple[float, float]) -> list[F
                 else "look at the residuals: add dynamics, check signs and units, or it is noise",
             )
         )
+    # What rounding leaves has a colour that says nothing of noise.
+    if max(costs.values(), default=0.0) < ROUNDING_PERCENT:
+        return found
     return [*found, *colour_findings(*colour)]
