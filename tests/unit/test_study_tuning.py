@@ -9,6 +9,7 @@ import pytest
 
 from flightid.cli.program import run
 from flightid.errors import StudyError
+from flightid.study import run_study
 from flightid.study.settings import read_settings
 from flightid.study.tuning import TuneSettings, tune_models
 
@@ -95,3 +96,17 @@ def test_records_alone_hold_no_gains() -> None:
     with pytest.raises(StudyError, match="cannot be tuned from records alone"):
         tune_models([Item()], None, TuneSettings())  # type: ignore[list-item]
     assert tune_models([], None, TuneSettings()) is None
+
+
+def test_models_in_files_are_tuned_beside_their_log(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = run_study(study, output=tmp_path / "made")
+    file, log = made.output / "models" / "roll_rate.toml", made.output / "flight.bin"
+    assert made.identified[0].fit is not None
+    code = run(["--quiet", "tune", str(file), "--log", str(log), "--json"])
+    told = json.loads(capsys.readouterr().out)
+    assert code in (0, 1)
+    assert list(told["designs"]) == ["roll"]
+    assert run(["--quiet", "tune", str(file)]) == 2
+    assert "name the flight with --log" in capsys.readouterr().err

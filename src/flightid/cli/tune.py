@@ -2,19 +2,30 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from flightid.cli.output import emit_values, json_option, leave_by_verdict, note
 
+if TYPE_CHECKING:
+    from flightid.control.tuning.result import Tuning
+
 
 @click.command()
-@click.argument("study", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument(
+    "files",
+    nargs=-1,
+    required=True,
+    metavar="STUDY | MODEL...",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+)
 @click.option(
     "--log",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Log to read instead of the one that the study names.",
+    help="Log to read instead of the one that the study names; of models: their flight.",
 )
 @click.option(
     "--output",
@@ -30,25 +41,29 @@ from flightid.cli.output import emit_values, json_option, leave_by_verdict, note
 @click.option("--overwrite", is_flag=True, help="Replace parameter files that exist.")
 @json_option
 def command(
-    study: Path,
+    files: tuple[Path, ...],
     log: Path | None,
     output: Path | None,
     target: Path | None,
     overwrite: bool,
     as_json: bool,
 ) -> None:
-    """Run STUDY and tune the autopilot that its log was flown with.
+    """Run STUDY, or take fitted MODELs, and tune the autopilot that the log was flown with.
 
     The table [tune] of the study holds the requirements; without one the usual ones apply. Gains
     keep their margins for every plant that the data allow. The exit code is 1 where a verdict on
     the gains is red.
     """
-    from flightid.study import run_study
+    report = None
+    if _is_study(files):
+        from flightid.study import run_study
 
-    result = run_study(study, output=output, log=log, tune=True)
-    tuning = result.tuning
+        result = run_study(files[0], output=output, log=log, tune=True)
+        tuning, report = result.tuning, result.output / "report.html"
+    else:
+        tuning = _of_models(files, log)
     if tuning is None:
-        raise click.ClickException("the study has no model of a rate that can be tuned")
+        raise click.ClickException("there is no model of a rate that can be tuned")
     if as_json:
         emit_values(tuning.to_dict())
     else:
@@ -57,8 +72,30 @@ def command(
             click.echo(f"\n{design.promise_table()}")
         if tuning.together:
             click.echo(f"\n{tuning.together_table()}")
-    note(f"Wrote {result.output / 'report.html'}")
+    if report is not None:
+        note(f"Wrote {report}")
     if target is not None and tuning.exists:
         for path in tuning.write(target, overwrite=overwrite):
             note(f"Wrote {path}")
     leave_by_verdict(tuning.findings)
+
+
+def _is_study(files: tuple[Path, ...]) -> bool:
+    """Whether a study is meant: one file, with the table that every study has."""
+    if len(files) > 1:
+        return False
+    # A file that is no TOML is told as a study that cannot be read.
+    try:
+        content = tomllib.loads(files[0].read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError):
+        return True
+    return "estimated" not in content and "kind" not in content
+
+
+def _of_models(files: tuple[Path, ...], log: Path | None) -> Tuning | None:
+    from flightid import read_log
+    from flightid.study.tuning import TuneSettings, tune_files
+
+    if log is None:
+        raise click.UsageError("models hold no gains: name the flight with --log")
+    return tune_files(files, read_log(log), TuneSettings())

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flightid.control.autopilots import axis_loop_of
@@ -13,7 +14,9 @@ from flightid.control.tuning.result import Tuning
 from flightid.control.tuning.tune import tune
 from flightid.control.tuning.tune_pid import CHANNELS, DRAWS
 from flightid.errors import StudyError
+from flightid.models import Model, load_model
 from flightid.study.reading import TableReader
+from flightid.validation import Comparison, Verification
 
 if TYPE_CHECKING:
     from flightid.logs import Log
@@ -68,6 +71,38 @@ def read_tune(reader: TableReader) -> TuneSettings:
     return made
 
 
+def tune_files(files: Iterable[str | Path], log: Log, settings: TuneSettings) -> Tuning | None:
+    """Tune the axes of model files, as `run_study` and ``flightid identify --write`` leave them.
+
+    Parameters
+    ----------
+    files : iterable of str or Path
+        The first model of an axis counts; its covariance and evidence are in the file.
+    log : Log
+        The flight, which holds the gains that flew.
+    settings : TuneSettings
+
+    Returns
+    -------
+    Tuning or None
+        None where no model is of a rate to its command.
+    """
+    models: dict[str, object] = {}
+    for model in map(load_model, files):
+        for axis in _axes(model):
+            models.setdefault(axis, model)
+    return _tuned(models, log, settings, {}) if models else None
+
+
+def _axes(model: Model) -> list[str]:
+    """Axes whose rate a model predicts from its command."""
+    return [
+        axis
+        for axis, (command, rate) in CHANNELS.items()
+        if command in model.inputs and rate in model.outputs
+    ]
+
+
 def tune_models(
     identified: Iterable[Identified], log: Log | None, settings: TuneSettings
 ) -> Tuning | None:
@@ -90,17 +125,15 @@ def tune_models(
     StudyError
         The study reads records, which hold no gains.
     """
-    fits, checks = {}, {}
+    fits: dict[str, object] = {}
+    checks = {}
     for item in identified:
         if item.fit is None:
             continue
-        model = item.fit.model
-        for axis, (command, rate) in CHANNELS.items():
-            if command in model.inputs and rate in model.outputs and axis not in fits:
+        for axis in _axes(item.fit.model):
+            if axis not in fits:
                 fits[axis] = item.fit
-                checks[axis] = tuple(
-                    each for each in item.verifications.values() if hasattr(each, "findings")
-                )
+                checks[axis] = tuple(item.verifications.values())
     if not fits:
         return None
     if log is None:
@@ -109,6 +142,15 @@ def tune_models(
             needed="a log, which holds the gains that flew",
             action="take [tune] out, or call flightid.tune with the gains",
         )
+    return _tuned(fits, log, settings, checks)
+
+
+def _tuned(
+    fits: Mapping[str, object],
+    log: Log,
+    settings: TuneSettings,
+    checks: Mapping[str, Iterable[Verification | Comparison]],
+) -> Tuning:
     return tune(
         fits,
         gains={axis: axis_loop_of(log, axis) for axis in fits},
