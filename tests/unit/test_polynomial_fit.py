@@ -296,3 +296,8 @@ def test_kernels_too_need_samples():
 def test_frequency_domain_options_are_refused():
     with pytest.raises(OptionError, match="no such option"):
         fid.identify(P.arx("u", "y", na=1, nb=1), flown(ARMAX, 24), starts=3)
+
+
+def test_swapped_inputs_and_outputs_are_refused():
+    with pytest.raises(OptionError, match="swapped"):
+        fid.identify(P.arx("y", "u", na=2, nb=2), flown(ARMAX, 1))

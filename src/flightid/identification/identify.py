@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from flightid.conventions import Role
+from flightid.errors import OptionError
 from flightid.identification.fit import Fit
 from flightid.identification.fit_evidence import evidence_of
 from flightid.identification.held_inputs import hold_for, with_hold_said
@@ -171,8 +173,27 @@ def identify(
     (-6.0, 180.0)
     """
     chosen = method_of(model, data, method)
+    _require_roles(model, flat(data))
     held = hold_for(chosen.options, flat(data), options)
     given = options if held is None else {**options, "hold": held.hold}
     fit = replace(chosen.run(model, data, given), structure=model, method=chosen.name)
     fit = fit if held is None else with_hold_said(fit, held)
     return replace(fit, evidence=evidence_of(fit, flat(data), loop))
+
+
+def _require_roles(model: Any, data: Sequence[object]) -> None:  # noqa: ANN401 - any kind
+    """Refuse a model whose inputs and outputs are the other way round in a record."""
+    outputs = tuple(getattr(model, "outputs", None) or (model.output,))
+    for record in data:
+        if not isinstance(record, Record):
+            continue
+        roles = {name: channel.role for name, channel in record.channels.items()}
+        swapped = [name for name in outputs if roles.get(name) is Role.INPUT]
+        driven = [name for name in model.inputs if roles.get(name) is Role.OUTPUT]
+        if len(swapped) == len(outputs) and len(driven) == len(model.inputs) and driven:
+            raise OptionError(
+                f"inputs and outputs are swapped for record {record.name!r}",
+                found=f"inputs {', '.join(model.inputs)}; outputs {', '.join(outputs)}",
+                needed=f"inputs {', '.join(record.inputs)}; outputs {', '.join(record.outputs)}",
+                action="name inputs first, then outputs; or change roles with Record.with_roles",
+            )
