@@ -124,13 +124,14 @@ def _dotted(path: Path) -> str:
 
 
 def _circles(arrows: dict[str, set[str]]) -> list[str]:
-    """Nodes from which a walk along the arrows comes back."""
-    reached = {node: set(targets) for node, targets in arrows.items()}
-    for middle in arrows:
-        for node in arrows:
-            if middle in reached[node]:
-                reached[node] |= reached[middle]
-    return sorted(node for node in arrows if node in reached[node])
+    """Nodes that stay when those are taken away again and again that nothing leads to or from."""
+    left = {node: targets & set(arrows) for node, targets in arrows.items()}
+    while True:
+        reached = set().union(*left.values()) if left else set()
+        ends = {node for node, targets in left.items() if not targets or node not in reached}
+        if not ends:
+            return sorted(left)
+        left = {node: targets - ends for node, targets in left.items() if node not in ends}
 
 
 def _folder(name: str) -> str:
