@@ -134,6 +134,17 @@ def test_the_unstable_helicopter_is_found_by_a_study_file_alone(tmp_path: Path) 
 
 
 @pytest.mark.nightly
+def test_the_grey_boxes_are_found_by_a_study_file_alone(tmp_path: Path) -> None:
+    for item in (EXAMPLES / "quadrotor_grey_box").iterdir():
+        if item.suffix in (".py", ".toml"):
+            (tmp_path / item.name).write_text(item.read_text(encoding="utf-8"))
+    assert _script(tmp_path / "fly.py", folder=tmp_path).returncode == 0
+    run = _run(FLIGHTID, "--quiet", "run", "study.toml", "--output", "out", folder=tmp_path)
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    assert re.search(r"[78] of 8 true values lie inside", run.stdout)
+
+
+@pytest.mark.nightly
 def test_the_r50_is_found_by_a_study_file_alone(tmp_path: Path) -> None:
     for name in ("fly.py", "flights.py", "study.toml"):
         (tmp_path / name).write_text((EXAMPLES / "r50" / name).read_text(encoding="utf-8"))

@@ -65,7 +65,7 @@ def feedback_findings(test: FeedbackTest) -> tuple[Finding, ...]:
     seen = "a loop was closed, as declared"
     if test.source == "test":
         seen = (
-            f"past noise of the outputs explains {100.0 * (test.share or 0.0):.2g} % of what is "
+            f"past noise of the outputs explains {100.0 * (test.share or 0.0):.3g} % of what is "
             f"new in input {test.input} (p = {test.p_value:.2g}): a loop seems to be closed"
         )
     return (

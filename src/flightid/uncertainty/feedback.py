@@ -87,7 +87,7 @@ class FeedbackTest:
             return words[self.source]
         return (
             f"loop {self.loop}: past noise of the outputs explains "
-            f"{100.0 * (self.share or 0.0):.2g} % of what is new in input {self.input} "
+            f"{100.0 * (self.share or 0.0):.3g} % of what is new in input {self.input} "
             f"(p = {self.p_value:.2g})"
         )
 
