@@ -301,3 +301,9 @@ def test_frequency_domain_options_are_refused():
 def test_swapped_inputs_and_outputs_are_refused():
     with pytest.raises(OptionError, match="swapped"):
         fid.identify(P.arx("y", "u", na=2, nb=2), flown(ARMAX, 1))
+
+
+def test_a_regression_needs_no_search_to_be_settled():
+    fit = fid.identify(P.arx("u", "y", na=2, nb=2), flown(ARMAX, 1, noise=0.1))
+    settled = next(check for check in fit.evidence.checks if check.name == "estimator settled")
+    assert (settled.light.value, settled.what) == ("green", "solved without a search")

@@ -27,6 +27,7 @@ from flightid.evidence.parameter_checks import declared_signs
 from flightid.evidence.spans import Span, judge_coherence, judge_span
 from flightid.findings import Finding, worst
 from flightid.inspection import Inspection
+from flightid.models.narx.structure import STOPS
 from flightid.record import Record
 from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
@@ -34,6 +35,8 @@ from flightid.uncertainty.feedback import declared_loop
 
 FROM_LOG = "Log.record"
 CONVERGED = frozenset({"gradient", "step", "cost", "zero", "bounds"})
+STRAIGHT = frozenset({"", "regression", "instruments", "kernel", "subspace"})
+"""Ends of methods that search nothing: linear equations solve them."""
 # Which check a finding of a fit belongs to; all others are guidelines.
 BELONGS = {
     "estimator-bias": SETTLED,
@@ -152,8 +155,10 @@ def _ended(findings: Sequence[Finding], termination: str) -> Check | None:
     corrected = "".join(f"; {finding.message}" for finding in findings)
     if termination in CONVERGED:
         return Check(SETTLED, Light.GREEN, f"the search ended at a minimum{corrected}")
-    if not termination:
-        return Check(SETTLED, Light.GREEN, f"solved in one step{corrected}")
+    if termination in STRAIGHT:
+        return Check(SETTLED, Light.GREEN, f"solved without a search{corrected}")
+    if termination in STOPS:
+        return Check(SETTLED, Light.GREEN, f"terms were chosen until {termination!r} said enough")
     action = "raise maximum_iterations, use more starts, or simplify the model"
     return Check(SETTLED, Light.AMBER, f"the search ended by {termination!r}", action)
 
