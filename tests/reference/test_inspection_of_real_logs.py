@@ -44,3 +44,10 @@ def test_px4_2016_was_moved_by_hand(shared_data: Path) -> None:
     assert means["vehicle_attitude"] == pytest.approx(94, abs=1)
     assert means["actuator_controls_0"] == pytest.approx(47, abs=1)
     assert means["sensor_combined"] == pytest.approx(248, abs=1)
+
+
+def test_no_coherence_is_named_where_none_was_measured(shared_data: Path) -> None:
+    inspection = fid.inspect_log(shared_data / "logs" / "px4_esc_status.ulg")
+    band = next(f for f in inspection.findings if f.code == "no-usable-band")
+    assert "none could be measured" in band.message
+    assert "0.00" not in band.message

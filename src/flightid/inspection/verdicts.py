@@ -174,13 +174,14 @@ def _excitation(log: Log, found: Inspection) -> list[Finding]:
 def _bands(log: Log, found: Inspection) -> list[Finding]:
     findings = [_band(log, band) for band in found.bands if band.rate_hz > 0]
     if all(finding.code != "band" for finding in findings):
-        best = max((band.coherence or 0.0 for band in found.bands), default=0.0)
+        measured = [band.coherence for band in found.bands if band.coherence is not None]
+        seen = f"largest found {max(measured):.2f}" if measured else "none could be measured"
         findings.append(
             Finding(
                 "no-usable-band",
                 Light.RED,
                 "no axis has a band that supports a model: half a decade with coherence of at "
-                f"least 0.6 is needed (largest coherence found {best:.2f})",
+                f"least 0.6 is needed ({seen})",
                 advice.excitation(log),
             )
         )
