@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from flightid.identification import PolynomialDetails
@@ -91,12 +92,17 @@ def model_table(items: Iterable[Identified]) -> Table:
         Column("worst TIC", digits=2),
         Column("note"),
     )
-    notes = (
-        "modes: natural frequency in Hz with the half-width of its 95 % interval, and damping "
-        "ratio; 1 is a real pole. Free runs: on the records of the verification.",
-    )
-    made = Table("Models", columns, tuple(map(_row, items)), notes)
-    return made.without_empty_columns()
+    rows = tuple(map(_row, items))
+    made = Table("Models", columns, rows).without_empty_columns()
+    # A note explains a column that is there.
+    words = {
+        "modes": "modes: natural frequency in Hz with the half-width of its 95 % interval, and "
+        "damping ratio; 1 is a real pole",
+        "worst free-run fit": "free runs: on the records of the verification",
+    }
+    there = {column.name for column in made.columns}
+    notes = tuple(f"{text}." for title, text in words.items() if title in there)
+    return replace(made, notes=notes)
 
 
 def _row(item: Identified) -> tuple[Cell, ...]:
