@@ -1,0 +1,32 @@
+"""Print the table: `python -m tests.strangers [PART OF A NAME ...] --runs 500 --jobs 2`."""
+
+from __future__ import annotations
+
+import argparse
+
+from tests.strangers.cases import CASES
+from tests.strangers.counting import HEADING, count
+
+
+def main() -> None:
+    """Count the named cases, or all."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help="parts of names of cases; all where none is given")
+    parser.add_argument("--runs", type=int, default=100)
+    parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--each", action="store_true", help="coverage of every quantity too")
+    asked = parser.parse_args()
+    print(HEADING, flush=True)
+    for case in CASES:
+        if asked.names and not any(part in case.name for part in asked.names):
+            continue
+        tally = count(case, asked.runs, first_seed=asked.first_seed, jobs=asked.jobs)
+        print(tally.row(), flush=True)
+        for name in tally.quantities() if asked.each else ():
+            share, n = tally.coverage(name)
+            print(f"    {name:40s} {100 * share:6.1f} {n:7d}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,8 @@
+"""All conditions, one module a family: a new family adds its module here."""
+
+from __future__ import annotations
+
+from tests.strangers import output_error
+from tests.strangers.counting import Case
+
+CASES: tuple[Case, ...] = (*output_error.CASES,)
