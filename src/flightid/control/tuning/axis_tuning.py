@@ -14,7 +14,8 @@ from flightid.control.tuning.controller_paths import ControllerPaths, loop_respo
 from flightid.control.tuning.evidence import Evidence
 from flightid.control.tuning.gain_search import GainSearchResult, search
 from flightid.control.tuning.gain_search import steps as search_steps
-from flightid.control.tuning.loop_problem import ANGLE, LoopProblem, Plants
+from flightid.control.tuning.limits import ANGLE
+from flightid.control.tuning.loop_problem import LoopProblem, Plants
 from flightid.control.tuning.pid_design import Stage, TunedGain
 from flightid.control.tuning.promises import Promise, promises
 from flightid.control.tuning.requirements import TuningRequirements

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from flightid.control.tuning.loop_problem import TARGET, LoopAssessment, LoopProblem
+from flightid.control.tuning.limits import TARGET
+from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
 
 Array = NDArray[np.float64]
 Linear = tuple[Array, Array, Array, Array]

@@ -11,17 +11,15 @@ from numpy.typing import NDArray
 
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
 from flightid.control.margins.stability_count import unstable_poles
+from flightid.control.tuning.limits import ANGLE, RATE, TINY, WHOLE, limits, present
 from flightid.control.tuning.requirements import TuningRequirements
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-TINY = 1e-12
 DISTURBANCE_WEIGHT = 0.2
 LOWEST_PEAK_RAD_S, PEAK_BANDS = 0.5, 20
 FULL, NONE = 1.0, -20.0
 """Slack of a requirement that sets no limit, for lack of a crossing; and the least that counts."""
-RATE, WHOLE, ANGLE = "rate loop", "whole loop", "angle loop"
-TARGET = "target"
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,46 +253,17 @@ class LoopProblem:
         highest: Array,
     ) -> dict[str, Array]:
         """Slack by requirement, bounded so that one plant cannot hide the others."""
-        need, parts = self.requirements, {}
-        for name, found in metrics.items():
-            least = need.angle_phase_margin_deg if name == ANGLE else need.phase_margin_deg
-            peak = found.sensitivity_peak
-            parts[f"{name}: phase margin"] = found.phase_margin_deg / least - 1.0
-            parts[f"{name}: gain margin"] = found.gain_margin_db / need.gain_margin_db - 1.0
-            parts[f"{name}: gain reduction margin"] = (
-                found.gain_reduction_margin_db / need.gain_margin_db - 1.0
-            )
-            parts[f"{name}: sensitivity peak"] = np.log(need.peak / peak) / np.log(need.peak)
-            if need.delay_margin_s is not None and name != ANGLE:
-                parts[f"{name}: delay margin"] = found.delay_margin_s / need.delay_margin_s - 1.0
-        if self.crossover_limit_rad_s is not None:
-            parts["identified band"] = np.log(self.crossover_limit_rad_s / highest)
+        parts = {}
+        for limit in limits(self.requirements, metrics, self.crossover_limit_rad_s):
+            values = highest if limit.highest else getattr(metrics[limit.loop], limit.field)
+            parts[limit.name] = limit.slack(np.asarray(values))
         if self.noise_limit is not None:
             parts["output noise"] = np.log(self.noise_limit / np.maximum(noise, TINY))
         bounded = {
-            name: np.clip(np.where(np.isnan(each), FULL, each), NONE, FULL)
-            for name, each in (parts | self._targets(metrics)).items()
+            name: np.clip(np.where(np.isnan(slack), FULL, slack), NONE, FULL)
+            for name, slack in parts.items()
         }
         return {"stability": np.where(stable, FULL, -1.0), **bounded}
-
-    def _targets(self, metrics: dict[str, LoopMetrics]) -> dict[str, Array]:
-        need, rate = self.requirements, metrics[RATE]
-        asked = [
-            ("crossover", rate.crossover_rad_s, need.crossover_rad_s),
-            (
-                "disturbance bandwidth",
-                rate.disturbance_bandwidth_rad_s,
-                need.disturbance_bandwidth_rad_s,
-            ),
-        ]
-        if ANGLE in metrics:
-            reached = metrics[ANGLE].crossover_rad_s
-            asked.append(("angle crossover", reached, need.angle_crossover_rad_s))
-        return {
-            f"{TARGET} {name}": np.log(present(reached) / target)
-            for name, reached, target in asked
-            if target is not None
-        }
 
     def _objective(self, plants: Plants, rate: LoopMetrics, difference: Complex) -> Array:
         """Logarithm of what is raised: how little a step of disturbance leaves, or a bandwidth.
@@ -328,8 +297,3 @@ def highest_crossover(omega_rad_s: Array, loop: Complex) -> Array:
     share = np.clip(one / np.where(one > two, one - two, 1.0), 0.0, 1.0)
     found = np.exp(logs[last] + share * (logs[last + 1] - logs[last]))
     return np.asarray(np.where(above.any(axis=-1), found, np.nan))
-
-
-def present(values: Array) -> Array:
-    """Zero in place of a frequency that is not there."""
-    return np.where(np.isnan(values), TINY, values)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.tuning.loop_problem import ANGLE, TARGET, LoopAssessment, LoopProblem
+from flightid.control.tuning.limits import ANGLE, limits
+from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import DrawnEnds
 
@@ -87,16 +88,15 @@ class _Kind:
     name: str
     unit: str
     more: bool
-    requirement: str = ""
 
 
 KINDS = (
     _Kind("crossover_rad_s", "crossover", "rad/s", True),
-    _Kind("phase_margin_deg", "phase margin", "deg", True, "phase margin"),
-    _Kind("gain_margin_db", "gain margin", "dB", True, "gain margin"),
-    _Kind("gain_reduction_margin_db", "gain reduction margin", "dB", True, "gain reduction margin"),
-    _Kind("delay_margin_s", "delay margin", "s", True, "delay margin"),
-    _Kind("sensitivity_peak", "sensitivity peak", "1", False, "sensitivity peak"),
+    _Kind("phase_margin_deg", "phase margin", "deg", True),
+    _Kind("gain_margin_db", "gain margin", "dB", True),
+    _Kind("gain_reduction_margin_db", "gain reduction margin", "dB", True),
+    _Kind("delay_margin_s", "delay margin", "s", True),
+    _Kind("sensitivity_peak", "sensitivity peak", "1", False),
     _Kind("disturbance_bandwidth_rad_s", "disturbance bandwidth", "rad/s", True),
     _Kind("disturbance_peak_db", "disturbance peak", "dB", False),
 )
@@ -154,33 +154,14 @@ def _requirement(
     problem: LoopProblem, judged: LoopAssessment, loop: str, kind: _Kind
 ) -> tuple[str, bool]:
     """What was asked of a number, in words, and whether all plants meet it."""
-    need, texts, names = problem.requirements, [], []
-    if kind.requirement:
-        names.append(f"{loop}: {kind.requirement}")
-    least_phase = need.angle_phase_margin_deg if loop == ANGLE else need.phase_margin_deg
-    fixed = {
-        "phase margin": f"≥ {least_phase:g}",
-        "gain margin": f"≥ {need.gain_margin_db:g}",
-        "gain reduction margin": f"≥ {need.gain_margin_db:g}",
-        "sensitivity peak": f"≤ {need.peak:.4g}",
-        "delay margin": "" if need.delay_margin_s is None else f"≥ {need.delay_margin_s:g}",
-    }
-    if kind.requirement and names[0] in judged.names:
-        texts.append(fixed[kind.requirement])
-    if kind.name == "crossover" and loop != "whole loop":
-        target = need.angle_crossover_rad_s if loop == ANGLE else need.crossover_rad_s
-        if target is not None:
-            texts.append(f"≥ {target:g}")
-            names.append(f"{TARGET} {'angle ' if loop == ANGLE else ''}crossover")
-        if loop != ANGLE and problem.crossover_limit_rad_s is not None:
-            texts.append(f"≤ {problem.crossover_limit_rad_s:.4g}")
-            names.append("identified band")
-    target = need.disturbance_bandwidth_rad_s
-    if kind.name == "disturbance bandwidth" and loop == "rate loop" and target is not None:
-        texts.append(f"≥ {target:g}")
-        names.append(f"{TARGET} disturbance bandwidth")
-    rows = [judged.slack[judged.names.index(name), 0] for name in names if name in judged.names]
-    return " and ".join(texts), all(bool((row >= 0.0).all()) for row in rows)
+    asked = [
+        limit
+        for limit in limits(problem.requirements, judged.metrics, problem.crossover_limit_rad_s)
+        if (limit.loop, limit.field) == (loop, kind.field)
+    ]
+    rows = [judged.slack[judged.names.index(limit.name), 0] for limit in asked]
+    met = all(bool((row >= 0.0).all()) for row in rows)
+    return " and ".join(limit.text for limit in asked), met
 
 
 def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None) -> Promise:

@@ -1,0 +1,124 @@
+"""Requirements as a list: what each asks of which number of which loop, in figures and in words.
+
+The search reads the slack and the table of worst cases reads the words, so a new requirement is a
+field in `requirements.py` and its line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.control.tuning.requirements import TuningRequirements
+
+Array = NDArray[np.float64]
+RATE, WHOLE, ANGLE = "rate loop", "whole loop", "angle loop"
+TARGET = "target"
+TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class Limit:
+    """One requirement on one number of one loop.
+
+    Attributes
+    ----------
+    name : str
+        Unique among the requirements of a problem.
+    loop : str
+    field : str
+        Of `LoopMetrics`: the number it speaks of.
+    text : str
+        In words, as the tables print it.
+    slack : callable
+        Values of the number to slack, at least 0 where the requirement is met.
+    highest : bool
+        Whether the highest crossover is meant where there are several.
+    """
+
+    name: str
+    loop: str
+    field: str
+    text: str
+    slack: Callable[[Array], Array]
+    highest: bool = False
+
+
+def limits(
+    need: TuningRequirements, loops: Iterable[str], crossover_limit_rad_s: float | None
+) -> tuple[Limit, ...]:
+    """Every requirement on the margins and frequencies of the loops that there are.
+
+    Parameters
+    ----------
+    need : TuningRequirements
+    loops : iterable of str
+        `RATE`, and `WHOLE` and `ANGLE` where there is an angle loop.
+    crossover_limit_rad_s : float or None
+        Highest crossover of the rate loop that the identified band allows, rad/s.
+    """
+    names = tuple(loops)
+    made = [limit for loop in names for limit in _margins(need, loop)]
+    if crossover_limit_rad_s is not None:
+        text = f"≤ {crossover_limit_rad_s:.4g}"
+        below = _below(crossover_limit_rad_s)
+        made.append(Limit("identified band", RATE, "crossover_rad_s", text, below, highest=True))
+    return (*made, *(limit for limit in _targets(need) if limit.loop in names))
+
+
+def present(values: Array) -> Array:
+    """Zero in place of a frequency that is not there."""
+    return np.where(np.isnan(values), TINY, values)
+
+
+def _margins(need: TuningRequirements, loop: str) -> Iterator[Limit]:
+    phase = need.angle_phase_margin_deg if loop == ANGLE else need.phase_margin_deg
+    for name, field, least in (
+        ("phase margin", "phase_margin_deg", phase),
+        ("gain margin", "gain_margin_db", need.gain_margin_db),
+        ("gain reduction margin", "gain_reduction_margin_db", need.gain_margin_db),
+        ("delay margin", "delay_margin_s", None if loop == ANGLE else need.delay_margin_s),
+    ):
+        if least is not None:
+            yield Limit(f"{loop}: {name}", loop, field, f"≥ {least:g}", _share_above(least))
+    yield Limit(
+        f"{loop}: sensitivity peak",
+        loop,
+        "sensitivity_peak",
+        f"≤ {need.peak:.4g}",
+        _peak(need.peak),
+    )
+
+
+def _targets(need: TuningRequirements) -> Iterator[Limit]:
+    for name, loop, field, least in (
+        ("crossover", RATE, "crossover_rad_s", need.crossover_rad_s),
+        (
+            "disturbance bandwidth",
+            RATE,
+            "disturbance_bandwidth_rad_s",
+            need.disturbance_bandwidth_rad_s,
+        ),
+        ("angle crossover", ANGLE, "crossover_rad_s", need.angle_crossover_rad_s),
+    ):
+        if least is not None:
+            yield Limit(f"{TARGET} {name}", loop, field, f"≥ {least:g}", _above(least))
+
+
+def _share_above(least: float) -> Callable[[Array], Array]:
+    return lambda values: values / least - 1.0
+
+
+def _above(least: float) -> Callable[[Array], Array]:
+    return lambda values: np.log(present(values) / least)
+
+
+def _below(most: float) -> Callable[[Array], Array]:
+    return lambda values: np.log(most / values)
+
+
+def _peak(most: float) -> Callable[[Array], Array]:
+    return lambda values: np.log(most / values) / np.log(most)

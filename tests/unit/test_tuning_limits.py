@@ -1,0 +1,43 @@
+"""Requirements of tuning as a list: each says the number that it compares with."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from flightid.control.tuning.limits import ANGLE, RATE, WHOLE, limits
+from flightid.control.tuning.requirements import TuningRequirements
+
+ASKED = TuningRequirements(
+    phase_margin_deg=41.0,
+    gain_margin_db=7.0,
+    sensitivity_peak=1.7,
+    delay_margin_s=0.013,
+    crossover_rad_s=11.0,
+    disturbance_bandwidth_rad_s=5.0,
+    angle_phase_margin_deg=57.0,
+    angle_crossover_rad_s=3.0,
+)
+
+
+def test_the_limit_in_words_is_the_limit_in_figures() -> None:
+    made = limits(ASKED, (RATE, WHOLE, ANGLE), 19.0)
+    for limit in made:
+        sign, number = re.fullmatch(r"([≥≤]) ([\d.]+)", limit.text).groups()
+        inside = 1.001 if sign == "≥" else 0.999
+        at = np.array([float(number) * inside, float(number) / inside])
+        met, missed = limit.slack(at)
+        assert met > 0.0 > missed, limit.name
+    assert len({limit.name for limit in made}) == len(made)
+
+
+def test_every_requirement_on_a_loop_is_a_limit() -> None:
+    texts = {limit.text[2:] for limit in limits(ASKED, (RATE, WHOLE, ANGLE), 19.0)}
+    assert texts == {"41", "7", "1.7", "0.013", "11", "5", "57", "3", "19"}
+
+
+def test_loops_that_are_not_there_have_no_limits() -> None:
+    made = limits(ASKED, (RATE,), None)
+    assert {limit.loop for limit in made} == {RATE}
+    assert "identified band" not in {limit.name for limit in made}
