@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.strangers import output_error
+from tests.strangers import aircraft, output_error
 from tests.strangers.counting import Case
 
-CASES: tuple[Case, ...] = (*output_error.CASES,)
+CASES: tuple[Case, ...] = (*output_error.CASES, *aircraft.CASES)
