@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,7 @@ from flightid.models import LinearModel, LinearSystem, NarxModel, StateSpaceMode
 from flightid.models.linear.hold_equivalent import Hold
 from flightid.models.model import Model, linear_system, model_of
 from flightid.models.sampled.recursion import run_recursion
+from flightid.models.state_space.measured_states import measured_start
 from flightid.record import Channel, InputHold, Record, Step
 from flightid.record.chosen_hold import chosen_hold
 from flightid.simulation.noise import (
@@ -32,7 +34,7 @@ def simulate(
     record: Record,
     *,
     hold: Hold | None = None,
-    initial_state: ArrayLike | Mapping[str, float] | None = None,
+    initial_state: str | ArrayLike | Mapping[str, float] | None = None,
     substeps: int | None = None,
     input_bias: Mapping[str, float] | None = None,
     output_bias: Mapping[str, float] | None = None,
@@ -62,9 +64,10 @@ def simulate(
     hold : {"first", "zero"}, optional
         What the inputs do between samples. Default: what the record knows, else "first"; the
         record that comes back knows what was used.
-    initial_state : array_like, shape (n,), or mapping of str to float, optional
-        State at the first sample. Left out: zero, for a nonlinear model its trim; a mapping by
-        state of a `StateSpaceModel` changes some entries of that.
+    initial_state : str, array_like, shape (n,), or mapping of str to float, optional
+        State at the first sample. Left out or ``"trim"``: zero, for a nonlinear model its trim; a
+        mapping by state of a `StateSpaceModel` changes some entries of that. ``"measured"``: what
+        the outputs of the record tell at its first sample.
     substeps : int, optional
         Runge-Kutta steps in a sample interval, for a nonlinear model. Left out: enough for the
         fastest eigenvalue at the trim (step times eigenvalue at most 0.25).
@@ -111,6 +114,7 @@ def simulate(
     >>> bool(np.allclose(simulate(lag, record)["y"], 1 - np.exp(-time_s)))
     True
     """
+    initial_state = _start_in_words(source, record, initial_state)
     model = _runnable(source, noise, initial_state)
     between = chosen_hold(record, hold).hold
     names, outputs = tuple(model.inputs), tuple(model.outputs)
@@ -141,6 +145,23 @@ def simulate(
         # A sampled model reads its inputs at their samples alone.
         return made_record.replace(input_shape=record.input_shape)
     return made_record
+
+
+def _start_in_words(source: object, record: Record, given: Any) -> Any:  # noqa: ANN401
+    """The initial state that a word stands for; anything else as it is."""
+    if not isinstance(given, str) or given == "trim":
+        return None if isinstance(given, str) else given
+    if given != "measured":
+        raise OptionError(
+            "unknown start of a simulation",
+            found=repr(given),
+            needed="'trim', 'measured', numbers, or numbers by state",
+            action="use predict, which solves for a start" if given == "estimate" else "",
+        )
+    model = model_of(source)
+    if not isinstance(model, StateSpaceModel):
+        raise OptionError("states of this model have no names", found=type(model).__name__)
+    return measured_start(model, record)
 
 
 def _runnable(
@@ -208,10 +229,27 @@ def _run_linear(
     """Outputs of a linear model, continuous or sampled, shape (p, n_samples)."""
     if isinstance(model, LinearSystem) and model.sample_time_s is not None:
         return _run_sampled(model, driven, sample_time_s, initial_state)
-    a, b, c, d, delays_s = (np.ascontiguousarray(m) for m in model.state_space())
+    a, b, c, d, delays_s, driven = with_constants(model, driven)
     start = _linear_start(model, initial_state, a.shape[0])
     _, computed = _native.simulate_linear(a, b, c, d, delays_s, driven, start, sample_time_s, first)
     return computed
+
+
+def with_constants(
+    model: LinearModel, driven: NDArray[np.float64], kept: NDArray[np.float64] | float = 1.0
+) -> tuple[NDArray[np.float64], ...]:
+    """A, B, C, D, delays and inputs of a linear model, its constant terms as one more input.
+
+    `kept` is one for outputs that hold their constant, shape (n_outputs,).
+    """
+    a, b, c, d, delays_s = (np.ascontiguousarray(m, dtype=np.float64) for m in model.state_space())
+    if not isinstance(model, StateSpaceModel):
+        return a, b, c, d, delays_s, driven
+    rates, levels = model.constants()
+    if not (np.any(rates) or np.any(levels)):
+        return a, b, c, d, delays_s, driven
+    b, d = np.column_stack([b, rates]), np.column_stack([d, levels * kept])
+    return a, b, c, d, np.append(delays_s, 0.0), np.vstack([driven, np.ones(driven.shape[1])])
 
 
 def _run_sampled(

@@ -211,6 +211,21 @@ class Linearised(Adjustable):
         delays = one_delay_for_each_input(columns, list(found.delays_s), list(self.inputs))
         return a, b, found.h0 + found.h1 @ a, found.d + found.h1 @ b, delays
 
+    def constants(self) -> tuple[Array, Array]:
+        """Constant terms of ẋ and of the outputs, such as M0: zero about a declared trim.
+
+        Returns
+        -------
+        tuple of ndarray
+            Shapes (n_states,) and (n_outputs,). A model with a trim holds departures from it.
+        """
+        n, p = len(self.states), len(self.outputs)
+        if any(self.trim.values()):
+            return np.zeros(n), np.zeros(p)
+        found, slopes = self._slopes(None, None)
+        rates = np.asarray(-np.linalg.solve(slopes[:n, :n], found[:n]), dtype=np.float64)
+        return rates, found[n : n + p] + slopes[n : n + p, :n] @ rates
+
     @property
     def sample_time_s(self) -> None:
         """None: continuous time."""
