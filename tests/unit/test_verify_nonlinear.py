@@ -26,7 +26,9 @@ def test_initial_state_and_shifts_are_found() -> None:
     start = {"alpha": 0.05, "q": -0.1}
     clean = flown(model, stepped(), 0.0, 0, initial_state=start)
     moved = clean.replace({"elevator": clean["elevator"] - 0.01, "az": clean["az"] + 2.0})
-    result = fid.verify(model, moved, initial_state="estimate", outputs=["q", "az"])
+    result = fid.verify(
+        model, moved, initial_state="estimate", state_bias=True, outputs=["q", "az"]
+    )
     shifts = result.predictions[0].shifts
     assert shifts.rank == shifts.n_free == 5
     assert shifts.input_bias is not None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +10,15 @@ import numpy as np
 from flightid.errors import OptionError, UnknownNameError
 from flightid.identification.prediction.equations import predict_equations
 from flightid.identification.prediction.linear import Freedom, predict_linear
+from flightid.identification.prediction.remembered import WORDS
 from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.prediction.result import Prediction, Shifts
 from flightid.identification.prediction.weights import guide_weights
 from flightid.models import StateSpaceModel
 from flightid.models.model import LinearModel
+from flightid.models.state_space.measured_states import measured_start
 from flightid.record import Channel, Record, Step
+from flightid.simulation.simulate import with_constants
 
 
 def predict_continuous(
@@ -40,14 +43,34 @@ def predict_continuous(
             action="identify an ARX … Box–Jenkins or innovations model to predict some steps ahead",
         )
     settle = request.settle_samples(record.n_samples, record.sample_time_s)
-    freedom = replace(_freedom(model, request), stretch=settle or _least(model, request))
-    if isinstance(model, StateSpaceModel) and not model.is_linear:
+    whole = is_whole(model)
+    if whole and request.initial_state is None:
+        # Its channels are whole, so a record says where it starts.
+        request = replace(request, initial_state="measured")
+    freedom = replace(_freedom(model, record, request), stretch=settle or _least(model, request))
+    if whole and isinstance(model, StateSpaceModel):
         return _of_equations(model, record, outputs, request, freedom)
     return _of_matrices(model, record, outputs, request, freedom)
 
 
-def _freedom(model: LinearModel, request: Request) -> Freedom:
+def is_whole(model: object) -> bool:
+    """Whether a model takes its channels whole: nonlinear equations have no point to depart from.
+
+    Example
+    -------
+    >>> is_whole(object())
+    False
+    """
+    return isinstance(model, StateSpaceModel) and not model.is_linear
+
+
+def _freedom(model: LinearModel, record: Record, request: Request) -> Freedom:
     start = request.initial_state
+    estimated = is_whole(model) and start == "estimate"
+    if isinstance(model, StateSpaceModel) and (estimated or start == "measured"):
+        # A nonlinear search begins at the measurement.
+        known = _measured(model, record, range(len(model.states)))
+        return Freedom(request.state_bias, request.output_bias, estimated, known)
     if not isinstance(start, Mapping):
         solved = start in ("estimate", "measured")
         return Freedom(request.state_bias, request.output_bias, solved)
@@ -57,17 +80,28 @@ def _freedom(model: LinearModel, request: Request) -> Freedom:
             raise UnknownNameError(
                 "the model has no such state", found=name, needed=", ".join(names)
             )
-        if isinstance(value, str) and value != "estimate":
+        if isinstance(value, str) and value not in WORDS:
             raise OptionError(
-                f"unknown start of state {name!r}", found=repr(value), needed="a number, 'estimate'"
+                f"unknown start of state {name!r}",
+                found=repr(value),
+                needed="a number, " + ", ".join(map(repr, WORDS)),
             )
-    free = tuple(names.index(name) for name, value in start.items() if isinstance(value, str))
+    free = tuple(names.index(name) for name, value in start.items() if value == "estimate")
     given = {
         names.index(name): float(value)
         for name, value in start.items()
         if not isinstance(value, str)
     }
+    unsaid = [name for name in names if name not in start] if is_whole(model) else []
+    wanted = [*unsaid, *(name for name, value in start.items() if value == "measured")]
+    if wanted and isinstance(model, StateSpaceModel):
+        given |= _measured(model, record, [names.index(name) for name in wanted])
     return Freedom(request.state_bias, request.output_bias, free, given)
+
+
+def _measured(model: StateSpaceModel, record: Record, places: Iterable[int]) -> dict[int, float]:
+    start = measured_start(model, record)
+    return {place: float(start[place]) for place in places}
 
 
 def _states(model: LinearModel) -> list[str]:
@@ -82,11 +116,10 @@ def _states(model: LinearModel) -> list[str]:
 
 
 def _least(model: LinearModel, request: Request) -> int | None:
-    """Samples that tell a measured state: as many as it has numbers."""
-    if request.initial_state != "measured":
+    """Samples that tell a measured state without a name: as many as it has numbers."""
+    if request.initial_state != "measured" or isinstance(model, StateSpaceModel):
         return None
-    order = len(model.states) if isinstance(model, StateSpaceModel) else len(model.state_space()[0])
-    return max(order, 1)
+    return max(len(model.state_space()[0]), 1)
 
 
 def _of_equations(
@@ -117,11 +150,13 @@ def _of_matrices(
     freedom: Freedom,
 ) -> Prediction:
     rows = [list(model.outputs).index(name) for name in outputs]
-    a, b, c, d, delays_s = (np.ascontiguousarray(m, dtype=np.float64) for m in model.state_space())
     trim = record.trim
     offset = np.array([[trim.get(name, 0.0)] for name in outputs])
     driven = record.matrix(model.inputs)
     driven = driven - np.array([[trim.get(name, 0.0)] for name in model.inputs])
+    # An output whose trim is declared holds its constant there.
+    kept = np.array([name not in trim for name in model.outputs], dtype=np.float64)
+    a, b, c, d, delays_s, driven = with_constants(model, driven, kept)
     predicted, shifts = predict_linear(
         (a, b, np.ascontiguousarray(c[rows]), np.ascontiguousarray(d[rows]), delays_s),
         driven,
@@ -153,15 +188,18 @@ def _prediction(
         step=Step("predict", {"hold": request.hold}),
     )
     start = freedom.stretch or 0
-    words = start_words(request, start, record.sample_time_s)
+    named = isinstance(model, StateSpaceModel)
+    words = start_words(request, start, record.sample_time_s, named=named)
     return Prediction(record, predicted, outputs, request.horizon, words, start, shifts)
 
 
-def start_words(request: Request, start: int, sample_time_s: float) -> str:
-    """Where a model without a noise model started."""
+def start_words(request: Request, start: int, sample_time_s: float, *, named: bool) -> str:
+    """Where a model without a noise model started; `named`: whether its states have names."""
     on = f"over the first {start * sample_time_s:.3g} s" if start else "over the whole record"
     if isinstance(request.initial_state, Mapping):
         return "a given state"
+    if request.initial_state == "measured" and named:
+        return "the measured state"
     if request.initial_state in ("estimate", "measured"):
         return f"an initial state solved for {on}"
     return "rest at trim" if request.initial_state in (None, "trim") else "rest"

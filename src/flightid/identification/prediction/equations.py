@@ -38,7 +38,7 @@ class NonlinearRun:
     rows : list of int
         Places of the compared outputs.
     start : OwnNumbers
-        At trim, without shifts; its free places are solved for.
+        Where the search begins, without shifts; its free places are solved for.
     """
 
     model: StateSpaceModel
@@ -63,10 +63,12 @@ class NonlinearRun:
         n, m, p = len(model.states), len(model.inputs), len(model.outputs)
         cuts: list[int] = []
         whole = (cuts, np.zeros((0, 0)), 0, np.zeros((0, 0)))
-        steps = steps_per_sample(model, sample_time_s, None)
         initial = np.array([float(model.trim.get(name, 0.0)) for name in model.states])
         for place, value in freedom.given.items():
             initial[place] = value
+        values = map(float, (*initial, *inputs[:, 0]))
+        flown = dict(zip((*model.states, *model.inputs), values, strict=True))
+        steps = steps_per_sample(model, sample_time_s, None, at={} if model.trim else flown)
         start = OwnNumbers(
             initial,
             np.zeros(m),

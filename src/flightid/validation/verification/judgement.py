@@ -124,10 +124,10 @@ def _findings(
             Finding(
                 "verification-nonlinear",
                 Light.GREEN,
-                "the model is not linear: its equations were integrated, and a state bias is a "
-                "constant shift of each input",
+                "the model is not linear: its equations were integrated",
             )
         )
+    found += _shifted_inputs(predictions)
     held = [each for each in predictions if each.diverged_at is not None]
     found += [
         Finding(
@@ -150,6 +150,25 @@ def _findings(
             )
         )
     return (*found, *_growth(predictions))
+
+
+def _shifted_inputs(predictions: tuple[Prediction, ...]) -> list[Finding]:
+    """Constants that were added to measured inputs of a nonlinear model."""
+    shifts = [each.shifts.input_bias for each in predictions]
+    moved = [np.abs(shift) for shift in shifts if shift is not None and np.any(shift)]
+    if not moved:
+        return []
+    largest = np.max(moved, axis=0)
+    inputs = predictions[0].predicted.inputs
+    sizes = ", ".join(f"{n} {s:.3g}" for n, s in zip(inputs, largest, strict=True))
+    return [
+        Finding(
+            "verification-inputs-shifted",
+            Light.AMBER,
+            f"the model ran on other inputs than the measured ones: constant shifts up to {sizes}",
+            "leave state_bias out, or mend the sensors of the inputs",
+        )
+    ]
 
 
 def _growth(predictions: tuple[Prediction, ...]) -> tuple[Finding, ...]:

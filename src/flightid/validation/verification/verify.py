@@ -9,13 +9,15 @@ from typing import Any, overload
 import numpy as np
 
 from flightid.errors import DataError, OptionError
-from flightid.identification.prediction.continuous import predict_continuous
+from flightid.identification.prediction.continuous import is_whole, predict_continuous
 from flightid.identification.prediction.predict import (
+    Predictor,
     output_names,
     outputs_held,
     predictor_of,
     require_units,
 )
+from flightid.identification.prediction.remembered import remembered
 from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.models.linear.hold_equivalent import Hold
@@ -84,7 +86,8 @@ def verify(
     biases y_ref and, with ``initial_state="estimate"``, the initial state are solved for by
     weighted least squares in each record, since they belong to the record. u_ref is the record's
     declared trim, or zero. The equations of a nonlinear model are integrated instead, on the
-    channels as they are; its state bias is a constant shift of each input. Sampled models (ARX …
+    channels as they are, from the measured state; ``state_bias=True`` solves for a constant shift
+    of each of its inputs, which is never done unasked. Sampled models (ARX …
     Box–Jenkins, innovations forms, NARX) run about the operating point of their training records,
     from a state that a first stretch tells, which no score counts; no bias is taken off.
 
@@ -111,7 +114,8 @@ def verify(
     settle_s : float, optional
         First stretch, s, on which start and biases are solved for and which no score counts.
     state_bias, output_bias : bool, optional
-        Solve for state biases b and output biases y_ref; default: for models in continuous time.
+        Solve for state biases b and output biases y_ref; default: as the fit was told of
+        `input_bias` and `output_bias`, else for models in continuous time (b: linear ones).
     outputs : sequence of str, optional
         Outputs to compare; default: those of the models that every record holds.
     hold : {"first", "zero"}, optional
@@ -164,17 +168,13 @@ def verify(
     chosen = _compared([model for model, _ in models], flown, outputs)
     _require_change(flown, chosen)
     held = chosen_hold(flown, hold)
+    asked = Request(
+        horizon, initial_state, settle_s, bool(state_bias), bool(output_bias), held.in_time
+    )
+    told = (state_bias is not None, output_bias is not None)
     requests = [
-        Request(
-            horizon,
-            initial_state,
-            settle_s,
-            # Models in continuous time hold about the record's own trim, which no training told.
-            way is predict_continuous if state_bias is None else state_bias,
-            way is predict_continuous if output_bias is None else output_bias,
-            held.in_time,
-        )
-        for _, way in models
+        _request(each, model, way, asked, told)
+        for each, (model, way) in zip(several, models, strict=True)
     ]
     runs = []
     for (model, way), request in zip(models, requests, strict=True):
@@ -193,6 +193,25 @@ def verify(
     if not isinstance(source, list | tuple):
         return results[0]
     return compared(dict(zip(_names(several, names), results, strict=True)))
+
+
+def _request(
+    source: object, model: object, way: Predictor, asked: Request, told: tuple[bool, bool]
+) -> Request:
+    """What is solved for: as told here, else as the fit was told, else by the kind of model."""
+    if way is not predict_continuous:
+        return asked
+    known = remembered(source)
+    # Linear models hold about the record's own trim, which no training told; equations of whole
+    # channels have none, and a shift of every input would make other inputs of the measured ones.
+    state = not is_whole(model) if known.input_bias is None else known.input_bias
+    output = True if known.output_bias is None else known.output_bias
+    return replace(
+        asked,
+        initial_state=asked.initial_state or known.initial_state,
+        state_bias=asked.state_bias if told[0] else state,
+        output_bias=asked.output_bias if told[1] else output,
+    )
 
 
 def _scored_alike(runs: list[list[Prediction]]) -> list[list[Prediction]]:
