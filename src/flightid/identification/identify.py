@@ -95,9 +95,11 @@ def identify(
     correct_bias : bool
         Responses: take out, in rounds of fit and correction, what windows or local polynomials add
         by leakage and finite resolution. Where that is impossible a finding says so.
-    initial_state : "estimate", "trim" or mapping
-        Records: state at the first sample of each, estimated or at the model's trim; or by state a
-        number or "estimate", the others at trim.
+    initial_state : "estimate", "measured", "trim" or mapping
+        Records: state at the first sample of each: estimated (the search begins at the
+        measurement), held at the measurement, whose noise then widens the intervals, or at the
+        model's trim; or by state a number or one of these words, the others measured. States that
+        no output tells are at trim.
     output_bias, input_bias : bool or sequence of str
         Records: constants added to outputs (default: all) and to inputs (default: none) of each
         record, estimated; True for all channels, or names.
@@ -177,6 +179,7 @@ def identify(
     held = hold_for(chosen.options, flat(data), options)
     given = options if held is None else {**options, "hold": held.hold}
     fit = replace(chosen.run(model, data, given), structure=model, method=chosen.name)
+    fit = replace(fit, provenance={**fit.provenance, "told": options})
     fit = fit if held is None else with_hold_said(fit, held)
     return replace(fit, evidence=evidence_of(fit, flat(data), loop))
 

@@ -6,7 +6,7 @@ growing modes set at its end and the others at its beginning, so that nothing gr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +20,7 @@ from flightid.findings import Finding
 from flightid.identification.records.setup import OwnNumbers, RecordSet
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.integration_steps import steps_per_sample
+from flightid.models.state_space.measured_states import measured_point, state_outputs
 
 Array = NDArray[np.float64]
 Segments = tuple[list[int], Array, int, Array]
@@ -93,15 +94,16 @@ def equation_runs(model: GreyBoxModel, prepared: RecordSet) -> EquationRuns | No
     """
     if not isinstance(model, StateSpaceModel):
         return None
-    transition = _transition(model)
     linear = model.is_linear
+    at = measured_point(model, prepared.records)
+    transition = _transition(model, at)
     durations = [(inputs.shape[1] - 1) * dt for inputs, _, dt in prepared.arrays]
     rate = _fastest_growth(transition)
     e_folds = rate * max(durations)
     if linear and e_folds <= SINGLE_RUN:
         return None
     radius = {"radius": LINEAR_RADIUS} if linear else {}
-    substeps = [steps_per_sample(model, dt, None, **radius) for _, _, dt in prepared.arrays]
+    substeps = [steps_per_sample(model, dt, None, at=at, **radius) for _, _, dt in prepared.arrays]
     segments = [
         _segments(model, transition, prepared, place, rate)
         if rate * duration > SINGLE_RUN
@@ -146,6 +148,7 @@ def _placed(numbers: OwnNumbers, segments: Segments) -> OwnNumbers:
         numbers,
         initial=np.concatenate([first, last]),
         free_initial=list(range(n)),
+        held=(),
         limits=[*((-np.inf, np.inf) for _ in range(n)), *others] if others else [],
     )
 
@@ -166,9 +169,9 @@ def judge_runs(runs: EquationRuns | None) -> list[Finding]:
     ]
 
 
-def _transition(model: StateSpaceModel) -> Array:
+def _transition(model: StateSpaceModel, at: Mapping[str, float]) -> Array:
     try:
-        return model.state_space()[0]
+        return model.state_space(at=at)[0]
     except (DataError, SingularError):
         # A nonlinear model need not have a linearisation at its trim.
         return np.zeros((len(model.states), len(model.states)))
@@ -188,7 +191,7 @@ def _segments(
     length = max(2, int(SEGMENT / (rate * sample_time_s)))
     count = max(1, int(np.ceil(n_samples / length)))
     cuts = [round(k * n_samples / count) for k in range(1, count)]
-    return cuts, ends, n_growing, _guesses(model, outputs, [0, *cuts, n_samples - 1])
+    return cuts, ends, n_growing, _guesses(model, inputs, outputs, [0, *cuts, n_samples - 1])
 
 
 def _conditions(transition: Array, limit: float) -> tuple[Array, int]:
@@ -202,13 +205,9 @@ def _conditions(transition: Array, limit: float) -> tuple[Array, int]:
     return np.ascontiguousarray(np.vstack([still, growing])), n_growing
 
 
-def _guesses(model: StateSpaceModel, outputs: Array, samples: Sequence[int]) -> Array:
-    """States at some samples: measured where an output is a state, else those of the trim."""
-    guesses = np.tile(
-        [float(model.trim.get(name, 0.0)) for name in model.states], (len(samples), 1)
-    )
-    for column, state in enumerate(model.states):
-        for row, output in enumerate(model.measurements.values()):
-            if output.expression.strip() == state:
-                guesses[:, column] = outputs[row, list(samples)]
-    return np.ascontiguousarray(guesses)
+def _guesses(
+    model: StateSpaceModel, inputs: Array, outputs: Array, samples: Sequence[int]
+) -> Array:
+    """States at some samples: measured where outputs tell them, else those of the trim."""
+    seen = state_outputs(model, inputs, outputs)
+    return np.ascontiguousarray(seen.states(outputs[:, list(samples)]).T)

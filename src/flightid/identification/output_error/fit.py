@@ -23,6 +23,7 @@ from flightid.identification.fit_findings import (
 )
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.multistart import End, cluster, collect, draw_starts, local_minima
+from flightid.identification.output_error.distinct import require_distinct, run_with_slopes
 from flightid.identification.output_error.equation_records import (
     EquationRuns,
     equation_runs,
@@ -31,8 +32,9 @@ from flightid.identification.output_error.equation_records import (
 )
 from flightid.identification.records.findings import judge_channels, judge_fit
 from flightid.identification.records.options import RecordOptions
-from flightid.identification.records.setup import OwnNumbers, RecordSet, prepare_records
+from flightid.identification.records.setup import RecordSet, prepare_records
 from flightid.identification.records.statistics import (
+    HeldStart,
     RecordStatistics,
     record_statistics,
 )
@@ -40,6 +42,7 @@ from flightid.identification.regression.equation_error import equation_error_sta
 from flightid.identification.regression.fourier_output_error_fit import fit_fourier_output_error
 from flightid.identification.regression.options import FourierOutputErrorOptions
 from flightid.models import GreyBoxModel, StateSpaceModel
+from flightid.models.state_space.measured_states import state_outputs
 from flightid.record import Channel, Record, Step
 from flightid.uncertainty.residual_covariance import Beside
 from flightid.version import VERSION
@@ -138,14 +141,15 @@ def conclude(
     fitted = _with_estimates(model, best)
     own = [start.filled(end) for start, end in zip(prepared.own, best.own, strict=True)]
     runs = [
-        _run(fitted, prepared, runs_of, place, numbers, with_slopes=True)
+        run_with_slopes(fitted, prepared, runs_of, place, numbers)
         for place, numbers in enumerate(own)
     ]
     if runs_of is not None:
         own = [runs_of.start(fitted, prepared, k, numbers) for k, numbers in enumerate(own)]
         setup = [*setup, *judge_runs(runs_of)]
+    starts = [_held_start(fitted, prepared, runs_of, k, best.noise) for k in range(len(own))]
     known = record_statistics(
-        fitted, prepared, own, best.determined, runs, best.noise, options.limit, beside
+        fitted, prepared, own, best.determined, runs, best.noise, options.limit, beside, starts
     )
     return _assemble(fitted, prepared, options, groups, runs, known, setup)
 
@@ -176,10 +180,12 @@ def searched(
         No start led anywhere.
     """
     starts = options
-    for _ in range(ROUNDS):
+    for turn in range(ROUNDS):
         runs_of = equation_runs(model, prepared)
         placed = prepared if runs_of is None else segmented_starts(prepared, runs_of)
         placed = replace(placed, model=model)
+        if turn == 0 and responses is None:
+            require_distinct(model, placed, runs_of)
         groups = cluster(search_records(placed, starts, runs_of, responses))
         fitted = _with_estimates(model, groups[0][0])
         after = equation_runs(fitted, prepared)
@@ -245,34 +251,23 @@ def search_records(
     return collect([each if isinstance(each, str) else RecordEnd.of_native(each) for each in found])
 
 
-def _run(
+def _held_start(
     fitted: GreyBoxModel,
     prepared: RecordSet,
     runs_of: EquationRuns | None,
     place: int,
-    own: OwnNumbers,
-    *,
-    with_slopes: bool,
-) -> tuple[Array, Array]:
-    """Outputs with bias, and their derivatives by θ, initial states, shifts and biases."""
-    asked = (
-        fitted.parameters.independent_values(),
-        fitted.parameters.free_indices,
-        prepared.arrays[place],
-        own.native,
-        prepared.first_order_hold,
-        with_slopes,
-    )
-    outputs, slopes = (
-        fitted.native.run_record(*asked)
-        if runs_of is None
-        else runs_of.native.run_record(place, *asked)
-    )
-    n_outputs, n_samples = outputs.shape
-    biases = np.zeros((n_outputs, n_samples, len(own.free_bias)))
-    for column, output in enumerate(own.free_bias):
-        biases[output, :, column] = 1.0
-    return outputs + own.bias[:, None], np.concatenate([slopes, biases], axis=2)
+    noise: Array,
+) -> HeldStart | None:
+    """What noise of a record's measured initial states does to its outputs."""
+    own = prepared.own[place]
+    if not (own.held and isinstance(fitted, StateSpaceModel)):
+        return None
+    held = list(own.held)
+    moved = replace(own, free_initial=held, free_shift=[], free_bias=[], limits=[])
+    slopes = run_with_slopes(fitted, prepared, runs_of, place, moved)[1]
+    inputs, outputs, _ = prepared.arrays[place]
+    covariance = state_outputs(fitted, inputs, outputs).noise(noise)[np.ix_(held, held)]
+    return HeldStart(slopes[:, :, len(fitted.parameters.free) :], covariance)
 
 
 def _fitted_records(

@@ -6,15 +6,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import norm
 
 from flightid.errors import OptionError, UnknownNameError
 from flightid.options import Options, option
 
+Array = NDArray[np.float64]
 InitialState = str | Mapping[str, float | str]
 Freedom = bool | str | Sequence[str]
 
-ESTIMATE, TRIM = "estimate", "trim"
+ESTIMATE, MEASURED, TRIM = "estimate", "measured", "trim"
+STARTS_OF_STATES = (ESTIMATE, MEASURED, TRIM)
 HOLDS = ("first", "zero")
 COVARIANCES = ("diagonal", "full")
 LOSSES = ("gaussian", "huber")
@@ -31,8 +34,8 @@ class RecordOptions(Options):
     seed: int = option(0, minimum=0, doc="Seed of the hypercube.")
     initial_state: InitialState = option(
         ESTIMATE,
-        choices=(ESTIMATE, TRIM),
-        doc="State at the first sample of each record; by state a number or 'estimate'.",
+        choices=STARTS_OF_STATES,
+        doc="State at the first sample of each record; by state a number or one of these words.",
     )
     output_bias: Freedom = option(
         True, doc="Constants added to outputs of each record, estimated: all, none, or names."
@@ -88,35 +91,47 @@ def chosen(freed: Freedom, names: Sequence[str], subject: str) -> list[int]:
 
 
 def initial_values(
-    start: InitialState, states: Sequence[str], trim: Sequence[float]
-) -> tuple[list[float], list[int]]:
-    """Initial state and the places of its free entries.
+    start: InitialState, states: Sequence[str], trim: Array, measured: Array
+) -> tuple[Array, list[int], list[int]]:
+    """Initial state, the places of its free entries, and of those held at the measurement.
+
+    A search begins at the measurement too. States that a mapping does not name are measured.
+
+    Parameters
+    ----------
+    start : str or mapping of str to float or str
+    states : sequence of str
+    trim, measured : ndarray, shape (n_states,)
+        The latter at the trim where nothing measures a state.
 
     Raises
     ------
     UnknownNameError
         A state that is not there.
     OptionError
-        Neither a number nor ``"estimate"``.
+        Neither a number nor one of the words.
     """
-    values = list(map(float, trim))
-    if isinstance(start, str):
-        return values, list(range(len(states))) if start == ESTIMATE else []
-    free = []
-    for name, given in start.items():
+    asked = dict.fromkeys(states, start) if isinstance(start, str) else dict(start)
+    for name, given in asked.items():
         if name not in states:
             raise UnknownNameError(
                 "initial_state names an unknown state", found=repr(name), needed=", ".join(states)
             )
-        place = list(states).index(name)
-        if given == ESTIMATE:
-            free.append(place)
-        elif isinstance(given, int | float):
-            values[place] = float(given)
-        else:
+        if given not in STARTS_OF_STATES and not isinstance(given, int | float):
             raise OptionError(
                 f"initial_state of {name} is not known",
                 found=repr(given),
-                needed="a number or 'estimate'",
+                needed="a number, " + ", ".join(map(repr, STARTS_OF_STATES)),
             )
-    return values, sorted(free)
+    values = measured.copy()
+    free: list[int] = []
+    held: list[int] = []
+    for place, name in enumerate(states):
+        given = asked.get(name, MEASURED)
+        if given == TRIM:
+            values[place] = trim[place]
+        elif not isinstance(given, str):
+            values[place] = float(given)
+        else:
+            (free if given == ESTIMATE else held).append(place)
+    return values, free, held

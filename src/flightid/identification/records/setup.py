@@ -16,6 +16,7 @@ from flightid.identification.records.options import (
     initial_values,
 )
 from flightid.models import GreyBoxModel, StateSpaceModel
+from flightid.models.state_space.measured_states import state_outputs
 from flightid.record import Record
 from flightid.units import require_match
 
@@ -40,6 +41,8 @@ class OwnNumbers:
         Where `initial` is no initial state but conditions at both ends: the state at the first
         sample, shape (n_states,), and its derivatives by the free parameters, initial numbers and
         shifts, shape (n_states, columns).
+    held : tuple of int
+        States that are held at their measurement, noise and all.
     """
 
     initial: Array
@@ -50,6 +53,7 @@ class OwnNumbers:
     free_bias: list[int]
     limits: Limits = field(default_factory=list)
     start: tuple[Array, Array] | None = None
+    held: tuple[int, ...] = ()
 
     @property
     def native(self) -> NativeOwn:
@@ -77,7 +81,7 @@ class OwnNumbers:
         for part, where in zip(parts, places, strict=True):
             part[where] = values[start : start + len(where)]
             start += len(where)
-        return OwnNumbers(parts[0], parts[1], parts[2], *places, self.limits)
+        return OwnNumbers(parts[0], parts[1], parts[2], *places, self.limits, held=self.held)
 
 
 @dataclass(frozen=True)
@@ -162,6 +166,7 @@ def prepare_records(
     whole = isinstance(model, StateSpaceModel) and not model.is_linear
     trim = dict(model.trim) if isinstance(model, StateSpaceModel) else {}
     points = ((model.inputs, trim), (model.outputs, _output_trim(model)))
+    at_trim = np.array([float(trim.get(name, 0.0)) for name in states])
     arrays, offsets, own = [], [], []
     for record in records:
         for name in (*model.inputs, *model.outputs):
@@ -179,33 +184,47 @@ def prepare_records(
         outputs = np.ascontiguousarray(record.matrix(model.outputs) - shift_out)
         arrays.append((inputs, outputs, record.sample_time_s))
         offsets.append(shift_out)
-        values, free_states = initial_values(
-            options.initial_state, states, [trim.get(name, 0.0) for name in states]
+        values, free_states, held = initial_values(
+            options.initial_state, states, at_trim, _measured(model, inputs, outputs, at_trim)
         )
+        declared = declared_numbers(model, options, "initial", states)
         initial, shift, bias = (
-            with_declared(start, free, names, declared_numbers(model, options, kind, names))
-            for kind, names, start, free in (
-                ("initial", states, np.array(values), free_states),
+            with_declared(start, free, names, numbers)
+            for names, start, free, numbers in (
+                (states, values, free_states, declared),
                 (
-                    "reference",
                     model.inputs,
                     np.zeros(len(model.inputs)),
                     chosen(options.input_bias, model.inputs, "input_bias"),
+                    declared_numbers(model, options, "reference", model.inputs),
                 ),
                 (
-                    "bias",
                     model.outputs,
                     np.zeros(len(model.outputs)),
                     chosen(options.output_bias, model.outputs, "output_bias"),
+                    declared_numbers(model, options, "bias", model.outputs),
                 ),
             )
         )
+        kept = tuple(place for place in held if states[place] not in declared)
         limits = [*initial[2], *shift[2], *bias[2]]
         if not np.any(np.isfinite(limits)):
             limits = []
-        own.append(OwnNumbers(initial[0], shift[0], bias[0], initial[1], shift[1], bias[1], limits))
+        own.append(
+            OwnNumbers(
+                initial[0], shift[0], bias[0], initial[1], shift[1], bias[1], limits, held=kept
+            )
+        )
     _require_length(model, records, own)
     return RecordSet(model, records, arrays, offsets, own, states, options.hold == "first")
+
+
+def _measured(model: GreyBoxModel, inputs: Array, outputs: Array, at_trim: Array) -> Array:
+    """Where the search for a record's initial state begins, or where that state is held."""
+    if not isinstance(model, StateSpaceModel):
+        return at_trim
+    seen = state_outputs(model, inputs, outputs)
+    return seen.states(outputs[:, :1])[:, 0]
 
 
 def _require_length(

@@ -61,6 +61,22 @@ class RecordStatistics:
     colour: tuple[float, float]
 
 
+@dataclass(frozen=True, eq=False)
+class HeldStart:
+    """Initial states that one record holds at their measurement.
+
+    Attributes
+    ----------
+    slopes : ndarray, shape (n_outputs, n_samples, n_held)
+        Derivatives of the outputs by them.
+    covariance : ndarray, shape (n_held, n_held)
+        Of the measurement's noise.
+    """
+
+    slopes: Array
+    covariance: Array
+
+
 def record_statistics(
     fitted: GreyBoxModel,
     prepared: RecordSet,
@@ -70,10 +86,12 @@ def record_statistics(
     noise: Array,
     limit: float,
     beside: Beside | None = None,
+    starts: Sequence[HeldStart | None] = (),
 ) -> RecordStatistics:
     """Standard errors, bounds and correlations of a fit to records.
 
-    `beside` concerns residuals of other data that were fitted together with the records.
+    `beside` concerns residuals of other data that were fitted together with the records, `starts`
+    initial states that were held at a measurement: its noise adds to the covariance.
 
     Raises
     ------
@@ -101,7 +119,7 @@ def record_statistics(
     triangle = triangle_of(blocks, None if other is None else other.slopes)
     require_identifiable(names, triangle)
     known = residual_covariance(blocks, other)
-    covariance = known.covariance
+    covariance = known.covariance + _of_starts(starts, blocks, whitener, known.white)
     parameters = fitted_parameters(
         fitted, names, covariance, triangle / np.sqrt(2.0), known.freedom
     )
@@ -127,6 +145,20 @@ def record_statistics(
         ],
         known.colour,
     )
+
+
+def _of_starts(
+    starts: Sequence[HeldStart | None], blocks: Sequence[Block], whitener: Array, inverse: Array
+) -> Array:
+    """What the noise of measured initial states adds to the covariance of the parameters."""
+    total = np.zeros_like(inverse)
+    for start, block in zip(starts, blocks, strict=False):
+        if start is None:
+            continue
+        white = np.tensordot(whitener, start.slopes, axes=1)
+        moved = inverse @ block.projected.T @ white.reshape(len(block.projected), -1)
+        total += moved @ start.covariance @ moved.T
+    return total
 
 
 def _limited(residual: Array, limit: float) -> Array:

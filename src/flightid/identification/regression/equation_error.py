@@ -142,7 +142,7 @@ def _problem(
     operator: Callable[[MeasuredMotion], Operator],
 ) -> tuple[EquationRegression, Array, Limits]:
     records = check_records(model, data)
-    reconstruction = Reconstruction.of(model)
+    reconstruction = Reconstruction.of(model, records[0])
     motions = [reconstruction.measured(record) for record in records]
     start, limits = limits_of(model, options.maximum_iterations)
     right = RightSide(reconstruction, options.hold)

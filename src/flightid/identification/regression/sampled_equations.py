@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 from flightid.errors import DataError, FitError, ModelError, SingularError
 from flightid.identification.records.delayed_inputs import delayed_inputs
 from flightid.models import StateSpaceModel
+from flightid.models.state_space.measured_states import StateOutputs
 from flightid.record import Record
 
 Array = NDArray[np.float64]
 _SAME = 1e-9
-_PROBES = 4
 
 
 @dataclass(frozen=True)
@@ -50,50 +50,34 @@ class MeasuredMotion:
 
 @dataclass(frozen=True)
 class Reconstruction:
-    """How measured outputs give the states: x = W (y − y₀).
+    """How measured outputs give the states: x = H⁺ (y − h).
 
     Attributes
     ----------
     model : StateSpaceModel
-    direct : tuple of int
+    seen : StateOutputs
         Outputs that are fixed combinations of states alone.
     others : tuple of int
         All other outputs.
-    weights : ndarray, shape (n_states, n_direct)
-    offset : ndarray, shape (n_direct,)
     """
 
     model: StateSpaceModel
-    direct: tuple[int, ...]
+    seen: StateOutputs
     others: tuple[int, ...]
-    weights: Array
-    offset: Array
 
     @classmethod
-    def of(cls, model: StateSpaceModel) -> Reconstruction:
-        """Find the outputs that give the states.
+    def of(cls, model: StateSpaceModel, record: Record) -> Reconstruction:
+        """Find the outputs that give the states, near the samples of a record.
 
         Raises
         ------
         FitError
             Some states are not measured.
         """
-        n, p = len(model.states), len(model.outputs)
-        values = model.parameters.independent_values()
-        width = 2 * n + len(model.inputs)
-        probes = np.vstack([np.zeros(width), _probes(model, width)])
-        places = [*range(width), *(width + place for place in model.parameters.free_indices)]
-        found, slopes = model.native.sample(values, probes, places)
-        rows, offset = slopes[:, n:, :], found[0, n:]
-        scale = np.abs(rows).max(axis=(0, 2)) + 1e-300
-        spread = np.abs(rows[:, :, n : 2 * n] - rows[0, :, n : 2 * n]).max(axis=(0, 2))
-        elsewhere = np.abs(rows[:, :, [*range(n), *range(2 * n, len(places))]])
-        strange = elsewhere.max(axis=(0, 2), initial=0.0) + spread > _SAME * scale
-        direct = tuple(int(place) for place in np.flatnonzero(~strange))
-        matrix = rows[0][list(direct), n : 2 * n].reshape(len(direct), n)
-        _require_states(model, matrix)
-        others = tuple(place for place in range(p) if place not in direct)
-        return cls(model, direct, others, np.linalg.pinv(matrix), offset[list(direct)])
+        seen = StateOutputs.of(model, record.matrix(model.inputs), record.matrix(model.outputs))
+        _require_states(model, seen.matrix)
+        others = tuple(k for k in range(len(model.outputs)) if k not in seen.places)
+        return cls(model, seen, others)
 
     def measured(self, record: Record) -> MeasuredMotion:
         """States, inputs and remaining outputs of a record.
@@ -104,19 +88,10 @@ class Reconstruction:
             The record lacks a channel of the model.
         """
         outputs = record.matrix(self.model.outputs)
-        states = self.weights @ (outputs[list(self.direct)] - self.offset[:, None])
+        states = self.seen.states(outputs)
         inputs = record.matrix(self.model.inputs)
         others = outputs[list(self.others)]
         return MeasuredMotion(record.name, record.sample_time_s, states, inputs, others)
-
-
-def _probes(model: StateSpaceModel, width: int) -> Array:
-    """Points near the trim at which a linear output shows the same slopes."""
-    n = len(model.states)
-    trim = np.array([model.trim.get(name, 0.0) for name in model.point_names])
-    shifts = np.random.default_rng(0).uniform(0.05, 0.15, (_PROBES, width))
-    shifts[:, :n] *= 2.0
-    return np.asarray(trim + shifts)
 
 
 def _require_states(model: StateSpaceModel, matrix: Array) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from flightid.errors import DataError, OptionError, SingularError
@@ -17,13 +19,14 @@ def steps_per_sample(
     sample_time_s: float,
     substeps: int | None,
     radius: float = STEP_RADIUS,
+    at: Mapping[str, float] | None = None,
 ) -> int:
     """Runge-Kutta steps in a sample interval: those asked for, or enough for the fastest mode.
 
     Parameters
     ----------
     model : StateSpaceModel
-        Its eigenvalues at its trim count.
+        Its eigenvalues count.
     sample_time_s : float
         Time between samples, s.
     substeps : int or None
@@ -31,6 +34,8 @@ def steps_per_sample(
         `radius`.
     radius : float
         Largest product of step and eigenvalue.
+    at : mapping of str to float, optional
+        Where the eigenvalues are taken, instead of the trim.
 
     Returns
     -------
@@ -56,7 +61,7 @@ def steps_per_sample(
             )
         return substeps
     try:
-        fastest = float(np.max(np.abs(model.eigenvalues())))
+        fastest = float(np.max(np.abs(model.eigenvalues(at=at))))
     except (DataError, SingularError):
         # The trim may be no point of the flight; the run itself judges whether the model has a
         # value where it goes.

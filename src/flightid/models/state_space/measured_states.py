@@ -1,0 +1,195 @@
+"""What measured outputs say of states: where runs begin, and where equations are probed.
+
+Outputs that are fixed combinations of states alone, y = H x + h, give states by least squares. The
+equations are probed near measured samples, since a model that divides by a speed has no value at
+rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError, SingularError
+from flightid.models.state_space.model import StateSpaceModel
+from flightid.record import Record
+
+Array = NDArray[np.float64]
+_SAME = 1e-9
+_PROBES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class StateOutputs:
+    """Outputs that are fixed combinations of states: y = H x + h.
+
+    Attributes
+    ----------
+    places : tuple of int
+        Of these outputs among the model's.
+    matrix : ndarray, shape (n_direct, n_states)
+        H.
+    offset : ndarray, shape (n_direct,)
+        h.
+    trim : ndarray, shape (n_states,)
+        Where states that nothing measures stay.
+    """
+
+    places: tuple[int, ...]
+    matrix: Array
+    offset: Array
+    trim: Array
+
+    @property
+    def weights(self) -> Array:
+        """Least-squares inverse of H, shape (n_states, n_direct)."""
+        return np.asarray(np.linalg.pinv(self.matrix))
+
+    def states(self, outputs: Array) -> Array:
+        """States at samples, (n_states, n_samples), from all outputs, (n_outputs, n_samples).
+
+        Nearest to the trim where outputs leave a choice.
+        """
+        rows = list(self.places)
+        direct = outputs[rows] - (self.offset + self.matrix @ self.trim)[:, None]
+        return np.asarray(self.trim[:, None] + self.weights @ direct)
+
+    def noise(self, covariance: Array) -> Array:
+        """Covariance of measured states (n_states, n_states) from that of all outputs' noise."""
+        rows = list(self.places)
+        return np.asarray(self.weights @ covariance[np.ix_(rows, rows)] @ self.weights.T)
+
+    @classmethod
+    def of(cls, model: StateSpaceModel, inputs: Array, outputs: Array) -> StateOutputs:
+        """Find them, from samples of inputs (n_inputs, n) and outputs (n_outputs, n).
+
+        A row of outputs that was not measured is NaN.
+
+        Raises
+        ------
+        DataError
+            The equations have no value near the samples.
+        SingularError
+            The equations do not give every state derivative.
+        """
+        n, width = len(model.states), 2 * len(model.states) + len(model.inputs)
+        values = model.parameters.independent_values()
+        places = [*range(width), *(width + place for place in model.parameters.free_indices)]
+        probes = _probes(model, inputs, outputs)
+        found, slopes = model.native.sample(values, probes, places)
+        rows = slopes[:, n:, :]
+        scale = np.abs(rows).max(axis=(0, 2)) + 1e-300
+        spread = np.abs(rows[:, :, n : 2 * n] - rows[0, :, n : 2 * n]).max(axis=(0, 2))
+        elsewhere = np.abs(rows[:, :, [*range(n), *range(2 * n, len(places))]])
+        strange = elsewhere.max(axis=(0, 2), initial=0.0) + spread > _SAME * scale
+        strange |= ~np.all(np.isfinite(outputs), axis=1)
+        direct = tuple(int(place) for place in np.flatnonzero(~strange))
+        matrix = rows[0][list(direct), n : 2 * n].reshape(len(direct), n)
+        offset = found[0, n:][list(direct)] - matrix @ probes[0, n : 2 * n]
+        return cls(direct, matrix, offset, _trim(model))
+
+
+def state_outputs(model: StateSpaceModel, inputs: Array, outputs: Array) -> StateOutputs:
+    """Outputs that tell states; those that are one by name where the equations have no value.
+
+    Parameters
+    ----------
+    model : StateSpaceModel
+    inputs, outputs : ndarray, shapes (n_inputs, n_samples) and (n_outputs, n_samples)
+        All of the model's, whole or as departures, as the model is run; outputs that were not
+        measured are NaN.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> yaw = fid.load_model("quadrotor_yaw")
+    >>> outputs = np.full((len(yaw.outputs), 9), 0.5)
+    >>> state_outputs(yaw, np.zeros((1, 9)), outputs).states(outputs)[:, 0]
+    array([0.5, 0.5])
+    """
+    plain = _by_name(model, outputs)
+    if np.all(np.any(plain.matrix, axis=0)):
+        return plain
+    try:
+        return StateOutputs.of(model, inputs, outputs)
+    except (DataError, SingularError):
+        return plain
+
+
+def measured_start(model: StateSpaceModel, record: Record) -> Array:
+    """State at a record's first sample as its outputs tell it, shape (n_states,).
+
+    Of a linear model departures from the record's declared trim, of a nonlinear one whole values.
+    The record may lack outputs.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> yaw = fid.load_model("quadrotor_yaw")
+    >>> record = fid.Record.from_arrays(
+    ...     np.arange(9) / 50, inputs={"tau_psi": np.zeros(9)},
+    ...     outputs={"r": np.full(9, 0.5)}, units={"r": "rad/s"})
+    >>> measured_start(yaw, record)
+    array([0.5, 0. ])
+    """
+    departs = record.trim if model.is_linear else {}
+    blank = np.full(record.n_samples, np.nan)
+
+    def rows(names: tuple[str, ...]) -> Array:
+        return np.array([record[n] - departs.get(n, 0.0) if n in record else blank for n in names])
+
+    outputs = rows(model.outputs)
+    seen = state_outputs(model, rows(model.inputs), outputs)
+    if model.is_linear and (departs or any(model.trim.values())):
+        seen = replace(seen, offset=0.0 * seen.offset, trim=0.0 * seen.trim)
+    return np.asarray(seen.states(outputs[:, :1])[:, 0])
+
+
+def measured_point(model: StateSpaceModel, records: Sequence[Record]) -> dict[str, float]:
+    """Where the model is looked at: its trim, or without one the first measured sample.
+
+    Returns
+    -------
+    dict of str to float
+        States and inputs; empty where the model declares a trim or is linear.
+    """
+    if model.trim or model.is_linear:
+        return {}
+    inputs, outputs = records[0].matrix(model.inputs), records[0].matrix(model.outputs)
+    start = state_outputs(model, inputs, outputs).states(outputs[:, :1])[:, 0]
+    values = (*map(float, start), *map(float, inputs[:, 0]))
+    return dict(zip((*model.states, *model.inputs), values, strict=True))
+
+
+def _trim(model: StateSpaceModel) -> Array:
+    return np.array([float(model.trim.get(name, 0.0)) for name in model.states])
+
+
+def _by_name(model: StateSpaceModel, outputs: Array) -> StateOutputs:
+    names = list(model.states)
+    shown = [output.expression.strip() for output in model.measurements.values()]
+    places = [
+        row
+        for row, formula in enumerate(shown)
+        if formula in names and np.all(np.isfinite(outputs[row]))
+    ]
+    matrix = np.zeros((len(places), len(names)))
+    matrix[range(len(places)), [names.index(shown[row]) for row in places]] = 1.0
+    return StateOutputs(tuple(places), matrix, np.zeros(len(places)), _trim(model))
+
+
+def _probes(model: StateSpaceModel, inputs: Array, outputs: Array) -> Array:
+    """Points near measured samples, at which a linear output shows the same slopes."""
+    n, width = len(model.states), 2 * len(model.states) + len(model.inputs)
+    samples = np.linspace(0, inputs.shape[1] - 1, _PROBES + 1).astype(int)
+    states = _by_name(model, outputs).states(outputs[:, samples])
+    rates = np.array([float(model.trim.get(f"{name}'", 0.0)) for name in model.states])
+    moving = np.tile(rates[:, None], len(samples))
+    points = np.vstack([moving, states, inputs[:, samples]]).T
+    shifts = np.random.default_rng(0).uniform(0.05, 0.15, (_PROBES, width))
+    shifts[:, :n] *= 2.0
+    points[1:] += shifts
+    return np.ascontiguousarray(points)
