@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from flightid.record import Record
     from flightid.responses import FrequencyResponse
 
-LOGS = {".bin", ".ulg", ".log"}
 ON_RESPONSES = "frequency_domain"
 
 
@@ -71,6 +70,7 @@ def command(
     The exit code is 1 where a verdict is red.
     """
     import flightid
+    from flightid.logs import is_log
     from flightid.models import load_structure
     from flightid.progress import progress
 
@@ -87,7 +87,7 @@ def command(
         advance()
         fit = flightid.identify(model, data, method=method, **of_method)
         result = flightid.reduce(fit, data) if reduced else fit
-        if file.suffix.lower() in LOGS:
+        if is_log(file):
             result = _with_inspection(result, file)
         advance()
     note(repr(result))
@@ -169,9 +169,10 @@ def _records(
     sid_run: int | None,
 ) -> list[Record]:
     import flightid
+    from flightid.logs import is_log
 
     names = [*model.inputs, *model.outputs]
-    if file.suffix.lower() in LOGS:
+    if is_log(file):
         return [flightid.read_log(file).record(names=names, span_s=span, sid_run=sid_run)]
     if span is not None or sid_run is not None:
         raise click.UsageError("--span and --run belong to logs")

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from flightid.responses import FrequencyResponse
 
 FILE = click.Path(dir_okay=False, path_type=Path)
-LOGS = {".bin", ".log", ".ulg"}
 
 
 @click.command()
@@ -100,9 +99,9 @@ def _read(
     sweep: int | None,
     time: str,
 ) -> list[Record]:
-    if file.suffix.lower() in LOGS:
-        from flightid.logs import read_log
+    from flightid.logs import is_log, read_log
 
+    if is_log(file):
         return [read_log(file).record(span_s=span, sid_run=sweep)]
     from flightid.record.read import read_records
 

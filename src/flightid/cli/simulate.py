@@ -157,7 +157,7 @@ def _driving(
 ) -> list[Record]:
     """Records of the files, or one of shapes."""
     from flightid import read_log, read_records
-    from flightid.cli.identify import LOGS
+    from flightid.logs import is_log
     from flightid.vehicles.pilot_inputs import stick_record
 
     inputs = tuple(model.inputs)
@@ -175,7 +175,7 @@ def _driving(
         raise click.UsageError("--input makes records of its own: give it or RECORDS")
     found: list[Record] = []
     for file in files:
-        if file.suffix.lower() in LOGS:
+        if is_log(file):
             found.append(read_log(file).record(names=list(inputs), span_s=span))
         elif span is not None:
             raise click.UsageError("--span belongs to logs")

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from flightid.errors import LogFormatError
+from flightid.errors import FileFormatError, LogFormatError
 from flightid.logs.dataflash.reader import open_dataflash
 from flightid.logs.log import Log
 from flightid.logs.source import LogSource
 from flightid.logs.ulog.reader import UlogSource
+from flightid.record.formats.sniff import file_format
 
 ULOG_MAGIC = b"ULog\x01\x12\x35"
 DATAFLASH_HEADER = b"\xa3\x95"
@@ -73,6 +74,29 @@ def read_log(path: str | Path) -> Log:
         if holds(head):
             return Log(path, open_source(path))
     raise _not_a_log(path, head)
+
+
+def is_log(path: str | Path) -> bool:
+    """Whether `read_log` is the reader of a file, judged by its content: not of records of a rig.
+
+    A log of an autopilot that flightid does not read counts too: `read_log` says what it is.
+
+    Raises
+    ------
+    OSError
+        The file cannot be read.
+    """
+    path = Path(path)
+    with path.open("rb") as file:
+        head = file.read(SNIFFED)
+    signs = (ULOG_MAGIC, DATAFLASH_HEADER, *(magic for magic, _, _ in _FOREIGN))
+    if head.startswith(signs):
+        return True
+    try:
+        file_format(path)
+    except FileFormatError:
+        return DATAFLASH_HEADER in head
+    return False
 
 
 def _not_a_log(path: Path, head: bytes) -> LogFormatError:
