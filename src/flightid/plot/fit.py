@@ -25,7 +25,7 @@ class EstimateBar:
     name : str
         Parameter and model.
     value, low, high : float
-        EstimateBar and its 95 % interval, any unit.
+        Estimate and its 95 % interval, any unit.
     truth : float or None
         True value where it is known.
 
@@ -45,6 +45,8 @@ class EstimateBar:
 def parameter_intervals(estimates: Sequence[EstimateBar], *, name: str = "estimate") -> go.Figure:
     """Draw 95 % intervals in percent of the reference: the truth where known, else the estimate.
 
+    Where the truth is zero, departures from it are in percent of the estimate.
+
     Parameters
     ----------
     estimates : sequence of EstimateBar
@@ -62,11 +64,7 @@ def parameter_intervals(estimates: Sequence[EstimateBar], *, name: str = "estima
     2
     """
     made = look.figure(height_px=FRAME_PX + ROW_PX * len(estimates))
-    references = [item.value if item.truth is None else item.truth for item in estimates]
-    scaled = [
-        [100 * (edge / reference - 1) for edge in (item.value, item.low, item.high)]
-        for item, reference in zip(estimates, references, strict=True)
-    ]
+    scaled = [_departures(item) for item in estimates]
     names = [item.name for item in estimates]
     centres = [values[0] for values in scaled]
     made.add_trace(
@@ -102,6 +100,13 @@ def parameter_intervals(estimates: Sequence[EstimateBar], *, name: str = "estima
     made.update_xaxes(title_text=f"departure from the {reference} [%]")
     made.update_layout(hovermode="closest")
     return made
+
+
+def _departures(item: EstimateBar) -> list[float]:
+    """Of value and ends of the interval, percent; their half width where all else is zero."""
+    reference = item.value if item.truth is None else item.truth
+    scale = reference or item.value or 0.5 * (item.high - item.low) or 1.0
+    return [100.0 * (edge - reference) / scale for edge in (item.value, item.low, item.high)]
 
 
 def fit_figure(fit: Fit, name: str | None = None) -> go.Figure:

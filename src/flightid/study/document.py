@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,6 +17,7 @@ from flightid.report.figures import figure_block
 from flightid.report.handling_qualities import handling_qualities_blocks
 from flightid.report.tuning import tuning_section
 from flightid.study.estimate_tables import model_table, structure_words
+from flightid.study.faults import section_of, whole_section
 from flightid.study.model_section import model_section
 from flightid.study.truth import recovered
 from flightid.table import Cell, Column, Table
@@ -41,19 +43,16 @@ def study_document(study: Study) -> Document:
     """
     settings = study.settings
     models = [model_section(item, study.truth) for item in study.identified]
-    gains = () if study.tuning is None else (tuning_section(study.tuning),)
     return Document(
         settings.title,
         settings.aircraft,
         (
-            Section("Result", tuple(_result(study))),
+            section_of("Result", _result, study),
             *models,
             *_qualities(study),
             *_uses(study),
-            *gains,
-            Section(
-                "The records" if study.inspection is None else "The log",
-                tuple(_source_blocks(study)),
+            section_of(
+                "The records" if study.inspection is None else "The log", _source_blocks, study
             ),
             Section("Provenance", provenance(study.files, _options(study))),
         ),
@@ -65,11 +64,12 @@ def _uses(study: Study) -> Iterator[Section]:
     """What was made with the models, where the study asks for it."""
     uses = study.uses
     if uses.conditions is not None:
-        yield Section("Flight conditions", result_blocks(uses.conditions))
+        yield section_of("Flight conditions", result_blocks, uses.conditions)
     if uses.rotor is not None:
-        yield Section("Rotor physics", result_blocks(uses.rotor))
+        yield section_of("Rotor physics", result_blocks, uses.rotor)
     for asked, closed in uses.loops:
-        yield closed_loop_section(closed, band_rad_s=asked.band_rad_s)
+        made = partial(closed_loop_section, closed, band_rad_s=asked.band_rad_s)
+        yield whole_section(closed.name, made)
     if uses.files:
         rows = tuple((name, file) for name, file in uses.files.items())
         table = Table(
@@ -77,12 +77,14 @@ def _uses(study: Study) -> Iterator[Section]:
         )
         exported = (TableBlock(each.summary()) for each in uses.exported)
         yield Section("Files", (TableBlock(table), *exported))
+    if study.tuning is not None:
+        yield whole_section("Gains", tuning_section, study.tuning)
 
 
 def _qualities(study: Study) -> Iterator[Section]:
     if study.qualities:
         parts = (
-            Section(f"Handling qualities of “{name}”", handling_qualities_blocks(found))
+            section_of(f"Handling qualities of “{name}”", handling_qualities_blocks, found)
             for name, found in study.qualities.items()
         )
         yield Section("Handling qualities", (), tuple(parts))
@@ -151,10 +153,12 @@ def _inside(parameter: Estimate, true_value: float | None) -> bool | None:
     return parameter.interval95[0] <= true_value <= parameter.interval95[1]
 
 
-def _result(study: Study) -> list[Block]:
-    notes = study.settings.notes
-    blocks: list[Block] = [Paragraph(notes)] if notes else []
-    blocks.append(Lights(tuple(map(_in_short, study.identified)), repeats=True))
+def _result(study: Study) -> Iterator[Block]:
+    if study.settings.notes:
+        yield Paragraph(study.settings.notes)
+    if study.faults:
+        yield Lights(study.faults)
+    yield Lights(tuple(map(_in_short, study.identified)), repeats=True)
     # A tied parameter follows another: it would count the same miss twice.
     inside = [
         _inside(parameter, true)
@@ -163,12 +167,12 @@ def _result(study: Study) -> list[Block]:
     ]
     judged = np.array([value for value in inside if value is not None], dtype=bool)
     if judged.size:
-        blocks.append(Lights((recovered(judged),)))
+        yield Lights((recovered(judged),))
     if len(study.identified) > 1 or not study.has_equations:
-        blocks.append(TableBlock(model_table(study.identified)))
+        yield TableBlock(model_table(study.identified))
     if study.has_equations:
-        blocks.append(TableBlock(parameter_table(study)))
-    return [*blocks, *_interval_figure(study)]
+        yield TableBlock(parameter_table(study))
+    yield from _interval_figure(study)
 
 
 def _in_short(item: Identified) -> Finding:
@@ -230,6 +234,8 @@ def _interval_figure(study: Study) -> tuple[Figure, ...]:
         return ()
     reference = _beside(study) or "estimate"
     caption = f"Estimates with their 95 % intervals, in percent of the {reference}."
+    if any(bar.truth == 0.0 for bar in estimates):
+        caption += " Where that is zero, in percent of the estimate."
     return (figure_block(parameter_intervals(estimates), caption),)
 
 

@@ -25,6 +25,7 @@ from flightid.report.reduction import reduction_blocks
 from flightid.report.verification import verification_blocks
 from flightid.study.choice_section import choice_blocks
 from flightid.study.estimate_tables import estimates_table
+from flightid.study.faults import blocks_until, section_of
 from flightid.study.response_figures import response_figures
 from flightid.study.structures import goal_findings
 
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from flightid.identification import Fit
     from flightid.study.identified import Identified
     from flightid.study.truth import Truth
-    from flightid.validation import ResidualTests
+    from flightid.validation import ResidualTests, SpectrumComparison
 
 
 def model_section(item: Identified, truth: Truth | None) -> Section:
@@ -49,7 +50,8 @@ def model_section(item: Identified, truth: Truth | None) -> Section:
     -------
     Section
     """
-    return Section(item.name, tuple(_first(item, truth)), tuple(_parts(item, truth)))
+    first = blocks_until(item.name, _first, item, truth)
+    return Section(item.name, first, tuple(_parts(item, truth)))
 
 
 def _first(item: Identified, truth: Truth | None) -> Iterator[Block]:
@@ -83,28 +85,39 @@ def _parts(item: Identified, truth: Truth | None) -> Iterator[Section]:
     structure, fit = item.settings.structure, item.fit
     if item.coherent is not None:
         title = "Choice of responses" if structure is None else "Coherence"
-        lights = (Lights(item.left_out),) if item.left_out else ()
-        limits = f"{item.coherent.minimum_coherence:g} over {item.coherent.minimum_decades:g}"
-        table = result_blocks(item.coherent, title=f"Coherence, at least {limits} decades needed")
-        figures = response_figures(item, truth) if structure is not None else ()
-        yield Section(title, (*lights, *table, *figures))
+        yield section_of(title, _coherence, item, truth)
     if item.choice is not None:
-        yield Section("Choice of the structure", choice_blocks(item))
+        yield section_of("Choice of the structure", choice_blocks, item)
     if item.reduction is not None:
-        yield Section("Reduction of the structure", reduction_blocks(item.reduction))
+        yield section_of("Reduction of the structure", reduction_blocks, item.reduction)
     if item.tests is not None:
-        yield Section("Residual tests", tuple(_tests(item.tests)))
+        yield section_of("Residual tests", _tests, item.tests)
     if fit is not None and isinstance(fit.model, StateSpaceModel):
-        yield Section("Modes and derivatives", (*_physics(fit), *_beside(item, fit)))
+        yield section_of("Modes and derivatives", _physics, item, fit)
     for name, verification in item.verifications.items():
-        yield Section(f"Prediction of “{name}”", verification_blocks(verification))
+        yield section_of(f"Prediction of “{name}”", verification_blocks, verification)
     if item.spectra is not None:
-        shown = "Spectrum as measured with its 95 % band, and of the model in free run."
-        picture = figure_block(spectrum_comparison(item.spectra), shown)
-        yield Section("Spectra", (picture, *result_blocks(item.spectra, title="Peaks")))
+        yield section_of("Spectra", _spectra, item.spectra)
 
 
-def _physics(fit: Fit) -> tuple[Block, ...]:
+def _coherence(item: Identified, truth: Truth | None) -> Iterator[Block]:
+    """Which responses or inputs were taken, and why."""
+    assert item.coherent is not None
+    if item.left_out:
+        yield Lights(item.left_out)
+    limits = f"{item.coherent.minimum_coherence:g} over {item.coherent.minimum_decades:g}"
+    yield from result_blocks(item.coherent, title=f"Coherence, at least {limits} decades needed")
+    if item.settings.structure is not None:
+        yield from response_figures(item, truth)
+
+
+def _spectra(spectra: SpectrumComparison) -> Iterator[Block]:
+    shown = "Spectrum as measured with its 95 % band, and of the model in free run."
+    yield figure_block(spectrum_comparison(spectra), shown)
+    yield from result_blocks(spectra, title="Peaks")
+
+
+def _physics(item: Identified, fit: Fit) -> Iterator[Block]:
     """Modes of any model; approximations and derivatives of those that have them."""
     approximations, table = None, None
     # A rig's or a filter's states fit no textbook formula, and coefficients are no derivatives.
@@ -116,7 +129,8 @@ def _physics(fit: Fit) -> tuple[Block, ...]:
         shown = modes_blocks(modes(fit))
     except ModelError as reason:
         shown = (Paragraph(f"No modes: {reason}."),)
-    return (*shown, *physics_blocks(approximations, table))
+    yield from (*shown, *physics_blocks(approximations, table))
+    yield from _beside(item, fit)
 
 
 def _beside(item: Identified, fit: Fit) -> tuple[Block, ...]:

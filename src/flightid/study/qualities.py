@@ -14,9 +14,11 @@ from flightid.dynamics.handling_qualities.handling_qualities import (
     handling_qualities,
 )
 from flightid.errors import StudyError
+from flightid.study.faults import Faults
 from flightid.study.reading import TableReader
 
 if TYPE_CHECKING:
+    from flightid.identification import Fit
     from flightid.study.identified import Identified
     from flightid.study.task import Task
 
@@ -150,7 +152,7 @@ def require_pairs(tasks: Iterable[Task], settings: QualitiesSettings) -> None:
 
 
 def rate_models(
-    identified: Iterable[Identified], settings: QualitiesSettings
+    identified: Iterable[Identified], settings: QualitiesSettings, faults: Faults
 ) -> dict[str, HandlingQualities]:
     """Handling qualities of every fit, by the name of its model.
 
@@ -158,6 +160,8 @@ def rate_models(
     ----------
     identified : iterable of Identified
     settings : QualitiesSettings
+    faults : Faults
+        Takes what cannot be rated.
 
     Returns
     -------
@@ -167,22 +171,29 @@ def rate_models(
     for item in identified:
         if item.fit is None or item.settings.structure is not None:
             continue
-        model, axes = item.fit.model, settings.axes
-        if axes is not None:
-            axes = {
-                axis: pair
-                for axis, pair in axes.items()
-                if pair[0] in model.outputs and pair[1] in model.inputs
-            }
-        found[item.settings.name] = handling_qualities(
-            item.fit,
-            axes=axes,
-            signs=settings.signs,
-            vehicle=settings.vehicle,
-            response_type=settings.response_type,
-            band_rad_s=settings.band_rad_s,
-            n_alpha=settings.n_alpha,
-            charts=None if settings.charts is None else str(settings.charts),
-            **settings.conditions,
-        )
+        name = item.settings.name
+        rated = faults.spare(f"handling qualities of “{name}”", _rated, None, item.fit, settings)
+        if rated is not None:
+            found[name] = rated
     return found
+
+
+def _rated(fit: Fit, settings: QualitiesSettings) -> HandlingQualities:
+    model, axes = fit.model, settings.axes
+    if axes is not None:
+        axes = {
+            axis: pair
+            for axis, pair in axes.items()
+            if pair[0] in model.outputs and pair[1] in model.inputs
+        }
+    return handling_qualities(
+        fit,
+        axes=axes,
+        signs=settings.signs,
+        vehicle=settings.vehicle,
+        response_type=settings.response_type,
+        band_rad_s=settings.band_rad_s,
+        n_alpha=settings.n_alpha,
+        charts=None if settings.charts is None else str(settings.charts),
+        **settings.conditions,
+    )

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 from flightid.errors import StudyError
+from flightid.study.model_settings import ModelSettings
 
 
 class Named(Protocol):
@@ -69,6 +70,23 @@ def require_references(sources: Sequence[Named], models: Sequence[Modelled], *, 
                 found=", ".join(sorted(both)),
                 needed=f"{kind}s that the fit does not use",
             )
+
+
+def require_conditions(models: Sequence[ModelSettings]) -> None:
+    """Check that each flight condition is of one model.
+
+    Raises
+    ------
+    StudyError
+        Two models name the same.
+    """
+    words = [model.condition for model in models if model.condition]
+    if len(set(words)) < len(words):
+        raise StudyError(
+            "study file: two models are of one flight condition",
+            found=", ".join(words),
+            needed="another `condition` for each model",
+        )
 
 
 def _require_unique(kind: str, named: Iterable[Named]) -> None:

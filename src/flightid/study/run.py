@@ -11,6 +11,7 @@ from flightid.files import sha256_of_file
 from flightid.progress import progress
 from flightid.report.html import to_html
 from flightid.report.text import to_text
+from flightid.study.faults import Faults
 from flightid.study.output import RESULTS, require_replaceable, whole_folder
 from flightid.study.pipeline import identify_models
 from flightid.study.qualities import rate_models, require_pairs
@@ -33,7 +34,8 @@ def run_study(
 ) -> Study:
     """Carry out a study file: log or records, responses, models, verification, report.
 
-    The output folder appears whole or not at all.
+    The output folder appears whole or not at all. What fails after the fits costs itself alone:
+    the report names it in red, and all that was found stands.
 
     Parameters
     ----------
@@ -88,6 +90,12 @@ def run_study(
         wanted = settings.tune or (TuneSettings() if tune else None)
         flown = None if taken.log is None else taken.log.value
         files = {item.name: sha256_of_file(item) for item in (source, *taken.files)}
+        faults = Faults()
+        tuning = None
+        if wanted is not None:
+            tuning = faults.spare("tuning", tune_models, None, identified, flown, wanted)
+        qualities = {} if rated is None else rate_models(identified, rated, faults)
+        uses = use_models(identified, settings.uses, folder, faults)
         study = Study(
             settings,
             final,
@@ -96,9 +104,10 @@ def run_study(
             identified,
             taken.truth,
             files,
-            None if wanted is None else tune_models(identified, flown, wanted),
-            {} if rated is None else rate_models(identified, rated),
-            use_models(identified, settings.uses, folder),
+            tuning,
+            qualities,
+            uses,
+            tuple(faults.findings),
             tuple(runner.carried_out),
             tuple(runner.from_cache),
         )

@@ -21,7 +21,7 @@ from flightid.study.qualities import QualitiesSettings, read_qualities
 from flightid.study.reading import TOP, TableReader
 from flightid.study.record_files import UNKNOWN, RecordFile, read_record_file, read_shape
 from flightid.study.reducing import ReduceSettings, read_reduce
-from flightid.study.references import require_references
+from flightid.study.references import require_conditions, require_references
 from flightid.study.response_settings import ResponseSettings, read_response
 from flightid.study.tuning import TuneSettings, read_tune
 from flightid.study.uses_settings import UsesSettings, read_uses
@@ -186,6 +186,7 @@ def read_settings(path: Path) -> Settings:
         )
     kind = "record" if files else "segment"
     require_references(files or segments, models, kind=kind)
+    require_conditions(models)
     require_records(conditioning, [each.name for each in files or segments])
     return Settings(
         *words,

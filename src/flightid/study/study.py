@@ -63,6 +63,8 @@ class Study(
         By model, where the study asks for them.
     uses : Uses
         Model files, and what else was made with the models.
+    faults : tuple of Finding
+        What was asked for after the fits and could not be made.
     carried_out, from_cache : tuple of str
         Stages that this run carried out, and those whose results the cache held.
 
@@ -83,6 +85,7 @@ class Study(
     tuning: Tuning | None = None
     qualities: Mapping[str, HandlingQualities] = field(default_factory=dict)
     uses: Uses = field(default_factory=Uses)
+    faults: tuple[Finding, ...] = ()
     carried_out: tuple[str, ...] = ()
     from_cache: tuple[str, ...] = ()
 

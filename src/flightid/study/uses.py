@@ -18,8 +18,14 @@ from flightid.export import Exported
 from flightid.export.to_file import export
 from flightid.identification import Fit
 from flightid.models import write_model
+from flightid.study.faults import Faults
 from flightid.study.identified import Identified
-from flightid.study.uses_settings import LoopSettings, UsesSettings
+from flightid.study.uses_settings import (
+    ExportSettings,
+    LoopSettings,
+    RotorSettings,
+    UsesSettings,
+)
 
 MODELS, EXPORTS = "models", "export"
 """Folders of the output."""
@@ -57,7 +63,9 @@ class Uses:
         }
 
 
-def use_models(identified: Sequence[Identified], settings: UsesSettings, folder: Path) -> Uses:
+def use_models(
+    identified: Sequence[Identified], settings: UsesSettings, folder: Path, faults: Faults
+) -> Uses:
     """Write every fitted model, and do with them what the study asks.
 
     Parameters
@@ -66,46 +74,57 @@ def use_models(identified: Sequence[Identified], settings: UsesSettings, folder:
     settings : UsesSettings
     folder : Path
         Output of the study.
+    faults : Faults
+        Takes what fails: a model that was left out, or that does not fit its use.
 
     Returns
     -------
     Uses
-
-    Raises
-    ------
-    StudyError
-        A model that is to be used was left out, or two models name one flight condition.
-    FlightidError
-        A model that does not fit its use; the message is that of the verb.
     """
     fits = {item.name: item.fit for item in identified if item.fit is not None}
-    asked, loops = settings.rotor, []
+    files: dict[str, str] = {}
+    files = faults.spare("the model files", _written, files, fits, folder)
+    conditions = faults.spare("the flight conditions", _conditions, None, identified)
     rotor = None
-    if asked is not None:
-        rotor = rotor_physics(
-            _fit(fits, asked.model),
-            asked.rotor_speed_rad_s,
-            lock_number=asked.lock_number,
-            bar_lock_number=asked.bar_lock_number,
-            expected=dict(asked.expected) or None,
-            names=dict(asked.names) or None,
-        )
-    for loop in settings.loops:
-        closed = close_loop(
-            _fit(fits, loop.model), loop.gains, draws=loop.draws, seed=loop.seed, name=loop.name
-        )
-        loops.append((loop, closed))
-    exported = []
-    for each in settings.exports:
-        (folder / EXPORTS).mkdir(exist_ok=True)
-        place = folder / EXPORTS / each.file
-        made = export(_fit(fits, each.model), place, each.format, **each.options)
-        # The folder gets its own name when the study is whole: paths are told from there.
-        inside = tuple(path.relative_to(folder) for path in made.files)
-        exported.append(replace(made, files=inside))
-    return Uses(
-        _written(fits, folder), _conditions(identified), rotor, tuple(loops), tuple(exported)
+    if settings.rotor is not None:
+        rotor = faults.spare("rotor physics", _rotor, None, fits, settings.rotor)
+    loops = [
+        (loop, closed)
+        for loop in settings.loops
+        if (closed := faults.spare(f"loop “{loop.name}”", _closed, None, fits, loop)) is not None
+    ]
+    exported = [
+        made
+        for each in settings.exports
+        if (made := faults.spare(f"export {each.file}", _exported, None, fits, each, folder))
+        is not None
+    ]
+    return Uses(files, conditions, rotor, tuple(loops), tuple(exported))
+
+
+def _rotor(fits: Mapping[str, Fit], asked: RotorSettings) -> RotorPhysics:
+    return rotor_physics(
+        _fit(fits, asked.model),
+        asked.rotor_speed_rad_s,
+        lock_number=asked.lock_number,
+        bar_lock_number=asked.bar_lock_number,
+        expected=dict(asked.expected) or None,
+        names=dict(asked.names) or None,
     )
+
+
+def _closed(fits: Mapping[str, Fit], loop: LoopSettings) -> ClosedLoop:
+    fit = _fit(fits, loop.model)
+    return close_loop(fit, loop.gains, draws=loop.draws, seed=loop.seed, name=loop.name)
+
+
+def _exported(fits: Mapping[str, Fit], asked: ExportSettings, folder: Path) -> Exported:
+    (folder / EXPORTS).mkdir(exist_ok=True)
+    made = export(
+        _fit(fits, asked.model), folder / EXPORTS / asked.file, asked.format, **asked.options
+    )
+    # The folder gets its own name when the study is whole: paths are told from there.
+    return replace(made, files=tuple(path.relative_to(folder) for path in made.files))
 
 
 def _fit(fits: Mapping[str, Fit], name: str) -> Fit:
@@ -133,12 +152,5 @@ def _written(fits: Mapping[str, Fit], folder: Path) -> dict[str, str]:
 
 def _conditions(identified: Sequence[Identified]) -> ConditionComparison | None:
     named = [(item.settings.condition, item.fit) for item in identified if item.settings.condition]
-    words = [str(word) for word, _ in named]
-    if len(set(words)) < len(words):
-        raise StudyError(
-            "study file: two models are of one flight condition",
-            found=", ".join(words),
-            needed="another `condition` for each model",
-        )
     held = {str(word): fit for word, fit in named if fit is not None}
     return compare_conditions(held) if len(held) > 1 else None

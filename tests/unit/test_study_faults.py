@@ -1,0 +1,104 @@
+"""A fault behind the fits of a study costs its own part alone, and is named."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.cli.program import run as command
+from flightid.study import document, model_section, uses
+
+MODEL = """
+kind = "state-space"
+name = "Roll"
+[states]
+p = "rad/s"
+[inputs]
+lat = "rad"
+[outputs]
+p = "p"
+[parameters]
+L0 = { value = 0.0, unit = "1/s^2", status = "fixed" }
+Lp = { value = -2.0, unit = "1/s" }
+Lq = { value = 0.1, unit = "1/s" }
+Llat = { value = 4.0, unit = "1/s^2" }
+[equations]
+"p'" = "(Lp + Lq)*p + Llat*lat"
+"""
+REFERENCE = MODEL.replace("{ value = 0.1,", "{ value = 0.0,")
+STUDY = """
+[study]
+title = "Roll"
+[fit]
+method = "output_error"
+[[record]]
+name = "a"
+path = "a.csv"
+hold = "zero"
+[[model]]
+name = "Roll"
+template = "roll.toml"
+reference = "reference.toml"
+identify = "a"
+[model.parameters]
+Lp = { value = -2.0, free = false }
+[[loop]]
+name = "Damper"
+model = "Roll"
+gains = { lat = { p = 0.1 } }
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    rng = np.random.default_rng(0)
+    lat = np.repeat(rng.choice([-0.1, 0.1], 40), 10)
+    p = np.zeros(400)
+    for k in range(399):
+        p[k + 1] = np.exp(-0.04) * p[k] + 2.0 * (1.0 - np.exp(-0.04)) * lat[k]
+    p += 0.002 * rng.standard_normal(400)
+    rows = [f"{0.02 * k:.2f},{lat[k]},{p[k]}" for k in range(400)]
+    (tmp_path / "a.csv").write_text("\n".join(["time [s],lat [rad],p [rad/s]", *rows]), "utf-8")
+    (tmp_path / "roll.toml").write_text(MODEL, "utf-8")
+    (tmp_path / "reference.toml").write_text(REFERENCE, "utf-8")
+    (tmp_path / "study.toml").write_text(STUDY, "utf-8")
+    return tmp_path
+
+
+def test_a_reference_of_zero_ends_no_study(folder: Path) -> None:
+    made = fid.run_study(folder / "study.toml")
+    assert not made.faults
+    assert "Where that is zero, in percent of the estimate" in str(made.document.sections[0])
+    assert (made.output / "report.html").is_file()
+
+
+def broken(*_: object, **__: object) -> object:
+    raise ZeroDivisionError("a planted fault")
+
+
+def test_a_picture_that_fails_costs_its_section_alone(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(document, "parameter_intervals", broken)
+    monkeypatch.setattr(model_section, "modes_blocks", broken)
+    monkeypatch.setattr(document, "closed_loop_section", broken)
+    assert command(["--quiet", "run", str(folder / "study.toml")]) == 1
+    text = capsys.readouterr().out
+    for name in ("“Result”", "“Modes and derivatives”", "“Damper”"):
+        assert f"{name} could not be made: ZeroDivisionError: a planted fault" in text
+    assert "Parameters" in text
+    assert (folder / "study-output" / "models" / "roll.toml").is_file()
+
+
+def test_a_use_that_fails_costs_itself_alone(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uses, "close_loop", broken)
+    made = fid.run_study(folder / "study.toml")
+    assert [each.code for each in made.faults] == ["part-failed"]
+    assert "loop “Damper” could not be made" in made.faults[0].message
+    results = json.loads((made.output / "results.json").read_text("utf-8"))
+    assert results["faults"][0]["light"] == "red"
+    assert results["uses"]["files"] == {"Roll": "models/roll.toml"}
