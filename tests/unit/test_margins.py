@@ -113,7 +113,8 @@ def test_views():
 def test_a_band_limits_what_is_looked_at():
     found = fid.margins(loop(), band_rad_s=(1.0, 10.0))
     assert found.curve.omega_rad_s[[0, -1]] == pytest.approx([1.0, 10.0])
-    assert found.gain_margin.value is None
+    assert found.phase_margin.value == pytest.approx(fid.margins(loop()).phase_margin.value)
+    assert [each.omega_rad_s for each in found.phase_crossovers] == []
     assert fid.margins(measured(), band_rad_s=(1.0, 10.0)).gain_margin.value is None
 
 
@@ -141,3 +142,39 @@ def test_what_is_no_loop_is_refused():
     one = fid.FrequencyResponse.from_values(omega, [1.0, 0.5, 0.2], inputs=["r"], outputs=["e"])
     with pytest.raises(DataError, match="a sensitivity is zero or one"):
         fid.margins(one, given="sensitivity")
+
+
+def unstable(gain: float) -> fid.LinearSystem:
+    """Loop of gain · 2/((s − 0.5)(s + 4)): its gain at zero frequency is `gain`."""
+    return fid.LinearSystem(
+        [[0.0, 1.0], [2.0, -3.5]], [[0.0], [2.0 * gain]], [[1.0, 0.0]], [[0.0]], ("e",), ("y",)
+    )
+
+
+@pytest.mark.parametrize("band", [None, (0.001, 30.0), (2.0, 30.0)])
+def test_a_real_unstable_pole_limits_the_fall_of_the_gain(band):
+    found = fid.margins(unstable(3.5), band_rad_s=band)
+    assert found.is_stable
+    assert found.gain_reduction_margin.value == pytest.approx(20 * np.log10(3.5), abs=1e-4)
+    assert found.gain_reduction_crossing.value == 0.0
+    # Just above that limit the closed loop is stable, just below it is not.
+    for gain, stable in ((1.001, True), (0.999, False)):
+        assert fid.margins(unstable(gain), band_rad_s=band).is_stable is stable
+
+
+def test_a_measurement_says_nothing_of_gains_below_its_band():
+    omega = np.geomspace(2.0, 30.0, 80)
+    values = unstable(3.5).frequency_response(omega)
+    seen = fid.FrequencyResponse.from_values(omega, values, inputs=["e"], outputs=["y"])
+    found = fid.margins(seen, unstable_poles=1)
+    assert found.gain_reduction_margin.value is None
+    assert "cannot be said" in found.gain_reduction_margin.reason
+
+
+def test_a_nearer_limit_outside_the_band_is_told():
+    near, far = 20 * np.log10(np.pi / 2 / 0.4), 20 * np.log10(5 * np.pi / 2 / 0.4)
+    found = fid.margins(loop(), band_rad_s=(20.0, 200.0))
+    assert found.gain_margin.value == pytest.approx(far, abs=1e-3)
+    (said,) = [each for each in found.findings if each.code == "gain-limit-outside-band"]
+    assert f"{near:.3g} dB at 15.7 rad/s" in said.message
+    assert "gain-limit-outside-band" not in codes(fid.margins(loop()))

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from flightid.control.margins.crossings import level_crossings
 from flightid.control.margins.findings import guide_finding, stability_findings
+from flightid.control.margins.gain_limits import measured_up
 from flightid.control.margins.loop_metrics import DISTURBANCE_LEVEL_DB
 from flightid.control.margins.loop_source import Controller, Given, read_loop
-from flightid.control.margins.margins import LoopCurve, drawn_points, measured_up
+from flightid.control.margins.margins import LoopCurve, drawn_points
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.result import Result

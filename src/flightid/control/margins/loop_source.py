@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flightid.control.margins.loop_grid import Roots, loop_grid, roots_of, whole_grid
+from flightid.control.margins.loop_grid import loop_grid, roots_of, whole_grid
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
 from flightid.identification.uncertain_of import uncertain_of
@@ -59,6 +59,8 @@ class Loop:
         Highest frequency that has a meaning, rad/s: π/T of a sampled loop.
     closed_unstable_poles : int or None
         Of the closed loop, counted over all frequencies where the band holds only some of them.
+    whole_rad_s : ndarray, shape (n_f,), or None
+        All frequencies of a model's loop that the band cuts off, so that no limit is missed.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Loop:
     coherence: Array | None = None
     end_rad_s: float = np.inf
     closed_unstable_poles: int | None = None
+    whole_rad_s: Array | None = None
 
     @property
     def measured(self) -> bool:
@@ -200,36 +203,30 @@ def _modelled(
     omega = loop_grid(lambda at: of(model, at), roots, band_rad_s)
     count = roots.n_unstable if unstable_poles is None else unstable_poles
     name = f"{outputs[row]} / {inputs[column]}"
-    closed = closed_count(lambda at: of(model, at), roots, band_rad_s, count)
-    return Loop(name, uncertain, omega, of, count, None, roots.end_rad_s, closed)
+    whole, closed = None, None
+    if band_rad_s is not None:
+        whole = whole_grid(lambda at: of(model, at), roots, band_rad_s)
+        closed = closed_count(lambda at: of(model, at), whole, count)
+    return Loop(name, uncertain, omega, of, count, None, roots.end_rad_s, closed, whole)
 
 
-def closed_count(
-    of: Callable[[Array], Complex],
-    roots: Roots,
-    band_rad_s: tuple[float, float] | None,
-    unstable_poles: int,
-) -> int | None:
+def closed_count(of: Callable[[Array], Complex], whole: Array, unstable_poles: int) -> int:
     """Unstable poles of a closed loop, counted below, in and above a band.
 
     Parameters
     ----------
     of : callable
         The loop's response, shape (n_f,).
-    roots : Roots
-    band_rad_s : tuple of float or None
+    whole : ndarray, shape (n_f,)
+        Of `whole_grid`, rad/s.
     unstable_poles : int
         Of the open loop.
 
     Returns
     -------
-    int or None
-        None without a band: what is looked at is then all there is. Below zero where the open loop
-        must have more unstable poles.
+    int
+        Below zero where the open loop must have more unstable poles.
     """
-    if band_rad_s is None:
-        return None
-    whole = whole_grid(of, roots, band_rad_s)
     found = loop_metrics(whole, of(whole), unstable_poles=unstable_poles)
     return round(float(found.unstable_poles))
 

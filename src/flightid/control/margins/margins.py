@@ -10,8 +10,14 @@ from numpy.typing import NDArray
 
 from flightid.control.margins.crossings import gain_crossings, phase_crossings
 from flightid.control.margins.findings import margin_findings
-from flightid.control.margins.loop_grid import zoomed
-from flightid.control.margins.loop_metrics import LoopMetrics
+from flightid.control.margins.gain_limits import (
+    GAIN_LIMITS,
+    UNSEEN,
+    everywhere,
+    gain_limits,
+    measured_up,
+    outside_findings,
+)
 from flightid.control.margins.loop_source import Controller, Given, Loop, read_loop
 from flightid.findings import Finding
 from flightid.result import Result
@@ -24,8 +30,6 @@ Complex = NDArray[np.complex128]
 PHASE_GUIDE_DEG = 45.0
 GAIN_GUIDE_DB = 6.0
 """MIL-F-9490D table III and its successors, for modes between 0.06 Hz and the first elastic one."""
-ZOOMS = (1e-3, 1e-5)
-"""Ratios at which points are put beside what was found, round by round."""
 DRAWN_POINTS = 400
 FAR_DB = 40.0
 """Beyond which a passage of the negative axis is not listed."""
@@ -45,10 +49,10 @@ MISSING = {
     "crossover_rad_s": NO_CROSSOVER,
     "phase_margin_deg": NO_CROSSOVER,
     "delay_margin_s": NO_CROSSOVER,
-    "gain_margin_db": "no rise of the gain makes the loop unstable at a frequency in the band",
-    "phase_crossover_rad_s": "no gain margin in the band",
-    "gain_reduction_margin_db": "no fall of the gain makes the loop unstable in the band",
-    "gain_reduction_rad_s": "no gain-reduction margin in the band",
+    "gain_margin_db": "no rise of the gain makes the loop unstable",
+    "phase_crossover_rad_s": "there is no gain margin",
+    "gain_reduction_margin_db": "no fall of the gain makes the loop unstable",
+    "gain_reduction_rad_s": "there is no gain-reduction margin",
 }
 
 
@@ -220,8 +224,8 @@ def margins(
         over reference (fed-back signal over a disturbance added to it) 1/(1 + L).
     band_rad_s : tuple of float, optional
         Frequencies at which margins are looked for, rad/s; left out: all of a measurement, and for
-        a model what its roots and delays call for. Whether a model's loop is stable is counted over
-        all frequencies; of a measurement the band is all there is.
+        a model what its roots and delays call for. Whether a model's loop is stable, and how far
+        its gain may go, holds over all frequencies; of a measurement the band is all there is.
     unstable_poles : int, optional
         Unstable poles of the open loop. Left out: counted in a model; none in a measurement.
     phase_guide_deg, gain_guide_db : float
@@ -289,6 +293,7 @@ def margins(
         phase_guide_deg=phase_guide_deg,
         gain_guide_db=gain_guide_db,
     )
+    findings += outside_findings(loop, made)
     return Margins(
         loop.name,
         **made,
@@ -302,28 +307,6 @@ def margins(
     )
 
 
-def measured_up(loop: Loop) -> tuple[Array, LoopMetrics]:
-    """Frequencies, drawn close around what counts where the loop is a model, and the metrics.
-
-    Parameters
-    ----------
-    loop : Loop
-
-    Returns
-    -------
-    tuple of ndarray, shape (n_f,), and LoopMetrics
-    """
-    omega, thing = loop.omega_rad_s, loop.uncertain.value
-    for ratio in () if loop.measured else ZOOMS:
-        values = loop.of(thing, omega)
-        found = loop.metrics(omega, values)
-        centres = [getattr(found, name) for name in vars(found) if name.endswith("rad_s")]
-        logs, rows = np.log(omega), values[None, :]
-        passed = [gain_crossings(logs, rows).omega, phase_crossings(logs, rows).omega]
-        omega = zoomed(omega, np.concatenate([np.ravel(each) for each in centres] + passed), ratio)
-    return omega, loop.metrics(omega, loop.of(thing, omega))
-
-
 def drawn_points(loop: Loop, omega: Array) -> Array:
     """Frequencies for a picture: of a model some, of a measurement all."""
     if loop.measured or len(omega) <= DRAWN_POINTS:
@@ -334,19 +317,24 @@ def drawn_points(loop: Loop, omega: Array) -> Array:
 def _carried(loop: Loop, omega: Array) -> tuple[list[tuple[Any, Reading]], LoopCurve]:
     """Every number with its interval, and the curve with its standard errors."""
     names = [name for _, name, _ in QUANTITIES]
+    whole = everywhere(loop, omega)
     drawn = drawn_points(loop, omega)
     centre = loop.of(loop.uncertain.value, drawn)
 
     def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever is uncertain
         values = loop.of(thing, omega)
         found = loop.metrics(omega, values)
+        numbers = {name: float(getattr(found, name)) for name in names}
+        if whole is not None:
+            numbers |= gain_limits(numbers, loop, whole, loop.of(thing, whole))
         ratio = (values if drawn is omega else loop.of(thing, drawn)) / centre
         curve = [20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))]
-        return np.concatenate([[float(getattr(found, name)) for name in names], *curve])
+        return np.concatenate([list(numbers.values()), *curve])
 
     carried = loop.uncertain.carried(all_of)
+    missing = MISSING | (dict.fromkeys(GAIN_LIMITS, UNSEEN) if loop.measured else {})
     quantities = [
-        (each, carried.number(place, each[0], each[2], MISSING.get(each[1], "")))
+        (each, carried.number(place, each[0], each[2], missing.get(each[1], "")))
         for place, each in enumerate(QUANTITIES)
     ]
     stderr, count = carried.stderr, len(names)

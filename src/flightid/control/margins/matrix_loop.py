@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
-from flightid.control.margins.loop_grid import Roots, loop_grid, roots_of
+from flightid.control.margins.loop_grid import Roots, loop_grid, roots_of, whole_grid
 from flightid.control.margins.loop_source import Controller, Responding, closed_count, known_values
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
 from flightid.identification.uncertain_of import uncertain_of
@@ -133,11 +133,13 @@ def read_loops(
             omega = np.concatenate([omega[0] * STEADY, omega])
     names = {"outputs": rows, "inputs": columns, "both": rows + columns}[at]
     count = roots.n_unstable if unstable_poles is None else unstable_poles
-    closed = (
-        None
-        if measured
-        else closed_count(lambda at_: equivalent_loop(of(thing, at_)), roots, band_rad_s, count)
-    )
+    closed = None
+    if band_rad_s is not None:
+
+        def one_loop(at_: Array) -> Complex:
+            return equivalent_loop(of(thing, at_))
+
+        closed = closed_count(one_loop, whole_grid(one_loop, roots, band_rad_s), count)
     return MatrixLoop(names, uncertain, omega, of, count, measured, closed)
 
 
