@@ -8,7 +8,27 @@ import secrets
 from collections.abc import Callable
 from pathlib import Path
 
+from flightid.errors import OptionError
+
 BLOCK_BYTES = 1 << 20
+
+
+def as_path(path: object) -> Path:
+    """The path that a writer was given, for writers that take what to write first.
+
+    Raises
+    ------
+    OptionError
+        It is no path: the two arguments stand the wrong way round.
+    """
+    if isinstance(path, str | os.PathLike):
+        return Path(path)
+    raise OptionError(
+        "the file to write was expected here",
+        found=type(path).__name__,
+        needed="a path",
+        action="give what is to be written first, then the path",
+    )
 
 
 def write_atomically(path: str | Path, content: bytes | str | Callable[[Path], object]) -> Path:
@@ -43,7 +63,7 @@ def write_atomically(path: str | Path, content: bytes | str | Callable[[Path], o
     ...     written.read_text(), [entry.name for entry in Path(folder).iterdir()]
     ('{}', ['result.json'])
     """
-    final = Path(path)
+    final = as_path(path)
     # The suffix stays last: writers of other libraries choose their format by it.
     temporary = final.with_name(f".{final.stem}.{secrets.token_hex(6)}.part{final.suffix}")
     try:

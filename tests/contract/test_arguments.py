@@ -338,3 +338,13 @@ def test_the_rules_can_fail() -> None:
     assert _synonyms("f", _arguments(_astray)) == ["f: freq is called omega_rad_s here"]
     assert [line.split(" is ")[0] for line in _unknown("f", _astray)] == ["f: freq", "f: flavour"]
     assert _turned("f", _arguments(_astray)) == ["f: outputs stand before inputs"]
+
+
+def test_writers_take_what_to_write_first_and_then_the_path() -> None:
+    wrong = [
+        f"{name}({', '.join(arguments)})"
+        for name, function in _functions()
+        if name.startswith("write_") or name == "export"
+        if (arguments := _arguments(function)).index("path") != 1
+    ]
+    assert not wrong

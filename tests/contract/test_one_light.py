@@ -49,7 +49,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Path:
     driven = fid.Record.from_arrays(time_s, inputs={"tau_phi": sweep}, units={"tau_phi": "1"})
     record = fid.simulate(truth, driven, units={"p": "rad/s"})
     noisy = record.replace({"p": record["p"] + 0.1 * rng.standard_normal(time_s.size)})
-    return fid.write_records(tmp_path_factory.mktemp("light") / "flown.parquet", noisy)
+    return fid.write_records(noisy, tmp_path_factory.mktemp("light") / "flown.parquet")
 
 
 @pytest.fixture(scope="module")

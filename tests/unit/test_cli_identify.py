@@ -22,7 +22,7 @@ def recorded(folder: Path) -> Path:
     driven = fid.Record.from_arrays(time_s, inputs={"tau_phi": command}, units={"tau_phi": "1"})
     flown = fid.simulate(truth, driven, units={"p": "rad/s"})
     noise = np.random.default_rng(4).standard_normal(len(time_s))
-    return fid.write_records(folder / "flight.nc", flown.replace({"p": flown["p"] + 0.05 * noise}))
+    return fid.write_records(flown.replace({"p": flown["p"] + 0.05 * noise}), folder / "flight.nc")
 
 
 def test_a_parameter_goes_and_the_path_is_told(

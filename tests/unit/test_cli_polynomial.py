@@ -16,7 +16,7 @@ def files(tmp_path):
     paths = []
     for seed in (0, 1):
         path = tmp_path / f"run{seed}.parquet"
-        fid.write_records(path, flown(ARMAX, seed, n=600, noise=0.3))
+        fid.write_records(flown(ARMAX, seed, n=600, noise=0.3), path)
         paths.append(str(path))
     return paths
 

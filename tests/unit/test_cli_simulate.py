@@ -37,7 +37,7 @@ def test_records_noise_and_pages(tmp_path: Path, capsys: pytest.CaptureFixture[s
     driven = stick_record({"elevator": "rad"}, {"elevator": "3211:0.02:0.3"}, duration_s=5.0,
                           sample_rate_hz=50.0)  # fmt: skip
     flown = fid.simulate(fid.load_model("short_period"), driven)
-    source = fid.write_records(tmp_path / "flown.parquet", flown)
+    source = fid.write_records(flown, tmp_path / "flown.parquet")
     page, out = tmp_path / "page.html", tmp_path / "again.nc"
     words = ["simulate", "model", "short_period", str(source), "--sensor", "q=0.001"]
     words += ["--process", "q=0.002", "--gust", "alpha=0.01:0.8", "--seed", "3"]
@@ -96,7 +96,7 @@ def test_what_cannot_be_flown(
 
 def test_options_that_exclude_each_other(tmp_path: Path, capsys) -> None:
     record = stick_record({"elevator": "rad"}, {}, duration_s=1.0, sample_rate_hz=10.0)
-    source = str(fid.write_records(tmp_path / "a.parquet", [record, record]))
+    source = str(fid.write_records([record, record], tmp_path / "a.parquet"))
     start = ["simulate", "model", "short_period", source]
     for words, said in (
         (["--input", "elevator=step:1"], "give it or RECORDS"),

@@ -20,7 +20,7 @@ def flown(tmp_path: Path) -> Path:
     record = fid.Record.from_arrays(time_s, inputs={"tau_phi": 0.1 * np.sign(np.sin(3 * time_s))})
     seen = fid.simulate(model, record, units={"p": "rad/s"})
     path = tmp_path / "flight.parquet"
-    fid.write_records(path, [seen])
+    fid.write_records([seen], path)
     return path
 
 
@@ -67,7 +67,7 @@ def test_residual_tests_on_demand(
     record = fid.read_records(flown)[0]
     noise = 0.02 * np.random.default_rng(0).standard_normal(record.n_samples)
     path = tmp_path / "noisy.parquet"
-    fid.write_records(path, [record.replace({"p": record["p"] + noise})])
+    fid.write_records([record.replace({"p": record["p"] + noise})], path)
     page = tmp_path / "page.html"
     options = ["verify", "rate_first_order", str(path), "--value", "Lp=-4", "--residuals"]
     run([*options, "--html", str(page)])

@@ -134,7 +134,7 @@ def test_the_command_compares(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     model = fid.load_model("rate_first_order").with_values({"Lp": -4.0})
     inputs = fid.Record.from_arrays(TIME_S, inputs={"tau_phi": 0.1 * STEPS})
     path, page = tmp_path / "flight.parquet", tmp_path / "page.html"
-    fid.write_records(path, [fid.simulate(model, inputs, units={"p": "rad/s"})])
+    fid.write_records([fid.simulate(model, inputs, units={"p": "rad/s"})], path)
     options = ["verify", "rate_first_order", str(path), "--value", "Lp=-4"]
     options += ["--against", "rate_integrator", "--against", "rate_motor_lag"]
     assert run([*options, "--html", str(page)]) == 0

@@ -15,7 +15,7 @@ RECORD = fid.Record.from_arrays(np.arange(50) * 0.1, inputs={"u": np.arange(50.0
 
 @pytest.mark.parametrize("suffix", [".nc", ".parquet"])
 def test_records_are_no_logs(suffix: str, tmp_path: Path) -> None:
-    assert not is_log(fid.write_records(tmp_path / f"flight{suffix}", RECORD))
+    assert not is_log(fid.write_records(RECORD, tmp_path / f"flight{suffix}"))
 
 
 @pytest.mark.parametrize(

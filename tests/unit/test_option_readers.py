@@ -136,7 +136,7 @@ def test_every_method_is_reached_from_the_command_line(
     model, record = _flown()
     noise = 0.002 * np.random.default_rng(1).standard_normal(record.n_samples)
     fid.write_model(model, tmp_path / "roll.toml")
-    path = fid.write_records(tmp_path / "f.nc", record.replace({"p": record["p"] + noise}))
+    path = fid.write_records(record.replace({"p": record["p"] + noise}), tmp_path / "f.nc")
     words = ["identify", str(path), "--model", str(tmp_path / "roll.toml"), "--json", "--method"]
     given = {
         "output_error": ["--output-bias", "none", "--starts", "2"],

@@ -79,7 +79,7 @@ def test_the_command_line_fits_records(tmp_path: Path, capsys: pytest.CaptureFix
     flown = fid.simulate(truth, driven, units={"alpha": "rad", "q": "rad/s", "nz": "1"})
     fid.write_model(truth, tmp_path / "model.toml")
     file = tmp_path / "flown.nc"
-    fid.write_records(file, [flown])
+    fid.write_records([flown], file)
     arguments = ["identify", str(file), "--model", str(tmp_path / "model.toml")]
     code = run([*arguments, "--method", "output_error", "--json"])
     values = json.loads(capsys.readouterr().out)

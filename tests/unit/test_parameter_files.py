@@ -31,7 +31,7 @@ def test_round_trip_keeps_single_precision(
     write, values: dict[str, float], tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     path = tmp_path_factory.mktemp("param") / "gains.param"
-    found = read_parameters(write(path, values).path)
+    found = read_parameters(write(values, path).path)
     assert {k: np.float32(v) for k, v in found.items()} == {
         k: np.float32(v) for k, v in values.items()
     }
@@ -39,7 +39,7 @@ def test_round_trip_keeps_single_precision(
 
 @pytest.mark.parametrize("write", [write_ardupilot_parameters, write_px4_parameters])
 def test_rollback_holds_the_old_values_that_are_known(write, tmp_path: Path) -> None:
-    written = write(tmp_path / "roll.param", CHANGES, notes=["from log 7\nand a model"])
+    written = write(CHANGES, tmp_path / "roll.param", notes=["from log 7\nand a model"])
     assert written.rollback == tmp_path / "roll.rollback.param"
     assert read_parameters(written.rollback) == {"ATC_RAT_RLL_P": 0.135}
     assert read_parameters(written.path) == {"ATC_RAT_RLL_P": 0.11, "ATC_RAT_RLL_D": 0.0031}
@@ -49,23 +49,23 @@ def test_rollback_holds_the_old_values_that_are_known(write, tmp_path: Path) -> 
 
 
 def test_no_rollback_without_old_values(tmp_path: Path) -> None:
-    assert write_ardupilot_parameters(tmp_path / "a.param", {"A": 1.0}).rollback is None
+    assert write_ardupilot_parameters({"A": 1.0}, tmp_path / "a.param").rollback is None
     assert [p.name for p in tmp_path.iterdir()] == ["a.param"]
 
 
 def test_a_file_that_exists_is_kept(tmp_path: Path) -> None:
-    write_ardupilot_parameters(tmp_path / "a.param", CHANGES)
+    write_ardupilot_parameters(CHANGES, tmp_path / "a.param")
     with pytest.raises(errors.OptionError, match="already there"):
-        write_ardupilot_parameters(tmp_path / "a.param", {"A": 2.0})
+        write_ardupilot_parameters({"A": 2.0}, tmp_path / "a.param")
     (tmp_path / "a.param").unlink()
     with pytest.raises(errors.OptionError, match=r"a\.rollback\.param"):
-        write_ardupilot_parameters(tmp_path / "a.param", CHANGES)
-    write_ardupilot_parameters(tmp_path / "a.param", CHANGES[1:], overwrite=True)
+        write_ardupilot_parameters(CHANGES, tmp_path / "a.param")
+    write_ardupilot_parameters(CHANGES[1:], tmp_path / "a.param", overwrite=True)
 
 
 def test_qgroundcontrol_columns_and_types(tmp_path: Path) -> None:
     changes = {"MC_ROLLRATE_P": 0.15, "IMU_GYRO_RATEMAX": 400.0}
-    text = write_px4_parameters(tmp_path / "a.params", changes, integers=["IMU_GYRO_RATEMAX"]).path
+    text = write_px4_parameters(changes, tmp_path / "a.params", integers=["IMU_GYRO_RATEMAX"]).path
     rows = [line.split("\t") for line in text.read_text().splitlines() if line[0] != "#"]
     assert rows == [
         ["1", "1", "MC_ROLLRATE_P", "0.15", "9"],
@@ -83,7 +83,7 @@ def test_refuses_what_is_not_a_number_and_nothing_at_all(tmp_path: Path) -> None
     with pytest.raises(errors.OptionError, match="finite"):
         GainChange("A", float("nan"))
     with pytest.raises(errors.OptionError, match="no parameter"):
-        write_ardupilot_parameters(tmp_path / "a.param", {})
+        write_ardupilot_parameters({}, tmp_path / "a.param")
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def _record(**known: object) -> fid.Record:
 @pytest.mark.parametrize("suffix", [".parquet", ".nc"])
 def test_a_file_keeps_hold_and_period(tmp_path: Path, suffix: str) -> None:
     before = [_record(hold="zero", period_s=2.0), _record(hold="first"), _record()]
-    after = read_records(fid.write_records(tmp_path / f"flight{suffix}", before))
+    after = read_records(fid.write_records(before, tmp_path / f"flight{suffix}"))
     assert [each.input_shape for each in after] == [each.input_shape for each in before]
 
 
@@ -41,7 +41,7 @@ def test_a_file_without_them_takes_what_is_declared(tmp_path: Path) -> None:
 
 
 def test_a_declared_hold_must_not_contradict_the_file(tmp_path: Path) -> None:
-    path = fid.write_records(tmp_path / "flight.nc", _record(hold="zero"))
+    path = fid.write_records(_record(hold="zero"), tmp_path / "flight.nc")
     with pytest.raises(OptionError, match="contradicts the file"):
         read_records(path, hold="first")
 

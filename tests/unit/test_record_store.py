@@ -67,7 +67,7 @@ def assert_same(found: Record, expected: Record) -> None:
     max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_round_trip_is_bit_exact(tmp_path: Path, suffix: str, items: list[Record]) -> None:
-    path = write_records(tmp_path / f"flight{suffix}", items)
+    path = write_records(items, tmp_path / f"flight{suffix}")
     back = read_records(path)
     assert len(back) == len(items)
     for found, expected in zip(back, items, strict=True):
@@ -87,7 +87,7 @@ def _record(**options: object) -> Record:
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_stored_channels_can_be_selected_and_given_roles(tmp_path: Path, suffix: str) -> None:
-    path = write_records(tmp_path / f"flight{suffix}", _record())
+    path = write_records(_record(), tmp_path / f"flight{suffix}")
     (found,) = read_records(path, outputs={"roll_rate": "p"}, units={"roll_rate": "rad/s"})
     assert found.outputs == ("roll_rate",)
     assert found.unit("roll_rate") == "rad/s"
@@ -100,15 +100,15 @@ def test_stored_channels_can_be_selected_and_given_roles(tmp_path: Path, suffix:
 def test_long_histories_fit(tmp_path: Path, suffix: str) -> None:
     steps = [Step("conditioning.detrend", {"order": i, "why": "x" * 200}) for i in range(1000)]
     record = _record(history=steps)
-    assert_same(read_records(write_records(tmp_path / f"a{suffix}", record))[0], record)
+    assert_same(read_records(write_records(record, tmp_path / f"a{suffix}"))[0], record)
 
 
 def test_other_programs_read_the_files(tmp_path: Path) -> None:
     record = _record()
-    frame = pd.read_parquet(write_records(tmp_path / "a.parquet", [record, record]))
+    frame = pd.read_parquet(write_records([record, record], tmp_path / "a.parquet"))
     assert list(frame.columns) == ["time_s", "record", "tau", "p"]
     assert frame["record"].tolist() == [0] * 50 + [1] * 50
-    path = write_records(tmp_path / "a.nc", record)
+    path = write_records(record, tmp_path / "a.nc")
     with xr.open_dataset(path, group="record_0000", engine="h5netcdf", decode_times=False) as data:
         assert data["p"].attrs["units"] == "rad/s"
         assert data["p"].values.tolist() == record["p"].tolist()
@@ -116,23 +116,23 @@ def test_other_programs_read_the_files(tmp_path: Path) -> None:
 
 def test_history_of_numpy_numbers_is_stored_as_numbers(tmp_path: Path) -> None:
     record = _record(history=[Step("x", {"order": np.int64(3)})])
-    (found,) = read_records(write_records(tmp_path / "a.nc", record))
+    (found,) = read_records(write_records(record, tmp_path / "a.nc"))
     assert found.history[0].options == {"order": 3}
 
 
 def test_refusals_to_write(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="no record to write"):
-        write_records(tmp_path / "a.nc", [])
+        write_records([], tmp_path / "a.nc")
     with pytest.raises(OptionError, match=r"found \.xlsx; needed \.parquet or \.nc"):
-        write_records(tmp_path / "a.xlsx", _record())
+        write_records(_record(), tmp_path / "a.xlsx")
     bad = _record(history=[Step("x", {"order": object()})])
     with pytest.raises(DataError, match="a value that cannot be stored"):
-        write_records(tmp_path / "a.nc", bad)
+        write_records(bad, tmp_path / "a.nc")
     assert not list(tmp_path.iterdir())
 
 
 def test_changed_parquet_is_refused(tmp_path: Path) -> None:
-    path = write_records(tmp_path / "a.parquet", _record())
+    path = write_records(_record(), tmp_path / "a.parquet")
     table = pq.read_table(path)
     pq.write_table(table.slice(1), path)
     with pytest.raises(FileFormatError, match="49 rows where the labels say 50"):
@@ -143,12 +143,12 @@ def test_changed_parquet_is_refused(tmp_path: Path) -> None:
 
 
 def test_changed_netcdf_is_refused(tmp_path: Path) -> None:
-    path = write_records(tmp_path / "a.nc", _record())
+    path = write_records(_record(), tmp_path / "a.nc")
     with h5py.File(path, "a") as file:
         del file["record_0000/p"]
     with pytest.raises(FileFormatError, match=r"lacks variables .* found no p"):
         read_records(path)
-    path = write_records(tmp_path / "b.nc", _record())
+    path = write_records(_record(), tmp_path / "b.nc")
     with h5py.File(path, "a") as file:
         del file["record_0000/p"]
         file["record_0000/p"] = np.zeros(3)
@@ -175,7 +175,7 @@ def test_damaged_labels_are_refused(tmp_path: Path, text: str, message: str) -> 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_every_truncation_is_a_typed_error(tmp_path: Path, suffix: str) -> None:
-    content = write_records(tmp_path / f"a{suffix}", _record()).read_bytes()
+    content = write_records(_record(), tmp_path / f"a{suffix}").read_bytes()
     cut = tmp_path / f"cut{suffix}"
     for length in range(8, len(content), 97):
         cut.write_bytes(content[:length])

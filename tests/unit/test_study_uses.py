@@ -65,7 +65,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     driven = fid.Record.from_arrays(time_s, inputs={"tau_phi": sweep}, units={"tau_phi": "1"})
     record = fid.simulate(truth, driven, units={"p": "rad/s"})
     noisy = record.replace({"p": record["p"] + 0.05 * rng.standard_normal(time_s.size)})
-    fid.write_records(place / "flown.parquet", noisy)
+    fid.write_records(noisy, place / "flown.parquet")
     (place / "study.toml").write_text(STUDY, encoding="utf-8")
     return place
 

@@ -57,7 +57,7 @@ def command(
         if link.rejected:
             note(f"{link.rejected} datagrams were damaged or not delivered.")
     if output is not None:
-        note(f"Wrote {write_records(output, session.record)}")
+        note(f"Wrote {write_records(session.record, output)}")
     emit(session, as_json=as_json)
 
 

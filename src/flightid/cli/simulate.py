@@ -189,7 +189,7 @@ def _write(path: Path, records: list[Record]) -> Path:
     from flightid.record.sheet import write_sheet
 
     if path.suffix.lower() != ".csv":
-        return write_records(path, records)
+        return write_records(records, path)
     if len(records) > 1:
         raise click.UsageError("a .csv holds one record: write .parquet or .nc")
     return write_sheet(records[0], path)

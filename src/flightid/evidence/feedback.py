@@ -8,6 +8,7 @@ from flightid.errors import DataError
 from flightid.record import Record
 from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
+from flightid.record.several import as_records
 from flightid.uncertainty.feedback import FeedbackTest, declared_loop, find_feedback
 
 MAXIMUM_SAMPLES = 20_000
@@ -62,7 +63,7 @@ def feedback_test(
     >>> feedback_test(record).loop, str(feedback_test(record, loop="closed"))
     ('open', 'loop closed, as declared')
     """
-    listed = [records] if isinstance(records, Record) else list(records)
+    listed = list(as_records(records))
     if not listed:
         raise DataError("there is no record", needed="one or more")
     driven = listed[0].inputs if inputs is None else tuple(inputs)

@@ -13,6 +13,7 @@ from flightid.export.c import export_c
 from flightid.export.exported import Exported
 from flightid.export.fmu import export_fmu
 from flightid.export.jsbsim import export_jsbsim
+from flightid.files import as_path
 from flightid.findings import Finding
 from flightid.identification import Fit
 from flightid.models import (
@@ -102,7 +103,7 @@ def export(
     ...     export(roll, f"{folder}/roll.c", sample_time_s=1 / 400)
     Exported(c: roll.c, roll.h)
     """
-    place = Path(path)
+    place = as_path(path)
     chosen = format or FORMATS.get(place.suffix.lower(), "")
     if chosen not in FORMATS.values():
         known = ", ".join(f"{kind} ({suffix})" for suffix, kind in FORMATS.items())

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from flightid.errors import ModelError
-from flightid.files import write_atomically
+from flightid.files import as_path, write_atomically
 from flightid.models.kinds import model_to_description
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -50,7 +50,7 @@ def write_model(source: object, path: str | Path) -> Path:
     ...     load_model(write_model(model, Path(folder) / "mine.toml")) == model
     True
     """
-    if Path(path).suffix != ".toml":
+    if as_path(path).suffix != ".toml":
         raise ModelError("a model is written as TOML", found=str(path), needed="a name in .toml")
     return write_atomically(path, model_as_toml(source))
 

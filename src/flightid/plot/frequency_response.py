@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from flightid.errors import DataError
 from flightid.plot import look
 from flightid.uncertainty.quantiles import half_width
-
-"""Standard deviations of a normal 95 % interval."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +64,18 @@ def bode(curves: Sequence[Curve], *, unit: str = "", minimum_coherence: float = 
     -------
     plotly.graph_objects.Figure
 
+    Raises
+    ------
+    DataError
+        What is given are no curves: fits, models and responses draw themselves by ``.plot()``.
+
     Example
     -------
     >>> omega = np.array([1.0, 10.0])
     >>> len(bode([Curve("model", omega, 1 / (1j * omega))]).data)
     2
     """
+    curves = _curves(curves)
     has_coherence = any(curve.coherence is not None for curve in curves)
     rows = 3 if has_coherence else 2
     made = look.figure(rows, row_heights=(2.2, 2.0, 1.1)[:rows], height_px=560 if rows > 2 else 470)
@@ -90,6 +95,19 @@ def bode(curves: Sequence[Curve], *, unit: str = "", minimum_coherence: float = 
             minimum_coherence, line={"color": look.LINE, "dash": "dot", "width": 1}, row=3, col=1
         )
     return made
+
+
+def _curves(given: object) -> tuple[Curve, ...]:
+    items = tuple(given) if isinstance(given, Iterable) else (given,)
+    for item in items:
+        if not isinstance(item, Curve):
+            raise DataError(
+                "curves were expected",
+                found=type(item).__name__,
+                needed="several Curve",
+                action="fits, models and responses draw themselves: call .plot()",
+            )
+    return items
 
 
 def _line(curve: Curve, values: NDArray[np.float64], *, legend: bool) -> go.Scatter:

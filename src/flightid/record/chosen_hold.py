@@ -12,6 +12,7 @@ from flightid.findings import Finding
 from flightid.record.hold import BETWEEN, InputHold, InputShape, require_hold
 from flightid.record.record import Record
 from flightid.record.repeats import Staircase, found_staircase
+from flightid.record.several import as_records
 
 DECLARED, RECORDED, ASSUMED = "declared", "record", "assumed"
 
@@ -86,7 +87,7 @@ def chosen_hold(
     >>> chosen_hold(record, None)
     ChosenHold(hold='zero', source='record', findings=())
     """
-    listed = [records] if isinstance(records, Record) else list(records)
+    listed = list(as_records(records))
     if declared is not None:
         return ChosenHold(require_hold(declared, known), DECLARED)
     found = hold_of_shapes([(each.name, each.input_shape) for each in listed], known, assumed)

@@ -11,16 +11,17 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from flightid.errors import DataError, FileFormatError, OptionError
-from flightid.files import write_atomically
+from flightid.files import as_path, write_atomically
 from flightid.record.formats import netcdf, parquet
 from flightid.record.labels import RecordLabels, from_text, labels_of, to_text
 from flightid.record.record import Record
+from flightid.record.several import as_records
 from flightid.record.validation import TIME
 
 RECORD_COLUMN = "record"
 
 
-def write_records(path: str | Path, records: Record | Sequence[Record]) -> Path:
+def write_records(records: Record | Sequence[Record], path: str | Path) -> Path:
     """Write records to one file, whole or not at all; `read_records` gives back the same records.
 
     Values and stamps are kept bit for bit; so are names, units, roles, notes, trim values and
@@ -30,10 +31,10 @@ def write_records(path: str | Path, records: Record | Sequence[Record]) -> Path:
 
     Parameters
     ----------
-    path : str or Path
-        File that ends in ``.parquet`` or ``.nc``.
     records : Record or sequence of Record
         At least one.
+    path : str or Path
+        File that ends in ``.parquet`` or ``.nc``.
 
     Returns
     -------
@@ -55,12 +56,12 @@ def write_records(path: str | Path, records: Record | Sequence[Record]) -> Path:
     >>> from flightid.record import read_records
     >>> record = Record.from_arrays([0.0, 0.5], outputs={"p": [0.1, 0.3]}, units={"p": "rad/s"})
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = write_records(Path(folder) / "flight.parquet", record)
+    ...     path = write_records(record, Path(folder) / "flight.parquet")
     ...     read_records(path)[0]["p"]
     array([0.1, 0.3])
     """
-    target = Path(path)
-    items = [records] if isinstance(records, Record) else list(records)
+    target = as_path(path)
+    items = list(as_records(records))
     if not items:
         raise DataError("there is no record to write", needed="at least one")
     if target.suffix.lower() == ".parquet":

@@ -13,6 +13,7 @@ from flightid.findings import Finding
 from flightid.record import Record
 from flightid.record.history import Step
 from flightid.record.hold import InputShape, Loop, common_hold, common_loop
+from flightid.record.several import as_records
 from flightid.responses.errors.linear_estimate import LinearEstimate, WindowedWeights
 from flightid.responses.estimators.local_polynomial import estimate_local_polynomial
 from flightid.responses.estimators.windowed import (
@@ -122,7 +123,7 @@ def estimate_response(
     True
     """
     ResponseOptions(estimator, n_omega, window_s, overlap, detrend, covariance)
-    listed = [records] if isinstance(records, Record) else list(records)
+    listed = list(as_records(records))
     if estimator == "instrument" and excitations is None and listed:
         excitations = listed[0].excitations
     used = excitations if estimator == "instrument" else None

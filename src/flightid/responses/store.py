@@ -145,7 +145,7 @@ def write_response(response: FrequencyResponse, path: str | Path) -> Path:
         The file.
     """
     dataset = to_xarray(response)
-    return write_atomically(Path(path), lambda target: dataset.to_netcdf(target, engine="h5netcdf"))
+    return write_atomically(path, lambda target: dataset.to_netcdf(target, engine="h5netcdf"))
 
 
 def read_response(path: str | Path) -> FrequencyResponse:

@@ -6,12 +6,13 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
 from flightid.errors import FileFormatError, OptionError
-from flightid.files import write_atomically
+from flightid.files import as_path, write_atomically
 
 NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
 """Both autopilots keep names in 16 characters."""
@@ -86,6 +87,13 @@ Changes = Iterable[GainChange] | Mapping[str, float]
 def _listed(changes: Changes) -> list[GainChange]:
     if isinstance(changes, Mapping):
         found = [GainChange(name, float(value)) for name, value in changes.items()]
+    elif isinstance(changes, str | PathLike):
+        raise OptionError(
+            "changes were expected here",
+            found=changes,
+            needed="GainChanges, or values by name",
+            action="give what is to be written first, then the path",
+        )
     else:
         found = list(changes)
     if not found:
@@ -99,7 +107,7 @@ def _number(value: float) -> str:
 
 
 def _write(path: str | Path, text: str, rollback: str | None, overwrite: bool) -> WrittenParameters:
-    final = Path(path)
+    final = as_path(path)
     back = final.with_name(final.stem + ROLLBACK + final.suffix) if rollback else None
     for target in (final, back):
         if target is not None and target.exists() and not overwrite:
@@ -117,7 +125,7 @@ def _write(path: str | Path, text: str, rollback: str | None, overwrite: bool) -
 
 
 def write_ardupilot_parameters(
-    path: str | Path, changes: Changes, *, notes: Iterable[str] = (), overwrite: bool = False
+    changes: Changes, path: str | Path, *, notes: Iterable[str] = (), overwrite: bool = False
 ) -> WrittenParameters:
     """Write an ArduPilot parameter file: one ``NAME,value`` a line, reasons as comments.
 
@@ -126,10 +134,10 @@ def write_ardupilot_parameters(
 
     Parameters
     ----------
-    path : str or Path
-        File, usually ``*.param``.
     changes : iterable of GainChange, or mapping of str to float
         What to set.
+    path : str or Path
+        File, usually ``*.param``.
     notes : iterable of str
         Comment lines at the top.
     overwrite : bool
@@ -154,8 +162,9 @@ def write_ardupilot_parameters(
     -------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     written = write_ardupilot_parameters(f"{folder}/roll.param",
-    ...                           [GainChange("ATC_RAT_RLL_P", 0.12, 0.135, "phase margin")])
+    ...     written = write_ardupilot_parameters(
+    ...         [GainChange("ATC_RAT_RLL_P", 0.12, 0.135, "phase margin")],
+    ...         f"{folder}/roll.param")
     ...     print(written.path.read_text(), written.rollback.read_text(), sep="")
     ATC_RAT_RLL_P,0.12 # phase margin; was 0.135
     ATC_RAT_RLL_P,0.135
@@ -169,8 +178,8 @@ def write_ardupilot_parameters(
 
 
 def write_px4_parameters(
-    path: str | Path,
     changes: Changes,
+    path: str | Path,
     *,
     notes: Iterable[str] = (),
     integers: Iterable[str] = (),
@@ -180,10 +189,10 @@ def write_px4_parameters(
 
     Parameters
     ----------
-    path : str or Path
-        File, usually ``*.params``.
     changes : iterable of GainChange, or mapping of str to float
         What to set.
+    path : str or Path
+        File, usually ``*.params``.
     notes : iterable of str
         Comment lines at the top.
     integers : iterable of str
@@ -210,7 +219,7 @@ def write_px4_parameters(
     -------
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     written = write_px4_parameters(f"{folder}/roll.params", {"MC_ROLLRATE_P": 0.15})
+    ...     written = write_px4_parameters({"MC_ROLLRATE_P": 0.15}, f"{folder}/roll.params")
     ...     read_parameters(written.path)
     {'MC_ROLLRATE_P': 0.15}
     """

@@ -297,7 +297,7 @@ class PidDesign(
         OSError
             A file cannot be written.
         """
-        return write_steps(path, [self], overwrite=overwrite)
+        return write_steps([self], path, overwrite=overwrite)
 
     def _computed(self) -> dict[str, object]:
         return {
@@ -314,7 +314,7 @@ class PidDesign(
 
 
 def write_steps(
-    path: str | Path, designs: Sequence[PidDesign], *, overwrite: bool = False
+    designs: Sequence[PidDesign], path: str | Path, *, overwrite: bool = False
 ) -> tuple[Path, ...]:
     """Write the steps of several axes together; an axis that arrives earlier stays there.
 
@@ -343,7 +343,7 @@ def write_steps(
         )
         name = final if count == 1 else final.with_name(f"{final.stem}-{k + 1}{final.suffix}")
         notes = [f"flightid: step {k + 1} of {count}; fly each before the next"]
-        made = write(name, changes, notes=notes, overwrite=overwrite)
+        made = write(changes, name, notes=notes, overwrite=overwrite)
         written += [each for each in (made.path, made.rollback) if each is not None]
     return tuple(written)
 

@@ -186,7 +186,7 @@ class Tuning(Result, schema="flightid.tuning/1"):
         OptionError
             A file is already there.
         """
-        return write_steps(path, self.designs, overwrite=overwrite)
+        return write_steps(self.designs, path, overwrite=overwrite)
 
     def _computed(self) -> dict[str, object]:
         return {

@@ -15,6 +15,7 @@ from flightid.errors import DataError, OptionError
 from flightid.excitation.spectrum import power_spectrum
 from flightid.findings import Finding
 from flightid.record import Record
+from flightid.record.several import as_records
 from flightid.responses.spectrum_measures import band_rms, cutoff_frequency
 from flightid.result import Result
 from flightid.table import Table
@@ -145,7 +146,7 @@ def pilot_cutoff(
     >>> bool(found.cutoff.interval95[0] < 78.5 < found.cutoff.interval95[1])
     True
     """
-    given = (records,) if isinstance(records, Record) else tuple(records)
+    given = as_records(records)
     if not given:
         raise DataError("there is no record", needed="one or more")
     parts = [_periodogram(each, channel) for each in given]

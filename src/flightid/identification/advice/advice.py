@@ -17,6 +17,7 @@ from flightid.identification.advice.impulse_response import ImpulseResponse, imp
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 from flightid.record.hold import Loop
+from flightid.record.several import as_records
 from flightid.result import Result
 from flightid.table import Column, Table
 
@@ -139,7 +140,7 @@ def advise(
     >>> advise(record).findings[0].code
     'poor-excitation'
     """
-    listed = [records] if isinstance(records, Record) else list(records)
+    listed = list(as_records(records))
     if not listed:
         raise DataError("there is no record", needed="one or more")
     if outputs is None and len(listed[0].outputs) != 1:

@@ -15,6 +15,7 @@ from flightid.identification.prediction_error.linear_regression import Regressio
 from flightid.models.polynomial.structure import KERNELS
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
+from flightid.record.several import as_records
 from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.quantiles import half_width
@@ -183,7 +184,7 @@ def impulse_response(
     >>> impulse_response(record).delays
     {'u': 3}
     """
-    listed = [records] if isinstance(records, Record) else list(records)
+    listed = list(as_records(records))
     if not listed:
         raise DataError("there is no record", needed="one or more")
     if outputs is None and len(listed[0].outputs) != 1:

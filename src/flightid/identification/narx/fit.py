@@ -34,6 +34,7 @@ from flightid.models.narx.model import NarxModel
 from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.structure import NarxStructure
 from flightid.record import Record
+from flightid.record.several import as_records
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
@@ -76,7 +77,7 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
     Reference: Chen, Cowan & Grant, IEEE Trans. Neural Networks 2 (1991), section III; penalties:
     Chen, Neurocomputing 69 (2006).
     """
-    records = (data,) if isinstance(data, Record) else tuple(data)
+    records = as_records(data)
     scaling = scaling_of(structure, records)
     chosen_on, estimated_on = regressors_of(structure, scaling, records)
     candidates = candidate_terms(structure, chosen_on.vectors)

@@ -17,6 +17,7 @@ from flightid.models.linear.hold_equivalent import Hold
 from flightid.models.model import LinearModel, Model, model_of
 from flightid.record import Record
 from flightid.record.chosen_hold import chosen_hold
+from flightid.record.several import as_records
 from flightid.units import canonical
 
 Predictor = Callable[[Any, Record, tuple[str, ...], Request], Prediction]
@@ -149,7 +150,7 @@ def predict(
     """
     model, way = predictor_of(source)
     asked = (outputs,) if isinstance(outputs, str) else outputs
-    flown = (records,) if isinstance(records, Record) else tuple(records)
+    flown = as_records(records)
     if not flown:
         raise OptionError("there is nothing to predict", needed="one record or more")
     chosen = outputs_held(model, flown, asked)

@@ -38,6 +38,7 @@ from flightid.models.polynomial.prediction import free_run
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels, hold_diverged
 from flightid.record import Record
+from flightid.record.several import as_records
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.residual_covariance import colour_findings
 
@@ -69,7 +70,7 @@ def fit_polynomial(structure: PolynomialStructure, data: Record | Sequence[Recor
 
     Reference: Ljung, *System Identification*, 2nd ed., sections 10.2, 10.3, 9.4 and 15.3.
     """
-    records = (data,) if isinstance(data, Record) else tuple(data)
+    records = as_records(data)
     channels = gather_channels(records, structure.output, structure.inputs, structure.offsets)
     channels.require_change()
     _require_samples(structure, channels)

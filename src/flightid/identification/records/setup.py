@@ -18,6 +18,7 @@ from flightid.identification.records.options import (
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.measured_states import state_outputs
 from flightid.record import Record
+from flightid.record.several import as_records
 from flightid.units import require_match
 
 Array = NDArray[np.float64]
@@ -154,7 +155,7 @@ def prepare_records(
     UnitError
         Record and model disagree on a unit.
     """
-    records = (data,) if isinstance(data, Record) else tuple(data)
+    records = as_records(data)
     if not model.parameters.free:
         raise FitError(
             "the model has no free parameter",

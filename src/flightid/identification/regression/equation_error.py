@@ -45,6 +45,7 @@ from flightid.identification.regression.weights import (
 )
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
+from flightid.record.several import as_records
 from flightid.uncertainty.residual_covariance import Block, residual_covariance
 
 Array = NDArray[np.float64]
@@ -172,7 +173,7 @@ def _finish(
 
     moved = attenuation(problem.motions, refit, end.x)[inner.mask]
     bias = dict(zip(inner.names, map(float, moved), strict=True))
-    records = (data,) if isinstance(data, Record) else tuple(data)
+    records = as_records(data)
     fit = assemble(
         method,
         inner,

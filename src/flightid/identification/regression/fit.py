@@ -25,6 +25,7 @@ from flightid.identification.regression.options import RegressionOptions
 from flightid.identification.regression.rounds import Limits
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
+from flightid.record.several import as_records
 from flightid.uncertainty import correlation as correlation_of
 from flightid.uncertainty.cramer_rao import inverse_hessian
 from flightid.units import require_match
@@ -91,7 +92,7 @@ def check_records(model: StateSpaceModel, data: Record | Sequence[Record]) -> tu
     UnitError
         Record and model disagree on a unit.
     """
-    records = (data,) if isinstance(data, Record) else tuple(data)
+    records = as_records(data)
     if not records:
         raise DataError("there is no record", needed="at least one")
     if not model.parameters.free:

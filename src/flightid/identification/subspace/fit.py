@@ -29,6 +29,7 @@ from flightid.models.innovations.prediction import free_run, one_step_errors
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.sampled.channels import hold_diverged
 from flightid.record import Record
+from flightid.record.several import as_records
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
@@ -39,7 +40,7 @@ def fit_subspace(structure: SubspaceStructure, data: Record | Sequence[Record]) 
 
     Reference: Ljung, *System Identification*, 2nd ed., sections 10.6 and 7.3.
     """
-    records = (data,) if isinstance(data, Record) else tuple(data)
+    records = as_records(data)
     gathered = gather(structure, records)
     choice, start = choose_order(structure, gathered, decompose(structure, gathered))
     size = gathered.scales

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.io import loadmat, savemat
 
 from flightid.errors import FileFormatError, ModelError
-from flightid.files import write_atomically
+from flightid.files import as_path, write_atomically
 from flightid.models.linear.description import system_from_table
 from flightid.models.linear.linear_system import LinearSystem
 
@@ -69,7 +69,7 @@ def write_system(
     ...     read_system(write_system(lag, Path(folder) / "lag.mat")).delays_s
     array([0.1])
     """
-    suffix = Path(path).suffix.lower()
+    suffix = as_path(path).suffix.lower()
     if suffix not in FORMATS:
         raise ModelError(
             "a linear system is not written so", found=str(path), needed=", ".join(FORMATS)

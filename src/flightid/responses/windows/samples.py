@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError, OptionError, UnitError
 from flightid.record import Record
 from flightid.record.history import Step
+from flightid.record.several import as_records
 
 SAME_SAMPLE_TIME = 1e-6
 """Largest relative difference of sample times that still counts as the same."""
@@ -77,7 +78,7 @@ def gather(
     UnknownNameError
         A record lacks a channel.
     """
-    listed = [records] if isinstance(records, Record) else list(records)
+    listed = list(as_records(records))
     if not listed:
         raise DataError("there is no record to estimate from", needed="at least one")
     names_in = _names(inputs, listed[0].inputs)

@@ -22,6 +22,7 @@ from flightid.models.polynomial.structure import PolynomialOptions, PolynomialSt
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.progress import progress, track
 from flightid.record import Record
+from flightid.record.several import as_records
 from flightid.simulation.metrics import fit_percent, rms_error
 from flightid.validation.order_scan.result import OrderScan, OrderTrial
 
@@ -107,8 +108,8 @@ def scan_orders(
     >>> scan.smallest("bic").structure.nk
     (2,)
     """
-    fitted = [records] if isinstance(records, Record) else list(records)
-    unseen = [validation] if isinstance(validation, Record) else list(validation)
+    fitted = list(as_records(records))
+    unseen = list(as_records(validation))
     if not fitted or not unseen:
         raise OptionError("a scan needs records to fit and records to validate on")
     name, names = _channels(fitted[0], outputs, inputs)

@@ -23,6 +23,7 @@ from flightid.identification.prediction.result import Prediction
 from flightid.models.linear.hold_equivalent import Hold
 from flightid.record import Record
 from flightid.record.chosen_hold import chosen_hold
+from flightid.record.several import as_records
 from flightid.responses import FrequencyResponse
 from flightid.validation.verification.baseline import baseline_findings
 from flightid.validation.verification.comparison import Comparison, compared
@@ -160,7 +161,7 @@ def verify(
     >>> 0.02 < result.theil["y"] < 0.06
     True
     """
-    flown = (records,) if isinstance(records, Record) else tuple(records)
+    flown = as_records(records)
     if not flown:
         raise OptionError("there is nothing to verify on", needed="one record or more")
     several = source if isinstance(source, list | tuple) else [source]
