@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -33,14 +34,27 @@ def stage(path: Path) -> str:
     return parts[0] if len(parts) > 1 else path.stem
 
 
+def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
+    """Every statement at any depth; an import is one, so expressions need no look."""
+    for statement in body:
+        yield statement
+        for field in ("body", "orelse", "finalbody", "handlers", "cases"):
+            yield from _statements(getattr(statement, field, []))
+
+
+@cache
+def imports(path: Path) -> tuple[tuple[str, str | None], ...]:
+    """Module and name of everything that a file imports; no name where it is a whole module."""
+    found: list[tuple[str, str | None]] = []
+    for node in _statements(tree(path).body):
+        if isinstance(node, ast.Import):
+            found += [(alias.name, None) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            found += [(node.module, alias.name) for alias in node.names]
+    return tuple(found)
+
+
 def imported_modules(path: Path) -> set[str]:
     """Every absolute module name that a file imports, at any depth."""
-    found: set[str] = set()
-    for node in ast.walk(tree(path)):
-        if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            found.add(node.module)
-            if node.module == "flightid":
-                found |= {f"flightid.{alias.name}" for alias in node.names}
-    return found
+    found = {module for module, _ in imports(path)}
+    return found | {f"{module}.{name}" for module, name in imports(path) if module == "flightid"}

@@ -30,6 +30,7 @@ WITHOUT_PICTURE = {
     "Interpretation": "sentences; `pole_zero` draws the roots",
     "KinematicConsistency": "tables; its corrected record draws itself",
     "Log": "raw messages; its records draw themselves",
+    "LogContents": "what a log holds",
     "LogTable": "raw messages",
     "NarxSearch": "a table of trials",
     "RatingChart": "a rating on it is drawn by `level_chart`",
@@ -38,6 +39,7 @@ WITHOUT_PICTURE = {
     "Stability": "a table of poles",
     "StructureComparison": "a table; its fits draw themselves",
     "Study": "its report holds the pictures",
+    "StudyResults": "what the report of a study is made of",
     "UniformBase": "an account of a time base",
 }
 # Writes what a reader takes back, hence not from its fields.

@@ -6,10 +6,10 @@ import pkgutil
 import traceback
 from collections.abc import Sequence
 from importlib import import_module
+from pathlib import Path
 
 import click
 
-import flightid.cli
 from flightid.cli.output import Exit, note
 from flightid.errors import FlightidError
 from flightid.version import VERSION
@@ -36,7 +36,9 @@ class Verbs(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Verbs in the order of the work."""
         del ctx
-        found = {module.name for module in pkgutil.iter_modules(flightid.cli.__path__)} - NOT_VERBS
+        found = {
+            module.name for module in pkgutil.iter_modules([str(Path(__file__).parent)])
+        } - NOT_VERBS
         ordered = [verb for verb in ORDER if verb in found]
         return [*ordered, *sorted(found - set(ordered))]
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.excitation import verdicts
 from flightid.excitation.checks import require_positive
 from flightid.excitation.excitation import Excitation
 from flightid.excitation.vehicle import RateAxis
@@ -18,6 +17,8 @@ from flightid.findings import Finding, worst
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
+LEAST_COHERENCE = 0.6
+"""Coherence from which a response counts as measured."""
 PARAMETERS = (("gain", "rad/s"), ("time constant", "s"), ("delay", "s"))
 
 
@@ -91,6 +92,11 @@ class AxisForecast:
     peak_attitude_rad: float
     stderr: tuple[float, float, float] | None
 
+    @property
+    def coherent_percent(self) -> float:
+        """Share of the band with coherence of 0.6 or more, percent."""
+        return 100.0 * float(np.mean(self.coherence >= LEAST_COHERENCE))
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(Result, schema="flightid.excitation.plan/1"):
@@ -161,7 +167,7 @@ class Plan(Result, schema="flightid.excitation.plan/1"):
                 (
                     axis.name,
                     float(share),
-                    verdicts.coherent_percent(axis.coherence),
+                    axis.coherent_percent,
                     100.0 * float(np.median(axis.random_error)),
                     axis.peak_control,
                     axis.peak_rate_rad_s,

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.excitation.excitation import Excitation
+from flightid.excitation.plan import Plan
 from flightid.findings import Finding
 
-if TYPE_CHECKING:
-    from flightid.excitation.plan import Plan
-
-LEAST_COHERENCE = 0.6
 SAMPLES_PER_CYCLE = 25.0
 """Sample rate over the highest frequency (Tischler & Remple, section 5.9)."""
 CYCLES_IN_RECORD = (3.0, 5.0)
@@ -41,11 +36,6 @@ AMC_TEMPLATE = {
     "fade_out_s": 5.0,
     "record_s": 130.0,
 }
-
-
-def coherent_percent(coherence: NDArray[np.float64]) -> float:
-    """Share of the band with coherence of 0.6 or more, percent."""
-    return 100.0 * float(np.mean(coherence >= LEAST_COHERENCE))
 
 
 def is_transient(excitation: Excitation) -> bool:
@@ -198,7 +188,7 @@ def _cut(share: float) -> float:
 def _information(plan: Plan) -> Iterator[Finding]:
     poor, good = COHERENT_PERCENT
     for axis in plan.axes:
-        share = coherent_percent(axis.coherence)
+        share = axis.coherent_percent
         light = Light.GREEN if share >= good else Light.AMBER if share >= poor else Light.RED
         yield Finding(
             "design-coherence",

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import MissingColumnError, UnitError
 from flightid.logs.channels.channel_map import ChannelSource, MappedChannel
+from flightid.logs.contents import LogContents
+from flightid.logs.log_table import LogTable
 from flightid.units import DIMENSIONLESS, convert, same_dimension
-
-if TYPE_CHECKING:
-    from flightid.logs.log import Log
-    from flightid.logs.log_table import LogTable
 
 
 @dataclass(frozen=True)
@@ -47,7 +44,7 @@ class Extracted:
         return f"{self.source}: {self.source.note}" if self.source.note else str(self.source)
 
 
-def find(log: Log, channel: MappedChannel) -> ChannelSource | None:
+def find(log: LogContents, channel: MappedChannel) -> ChannelSource | None:
     """The first source of a channel that the log holds with at least two rows."""
     for source in channel.sources:
         info = log.messages.get(source.message)
@@ -62,13 +59,13 @@ def find(log: Log, channel: MappedChannel) -> ChannelSource | None:
 
 
 def extract(
-    log: Log, channel: MappedChannel, span_s: tuple[float, float] | None = None
+    log: LogContents, channel: MappedChannel, span_s: tuple[float, float] | None = None
 ) -> Extracted:
     """Read a channel.
 
     Parameters
     ----------
-    log : Log
+    log : LogContents
         Log.
     channel : MappedChannel
         Channel and its candidate sources.
@@ -108,7 +105,7 @@ def extract(
     return Extracted(channel, source, time_s, values)
 
 
-def _table(log: Log, source: ChannelSource) -> LogTable:
+def _table(log: LogContents, source: ChannelSource) -> LogTable:
     """The rows of one instance: the named one, or the lowest."""
     instances = log.messages[source.message].instances
     instance = source.instance if source.instance is not None else min(instances, default=None)

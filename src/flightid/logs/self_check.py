@@ -10,7 +10,6 @@ sign and the delay are proven rather than assumed.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +18,8 @@ from scipy.optimize import minimize_scalar
 
 from flightid.conventions import Axis, Light
 from flightid.findings import Finding
+from flightid.logs.contents import LogContents
 from flightid.logs.dataflash.sid_runs import SidRun
-
-if TYPE_CHECKING:
-    from flightid.logs.log import Log
 
 # Axis -> command to the mixer in RATE, and the message with the controller's terms.
 COMMANDS = {Axis.ROLL: ("ROut", "PIDR"), Axis.PITCH: ("POut", "PIDP"), Axis.YAW: ("YOut", "PIDY")}
@@ -113,12 +110,12 @@ class InjectionCheck:
         )
 
 
-def check_injection(log: Log, run: SidRun) -> InjectionCheck:
+def check_injection(log: LogContents, run: SidRun) -> InjectionCheck:
     """Compare what reached the mixer with what the log says was injected.
 
     Parameters
     ----------
-    log : Log
+    log : LogContents
         ArduPilot log.
     run : SidRun
         One of its runs.
@@ -142,7 +139,7 @@ def check_injection(log: Log, run: SidRun) -> InjectionCheck:
     )
 
 
-def loop_time(log: Log) -> float:
+def loop_time(log: LogContents) -> float:
     """Time of one main loop, s: SCHED_LOOP_RATE, or the loop time that ANG logs, or 1/400 s."""
     rate_hz = log.parameters.get("SCHED_LOOP_RATE", 0.0)
     if rate_hz > 0:
@@ -170,7 +167,7 @@ def paired_rows(
     return np.flatnonzero(inside), next_one[inside]
 
 
-def chirp_clock(log: Log, run: SidRun) -> tuple[NDArray[np.float64], ...]:
+def chirp_clock(log: LogContents, run: SidRun) -> tuple[NDArray[np.float64], ...]:
     """Stamps, waveform clock and signal of a run's SIDD rows, s, s and run unit."""
     data = log.table("SIDD")
     rows = (data.time_s >= run.start_s - 0.05) & (data.time_s <= run.stop_s)
@@ -179,7 +176,7 @@ def chirp_clock(log: Log, run: SidRun) -> tuple[NDArray[np.float64], ...]:
     return data.time_s[rows][keep], clock[keep], data["Targ"][rows][keep]
 
 
-def _check_axis(log: Log, run: SidRun, axis: Axis, loop_time_s: float) -> AxisCheck | None:
+def _check_axis(log: LogContents, run: SidRun, axis: Axis, loop_time_s: float) -> AxisCheck | None:
     residual = mixer_residual(log, axis, loop_time_s)
     if residual is None:
         return None
@@ -200,7 +197,7 @@ def _check_axis(log: Log, run: SidRun, axis: Axis, loop_time_s: float) -> AxisCh
 
 
 def mixer_residual(
-    log: Log, axis: Axis, loop_time_s: float
+    log: LogContents, axis: Axis, loop_time_s: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
     """Command to the mixer minus the controller's terms, with the stamps of RATE, s."""
     command, controller = COMMANDS[axis]

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from flightid.conventions import Role
-from flightid.errors import DataError, MissingColumnError, OptionError
+from flightid.errors import DataError, MissingColumnError
 from flightid.logs.channels.channel_map import (
     ChannelMap,
     ChannelSource,
@@ -20,6 +19,7 @@ from flightid.logs.channels.channel_map import (
     channel_map,
     default_map,
 )
+from flightid.logs.contents import LogContents
 from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.logs.extraction import Extracted, extract, find
 from flightid.logs.self_check import InjectionCheck, check_injection, chirp_clock, paired_rows
@@ -27,9 +27,6 @@ from flightid.record import Channel, InputShape, Record, Step
 from flightid.record.timebase import GapPolicy, to_uniform
 from flightid.table import Cell
 from flightid.units import convert
-
-if TYPE_CHECKING:
-    from flightid.logs.log import Log
 
 EXCITATION = "excitation"
 EDGE_STEPS = 3.0
@@ -40,11 +37,11 @@ SI = {"deg": "rad", "deg/s": "rad/s"}
 
 
 def make_record(
-    log: Log,
+    log: LogContents,
     channels: ChannelMap | str | Path | None,
     names: Iterable[str] | None,
     span_s: tuple[float, float] | None,
-    sid_run: SidRun | int | None,
+    run: SidRun | None,
     sample_rate_hz: float | None,
     roles: Mapping[str, Role | str] | None,
     gaps: GapPolicy | str,
@@ -54,7 +51,6 @@ def make_record(
 ) -> Record:
     """See `Log.record`."""
     chosen = _chosen(log, channels, names).with_roles(roles or {})
-    run = _run(log, sid_run)
     if run is not None and span_s is None:
         span_s = run.chirp_span_s
     found, left_out = _found(log, chosen, span_s, required=names is not None)
@@ -116,7 +112,7 @@ def _input_shape(
 
 
 def _chosen(
-    log: Log, channels: ChannelMap | str | Path | None, names: Iterable[str] | None
+    log: LogContents, channels: ChannelMap | str | Path | None, names: Iterable[str] | None
 ) -> ChannelMap:
     if channels is None:
         chosen = default_map(log.kind, log.vehicle)
@@ -127,20 +123,8 @@ def _chosen(
     return chosen if names is None else chosen.select(names)
 
 
-def _run(log: Log, sid_run: SidRun | int | None) -> SidRun | None:
-    if sid_run is None or isinstance(sid_run, SidRun):
-        return sid_run
-    if not 0 <= sid_run < len(log.sid_runs):
-        raise OptionError(
-            "there is no such system-identification run",
-            found=sid_run,
-            needed=f"0 to {len(log.sid_runs) - 1}" if log.sid_runs else "a log with SIDS and SIDD",
-        )
-    return log.sid_runs[sid_run]
-
-
 def _found(
-    log: Log, chosen: ChannelMap, span_s: tuple[float, float] | None, *, required: bool
+    log: LogContents, chosen: ChannelMap, span_s: tuple[float, float] | None, *, required: bool
 ) -> tuple[list[Extracted], list[str]]:
     """Channels that the log holds; the others by name with the reason, unless they are required.
 
@@ -215,7 +199,7 @@ def _snapped(
     return (float(after[0]), end) if after.size and after[0] < end else span_s
 
 
-def _excitation(log: Log, run: SidRun, check: InjectionCheck) -> Extracted:
+def _excitation(log: LogContents, run: SidRun, check: InjectionCheck) -> Extracted:
     """The injected signal at the instants when it acted, as far as that is proven.
 
     The mode logs the chirp at the end of the loop before the one that uses it. Where the self-check

@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 
 from flightid.excitation import Excitation, Plan
 from flightid.excitation.excitation import COVERAGE_LEVEL_DB
-from flightid.excitation.verdicts import LEAST_COHERENCE
+from flightid.excitation.plan import LEAST_COHERENCE
 from flightid.plot import look
 from flightid.plot.record import Panel, Trace, time_histories
 

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from flightid.record.history import Step
+from flightid.record.samples import LabelledSamples
 from flightid.table import Column, Table
 
-if TYPE_CHECKING:
-    from flightid.record.history import Step
-    from flightid.record.record import Record
 
-
-def summary_table(record: Record) -> Table:
+def summary_table(record: LabelledSamples) -> Table:
     """Table of the channels with unit, role, mean, deviation and range."""
     columns = (
         Column("channel"),
@@ -41,7 +37,7 @@ def summary_table(record: Record) -> Table:
     return Table(repr(record), columns, rows, notes)
 
 
-def one_line(record: Record) -> str:
+def one_line(record: LabelledSamples) -> str:
     """Size, rate and channel names on one line."""
     return (
         f"Record({record.name!r}, {record.n_samples} samples, {record.sample_rate_hz:.6g} Hz, "
@@ -50,7 +46,7 @@ def one_line(record: Record) -> str:
     )
 
 
-def plain_values(record: Record) -> dict[str, object]:
+def plain_values(record: LabelledSamples) -> dict[str, object]:
     """Plain values, samples included."""
     return {
         "schema": "flightid.record/1",

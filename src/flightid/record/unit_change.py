@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.record.channel import Channel
+from flightid.record.samples import LabelledSamples
 from flightid.units import convert
-
-if TYPE_CHECKING:
-    from flightid.record.record import Record
 
 Converted = tuple[dict[str, NDArray[np.float64]], list[Channel], dict[str, float]]
 
 
-def in_units(record: Record, units: Mapping[str, str]) -> Converted:
+def in_units(record: LabelledSamples, units: Mapping[str, str]) -> Converted:
     """Samples of the named channels, all channels, and trim values, in other units.
 
     Raises

@@ -15,7 +15,7 @@ from flightid.errors import ModelError, OptionError, UnknownNameError
 from flightid.models import LinearModel, StateSpaceModel
 from flightid.models.model import linear_system
 from flightid.models.sampled.recursion import run_recursion
-from flightid.models.state_space.checks import derivative
+from flightid.models.state_space.parts import derivative
 
 Array = NDArray[np.float64]
 NOISE_PARTS = 8

@@ -19,22 +19,22 @@ from flightid.report.tuning import tuning_section
 from flightid.study.estimate_tables import model_table, structure_words
 from flightid.study.faults import section_of, whole_section
 from flightid.study.model_section import model_section
+from flightid.study.results import StudyResults
 from flightid.study.truth import recovered
 from flightid.table import Cell, Column, Table
 from flightid.version import VERSION
 
 if TYPE_CHECKING:
     from flightid.study.identified import Identified
-    from flightid.study.study import Study
     from flightid.uncertainty.estimate import Estimate
 
 
-def study_document(study: Study) -> Document:
+def study_document(study: StudyResults) -> Document:
     """Say what a study found.
 
     Parameters
     ----------
-    study : Study
+    study : StudyResults
         Results of all stages.
 
     Returns
@@ -60,7 +60,7 @@ def study_document(study: Study) -> Document:
     )
 
 
-def _uses(study: Study) -> Iterator[Section]:
+def _uses(study: StudyResults) -> Iterator[Section]:
     """What was made with the models, where the study asks for it."""
     uses = study.uses
     if uses.conditions is not None:
@@ -81,7 +81,7 @@ def _uses(study: Study) -> Iterator[Section]:
         yield whole_section("Gains", tuning_section, study.tuning)
 
 
-def _qualities(study: Study) -> Iterator[Section]:
+def _qualities(study: StudyResults) -> Iterator[Section]:
     if study.qualities:
         parts = (
             section_of(f"Handling qualities of “{name}”", handling_qualities_blocks, found)
@@ -90,12 +90,12 @@ def _qualities(study: Study) -> Iterator[Section]:
         yield Section("Handling qualities", (), tuple(parts))
 
 
-def parameter_table(study: Study) -> Table:
+def parameter_table(study: StudyResults) -> Table:
     """All parameters with their intervals, and with the truth where it is known.
 
     Parameters
     ----------
-    study : Study
+    study : StudyResults
         Results of all stages.
 
     Returns
@@ -125,14 +125,14 @@ def parameter_table(study: Study) -> Table:
     return Table("Parameters", tuple(columns), tuple(rows), notes)
 
 
-def _beside(study: Study) -> str:
+def _beside(study: StudyResults) -> str:
     """What stands beside the estimates: a reference, a simulated flight's truth, or nothing."""
     if any(item.reference is not None for item in study.identified):
         return "reference"
     return "" if study.truth is None else "truth"
 
 
-def _parameters(study: Study) -> Iterator[tuple[Identified, Estimate, float | None]]:
+def _parameters(study: StudyResults) -> Iterator[tuple[Identified, Estimate, float | None]]:
     for item in study.identified:
         if item.fit is None or item.settings.structure is not None:
             continue
@@ -153,7 +153,7 @@ def _inside(parameter: Estimate, true_value: float | None) -> bool | None:
     return parameter.interval95[0] <= true_value <= parameter.interval95[1]
 
 
-def _result(study: Study) -> Iterator[Block]:
+def _result(study: StudyResults) -> Iterator[Block]:
     if study.settings.notes:
         yield Paragraph(study.settings.notes)
     if study.faults:
@@ -186,7 +186,7 @@ def _in_short(item: Identified) -> Finding:
     return Finding("model", verdict.light, f"{first}; {verdict.message}", verdict.action)
 
 
-def _source_blocks(study: Study) -> Iterator[Block]:
+def _source_blocks(study: StudyResults) -> Iterator[Block]:
     if study.inspection is None:
         yield TableBlock(_record_table(study))
         return
@@ -197,7 +197,7 @@ def _source_blocks(study: Study) -> Iterator[Block]:
     yield TableBlock(_record_table(study), folded=True)
 
 
-def _record_table(study: Study) -> Table:
+def _record_table(study: StudyResults) -> Table:
     columns = (
         Column("record"),
         Column("from", "s", 6),
@@ -223,7 +223,7 @@ def _record_table(study: Study) -> Table:
     return Table(title, columns, rows)
 
 
-def _interval_figure(study: Study) -> tuple[Figure, ...]:
+def _interval_figure(study: StudyResults) -> tuple[Figure, ...]:
     estimates = [
         EstimateBar(f"{parameter.name}, {item.settings.name}", parameter.value, low, high, true)
         for item, parameter, true in _parameters(study)
@@ -239,7 +239,7 @@ def _interval_figure(study: Study) -> tuple[Figure, ...]:
     return (figure_block(parameter_intervals(estimates), caption),)
 
 
-def _options(study: Study) -> dict[str, Cell]:
+def _options(study: StudyResults) -> dict[str, Cell]:
     settings, response = study.settings, study.settings.response
     if not settings.models:
         return {}

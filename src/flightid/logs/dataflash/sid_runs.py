@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Axis
-
-if TYPE_CHECKING:
-    from flightid.logs.log import Log
+from flightid.logs.contents import LogContents
 
 COPTER_DELAY_S = 1.0
 """Silence before the chirp on ArduCopter (SYSTEM_ID_DELAY, mode_systemid.cpp); 0 on ArduPlane."""
@@ -123,7 +120,7 @@ class SidRun:
         )
 
 
-def locate(log: Log) -> tuple[SidRun, ...]:
+def locate(log: LogContents) -> tuple[SidRun, ...]:
     """Runs in a log, in order; a run without SIDD rows is left out.
 
     Each SIDS row starts a run, which lasts until the waveform's own clock (SIDD.Time) jumps back or

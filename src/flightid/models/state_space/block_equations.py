@@ -5,36 +5,35 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any, TypeVar
 
 from flightid.errors import ModelError
 from flightid.models.language.blocks import MAXIMUM_BLOCKS, Block, Realisation, wrapped
 from flightid.models.language.dimensions import unit_of
 from flightid.models.language.formula import formula_names
 from flightid.models.parameters import Parameter, Parameters
+from flightid.models.state_space.linear import Linearised
 from flightid.models.state_space.parts import Output
-
-if TYPE_CHECKING:
-    from flightid.models.state_space.model import StateSpaceModel
 
 Value = TypeVar("Value")
 
 
-def insert_blocks(bare: StateSpaceModel, blocks: Sequence[Block]) -> StateSpaceModel:
-    """A model with actuators at its inputs, and sensors and filters at its outputs.
+def written_out(bare: Linearised, blocks: Sequence[Block]) -> dict[str, Any]:
+    """What actuators at a model's inputs, and sensors and filters at its outputs, change in it.
 
     Blocks at one place stand one behind the other, in the order given, in the direction of the
     signal. Numbers of a block become fixed parameters ``<block>_<key>``.
 
     Parameters
     ----------
-    bare : StateSpaceModel
+    bare : Linearised
         Model without blocks.
     blocks : sequence of Block
 
     Returns
     -------
-    StateSpaceModel
+    dict
+        Fields of the model with these blocks that differ from the bare model's.
 
     Raises
     ------
@@ -63,25 +62,15 @@ def insert_blocks(bare: StateSpaceModel, blocks: Sequence[Block]) -> StateSpaceM
                 found=repr(place),
                 needed=f"one of {', '.join((*bare.inputs, *bare.outputs))}",
             )
-    return replace(
-        bare,
-        states=work.states,
-        measurements=work.measurements,
-        equations=work.equations,
-        definitions=work.definitions,
-        parameters=work.parameters,
-        delays=work.delays,
-        trim=work.trim,
-        blocks=named,
-        bare=bare,
-    )
+    kinds = ["states", "measurements", "equations", "definitions", "parameters", "delays", "trim"]
+    return {**{kind: getattr(work, kind) for kind in kinds}, "blocks": named, "bare": bare}
 
 
 @dataclass
 class _Expansion:
     """The tables of a model while blocks are written into them."""
 
-    bare: StateSpaceModel
+    bare: Linearised
     states: dict[str, str] = field(init=False)
     measurements: dict[str, Output] = field(init=False)
     equations: dict[str, str] = field(init=False)

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from flightid.errors import ModelError
 from flightid.models.language.dimensions import require_balance, require_unit
 from flightid.models.language.formula import RESERVED, formula_names
 from flightid.models.language.tables import check_tables
-
-if TYPE_CHECKING:
-    from flightid.models.state_space.model import StateSpaceModel
+from flightid.models.state_space.linear import Linearised
+from flightid.models.state_space.parts import derivative
 
 MAXIMUM_STATES = 200
 MAXIMUM_CHANNELS = 100
@@ -21,17 +19,12 @@ MAXIMUM_DEFINITIONS = 1_000
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-def derivative(state: str) -> str:
-    """Name of the derivative of a state."""
-    return f"{state}'"
-
-
-def check_model(model: StateSpaceModel) -> None:
+def check_model(model: Linearised) -> None:
     """Refuse a model that contradicts itself.
 
     Parameters
     ----------
-    model : StateSpaceModel
+    model : Linearised
 
     Raises
     ------
@@ -72,7 +65,7 @@ def check_model(model: StateSpaceModel) -> None:
     _check_record_values(model)
 
 
-def _check_record_values(model: StateSpaceModel) -> None:
+def _check_record_values(model: Linearised) -> None:
     for kind, known in (("initial", tuple(model.states)), ("biases", tuple(model.units))):
         for name in getattr(model, kind):
             if name not in known:
@@ -83,7 +76,7 @@ def _check_record_values(model: StateSpaceModel) -> None:
                 )
 
 
-def _check_sizes(model: StateSpaceModel) -> None:
+def _check_sizes(model: Linearised) -> None:
     limits = {"states": MAXIMUM_STATES, "inputs": MAXIMUM_CHANNELS, "outputs": MAXIMUM_CHANNELS}
     if len(model.definitions) > MAXIMUM_DEFINITIONS:
         raise ModelError(
@@ -101,7 +94,7 @@ def _check_sizes(model: StateSpaceModel) -> None:
         )
 
 
-def _check_names(model: StateSpaceModel) -> None:
+def _check_names(model: Linearised) -> None:
     seen: dict[str, str] = {}
     for kind in ("states", "inputs", "parameters", "definitions", "tables"):
         for name in getattr(model, kind):
@@ -129,7 +122,7 @@ def _check_names(model: StateSpaceModel) -> None:
 
 
 def _defined(
-    text: str, units: Mapping[str, str], subject: str, model: StateSpaceModel | None
+    text: str, units: Mapping[str, str], subject: str, model: Linearised | None
 ) -> set[str]:
     """Names in a formula, all of them known."""
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, TypedDict
+from typing import TypedDict
 
 from flightid.errors import ModelError
 from flightid.models.language.blocks import Block, read_block
@@ -19,10 +19,8 @@ from flightid.models.language.sympy_input import is_sympy, sympy_formula
 from flightid.models.language.tables import TableFunction, read_table_function
 from flightid.models.parameter_table import read_parameter
 from flightid.models.parameters import Parameter, Parameters
+from flightid.models.state_space.linear import Linearised
 from flightid.models.state_space.parts import Output
-
-if TYPE_CHECKING:
-    from flightid.models.state_space.model import StateSpaceModel
 
 _KEYS = {"schema", "kind", "name", "source", "note", "states", "inputs", "outputs", "parameters"}
 _KEYS |= {"constants", "constraints", "equations", "delays", "trim", "responses", "definitions"}
@@ -170,12 +168,12 @@ def _pairs(item: object) -> tuple[str, ...]:
     return tuple(read_text(each, "responses") for each in item)
 
 
-def to_plain(model: StateSpaceModel) -> dict[str, object]:
+def to_plain(model: Linearised) -> dict[str, object]:
     """Plain values that `from_plain` reads.
 
     Parameters
     ----------
-    model : StateSpaceModel
+    model : Linearised
 
     Returns
     -------
@@ -217,12 +215,12 @@ def _plain(parameter: Parameter) -> dict[str, object]:
     return {key: value for key, value in parameter.to_dict().items() if value is not None}
 
 
-def lines(model: StateSpaceModel) -> list[str]:
+def lines(model: Linearised) -> list[str]:
     """Equations, definitions, outputs, delays and blocks as text, one a line.
 
     Parameters
     ----------
-    model : StateSpaceModel
+    model : Linearised
 
     Returns
     -------
@@ -244,12 +242,12 @@ def lines(model: StateSpaceModel) -> list[str]:
     return [*equations, *definitions, *outputs, *delays, *blocks]
 
 
-def one_line(model: StateSpaceModel) -> str:
+def one_line(model: Linearised) -> str:
     """Name and size of a model.
 
     Parameters
     ----------
-    model : StateSpaceModel
+    model : Linearised
 
     Returns
     -------

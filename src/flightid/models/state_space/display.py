@@ -5,13 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING
 
 from flightid.models.language.symbolic import ZERO, Printer, Term, latex_name
-from flightid.models.state_space.checks import derivative
-
-if TYPE_CHECKING:
-    from flightid.models.state_space.model import StateSpaceModel
+from flightid.models.state_space.linear import Linearised
+from flightid.models.state_space.parts import derivative
 
 _BREAK = r" \\ "
 Rows = tuple[tuple[Term, ...], ...]
@@ -84,12 +81,12 @@ class MatrixDisplay:
         return "".join(f"<div>$${escape(each, quote=False)}$$</div>" for each in self._lines())
 
 
-def matrices_as_latex(model: StateSpaceModel) -> MatrixDisplay:
+def matrices_as_latex(model: Linearised) -> MatrixDisplay:
     """Derive the matrices of a model symbolically.
 
     Parameters
     ----------
-    model : StateSpaceModel
+    model : Linearised
 
     Returns
     -------

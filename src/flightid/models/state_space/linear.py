@@ -11,11 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 from flightid import _native
 from flightid.errors import DataError, SingularError, UnknownNameError
 from flightid.models.adjustable import Adjustable
+from flightid.models.language.blocks import Block
+from flightid.models.language.record_values import RecordValue
 from flightid.models.language.tables import TableFunction
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.realisation import Matrices, one_delay_for_each_input
-from flightid.models.state_space.checks import derivative
-from flightid.models.state_space.parts import Output, StateSpaceMatrices, pair_places
+from flightid.models.state_space.parts import (
+    Output,
+    StateSpaceMatrices,
+    derivative,
+    pair_places,
+)
 
 Array = NDArray[np.float64]
 
@@ -32,6 +38,12 @@ class Linearised(Adjustable):
     pairs: tuple[str, ...]
     definitions: Mapping[str, Output]
     tables: Mapping[str, TableFunction]
+    initial: Mapping[str, RecordValue]
+    biases: Mapping[str, RecordValue]
+    blocks: tuple[Block, ...]
+    bare: Linearised | None
+    source: str
+    note: str
     native: _native.StateSpace
 
     if TYPE_CHECKING:

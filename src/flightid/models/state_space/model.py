@@ -17,7 +17,7 @@ from flightid.models.language.record_values import RecordValue
 from flightid.models.language.tables import TableFunction
 from flightid.models.parameters import Parameters
 from flightid.models.state_space import description
-from flightid.models.state_space.block_equations import insert_blocks, split_own
+from flightid.models.state_space.block_equations import split_own, written_out
 from flightid.models.state_space.checks import check_model
 from flightid.models.state_space.display import MatrixDisplay, matrices_as_latex
 from flightid.models.state_space.linear import Linearised
@@ -269,7 +269,7 @@ class StateSpaceModel(Linearised, Tabled):
             biases=self.biases, pairs=self.pairs, name=self.name, source=self.source,
             note=self.note,
         )  # fmt: skip
-        found = insert_blocks(base, blocks) if blocks else base
+        found = replace(base, **written_out(base, blocks)) if blocks else base
         return replace(found, trim={**found.trim, **own}, initial={**found.initial, **own_initial})
 
     @property
@@ -334,5 +334,5 @@ class StateSpaceModel(Linearised, Tabled):
         trim, own = split_own(blocks, described["trim"])
         initial, own_initial = split_own(blocks, described["initial"])
         bare = cls(**{**described, "trim": trim, "initial": initial})  # type: ignore[arg-type]
-        found = insert_blocks(bare, blocks)
+        found = replace(bare, **written_out(bare, blocks))
         return replace(found, trim={**found.trim, **own}, initial={**found.initial, **own_initial})

@@ -15,6 +15,11 @@ from flightid.units import canonical
 Array = NDArray[np.float64]
 
 
+def derivative(state: str) -> str:
+    """Name of the derivative of a state."""
+    return f"{state}'"
+
+
 @dataclass(frozen=True)
 class Output:
     """What is measured: a formula of states, inputs, state derivatives and parameters.

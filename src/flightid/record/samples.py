@@ -1,0 +1,181 @@
+"""What a record holds: channels on one uniform time base, read-only, with their history."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from flightid.conventions import Role
+from flightid.record.channel import Channel
+from flightid.record.history import Step
+from flightid.record.hold import InputHold, InputShape
+from flightid.record.validation import (
+    TIME,
+    channels_of,
+    require_finite,
+    uniform_sample_time,
+    unknown_channel,
+)
+
+
+class LabelledSamples:
+    """Named channels with unit and role along one time; the half of a record that changes nothing.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Data variables along the dimension ``time_s`` with attributes ``unit``, ``role``, ``note``.
+
+    Raises
+    ------
+    DataError
+        Stamps that are not finite, not increasing or not uniform; samples that are not finite.
+    """
+
+    __slots__ = (
+        "_channels", "_dataset", "_history", "_input_shape", "_name", "_sample_time_s", "_trim",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        dataset: xr.Dataset,
+        *,
+        name: str = "record",
+        trim: Mapping[str, float] | None = None,
+        history: Iterable[Step] = (),
+        input_shape: InputShape | None = None,
+    ) -> None:
+        self._sample_time_s = uniform_sample_time(np.asarray(dataset[TIME].values))
+        self._channels = channels_of(dataset)
+        for key in self._channels:
+            require_finite(key, np.asarray(dataset[key].values))
+        frozen = dataset.copy(deep=True)
+        for variable in frozen.variables.values():
+            variable.values.flags.writeable = False
+        self._dataset = frozen
+        self._name = name
+        self._trim = dict(trim or {})
+        self._history = tuple(history)
+        self._input_shape = input_shape or InputShape()
+
+    @property
+    def name(self) -> str:
+        """Name of the manoeuvre."""
+        return self._name
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """The data as an `xarray.Dataset`; its arrays are read-only."""
+        return self._dataset
+
+    @property
+    def time_s(self) -> NDArray[np.float64]:
+        """Time stamps, s, shape (n_samples,)."""
+        return np.asarray(self._dataset[TIME].values)
+
+    @property
+    def n_samples(self) -> int:
+        """Number of samples."""
+        return int(self._dataset.sizes[TIME])
+
+    @property
+    def sample_time_s(self) -> float:
+        """Time between samples, s."""
+        return self._sample_time_s
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Samples per second, Hz."""
+        return 1.0 / self._sample_time_s
+
+    @property
+    def duration_s(self) -> float:
+        """Number of samples times sample time, s."""
+        return self.n_samples * self._sample_time_s
+
+    @property
+    def channels(self) -> dict[str, Channel]:
+        """Channels by name, in order."""
+        return dict(self._channels)
+
+    @property
+    def trim(self) -> dict[str, float]:
+        """Trim value by channel name, in the channel's unit; empty where none was declared."""
+        return dict(self._trim)
+
+    @property
+    def history(self) -> tuple[Step, ...]:
+        """What was done to the data, oldest first."""
+        return self._history
+
+    @property
+    def input_shape(self) -> InputShape:
+        """How the inputs move between samples, whether they repeat and were fed back."""
+        return self._input_shape
+
+    @property
+    def hold(self) -> InputHold | None:
+        """What inputs do between samples: "zero", "first", "band_limited"; None: not known."""
+        return self._input_shape.hold
+
+    @property
+    def period_s(self) -> float | None:
+        """Time after which the inputs repeat, s; None: not known, or they do not."""
+        return self._input_shape.period_s
+
+    def names(self, role: Role) -> tuple[str, ...]:
+        """Names of the channels of one role, in order."""
+        return tuple(key for key, channel in self._channels.items() if channel.role == role)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs."""
+        return self.names(Role.INPUT)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs."""
+        return self.names(Role.OUTPUT)
+
+    @property
+    def excitations(self) -> tuple[str, ...]:
+        """Names of the excitations."""
+        return self.names(Role.EXCITATION)
+
+    def unit(self, name: str) -> str:
+        """Unit of a channel.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such channel.
+        """
+        self._require(name)
+        return self._channels[name].unit
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        """Samples of a channel, read-only, shape (n_samples,), in the channel's unit."""
+        self._require(name)
+        return np.asarray(self._dataset[name].values)
+
+    def __contains__(self, name: object) -> bool:
+        """Tell whether a channel of this name exists."""
+        return name in self._channels
+
+    def matrix(self, names: Iterable[str]) -> NDArray[np.float64]:
+        """Samples of several channels, shape (n_channels, n_samples).
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such channel.
+        """
+        rows = [self[name] for name in names]
+        return np.array(rows, dtype=np.float64).reshape(len(rows), self.n_samples)
+
+    def _require(self, name: str) -> None:
+        if name not in self._channels:
+            raise unknown_channel(name, self._channels)
