@@ -216,7 +216,10 @@ def _refined(problem: LoopProblem, space: _Space, starts: list[Array], rows: lis
 
 
 def _merits(problem: LoopProblem, gains: Array, rows: list[int]) -> Array:
-    limits, levels = _split(problem.judge(gains, rows))
+    return _merit(*_split(problem.judge(gains, rows)))
+
+
+def _merit(limits: Array, levels: Array) -> Array:
     return np.asarray(levels.min(axis=1) - PENALTY * np.maximum(0.0, -limits.min(axis=1)))
 
 
@@ -242,23 +245,29 @@ def _split(judged: LoopAssessment) -> tuple[Array, Array]:
 
 def _climb(problem: LoopProblem, space: _Space, start: Array, rows: list[int]) -> Array:
     """Sequential linear programming in a trust region; no step makes the merit worse."""
+
+    def judged(at: Array) -> tuple[Array, Array]:
+        return _split(problem.judge(space.to_gains(at[None]), rows))
+
     low, high = space.bounds()
     point, reach = np.clip(space.to_point(start), low, high), FIRST_REACH
-    merit = float(_merits(problem, space.to_gains(point[None]), rows)[0])
+    merit = float(_merit(*judged(point))[0])
+    linear: Linear | None = None
     for _ in range(ITERATIONS):
-        linear = _linearised(problem, space, point, rows)
+        linear = linear or _linearised(problem, space, point, rows)
         box = np.maximum(low - point, -reach), np.minimum(high - point, reach)
         step = _linear_step(linear, *box)
         if step is None or np.abs(step).max() < SMALLEST_REACH:
             break
-        trial = float(_merits(problem, space.to_gains((point + step)[None]), rows)[0])
+        met = judged(point + step)
+        trial = float(_merit(*met)[0])
         if trial <= merit + SMALLEST_GAIN:
-            step = _linear_step(_corrected(problem, space, point, rows, linear, step), *box)
+            step = _linear_step(_corrected(linear, step, *met), *box)
             if step is not None:
-                trial = float(_merits(problem, space.to_gains((point + step)[None]), rows)[0])
+                trial = float(_merit(*judged(point + step))[0])
         if step is not None and trial > merit + SMALLEST_GAIN:
             full = np.abs(step).max() > 0.99 * reach
-            point, merit = point + step, trial
+            point, merit, linear = point + step, trial, None
             reach = min(2.0 * reach, 1.0) if full else reach
         else:
             reach *= SHRINK
@@ -267,22 +276,14 @@ def _climb(problem: LoopProblem, space: _Space, start: Array, rows: list[int]) -
     return np.asarray(space.to_gains(point[None])[0])
 
 
-def _corrected(
-    problem: LoopProblem,
-    space: _Space,
-    point: Array,
-    rows: list[int],
-    linear: Linear,
-    step: Array,
-) -> Linear:
-    """The linear problem with the curvature that a rejected step has met.
+def _corrected(linear: Linear, step: Array, limits: Array, levels: Array) -> Linear:
+    """The linear problem with the curvature that a rejected step has met at its end.
 
     Without it steps along a curved limit leave it and are refused, however good they are.
     """
     _, _, limit_slopes, level_slopes = linear
-    met = _split(problem.judge(space.to_gains((point + step)[None]), rows))
-    limits, levels = met[0][0], met[1][0]
-    return limits - limit_slopes @ step, levels - level_slopes @ step, limit_slopes, level_slopes
+    near_limits, near_levels = limits[0] - limit_slopes @ step, levels[0] - level_slopes @ step
+    return near_limits, near_levels, limit_slopes, level_slopes
 
 
 def _linearised(problem: LoopProblem, space: _Space, point: Array, rows: list[int]) -> Linear:

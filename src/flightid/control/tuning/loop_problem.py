@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -186,16 +187,20 @@ class LoopProblem:
         """Whether an angle loop is designed too."""
         return "A" in self.kinds
 
+    @cached_property
+    def _terms(self) -> tuple[Complex, Complex, Complex | None]:
+        """The controller's paths at the plants' frequencies, which no candidate changes."""
+        omega = self.plants.omega_rad_s
+        return self.paths.feedback(omega), self.paths.forward(omega), self.paths.angle(omega)
+
     def loops(self, gains: Array, plants: Plants) -> Loops:
-        """Loop transfers of candidates (n_candidates, n_gains)."""
-        omega = plants.omega_rad_s
+        """Loop transfers of candidates (n_candidates, n_gains) with plants at these frequencies."""
+        feedback, terms, unit = self._terms
         inner = gains[:, :-1] if self.has_angle else gains
-        control = inner @ self.paths.feedback(omega)
+        control = inner @ feedback
         rate = control[:, None] * plants.rate
-        unit = self.paths.angle(omega)
         if not self.has_angle or unit is None:
             return Loops(control, rate, rate, None)
-        terms = self.paths.forward(omega)
         forward = inner @ terms[:-1] + terms[-1]
         outer = (gains[:, -1:] * forward * unit)[:, None] * plants.angle
         return Loops(control, rate, rate + outer, outer / (1.0 + rate))
