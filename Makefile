@@ -8,7 +8,8 @@ STAMP  := $(VENV)/.installed
 JOBS   ?= auto
 FUZZ_RUNS ?= 1000000
 
-PYTEST = OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
+# Rewritten asserts are kept between runs, whatever the shell says of byte code.
+PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 .PHONY: demo test test-slow test-nightly docs fuzz bench lint hooks format stubs develop wheel constraints clean help
 

@@ -31,9 +31,8 @@ def _script(path: Path, *arguments: str, folder: Path) -> subprocess.CompletedPr
     return _run(sys.executable, str(path), *arguments, folder=folder)
 
 
-@pytest.mark.parametrize(
-    "name", ["study.toml", pytest.param("advised.toml", marks=pytest.mark.nightly)]
-)
+@pytest.mark.nightly  # test_readme.py finds the truth on the same flight in every run
+@pytest.mark.parametrize("name", ["study.toml", "advised.toml"])
 def test_the_rig_studies_find_the_truth(name: str, tmp_path: Path) -> None:
     study = EXAMPLES / "quadrotor_rig" / name
     run = _run(FLIGHTID, "--quiet", "run", str(study), "--output", "out", folder=tmp_path)
@@ -48,6 +47,7 @@ def test_the_rig_studies_find_the_truth(name: str, tmp_path: Path) -> None:
     assert len(results["models"]) == 3
 
 
+@pytest.mark.nightly  # test_fly.py keeps the same log from the command line in every run
 def test_the_rig_flight_is_kept_as_a_log(tmp_path: Path) -> None:
     run = _script(EXAMPLES / "quadrotor_rig" / "fly.py", "flight.BIN", folder=tmp_path)
     assert run.returncode == 0, run.stderr
@@ -94,7 +94,7 @@ def test_the_unstable_helicopter_is_found_and_beats_its_rival(tmp_path: Path) ->
 def test_the_dryer_script_checks_a_record_of_the_same_format(tmp_path: Path) -> None:
     # A stand-in with the noise-free output-error model whose coefficients the script expects.
     truth = fid.PolynomialModel(
-        "y", ("u",), 0.08, b=[[0.06296, 0.05397]], f=[[1, -1.24108, 0.36682]], nk=(3,)
+        ("u",), "y", 0.08, b=[[0.06296, 0.05397]], f=[[1, -1.24108, 0.36682]], nk=(3,)
     )
     generator = np.random.default_rng(0)
     u = 5.0 + np.sign(generator.standard_normal(1000))

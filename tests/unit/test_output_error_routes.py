@@ -20,7 +20,7 @@ import numpy as np
 import flightid as fid
 
 model = fid.load_model("short_period").with_fixed(Malphadot=-0.9)
-time_s = np.arange(400) * 0.02
+time_s = np.arange(200) * 0.02
 flown = []
 for seed in range(3):
     random = np.random.default_rng(seed)
@@ -28,9 +28,9 @@ for seed in range(3):
     units = {"elevator": "rad"}
     record = fid.Record.from_arrays(time_s, inputs={"elevator": elevator}, units=units)
     flight = fid.simulate(model, record, units={"alpha": "rad", "q": "rad/s", "nz": "1"})
-    noisy = {n: flight[n] + 0.005 * random.standard_normal(400) for n in ("alpha", "q", "nz")}
+    noisy = {n: flight[n] + 0.005 * random.standard_normal(200) for n in ("alpha", "q", "nz")}
     flown.append(flight.replace(noisy))
-fit = fid.identify(model, flown, starts=3, seed=4)
+fit = fid.identify(model, flown, starts=2, seed=4)
 for parameter in fit.parameters.values():
     print(parameter.name, parameter.value.hex(), (parameter.stderr or 0.0).hex())
 """

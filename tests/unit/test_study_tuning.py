@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from flightid.cli.program import run
 from flightid.errors import StudyError
-from flightid.study import run_study
 from flightid.study.settings import read_settings
 from flightid.study.tuning import TuneSettings, tune_models
 
@@ -56,8 +56,8 @@ def study(tmp_path: Path) -> Path:
     return path
 
 
-def test_a_study_is_tuned_from_its_log_and_the_steps_are_written(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_a_study_is_tuned_from_its_log_and_its_models_beside_it(
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     target = tmp_path / "gains.param"
     code = run(["--quiet", "tune", str(study), "--write", str(target), "--json"])
@@ -70,7 +70,17 @@ def test_a_study_is_tuned_from_its_log_and_the_steps_are_written(
     assert list(tmp_path.glob("gains*.rollback.param"))
     results = json.loads((tmp_path / "roll-output" / "results.json").read_text(encoding="utf-8"))
     assert results["tuning"]["designs"]["roll"]["exists"]
-    assert "Roll gains" in (tmp_path / "roll-output" / "report.txt").read_text(encoding="utf-8")
+    made = tmp_path / "roll-output"
+    assert "Roll gains" in (made / "report.txt").read_text(encoding="utf-8")
+
+    file, log = str(made / "models" / "roll_rate.toml"), str(made / "flight.bin")
+    quick = partial(TuneSettings, draws=12, angle_loop=False)
+    monkeypatch.setattr("flightid.study.tuning.TuneSettings", quick)
+    code = run(["--quiet", "tune", file, "--log", log, "--json"])
+    assert code in (0, 1)
+    assert list(json.loads(capsys.readouterr().out)["designs"]) == ["roll"]
+    assert run(["--quiet", "tune", file]) == 2
+    assert "name the flight with --log" in capsys.readouterr().err
 
 
 def test_settings_are_read_and_checked(study: Path) -> None:
@@ -96,17 +106,3 @@ def test_records_alone_hold_no_gains() -> None:
     with pytest.raises(StudyError, match="cannot be tuned from records alone"):
         tune_models([Item()], None, TuneSettings())  # type: ignore[list-item]
     assert tune_models([], None, TuneSettings()) is None
-
-
-def test_models_in_files_are_tuned_beside_their_log(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    made = run_study(study, output=tmp_path / "made")
-    file, log = made.output / "models" / "roll_rate.toml", made.output / "flight.bin"
-    assert made.identified[0].fit is not None
-    code = run(["--quiet", "tune", str(file), "--log", str(log), "--json"])
-    told = json.loads(capsys.readouterr().out)
-    assert code in (0, 1)
-    assert list(told["designs"]) == ["roll"]
-    assert run(["--quiet", "tune", str(file)]) == 2
-    assert "name the flight with --log" in capsys.readouterr().err
