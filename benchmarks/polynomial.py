@@ -21,7 +21,7 @@ from flightid.table import Column
 
 Array = NDArray[np.float64]
 TRUTH = fid.PolynomialModel(
-    "y", ("u",), 0.1, a=[1, -2.2, 1.9, -0.65], b=[[0.5, 0.3, -0.1]], c=[1, -0.8, 0.3]
+    ("u",), "y", 0.1, a=[1, -2.2, 1.9, -0.65], b=[[0.5, 0.3, -0.1]], c=[1, -0.8, 0.3]
 )
 DEGREES = range(1, 7)
 SAMPLED = 9

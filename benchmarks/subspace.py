@@ -18,7 +18,7 @@ from flightid.table import Column
 
 ORDER, HORIZON = 4, 15
 TRUTH = fid.PolynomialModel(
-    "y", ("u",), 0.1, a=[1, -2.6, 3.0, -1.8, 0.5], b=[[0.5, 0.3, -0.1, 0.2]], c=[1, -0.8, 0.3]
+    ("u",), "y", 0.1, a=[1, -2.6, 3.0, -1.8, 0.5], b=[[0.5, 0.3, -0.1, 0.2]], c=[1, -0.8, 0.3]
 )
 
 

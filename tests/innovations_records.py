@@ -16,8 +16,8 @@ _A = np.zeros((4, 4))
 _A[:2, :2], _A[2:, 2:] = _turn(0.95, 0.3), _turn(0.8, 1.0)
 _DRAWN = np.random.default_rng(0)
 PAIR = fid.InnovationsModel(
-    ("y", "z"),
     ("u", "v"),
+    ("y", "z"),
     0.1,
     _A,
     _DRAWN.standard_normal((4, 2)),
@@ -27,7 +27,7 @@ PAIR = fid.InnovationsModel(
     units={"y": "rad", "z": "rad/s", "u": "V", "v": "V"},
 )
 SINGLE = fid.InnovationsModel(
-    ("y",), ("u",), 0.1, _turn(0.94, 0.3), [[1.0], [0.4]], [[1.0, 0.3]], None, [[0.5], [0.2]]
+    ("u",), ("y",), 0.1, _turn(0.94, 0.3), [[1.0], [0.4]], [[1.0, 0.3]], None, [[0.5], [0.2]]
 )
 
 

@@ -8,11 +8,11 @@ from scipy.signal import lfilter
 import flightid as fid
 
 ARMAX = fid.PolynomialModel(
-    "y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], c=[1, -1.0, 0.2], units={"y": "rad"}
+    ("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], c=[1, -1.0, 0.2], units={"y": "rad"}
 )
 TWO_INPUTS = fid.PolynomialModel(
-    "y",
     ("u", "v"),
+    "y",
     0.1,
     b=[[1.0, 0.5], [0.3, -0.2, 0.1]],
     c=[1, 0.5],

@@ -139,9 +139,10 @@ OWN = {
         "column columns gaps instance max_gap_s roles run sample_rate_hz sid_run",
     ),
     "models": (
-        "parts of a model's description",
-        "content delay delays_s description expression fixed formulas left max min pade_order "
-        "parameter parameters require right solve_for system tie",
+        "parts of a model's description, and its orders",
+        "content count covariance delay delays_s description expression fixed formula formulas "
+        "left matrix max min na nb nc nd nf nk noise_variance operating_point output pade_order "
+        "parameter parameters require right solve_for structure system theta tie",
     ),
     "record": (
         "parts of a record and columns of a file",
@@ -230,11 +231,18 @@ def _functions() -> Iterator[tuple[str, types.FunctionType]]:
             seen.add(id(item))
             if inspect.isfunction(item):
                 yield name, item
-            elif inspect.isclass(item) and item.__module__.startswith("flightid"):
-                for key, member in vars(item).items():
-                    plain = getattr(member, "__func__", member)
-                    if not key.startswith("_") and inspect.isfunction(plain):
-                        yield f"{name}.{key}", plain
+            elif inspect.isclass(item):
+                yield from ((f"{name}.{key}", plain) for key, plain in _methods(item, seen))
+
+
+def _methods(item: type, seen: set[int]) -> Iterator[tuple[str, types.FunctionType]]:
+    """Public methods of a class and of the classes of the package above it."""
+    for kind in item.__mro__:
+        for key, member in vars(kind).items() if kind.__module__.startswith("flightid") else ():
+            plain = getattr(member, "__func__", member)
+            if not key.startswith("_") and inspect.isfunction(plain) and id(plain) not in seen:
+                seen.add(id(plain))
+                yield key, plain
 
 
 def _constructors() -> Iterator[tuple[str, list[str]]]:
@@ -282,8 +290,10 @@ def _synonyms(name: str, arguments: list[str]) -> list[str]:
 
 
 def _turned(name: str, arguments: list[str]) -> list[str]:
-    both = [argument for argument in arguments if argument in ("inputs", "outputs")]
-    return [f"{name}: outputs stand before inputs"] if both == ["outputs", "inputs"] else []
+    answers = [k for k, argument in enumerate(arguments) if argument in ("output", "outputs")]
+    if "inputs" in arguments and answers and answers[0] < arguments.index("inputs"):
+        return [f"{name}: outputs stand before inputs"]
+    return []
 
 
 def test_every_argument_is_a_word_of_the_dictionary_or_of_its_room() -> None:
@@ -301,6 +311,7 @@ def test_no_argument_is_a_synonym() -> None:
 
 def test_inputs_stand_before_outputs() -> None:
     offenders = [line for name, item in _functions() for line in _turned(name, _arguments(item))]
+    offenders += [line for name, given in _constructors() for line in _turned(name, given)]
     assert not offenders, "\n".join(offenders)
 
 
@@ -338,6 +349,7 @@ def test_the_rules_can_fail() -> None:
     assert _synonyms("f", _arguments(_astray)) == ["f: freq is called omega_rad_s here"]
     assert [line.split(" is ")[0] for line in _unknown("f", _astray)] == ["f: freq", "f: flavour"]
     assert _turned("f", _arguments(_astray)) == ["f: outputs stand before inputs"]
+    assert _turned("Model", ["output", "inputs"]) == ["Model: outputs stand before inputs"]
 
 
 def test_writers_take_what_to_write_first_and_then_the_path() -> None:

@@ -50,7 +50,7 @@ STRUCTURES = {
     "OE": lambda: fid.PolynomialModel.oe("tau_phi", "p", nb=2, nf=2),
     "BJ": lambda: fid.PolynomialModel.bj("tau_phi", "p", nb=2, nc=1, nd=1, nf=2),
     "innovations": lambda: fid.InnovationsModel.subspace("tau_phi", "p", 2),
-    "NARX": lambda: fid.NarxStructure("p", ("tau_phi",), 1, 2, kernel=None, degree=2, stop="bic"),
+    "NARX": lambda: fid.NarxStructure(("tau_phi",), "p", 1, 2, kernel=None, degree=2, stop="bic"),
 }
 
 

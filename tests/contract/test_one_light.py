@@ -115,7 +115,7 @@ def test_every_kind_of_fit_has_evidence_that_is_never_green_for_what_is_missing(
         fid.identify(model, record),
         fid.identify(fid.PolynomialModel.arx(("tau_phi",), "p", na=2, nb=2), record),
         fid.identify(fid.InnovationsModel.subspace(("tau_phi",), ("p",), order=1), record),
-        fid.identify(fid.NarxStructure("p", ("tau_phi",), 2, 2), record),
+        fid.identify(fid.NarxStructure(("tau_phi",), "p", 2, 2), record),
     ]
     for fit in fits:
         evidence = fit.evidence

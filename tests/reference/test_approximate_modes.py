@@ -160,7 +160,7 @@ def test_where_no_formula_fits() -> None:
     assert "Taken as quasi-static" in found._repr_html_()
     with pytest.raises(errors.ModelError, match="there is no such approximation"):
         found.mode("short period")
-    box = fid.PolynomialModel("y", ("u",), 0.1, a=[1.0, -0.5], b=[[1.0]])
+    box = fid.PolynomialModel(("u",), "y", 0.1, a=[1.0, -0.5], b=[[1.0]])
     with pytest.raises(errors.ModelError, match="sampled model has none of"):
         fid.approximate_modes(box)
     with pytest.raises(errors.ModelError, match="no approximation fits the states"):

@@ -54,7 +54,7 @@ def test_there_and_back_with_delays(hold):
 
 
 def test_polynomial_models_keep_their_delay():
-    model = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], nk=(4,))
+    model = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], nk=(4,))
     made = fid.to_continuous(model)
     assert_close(made.delays_s, [0.3], rtol=1e-12, why="the hold accounts for one sample")
     assert_close(
@@ -72,7 +72,7 @@ def test_polynomial_models_keep_their_delay():
 
 def test_published_model_has_no_continuous_counterpart():
     printed = fid.PolynomialModel(
-        "y1", ("u1",), 0.1, a=[1, -2.372, 1.465, 0.2673, -0.351],
+        ("u1",), "y1", 0.1, a=[1, -2.372, 1.465, 0.2673, -0.351],
         b=[[-0.0007, 0.007, 0.0001, 0.006]],
     )  # fmt: skip
     with pytest.raises(ModelError, match=r"no real continuous counterpart: found z = -0\.4192"):
@@ -82,12 +82,12 @@ def test_published_model_has_no_continuous_counterpart():
 
 
 def test_what_cannot_be_converted_is_refused():
-    fir = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5, 0.2, 0.1]])
+    fir = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5, 0.2, 0.1]])
     with pytest.raises(ModelError, match="not a delay of an input"):
         fid.to_continuous(fir)
     with pytest.raises(OptionError, match="unknown hold"):
         fid.to_continuous(fir, "cubic")
-    edge = fid.InnovationsModel(("y",), ("u",), 0.1, [[-1.0]], [[1.0]], [[1.0]])
+    edge = fid.InnovationsModel(("u",), ("y",), 0.1, [[-1.0]], [[1.0]], [[1.0]])
     with pytest.raises(ModelError, match="pole at -1"):
         fid.to_continuous(edge, "tustin")
     system = fid.LinearSystem(A, B, C, D, *CHANNELS, [0.25, 0.0])

@@ -130,7 +130,7 @@ def test_a_value_outside_a_refusing_table_is_no_value(tmp_path: Path) -> None:
 
 
 def test_discrete_models_are_taken_as_they_are(tmp_path: Path) -> None:
-    model = fid.PolynomialModel("y", ("u",), STEP_S, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], nk=(3,))
+    model = fid.PolynomialModel(("u",), "y", STEP_S, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], nk=(3,))
     system = model.linear_system()
     record = random_record(system)
     made = fid.export(model, tmp_path / "arx.c")

@@ -15,13 +15,13 @@ from tests.innovations_records import SINGLE, flown
 
 P = fid.PolynomialModel
 EQUATION_3 = P(
-    "y1", ("u1",), 0.1, a=[1, -2.372, 1.465, 0.2673, -0.351], b=[[-0.0007, 0.007, 0.0001, 0.006]]
+    ("u1",), "y1", 0.1, a=[1, -2.372, 1.465, 0.2673, -0.351], b=[[-0.0007, 0.007, 0.0001, 0.006]]
 )
 
 
 def from_roots(output, source, poles, zeros):
     a, b = (np.atleast_1d(np.real(np.poly(roots))) for roots in (poles, zeros))
-    return P(output, (source,), 0.1, a=a, b=[b])
+    return P((source,), output, 0.1, a=a, b=[b])
 
 
 EQUATION_5 = from_roots(
@@ -111,7 +111,7 @@ def test_lags_integrators_growth_and_cancellation_are_named():
 
 
 def test_time_constants_turn_intervals_over():
-    truth = P("y", ("u",), 0.1, a=[1, -0.8], b=[[1.0]])
+    truth = P(("u",), "y", 0.1, a=[1, -0.8], b=[[1.0]])
     drawn = np.random.default_rng(1)
     u, e = drawn.standard_normal((2, 400))
     record = fid.Record.from_arrays(np.arange(400) / 10, inputs={"u": u}, outputs={"y": e})

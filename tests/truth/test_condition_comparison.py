@@ -127,7 +127,7 @@ def test_ratios_without_an_answer() -> None:
 def test_refused(compared: fid.ConditionComparison) -> None:
     with pytest.raises(errors.OptionError, match="a comparison needs two conditions"):
         fid.compare_conditions({"hover": fid.load_model("r50_hover")})
-    box = fid.PolynomialModel("y", ("u",), 0.1, a=[1.0, -0.5], b=[[1.0]])
+    box = fid.PolynomialModel(("u",), "y", 0.1, a=[1.0, -0.5], b=[[1.0]])
     with pytest.raises(errors.ModelError, match="condition b has no named parameters"):
         fid.compare_conditions({"a": fid.load_model("r50_hover"), "b": box})
     with pytest.raises(errors.UnknownNameError, match="there is no such common parameter"):

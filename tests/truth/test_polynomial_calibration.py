@@ -10,9 +10,9 @@ from tests.polynomial_records import ARMAX, flown
 
 P = fid.PolynomialModel
 RUNS = 500
-BOX = P("y", ("u",), 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]], c=[1, 0.4], d=[1, -0.8])
-OUTPUT_ERROR = P("y", ("u",), 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]])
-REGRESSION = P("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
+BOX = P(("u",), "y", 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]], c=[1, 0.4], d=[1, -0.8])
+OUTPUT_ERROR = P(("u",), "y", 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]])
+REGRESSION = P(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
 CASES = {
     "arx": (REGRESSION, P.arx("u", "y", na=2, nb=2)),
     "armax": (ARMAX, P.armax("u", "y", na=2, nb=2, nc=2)),

@@ -39,7 +39,7 @@ def test_pulse_responses_recover_the_model_and_its_delays():
 def test_intervals_of_pulse_responses_hold_for_coloured_noise():
     inside = []
     truth = lfilter(*ARMAX.transfer("u"), np.eye(1, 40)[0])
-    coloured = P("y", ("u",), 0.1, a=ARMAX.a, b=ARMAX.b, c=np.convolve(ARMAX.a, [1, 0.9]))
+    coloured = P(("u",), "y", 0.1, a=ARMAX.a, b=ARMAX.b, c=np.convolve(ARMAX.a, [1, 0.9]))
     for seed in range(20):
         found = fid.impulse_response(flown(coloured, seed, n=900, noise=0.5))
         inside.append(np.abs(found.values[0] - truth) < 1.96 * found.stderr[0])
@@ -49,7 +49,7 @@ def test_intervals_of_pulse_responses_hold_for_coloured_noise():
 
 @pytest.mark.parametrize("kernel", ["tc", "dc"])
 def test_a_kernel_smooths_a_short_record(kernel):
-    quick = P("y", ("u",), 0.1, a=[1, -0.6], b=[[0.5]], c=[1, -0.6])
+    quick = P(("u",), "y", 0.1, a=[1, -0.6], b=[[0.5]], c=[1, -0.6])
     truth = lfilter(*quick.transfer("u"), np.eye(1, 40)[0])
     miss = np.zeros(2)
     for seed in range(4):
@@ -175,7 +175,7 @@ def test_residuals_of_two_outputs_are_tested_against_each_other():
     assert tests.test("ε′ε", "z", "y").verdict.value == "fail"
     assert tests.test("ε′ε", "y", "z").verdict.value == "pass"
     assert fid.residual_tests(fits, outputs=["y"]).outputs == ("y",)
-    other = fid.identify(P.arx("u", "z", na=1, nb=1), flown(P("z", ("u",), 0.1, b=[[1.0]]), 1))
+    other = fid.identify(P.arx("u", "z", na=1, nb=1), flown(P(("u",), "z", 0.1, b=[[1.0]]), 1))
     with pytest.raises(DataError, match="fits of different records"):
         fid.residual_tests([fits[0], other])
 

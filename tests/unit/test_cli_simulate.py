@@ -61,7 +61,7 @@ def test_a_nonlinear_model_rests_at_its_trim(tmp_path: Path) -> None:
 
 
 def test_black_boxes_fly_too(tmp_path: Path) -> None:
-    model = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -0.5], b=[[1.0]])
+    model = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -0.5], b=[[1.0]])
     path = fid.write_model(model, tmp_path / "arx.toml")
     out = tmp_path / "y.csv"
     words = ["simulate", "model", str(path), "--rate", "10", "--input", "u=step:1:0"]
@@ -105,7 +105,7 @@ def test_options_that_exclude_each_other(tmp_path: Path, capsys) -> None:
     ):
         assert run([*start, *words]) == 2
         assert said in capsys.readouterr().err
-    arx = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -0.5], b=[[1.0]])
+    arx = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -0.5], b=[[1.0]])
     path = fid.write_model(arx, tmp_path / "arx.toml")
     assert run(["simulate", "model", str(path), "--value", "a1=3"]) == 2
     assert "named parameters" in capsys.readouterr().err

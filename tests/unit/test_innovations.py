@@ -43,7 +43,7 @@ def test_recursion_by_doubling_is_the_recursion():
 def test_noise_free_records_give_the_model_back(method, direct):
     d = np.array([[0.3, -0.2], [0.1, 0.4]]) if direct else None
     a, b, c, _, k = PAIR.matrices
-    truth = M(PAIR.outputs, PAIR.inputs, 0.1, a, b, c, d, k, units=PAIR.units)
+    truth = M(PAIR.inputs, PAIR.outputs, 0.1, a, b, c, d, k, units=PAIR.units)
     structure = M.subspace(("u", "v"), ("y", "z"), method=method, direct=direct, offsets="none")
     fit = fid.identify(structure, [flown(truth, 1, n=300), flown(truth, 2, n=200)])
     assert fit.model.order == 4
@@ -57,7 +57,7 @@ def test_noise_free_records_give_the_model_back(method, direct):
 
 def test_unstable_models_are_found_too():
     a, b, c, _, k = SINGLE.matrices
-    truth = M(("y",), ("u",), 0.1, a * 1.1, b, c, None, k)
+    truth = M(("u",), ("y",), 0.1, a * 1.1, b, c, None, k)
     fit = fid.identify(
         M.subspace("u", "y", 2, offsets="none", horizon=8),
         [flown(truth, seed, n=80, noise=0.1, warm_up=0) for seed in range(4)],
@@ -176,9 +176,9 @@ def test_forms_of_one_model_agree(noisy):
 
 
 def test_delayed_responses_have_no_zeros_at_infinity():
-    poly = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], nk=(4,))
+    poly = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], nk=(4,))
     a, b, c, d, k = poly.state_space()
-    model = M(("y",), ("u",), 0.1, a, b, c, d, k)
+    model = M(("u",), ("y",), 0.1, a, b, c, d, k)
     zeros = model.zeros()["y/u"]
     assert_close(zeros[np.abs(zeros) > 1e-3], [-0.5], rtol=1e-9, why="one zero of B")
 
@@ -241,13 +241,13 @@ def test_records_that_cannot_do_are_refused():
 
 def test_models_that_contradict_themselves_are_refused():
     with pytest.raises(ModelError, match="matrix B"):
-        M(("y",), ("u",), 0.1, [[0.5]], [[1.0, 2.0]], [[1.0]])
+        M(("u",), ("y",), 0.1, [[0.5]], [[1.0, 2.0]], [[1.0]])
     with pytest.raises(ModelError, match="matrix A"):
-        M(("y",), ("u",), 0.1, [[np.nan]], [[1.0]], [[1.0]])
+        M(("u",), ("y",), 0.1, [[np.nan]], [[1.0]], [[1.0]])
     with pytest.raises(ModelError, match="sample time"):
-        M(("y",), ("u",), 0.0, [[0.5]], [[1.0]], [[1.0]])
+        M(("u",), ("y",), 0.0, [[0.5]], [[1.0]], [[1.0]])
     with pytest.raises(ModelError, match="noise covariance"):
-        M(("y",), ("u",), 0.1, [[0.5]], [[1.0]], [[1.0]], noise_covariance=np.eye(2))
+        M(("u",), ("y",), 0.1, [[0.5]], [[1.0]], [[1.0]], noise_covariance=np.eye(2))
     with pytest.raises(ModelError, match="has no outputs"):
         M.from_dict({"a": []})
     with pytest.raises(ModelError, match="must be a list"):
@@ -261,13 +261,13 @@ def test_predictions_refuse_what_they_do_not_know():
     with pytest.raises(OptionError, match=r"initial.state"):
         fid.predict(SINGLE, record, initial_state="backcast")
     with pytest.raises(DataError, match="another sample time"):
-        fid.predict(M(("y",), ("u",), 0.2, [[0.5]], [[1.0]], [[1.0]]), record)
+        fid.predict(M(("u",), ("y",), 0.2, [[0.5]], [[1.0]], [[1.0]]), record)
 
 
 def test_a_run_that_leaves_the_numbers_is_held():
     record = flown(SINGLE, 1, n=400)
     run = fid.predict(
-        M(("y",), ("u",), 0.1, [[3.0]], [[1.0]], [[1.0]]), record, initial_state="zero"
+        M(("u",), ("y",), 0.1, [[3.0]], [[1.0]], [[1.0]]), record, initial_state="zero"
     )
     assert run.diverged_at is not None
     assert np.all(np.isfinite(run.predicted["y"]))

@@ -105,8 +105,8 @@ def test_whole_delays_of_a_sampled_system_become_registers() -> None:
 
 def test_every_kind_of_model_gives_one() -> None:
     omega = np.array([0.7, 3.0])
-    polynomial = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
-    innovations = fid.InnovationsModel(("y",), ("u",), 0.1, [[0.9]], [[1.0]], [[1.0]])
+    polynomial = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
+    innovations = fid.InnovationsModel(("u",), ("y",), 0.1, [[0.9]], [[1.0]], [[1.0]])
     for model in (
         fid.load_model("rate_first_order"),
         fid.load_model("r50_hover"),

@@ -164,7 +164,7 @@ def test_sampled_models_are_turned_to_continuous_time() -> None:
         why="exact zero-order hold",
     )
     rig = fid.PolynomialModel(
-        "y", ("u",), 0.1, a=[1, -2.372, 1.465, 0.2673, -0.351], b=[[0.1, 0.2, 0.1, 0.1]]
+        ("u",), "y", 0.1, a=[1, -2.372, 1.465, 0.2673, -0.351], b=[[0.1, 0.2, 0.1, 0.1]]
     )
     found = fid.modes(rig)
     lost = [m for m in found if m.eigenvalue is None]
@@ -178,7 +178,7 @@ def test_sampled_models_are_turned_to_continuous_time() -> None:
 def test_black_box_fits_have_intervals_like_their_roots() -> None:
     random = np.random.default_rng(3)
     u = random.standard_normal(600)
-    truth = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
+    truth = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
     record = fid.Record.from_arrays(
         np.arange(600) / 10, inputs={"u": u}, outputs={"y": np.zeros(600)}
     )

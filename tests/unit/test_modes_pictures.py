@@ -67,7 +67,7 @@ def test_report_blocks() -> None:
     assert isinstance(figure, Figure)
     assert isinstance(parts, TableBlock)
     assert parts.folded
-    box = fid.PolynomialModel("y", ("u",), 0.1, a=[1.0, 0.5], b=[[1.0]])
+    box = fid.PolynomialModel(("u",), "y", 0.1, a=[1.0, 0.5], b=[[1.0]])
     assert len(modes_blocks(fid.modes(box))) == 2
 
 

@@ -24,7 +24,7 @@ from flightid.models.narx.terms import product_term
 from tests.closeness import assert_close
 from tests.narx_records import quadratic
 
-MODEL = fid.NarxStructure("y", ("u",), 1, 2, kernel=None, degree=2, stop="bic")
+MODEL = fid.NarxStructure(("u",), "y", 1, 2, kernel=None, degree=2, stop="bic")
 
 
 def test_recovers_a_polynomial_system_exactly_and_runs_freely_on_new_data() -> None:
@@ -95,7 +95,7 @@ def test_horizons_one_k_and_free_run() -> None:
     [("beta", 2.0, 2.0), ("matlab_spread", 2.0, 2.0 / 0.8326), ("sigma", 2.0, 2.0 * math.sqrt(2))],
 )
 def test_width_conventions(convention: str, width: float, beta: float) -> None:
-    model = fid.NarxStructure("y", ("u",), 2, 2, width=width, width_convention=convention)
+    model = fid.NarxStructure(("u",), "y", 2, 2, width=width, width_convention=convention)
     assert_close(model.beta, beta, rtol=1e-15, why="definition")
     assert f"β = {beta:.4g} ({convention} 2)" in repr(model)
 
@@ -106,7 +106,7 @@ def test_width_conventions(convention: str, width: float, beta: float) -> None:
 @pytest.mark.parametrize("candidates", ["data", "kmeans", "grid"])
 def test_radial_models_beat_the_linear_one(kernel: str, candidates: str) -> None:
     model = fid.NarxStructure(
-        "y", ("u",), 1, 2, kernel=kernel, width=3.0, candidates=candidates,
+        ("u",), "y", 1, 2, kernel=kernel, width=3.0, candidates=candidates,
         n_candidates=4 if candidates == "grid" else 40, maximum_terms=14,
     )  # fmt: skip
     fit = fid.identify(model, quadratic(noise=0.01))
@@ -122,7 +122,7 @@ def test_radial_models_beat_the_linear_one(kernel: str, candidates: str) -> None
 
 
 def test_centres_computed_on_the_fly_give_the_same_model(monkeypatch: pytest.MonkeyPatch) -> None:
-    model = fid.NarxStructure("y", ("u",), 1, 2, width=3.0, maximum_terms=10)
+    model = fid.NarxStructure(("u",), "y", 1, 2, width=3.0, maximum_terms=10)
     kept = fid.identify(model, quadratic(150, noise=0.01))
     monkeypatch.setattr("flightid.identification.narx.fit.MAXIMUM_BYTES", 0)
     lazy = fid.identify(model, quadratic(150, noise=0.01))
@@ -193,14 +193,14 @@ def test_findings_of_a_model_that_runs_away() -> None:
     y = np.cumsum(u + 0.5 * rng.standard_normal(60))
     record = fid.Record.from_arrays(np.arange(60) / 5, inputs={"u": u}, outputs={"y": y})
     model = fid.NarxStructure(
-        "y", ("u",), 3, 3, kernel=None, degree=3, stop="terms", maximum_terms=40, guard=1.5
+        ("u",), "y", 3, 3, kernel=None, degree=3, stop="terms", maximum_terms=40, guard=1.5
     )
     codes = {finding.code for finding in fid.identify(model, record).findings}
     assert codes == {"free-run-unstable", "loses-to-linear"}
 
 
 def test_collinear_candidates_are_counted() -> None:
-    model = fid.NarxStructure("y", ("u",), 1, 1, width=100.0, stop="terms", maximum_terms=8)
+    model = fid.NarxStructure(("u",), "y", 1, 1, width=100.0, stop="terms", maximum_terms=8)
     fit = fid.identify(model, quadratic(noise=0.01))
     finding = next(item for item in fit.findings if item.code == "collinear-candidates")
     assert "reduce the width" in finding.action
@@ -243,7 +243,7 @@ def test_search_says_when_the_best_loses_to_the_linear_model() -> None:
             y[t] = 0.9 * y[t - 1] + u[t - 1] + rng.standard_normal()
         return fid.Record.from_arrays(np.arange(80) / 5, inputs={"u": u}, outputs={"y": y})
 
-    model = fid.NarxStructure("y", ("u",), 2, 2, width=1.0, stop="terms", maximum_terms=40)
+    model = fid.NarxStructure(("u",), "y", 2, 2, width=1.0, stop="terms", maximum_terms=40)
     found = fid.validation.search_narx(model, linear(0), linear(1))
     assert "loses-to-linear" in {finding.code for finding in found.findings}
 
@@ -252,7 +252,7 @@ def test_search_keeps_structures_that_cannot_be_fitted_with_the_reason() -> None
     u = np.sin(0.3 * np.arange(200))
     y = np.concatenate([[0.0], u[:-1]]) ** 2
     record = fid.Record.from_arrays(np.arange(200) / 5, inputs={"u": u}, outputs={"y": y})
-    model = fid.NarxStructure("y", ("u",), 1, 1, maximum_terms=8)
+    model = fid.NarxStructure(("u",), "y", 1, 1, maximum_terms=8)
     found = fid.validation.search_narx(model, record, record, lags=[(1, 4), (1, 1)])
     assert found.trials[1].fit is None
     assert "cannot be told apart" in found.summary().to_text()

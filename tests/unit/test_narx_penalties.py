@@ -15,7 +15,7 @@ from flightid.identification.narx.regressors import regressors_of
 from tests.closeness import assert_close
 from tests.narx_records import quadratic
 
-MODEL = fid.NarxStructure("y", ("u",), 2, 2, kernel=None, degree=2, stop="aic")
+MODEL = fid.NarxStructure(("u",), "y", 2, 2, kernel=None, degree=2, stop="aic")
 
 
 def _problem(fit: fid.Fit, record: fid.Record) -> tuple[np.ndarray, np.ndarray]:

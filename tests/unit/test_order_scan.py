@@ -67,7 +67,7 @@ def test_the_table_marks_what_each_criterion_takes(scan):
 
 
 def test_arx_with_two_inputs_and_delays():
-    truth = P("y", ("u", "v"), 0.1, a=[1, -0.8], b=[[1.0], [0.5]], nk=(2, 2))
+    truth = P(("u", "v"), "y", 0.1, a=[1, -0.8], b=[[1.0], [0.5]], nk=(2, 2))
     scan = fid.scan_orders(
         flown(truth, 2, n=900, noise=0.2),
         flown(truth, 3, n=900, noise=0.2),
@@ -81,7 +81,7 @@ def test_arx_with_two_inputs_and_delays():
 
 @pytest.mark.parametrize(("kind", "more"), [("oe", {}), ("bj", {"nc": 1, "nd": 1})])
 def test_output_error_and_box_jenkins_are_scanned_by_full_fits(kind, more):
-    truth = P("y", ("u",), 0.1, b=[[1.0]], f=[[1, -0.8]], c=[1, 0.4], d=[1, -0.7])
+    truth = P(("u",), "y", 0.1, b=[[1.0]], f=[[1, -0.8]], c=[1, 0.4], d=[1, -0.7])
     scan = fid.scan_orders(
         flown(truth, 4, n=500, noise=0.1),
         flown(truth, 5, n=500, noise=0.1),

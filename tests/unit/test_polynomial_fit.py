@@ -116,7 +116,7 @@ def test_regularised_arx_is_closer_to_the_truth_than_least_squares():
 
 
 def test_instruments_are_consistent_where_least_squares_is_not():
-    truth = P("y", ("u",), 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]], d=[1, -0.9])
+    truth = P(("u",), "y", 0.1, b=[[1.0, 0.5]], f=[[1, -1.5, 0.7]], d=[1, -0.9])
     records = [flown(truth, seed, n=3000, noise=0.5) for seed in (9, 10)]
     plain = fid.identify(P.arx("u", "y", na=2, nb=2), records)
     fit = fid.identify(P.arx("u", "y", na=2, nb=2, method="iv4"), records)
@@ -136,20 +136,20 @@ def test_a_pole_that_a_zero_cancels_is_named():
 
 
 def test_noise_zeros_at_the_circle_are_named_and_kept_inside():
-    truth = P("y", ("u",), 0.1, a=[1, -0.5], b=[[1.0]], c=[1, -1.0])
+    truth = P(("u",), "y", 0.1, a=[1, -0.5], b=[[1.0]], c=[1, -1.0])
     fit = fid.identify(
         P.armax("u", "y", na=1, nb=1, nc=1, initial_state="zero"),
         flown(truth, 12, n=300, noise=0.5, warm_up=0),
     )
     assert abs(fit.model.c[1]) < 1.0
-    flipped = P("y", ("u",), 0.1, a=[1, -0.5], b=[[1.0]], c=[1, -2.0])
+    flipped = P(("u",), "y", 0.1, a=[1, -0.5], b=[[1.0]], c=[1, -2.0])
     fit = fid.identify(P.armax("u", "y", na=1, nb=1, nc=1), flown(flipped, 12, n=900, noise=0.5))
     # A zero outside has the same spectrum as its reflection.
     assert_close(fit.model.c[1], -0.5, atol=0.15, why="900 samples")
 
 
 def test_an_unstable_plant_is_legal_and_can_be_held_stable():
-    truth = P("y", ("u",), 0.1, a=[1, -1.005], b=[[1.0]])
+    truth = P(("u",), "y", 0.1, a=[1, -1.005], b=[[1.0]])
     record = flown(truth, 13, n=300, noise=0.3, warm_up=0)
     fit = fid.identify(P.arx("u", "y", na=1, nb=1, offsets="none"), record)
     assert fit.model.a[1] < -1.0
@@ -218,7 +218,7 @@ def test_few_iterations_are_reported():
 
 
 def test_time_series_without_input():
-    truth = P("y", (), 0.1, a=[1, -1.2, 0.5], c=[1, 0.4])
+    truth = P((), "y", 0.1, a=[1, -1.2, 0.5], c=[1, 0.4])
     fit = fid.identify(P.armax((), "y", na=2, nb=0, nc=1), flown(truth, 20, n=3000, noise=1.0))
     errors = np.array([p.stderr for p in fit.parameters.values()])
     assert np.all(np.abs(fit.model.theta - truth.theta) < 4.0 * errors)

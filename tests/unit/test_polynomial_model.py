@@ -15,8 +15,8 @@ from tests.polynomial_records import ARMAX, TWO_INPUTS, flown
 
 # Equations 3 and 4 of the published twin-rotor model: main rotor voltage to pitch, 10 Hz.
 PITCH = fid.PolynomialModel(
-    "pitch",
     ("voltage",),
+    "pitch",
     0.1,
     a=[1, -2.372, 1.465, 0.2673, -0.351],
     b=[[-0.0007, 0.007, 0.0001, 0.006]],
@@ -38,7 +38,7 @@ def test_the_published_pitch_model_has_a_pole_without_continuous_counterpart():
 
 
 def test_a_negative_zero_outside_the_circle_is_a_sampling_zero():
-    model = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -0.5], b=[[1.0, 1.5]])
+    model = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -0.5], b=[[1.0, 1.5]])
     text = model.summary().to_text()
     assert "sampling makes such zeros" in text
     assert "non-minimum" not in text
@@ -50,7 +50,7 @@ def test_roots_at_origin_and_one_have_no_damping():
     assert "integrator" in one.reason
     assert one.natural_frequency_rad_s == 0.0
     assert one.time_constant_s is None
-    assert fid.PolynomialModel("y", ("u",), 1.0, a=[1, -1.0], b=[[1.0]]).gains() == {"y/u": None}
+    assert fid.PolynomialModel(("u",), "y", 1.0, a=[1, -1.0], b=[[1.0]]).gains() == {"y/u": None}
 
 
 def test_responses_agree_with_scipy_and_control():
@@ -84,7 +84,7 @@ def test_the_state_space_form_predicts_like_the_polynomials():
 
 
 def test_one_step_of_a_first_order_model_by_hand():
-    model = fid.PolynomialModel("y", ("u",), 1.0, a=[1, -0.5], b=[[2.0]], c=[1, 0.5])
+    model = fid.PolynomialModel(("u",), "y", 1.0, a=[1, -0.5], b=[[2.0]], c=[1, 0.5])
     record = fid.Record.from_arrays(
         [0.0, 1.0, 2.0], inputs={"u": [1.0, 0.0, 1.0]}, outputs={"y": [1.0, 3.0, 2.0]}
     )
@@ -126,7 +126,7 @@ def test_offsets_come_from_the_trim_where_that_is_asked():
 
 
 def test_an_unstable_free_run_is_held_and_flagged():
-    model = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1e4], b=[[1.0]])
+    model = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1e4], b=[[1.0]])
     record = fid.Record.from_arrays(
         np.arange(200) / 10, inputs={"u": np.ones(200)}, outputs={"y": np.zeros(200)}
     )
@@ -186,7 +186,7 @@ def test_missing_keys_and_polynomials_are_named():
     with pytest.raises(ModelError, match="no output"):
         fid.PolynomialModel.from_dict(content)
     with pytest.raises(ModelError, match="do not fit the inputs"):
-        fid.PolynomialModel("y", ("u", "v"), 0.1, b=[[1.0]])
+        fid.PolynomialModel(("u", "v"), "y", 0.1, b=[[1.0]])
 
 
 def test_records_that_do_not_belong_to_the_model():
@@ -196,11 +196,11 @@ def test_records_that_do_not_belong_to_the_model():
     with pytest.raises(OptionError, match=r"initial.state"):
         fid.predict(ARMAX, record, initial_state="backcast")
     with pytest.raises(UnknownNameError, match="theta"):
-        fid.predict(fid.PolynomialModel("theta", ("u",), 0.1, b=[[1.0]]), record)
+        fid.predict(fid.PolynomialModel(("u",), "theta", 0.1, b=[[1.0]]), record)
     with pytest.raises(DataError, match="another sample time"):
-        fid.predict(fid.PolynomialModel("y", ("u",), 0.2, b=[[1.0]]), record)
+        fid.predict(fid.PolynomialModel(("u",), "y", 0.2, b=[[1.0]]), record)
     with pytest.raises(UnitError, match="another unit in the record"):
-        fid.predict(fid.PolynomialModel("y", ("u",), 0.1, b=[[1.0]], units={"y": "m"}), record)
+        fid.predict(fid.PolynomialModel(("u",), "y", 0.1, b=[[1.0]], units={"y": "m"}), record)
 
 
 def test_the_noise_model_shapes_white_noise():
@@ -210,3 +210,11 @@ def test_the_noise_model_shapes_white_noise():
     shaped = lfilter(*TWO_INPUTS.noise_transfer, errors)
     free = fid.predict(TWO_INPUTS, record, "free_run").residual("y")
     assert_close(shaped[200:], free[200:], atol=0.05, why="two estimates of the start fade")
+
+
+def test_inputs_stand_before_the_output() -> None:
+    for turned in (("y", ("u",)), ("y", "u")):
+        with pytest.raises(ModelError, match="inputs stand before the output"):
+            fid.PolynomialModel(*turned, 0.1, b=[[1.0]])
+        with pytest.raises(ModelError, match="inputs stand before the output"):
+            fid.NarxStructure(*turned, 1, 1)

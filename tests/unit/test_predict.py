@@ -26,12 +26,12 @@ def _lag_record(n: int = 400, *, level: float = 0.0, start: float = 0.0) -> fid.
 
 
 def _polynomial(**options: object) -> fid.PolynomialModel:
-    return fid.PolynomialModel("y", ("u",), STEP_S, a=[1, -0.9], b=[[0.5]], **options)
+    return fid.PolynomialModel(("u",), "y", STEP_S, a=[1, -0.9], b=[[0.5]], **options)
 
 
 def _innovations(**options: object) -> fid.InnovationsModel:
     return fid.InnovationsModel(
-        ("y",), ("u",), STEP_S, [[0.9]], [[0.5]], [[1.0]], k=[[0.9]], **options
+        ("u",), ("y",), STEP_S, [[0.9]], [[0.5]], [[1.0]], k=[[0.9]], **options
     )
 
 

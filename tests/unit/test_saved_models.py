@@ -15,14 +15,14 @@ from flightid.models.kinds import model_from_description, model_to_description
 from flightid.models.narx.scaling import Scaling
 
 ARMAX = fid.PolynomialModel(
-    "theta", ("v", "w"), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5], [0.3]], c=[1, 0.2], nk=(2, 1),
+    ("v", "w"), "theta", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5], [0.3]], c=[1, 0.2], nk=(2, 1),
     noise_variance=0.01, covariance=np.eye(6) * 1e-4, units={"theta": "rad", "v": "V"},
 )  # fmt: skip
 INNOVATIONS = fid.InnovationsModel(
-    ("p", "q"), ("lat",), 0.02, [[0.8, 0.1], [0.0, 0.3]], [[2.0], [1 / 3]], np.eye(2),
+    ("lat",), ("p", "q"), 0.02, [[0.8, 0.1], [0.0, 0.3]], [[2.0], [1 / 3]], np.eye(2),
     k=[[0.1, 0.0], [0.0, 0.2]], noise_covariance=np.diag([1e-3, 2e-3]), units={"p": "rad/s"},
 )  # fmt: skip
-STRUCTURE = fid.NarxStructure("y", ("u",), 2, 1, degree=2, width=1.3)
+STRUCTURE = fid.NarxStructure(("u",), "y", 2, 1, degree=2, width=1.3)
 NARX = NarxModel(
     STRUCTURE,
     (
@@ -56,7 +56,7 @@ def test_a_narx_equation_runs_as_before(tmp_path: Path) -> None:
 
 
 def test_a_narx_model_without_radial_terms_stays_so(tmp_path: Path) -> None:
-    bare = fid.NarxStructure("y", ("u",), 1, 1, kernel=None)
+    bare = fid.NarxStructure(("u",), "y", 1, 1, kernel=None)
     equation = NarxModel(bare, (Term("constant"),), (1.0,), NARX.scaling)
     back = fid.load_model(fid.write_model(equation, tmp_path / "narx.toml"))
     assert back.structure.kernel is None

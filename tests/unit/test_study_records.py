@@ -18,7 +18,7 @@ from flightid.report.html import to_html
 from flightid.report.text import to_text
 from flightid.study.settings import read_settings
 
-TRUTH = fid.PolynomialModel("angle", ("drive",), 0.1, a=[1, -1.6, 0.8], b=[[0.4]], nk=(2,))
+TRUTH = fid.PolynomialModel(("drive",), "angle", 0.1, a=[1, -1.6, 0.8], b=[[0.4]], nk=(2,))
 
 LINEAR = """
 [study]

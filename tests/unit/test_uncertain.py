@@ -100,7 +100,7 @@ def test_then_carries_on() -> None:
 
 def test_fits_of_every_kind_have_a_covariance() -> None:
     u = np.random.default_rng(0).standard_normal(600)
-    truth = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
+    truth = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
     record = fid.Record.from_arrays(
         np.arange(600) / 10, inputs={"u": u}, outputs={"y": np.zeros(600)}
     )

@@ -10,7 +10,7 @@ from flightid.errors import DataError, OptionError
 from flightid.validation.verification.baseline import baseline_of
 from tests.closeness import assert_close
 
-TRUTH = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
+TRUTH = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
 
 
 def fly(seed: int, *, offset: float = 0.0, curve: float = 0.0, name: str = "run") -> fid.Record:
@@ -56,7 +56,7 @@ def test_a_wrong_model_and_a_moved_point_are_red() -> None:
 
 
 def test_a_narx_model_runs_beside_the_linear_model_of_its_lags() -> None:
-    asked = fid.NarxStructure("y", ("u",), 2, 2, kernel=None, degree=2, stop="bic")
+    asked = fid.NarxStructure(("u",), "y", 2, 2, kernel=None, degree=2, stop="bic")
     fit = fid.identify(asked, fly(0, curve=0.8))
     linear = baseline_of(fit)
     found = fid.verify([fit, linear], fly(1, curve=0.8), names=["model", "linear"])
@@ -67,7 +67,7 @@ def test_a_narx_model_runs_beside_the_linear_model_of_its_lags() -> None:
     assert found.first.initial_state == "2 measured samples"
     # On a linear vehicle the same terms, chosen on few samples, have nothing to win.
     few = fid.identify(
-        fid.NarxStructure("y", ("u",), 2, 2, width=0.5, stop="terms", maximum_terms=40),
+        fid.NarxStructure(("u",), "y", 2, 2, width=0.5, stop="terms", maximum_terms=40),
         fly(0).segment(0.0, 10.0),
     )
     assert "loses-to-linear" in [finding.code for finding in fid.verify(few, fly(3)).findings]
@@ -75,7 +75,7 @@ def test_a_narx_model_runs_beside_the_linear_model_of_its_lags() -> None:
 
 def test_a_run_that_is_held_is_red() -> None:
     fit = fid.identify(
-        fid.NarxStructure("y", ("u",), 2, 2, kernel=None, degree=3, stop="terms", maximum_terms=25),
+        fid.NarxStructure(("u",), "y", 2, 2, kernel=None, degree=3, stop="terms", maximum_terms=25),
         fly(0).segment(0.0, 5.0),
     )
     record = fly(1)

@@ -56,7 +56,7 @@ def to_continuous(
     Example
     -------
     >>> import math
-    >>> roll = InnovationsModel(("p",), ("aileron",), 0.1, [[math.exp(-0.5)]], [[1.0]], [[1.0]])
+    >>> roll = InnovationsModel(("aileron",), ("p",), 0.1, [[math.exp(-0.5)]], [[1.0]], [[1.0]])
     >>> round(float(to_continuous(roll).a[0, 0]), 12)
     -5.0
     """
@@ -123,7 +123,7 @@ def to_discrete(source: object, sample_time_s: float, hold: str = "zero") -> Inn
     else:
         sampled = system.sampled(sample_time_s, "zero" if hold == "zero" else "first")
     found = sampled.state_space()[:4]
-    return InnovationsModel(sampled.outputs, sampled.inputs, sample_time_s, *found)
+    return InnovationsModel(sampled.inputs, sampled.outputs, sample_time_s, *found)
 
 
 def _require_hold(hold: str) -> None:

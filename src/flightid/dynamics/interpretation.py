@@ -99,7 +99,7 @@ class Interpretation(Result, schema="flightid.interpretation/1"):
 
     Example
     -------
-    >>> interpret(PolynomialModel("y", ("u",), 0.1, a=[1, -0.9], b=[[1.0]]))
+    >>> interpret(PolynomialModel(("u",), "y", 0.1, a=[1, -0.9], b=[[1.0]]))
     Interpretation(polynomial model: 1 pole, 0 zeros, 0 resonances)
     """
 
@@ -200,7 +200,7 @@ def interpret(
     Example
     -------
     >>> import numpy as np
-    >>> rig = PolynomialModel("y", ("u",), 0.1, a=[1, -2.372, 1.465, 0.2673, -0.351],
+    >>> rig = PolynomialModel(("u",), "y", 0.1, a=[1, -2.372, 1.465, 0.2673, -0.351],
     ...                       b=[[-0.0007, 0.007, 0.0001, 0.006]])
     >>> [round(item.frequency_hz, 3) for item in interpret(rig).resonances]
     [0.335]

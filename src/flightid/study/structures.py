@@ -87,8 +87,8 @@ def _narx(
 ) -> tuple[Fit, NarxSearch | None]:
     outputs_back, inputs_back = settings.orders["output_lags"], settings.orders["input_lags"]
     asked = NarxStructure(
-        settings.outputs[0],
         inputs,
+        settings.outputs[0],
         outputs_back[0],
         inputs_back[0],
         width=settings.widths[0],

@@ -37,8 +37,8 @@ class Advice(Result, schema="flightid.advice/1"):
 
     Attributes
     ----------
-    output : str
     inputs : tuple of str
+    output : str
     n_samples, n_records : int
     excitation_orders : mapping of str to int
         Order of persistent excitation of each input, at most 50: how many coefficients of B and A
@@ -55,8 +55,8 @@ class Advice(Result, schema="flightid.advice/1"):
     Advice('y' from u, 500 samples in 1 record, excitation order 2)
     """
 
-    output: str
     inputs: tuple[str, ...]
+    output: str
     n_samples: int
     n_records: int
     excitation_orders: Mapping[str, int]
@@ -106,10 +106,10 @@ def advise(
     Parameters
     ----------
     records : Record or sequence of Record
-    outputs : str, optional
-        Default: the only output.
     inputs : sequence of str, optional
         Default: all inputs.
+    outputs : str, optional
+        Default: the only output.
     n_lags : int
         Lags of the pulse response behind the delay.
     loop : {"open", "closed"}, optional
@@ -171,7 +171,7 @@ def advise(
         *_sampling(name, data),
         *_levels(names, data),
     )
-    return Advice(name, names, data.output.size, len(listed), orders, response, feedback, findings)
+    return Advice(names, name, data.output.size, len(listed), orders, response, feedback, findings)
 
 
 def excitation_order(row: Array, data: SampledChannels) -> int:

@@ -32,8 +32,8 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
 
     Attributes
     ----------
-    output : str
     inputs : tuple of str
+    output : str
     lags : ndarray of int, shape (n_lags,)
         Samples after the pulse; negative ones are the response before it, which only feedback has.
     values : ndarray, shape (n_inputs, n_lags)
@@ -54,8 +54,8 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
     'ImpulseResponse'
     """
 
-    output: str
     inputs: tuple[str, ...]
+    output: str
     lags: NDArray[np.int64]
     values: Array
     covariance: Array
@@ -142,10 +142,10 @@ def impulse_response(
     Parameters
     ----------
     records : Record or sequence of Record
-    outputs : str, optional
-        Default: the only output.
     inputs : sequence of str, optional
         Default: all inputs.
+    outputs : str, optional
+        Default: the only output.
     n_lags : int
         Lags from 0 on; the response should have died out by then.
     negative_lags : int
@@ -212,8 +212,8 @@ def impulse_response(
     values = np.array([theta[part] for part in parts])
     blocks = np.array([covariance[part, part] for part in parts])
     return ImpulseResponse(
-        name,
         names,
+        name,
         lags,
         values,
         blocks,

@@ -72,7 +72,7 @@ class NarxDetails(Details):
     >>> for t in range(1, 300):
     ...     y[t] = 0.7 * y[t - 1] + 0.4 * u[t - 1] - 0.3 * u[t - 1] ** 2
     >>> record = fid.Record.from_arrays(np.arange(300) / 10, inputs={"u": u}, outputs={"y": y})
-    >>> structure = fid.NarxStructure("y", ("u",), 1, 1, kernel=None, degree=2, stop="bic")
+    >>> structure = fid.NarxStructure(("u",), "y", 1, 1, kernel=None, degree=2, stop="bic")
     >>> fit = fid.identify(structure, record)
     >>> [chosen.term.name for chosen in fit.details.chosen]
     ['constant', 'y(t-1)', 'u(t-1)', 'u(t-1)^2']

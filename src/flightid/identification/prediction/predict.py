@@ -139,7 +139,7 @@ def predict(
     -------
     >>> import numpy as np
     >>> import flightid as fid
-    >>> truth = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
+    >>> truth = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
     >>> u = np.random.default_rng(0).standard_normal(300)
     >>> record = fid.Record.from_arrays(np.arange(300) / 10, inputs={"u": u},
     ...                                 outputs={"y": np.zeros(300)})
@@ -204,7 +204,7 @@ def _without_noise(system: LinearSystem) -> InnovationsModel:
     whole = system.with_pade()
     step_s = float(system.sample_time_s or 0.0)
     return InnovationsModel(
-        system.outputs, system.inputs, step_s, *whole.state_space()[:4], units=system.units
+        system.inputs, system.outputs, step_s, *whole.state_space()[:4], units=system.units
     )
 
 

@@ -48,7 +48,7 @@ class PolynomialDetails(Details):
     >>> import numpy as np
     >>> import flightid as fid
     >>> u = np.random.default_rng(0).standard_normal(500)
-    >>> truth = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
+    >>> truth = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
     >>> record = fid.Record.from_arrays(np.arange(500) / 10, inputs={"u": u},
     ...                                 outputs={"y": np.zeros(500)})
     >>> record = record.replace({"y": truth.simulate(record)})

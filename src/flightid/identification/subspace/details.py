@@ -26,7 +26,7 @@ class SubspaceDetails(PolynomialDetails):
     -------
     >>> import numpy as np
     >>> import flightid as fid
-    >>> truth = fid.InnovationsModel(("y",), ("u",), 0.1, [[0.9, 0.2], [-0.2, 0.9]],
+    >>> truth = fid.InnovationsModel(("u",), ("y",), 0.1, [[0.9, 0.2], [-0.2, 0.9]],
     ...                              [[1.0], [0.5]], [[1.0, 0.0]])
     >>> u = np.random.default_rng(0).standard_normal(400)
     >>> record = fid.Record.from_arrays(np.arange(400) / 10, inputs={"u": u},

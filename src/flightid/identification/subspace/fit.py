@@ -64,7 +64,7 @@ def _scaled(matrices: Matrices, size: Array) -> Matrices:
 
 
 def _unrefined(structure: SubspaceStructure, data: SubspaceData, start: Matrices) -> Refined:
-    model = InnovationsModel(structure.outputs, structure.inputs, 1.0, *start)
+    model = InnovationsModel(structure.inputs, structure.outputs, 1.0, *start)
     errors = tuple(
         one_step_errors(model, y, u, structure.initial_state)
         for y, u in zip(data.outputs, data.inputs, strict=True)
@@ -85,8 +85,8 @@ def _assemble(
     errors = tuple(size[:, None] * e for e in found.errors)
     joint = np.hstack(errors)
     model = InnovationsModel(
-        structure.outputs,
         structure.inputs,
+        structure.outputs,
         data.channels.sample_time_s,
         *_scaled(found.matrices, size),
         noise_covariance=joint @ joint.T * (len(size) / found.degrees),

@@ -140,7 +140,7 @@ def choose_order(
 def _prediction_criteria(
     structure: SubspaceStructure, data: SubspaceData, matrices: Matrices, count: int
 ) -> Criteria:
-    model = InnovationsModel(structure.outputs, structure.inputs, 1.0, *matrices)
+    model = InnovationsModel(structure.inputs, structure.outputs, 1.0, *matrices)
     size = data.scales[:, None]
     errors = np.hstack(
         [

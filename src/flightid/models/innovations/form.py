@@ -27,8 +27,8 @@ ABSENT = 1e-9
 class InnovationsForm:
     """Base of `InnovationsModel`, whose docstring says what its fields are."""
 
-    outputs: tuple[str, ...]
     inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
     sample_time_s: float
     a: ArrayLike
     b: ArrayLike

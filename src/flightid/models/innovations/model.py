@@ -26,7 +26,7 @@ class InnovationsModel(InnovationsForm, Tabled):
 
     Attributes
     ----------
-    outputs, inputs : tuple of str
+    inputs, outputs : tuple of str
         p and m channel names.
     sample_time_s : float
         Sample time T, s.
@@ -50,7 +50,7 @@ class InnovationsModel(InnovationsForm, Tabled):
 
     Example
     -------
-    >>> roll = InnovationsModel(("p",), ("aileron",), 0.1, [[0.8]], [[2.0]], [[1.0]])
+    >>> roll = InnovationsModel(("aileron",), ("p",), 0.1, [[0.8]], [[2.0]], [[1.0]])
     >>> roll
     InnovationsModel(1 state, p from aileron, T 0.1 s)
     >>> roll.poles()

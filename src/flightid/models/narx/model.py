@@ -49,7 +49,7 @@ class NarxModel(Tabled):
     >>> from flightid.models.narx.terms import product_term
     >>> scaling = Scaling({"y": 0.0, "u": 0.0}, {"y": 1.0, "u": 1.0}, {"y": "1", "u": "1"}, 0.1,
     ...                   (-1.0, 1.0))
-    >>> NarxModel(NarxStructure("y", ("u",), 1, 1), (product_term([Lag("y", 1)]),), (0.5,), scaling)
+    >>> NarxModel(NarxStructure(("u",), "y", 1, 1), (product_term([Lag("y", 1)]),), (0.5,), scaling)
     NarxModel('y' from u, 1 term, T 0.1 s)
     """
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from flightid.errors import OptionError
 from flightid.models.narx.terms import KERNELS, WIDTH_FACTORS, Lag, width_to_beta
+from flightid.models.sampled.channel_order import require_inputs_first
 from flightid.options import Options, option
 
 STOPS = ("press", "sse", "err", "terms", "aic", "aicc", "bic")
@@ -22,8 +23,8 @@ class NarxStructure(Options):
 
     Attributes
     ----------
-    output : str
     inputs : tuple of str
+    output : str
     output_lags, input_lags : int
         n_y, and n_u of each input.
     delay : int
@@ -73,12 +74,12 @@ class NarxStructure(Options):
 
     Example
     -------
-    >>> NarxStructure("theta", ("voltage",), 4, 4, width=2.0, width_convention="sigma")
+    >>> NarxStructure(("voltage",), "theta", 4, 4, width=2.0, width_convention="sigma")
     NarxStructure('theta' from voltage, 4 + 4 lags, gaussian β = 2.828 (sigma 2), stop press)
     """
 
-    output: str
     inputs: tuple[str, ...]
+    output: str
     output_lags: int = option(minimum=0, unit="samples", doc="Lags of the output.")
     input_lags: int = option(minimum=0, unit="samples", doc="Lags of each input.")
     delay: int = option(1, minimum=0, unit="samples", doc="Smallest lag of the inputs.")
@@ -102,6 +103,7 @@ class NarxStructure(Options):
     guard: float = option(3.0, minimum=1.0, unit="half ranges", doc="Where predictions are held.")
 
     def __post_init__(self) -> None:
+        require_inputs_first(self.inputs, self.output)
         object.__setattr__(self, "inputs", tuple(self.inputs))
         super().__post_init__()
         if not self.lags:

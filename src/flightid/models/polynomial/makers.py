@@ -48,7 +48,7 @@ class StructureMakers:
         names = (inputs,) if isinstance(inputs, str) else tuple(inputs)
         n = len(names)
         b, f, k = per_input(nb, n), per_input(nf, n), per_input(nk, n)
-        return PolynomialStructure(outputs, names, na, b, nc, nd, f, k, **options)
+        return PolynomialStructure(names, outputs, na, b, nc, nd, f, k, **options)
 
     @staticmethod
     def arx(

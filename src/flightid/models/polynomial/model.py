@@ -23,8 +23,8 @@ class PolynomialModel(Polynomials, StructureMakers, Tabled):
 
     Attributes
     ----------
-    output : str
     inputs : tuple of str
+    output : str
     sample_time_s : float
         Sample time T, s.
     a, c, d : ndarray
@@ -54,7 +54,7 @@ class PolynomialModel(Polynomials, StructureMakers, Tabled):
 
     Example
     -------
-    >>> pitch = PolynomialModel("theta", ("voltage",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
+    >>> pitch = PolynomialModel(("voltage",), "theta", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]])
     >>> pitch
     PolynomialModel(ARX, 'theta' from voltage, na 2, nb 2, nk 1, T 0.1 s)
     >>> print(pitch.difference_equation())

@@ -15,6 +15,7 @@ from flightid.models.estimated import Estimated
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.parameters import Parameter
 from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.sampled.channel_order import require_inputs_first
 from flightid.models.sampled.coefficients import coefficients, replaced
 from flightid.models.sampled.discrete_modes import DiscreteMode, discrete_modes, polynomial_roots
 
@@ -26,8 +27,8 @@ Matrices = tuple[Array, Array, Array, Array, Array]
 class Polynomials:
     """Base of `PolynomialModel`, whose docstring says what its fields are."""
 
-    output: str
     inputs: tuple[str, ...]
+    output: str
     sample_time_s: float
     a: ArrayLike = (1.0,)
     b: Sequence[ArrayLike] = ()
@@ -43,6 +44,7 @@ class Polynomials:
     estimated: Estimated | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
+        require_inputs_first(self.inputs, self.output)
         inputs = tuple(self.inputs)
         object.__setattr__(self, "inputs", inputs)
         for letter in "acd":
@@ -89,8 +91,8 @@ class Polynomials:
         n = len(structure.inputs)
         one = np.ones(1)
         return cls(
-            structure.output,
             structure.inputs,
+            structure.output,
             sample_time_s,
             np.concatenate([one, parts[0]]),
             parts[1 : n + 1],
@@ -109,8 +111,8 @@ class Polynomials:
     def structure(self) -> PolynomialStructure:
         """Orders of the model, with the default options of `identify`."""
         return PolynomialStructure(
-            self.output,
             self.inputs,
+            self.output,
             np.size(self.a) - 1,
             tuple(np.size(row) for row in self.b),
             np.size(self.c) - 1,

@@ -41,8 +41,8 @@ class PolynomialStructure(Options):
 
     Attributes
     ----------
-    output : str
     inputs : tuple of str
+    output : str
     na, nc, nd : int
         Degrees of A, C, D.
     nb, nf, nk : tuple of int
@@ -77,12 +77,12 @@ class PolynomialStructure(Options):
 
     Example
     -------
-    >>> PolynomialStructure("y", ("u",), 2, (2,), 1, 0, (0,), (1,))
+    >>> PolynomialStructure(("u",), "y", 2, (2,), 1, 0, (0,), (1,))
     PolynomialStructure(ARMAX, 'y' from u, na 2, nb 2, nc 1, nk 1)
     """
 
-    output: str
     inputs: tuple[str, ...]
+    output: str
     na: int
     nb: tuple[int, ...]
     nc: int

@@ -155,7 +155,7 @@ def search_narx(
     ...     for t in range(2, 200):
     ...         y[t] = 0.8 * np.tanh(y[t - 1]) + 0.5 * u[t - 2]
     ...     return fid.Record.from_arrays(np.arange(200) / 5, inputs={"u": u}, outputs={"y": y})
-    >>> search = search_narx(fid.NarxStructure("y", ("u",), 1, 1, maximum_terms=8), fly(0), fly(1),
+    >>> search = search_narx(fid.NarxStructure(("u",), "y", 1, 1, maximum_terms=8), fly(0), fly(1),
     ...                      lags=[(1, 1), (1, 2)])
     >>> search.best.structure.input_lags, search.trials[0].baseline.rms > search.trials[0].score.rms
     (2, True)

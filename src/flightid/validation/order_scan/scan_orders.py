@@ -98,7 +98,7 @@ def scan_orders(
     -------
     >>> import numpy as np
     >>> import flightid as fid
-    >>> truth = fid.PolynomialModel("y", ("u",), 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], nk=(2,))
+    >>> truth = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.5, 0.7], b=[[1.0, 0.5]], nk=(2,))
     >>> def fly(seed):
     ...     u, noise = np.random.default_rng(seed).standard_normal((2, 400))
     ...     record = fid.Record.from_arrays(np.arange(400) / 10, inputs={"u": u},

@@ -139,8 +139,8 @@ def residual_tests(
         for kind, name in _kinds(data, output)
     )
     return ResidualTests(
-        tuple(data.residuals),
         tuple(data.inputs),
+        tuple(data.residuals),
         tests,
         data.horizon,
         data.predictor,

@@ -29,7 +29,7 @@ class ResidualTests(Result, schema="flightid.residual_tests/1"):
 
     Attributes
     ----------
-    outputs, inputs : tuple of str
+    inputs, outputs : tuple of str
         Channels.
     tests : tuple of CorrelationTest
         By output: whiteness, then the functions of each input.
@@ -60,8 +60,8 @@ class ResidualTests(Result, schema="flightid.residual_tests/1"):
     ResidualTests(1 output, 1 input, 1000 samples, 5 of 5 tests passed)
     """
 
-    outputs: tuple[str, ...]
     inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
     tests: tuple[CorrelationTest, ...]
     horizon: Horizon
     predictor: str

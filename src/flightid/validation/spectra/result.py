@@ -21,7 +21,7 @@ class ResidualSpectra(Result, schema="flightid.residual_spectra/1"):
     ----------
     omega_rad_s : ndarray, shape (n_f,)
         Frequencies, rad/s.
-    outputs, inputs : tuple of str
+    inputs, outputs : tuple of str
         Channels.
     units : mapping of str to str
         Unit by channel.
@@ -45,8 +45,8 @@ class ResidualSpectra(Result, schema="flightid.residual_spectra/1"):
     """
 
     omega_rad_s: NDArray[np.float64]
-    outputs: tuple[str, ...]
     inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
     units: Mapping[str, str]
     density: NDArray[np.float64]
     low: NDArray[np.float64]

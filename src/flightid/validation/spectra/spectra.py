@@ -96,8 +96,8 @@ def residual_spectra(
     limit = np.broadcast_to(1.0 - (1.0 - LEVEL) ** (1.0 / free), response.coherence.shape)
     return ResidualSpectra(
         response.omega_rad_s,
-        response.outputs,
         response.inputs,
+        response.outputs,
         dict(response.units),
         density,
         low,
