@@ -81,7 +81,7 @@ def _ours(inputs: np.ndarray, start: np.ndarray) -> Callable[[], object]:
     record = (inputs, np.zeros((12, N_SAMPLES)), SAMPLE_S)
     own = (start, np.zeros(4), np.zeros(12), [], [], [])
     values, free = model.parameters.independent_values(), model.parameters.free_indices
-    return lambda: runs.run_record(0, values, free, record, own, True, True)
+    return lambda: runs.run_record(0, values, free, record, own, "first", True)
 
 
 def _aeroid(inputs: np.ndarray, start: np.ndarray, values: dict[str, float]) -> Any:

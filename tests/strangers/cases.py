@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tests.strangers import aircraft, output_error
+from tests.strangers import aircraft, holds, output_error
 from tests.strangers.counting import Case
 
-CASES: tuple[Case, ...] = (*output_error.CASES, *aircraft.CASES)
+CASES: tuple[Case, ...] = (*output_error.CASES, *aircraft.CASES, *holds.CASES)

@@ -60,7 +60,7 @@ def test_an_unstable_helicopter_in_hover_is_recovered_in_part() -> None:
         assert_close(fit.parameters[name].value, expected, rtol=1e-6, why="noise-free")
 
 
-@pytest.mark.parametrize("hold", ["first", "zero"])
+@pytest.mark.parametrize("hold", ["first", "zero", "band_limited"])
 @pytest.mark.parametrize("tau", [0.013, 0.0413, 0.0])
 def test_sensitivities_match_central_differences(hold: str, tau: float) -> None:
     model = _library("short_period").with_fixed(Malphadot=-0.9).with_values({"tau": tau or 0.001})
@@ -75,12 +75,12 @@ def test_sensitivities_match_central_differences(hold: str, tau: float) -> None:
     def outputs(values: Array, numbers: object = own) -> Array:
         native = numbers.native  # type: ignore[attr-defined]
         return model.native.run_record(
-            values, free, prepared.arrays[0], native, prepared.first_order_hold, False
+            values, free, prepared.arrays[0], native, prepared.hold, False
         )[0]
 
-    slopes = model.native.run_record(
-        at, free, prepared.arrays[0], own.native, prepared.first_order_hold, True
-    )[1]
+    slopes = model.native.run_record(at, free, prepared.arrays[0], own.native, prepared.hold, True)[
+        1
+    ]
     for column, place in enumerate(free):
         step = np.zeros_like(at)
         step[place] = 1e-6 * max(abs(at[place]), 0.01)

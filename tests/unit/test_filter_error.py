@@ -18,8 +18,7 @@ from tests.regression_flights import fly, noisy, short_period, values
 def test_steady_filter_is_the_textbook_one() -> None:
     a = np.array([[-1.0, 0.5], [-3.0, 0.2]])
     c, w = np.array([[1.0, 0.0]]), np.diag([0.3, 0.8])
-    none = np.zeros((2, 0))
-    point = ContinuousPoint(a, none, c, np.zeros((1, 0)), w, np.array([[0.1]]))
+    point = ContinuousPoint(a, c, w, np.array([[0.1]]))
     found = steady_filter(point, [], 0.05)[0]
     phi = _native.matrix_exponential(a * 0.05)
     grid = (np.arange(2000) + 0.5) / 2000 * 0.05
@@ -30,15 +29,15 @@ def test_steady_filter_is_the_textbook_one() -> None:
 
 
 def test_an_unstable_part_that_no_output_sees_has_no_filter() -> None:
-    a, none = np.diag([-1.0, 2.0]), np.zeros((2, 0))
-    point = ContinuousPoint(
-        a, none, np.array([[1.0, 0.0]]), np.zeros((1, 0)), np.eye(2), np.array([[0.1]])
-    )
+    seen = np.array([[1.0, 0.0]])
+    point = ContinuousPoint(np.diag([-1.0, 2.0]), seen, np.eye(2), np.array([[0.1]]))
     with pytest.raises(FitError, match="no steady filter"):
         steady_filter(point, [], 0.1)
 
 
-def _problem(model: fid.StateSpaceModel) -> tuple[InnovationsProblem, np.ndarray]:
+def _problem(
+    model: fid.StateSpaceModel, hold: str = "first"
+) -> tuple[InnovationsProblem, np.ndarray]:
     generator = np.random.default_rng(0)
     walk = np.cumsum(generator.standard_normal((4, 240)), axis=1)
     data = (
@@ -47,15 +46,16 @@ def _problem(model: fid.StateSpaceModel) -> tuple[InnovationsProblem, np.ndarray
     )
     scales = np.array([0.1, 0.2]), np.array([0.01, 0.02, 0.1])
     problem = InnovationsProblem(
-        model, data, (0, 1), *scales, output_bias=True, input_bias=True, hold="first"
+        model, data, (0, 1), *scales, output_bias=True, input_bias=True, hold=hold
     )
     start = np.array([*values(model).values(), -1.0, 0.5, 0.2, -0.3])
     start[5] = 0.013
     return problem, start
 
 
-def test_slopes_of_the_likelihood_are_exact() -> None:
-    problem, start = _problem(short_period())
+@pytest.mark.parametrize("hold", ["first", "zero", "band_limited"])
+def test_slopes_of_the_likelihood_are_exact(hold: str) -> None:
+    problem, start = _problem(short_period(), hold)
     residuals, jacobian = problem.residuals(start, with_slopes=True)
     gradient = 2.0 * jacobian.T @ residuals
 

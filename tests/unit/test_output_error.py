@@ -206,7 +206,7 @@ def test_residuals_and_costs_say_what_is_left() -> None:
 REFUSED = [
     ({"noise_covariance": "banded"}, OptionError, "noise_covariance is not known"),
     ({"loss": "l1"}, OptionError, "loss is not known"),
-    ({"hold": "band_limited"}, OptionError, "hold is not known"),
+    ({"hold": "second"}, OptionError, "hold is not known"),
     ({"start_from": "nowhere"}, OptionError, "start_from is not known"),
     ({"initial_state": "rest"}, OptionError, "initial_state is not known"),
     ({"initial_state": {"q": "loose"}}, OptionError, "initial_state of q is not known"),

@@ -12,9 +12,6 @@ from flightid.record.chosen_hold import ChosenHold, chosen_hold, hold_of_shapes
 from flightid.record.hold import HOLDS
 from flightid.responses import FrequencyResponse
 
-IN_TIME: tuple[InputHold, ...] = ("first", "zero")
-"""Holds that runs in time are made with."""
-
 
 def hold_for(
     options: type[Any], data: Sequence[object], given: Mapping[str, Any]
@@ -48,12 +45,11 @@ def hold_for(
         return ChosenHold(declared, "declared")
     records = [item for item in data if isinstance(item, Record)]
     responses = [item for item in data if isinstance(item, FrequencyResponse)]
-    known = IN_TIME if records else HOLDS
     if not responses:
-        return chosen_hold(records, None, known=known, assumed=assumed)
+        return chosen_hold(records, None, known=HOLDS, assumed=assumed)
     shapes = [("response", each.input_shape) for each in responses]
     shapes += [(each.name, each.input_shape) for each in records]
-    found = hold_of_shapes(shapes, known, assumed)
+    found = hold_of_shapes(shapes, HOLDS, assumed)
     # Without the records' samples or without the correction nothing runs between samples.
     idle = not records and (
         given.get("correct_bias") is False or all(each.linear is None for each in responses)

@@ -5,11 +5,13 @@
 //! samples the input is constant (zero-order hold) or linear (first-order hold), and a delay that is
 //! no multiple of T moves the corners of that input between the samples. Each step is cut at the
 //! corner and both pieces are integrated without approximation (Franklin, Powell & Workman, *Digital
-//! Control of Dynamic Systems*, 3rd ed., sections 4.3.3 and 6.3). Neighbouring samples act on a step;
-//! each is a tap with its weights.
+//! Control of Dynamic Systems*, 3rd ed., sections 4.3.3 and 6.3). A smooth input has no corners: it is
+//! taken as straight lines between points of a finer grid (`smooth_input.rs`). Neighbouring samples
+//! act on a step; each is a tap with its weights.
 
 use crate::error::CoreError;
 use crate::linear::hold_integrals::{HoldIntegrals, Jet, add_product};
+use crate::linear::smooth_input::{FINER, REACH, corner, interpolation};
 
 /// What an input does between its samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,6 +20,8 @@ pub enum Hold {
     Zero,
     /// Linear to the next sample.
     First,
+    /// Smooth, without power above half the sampling rate.
+    BandLimited,
 }
 
 /// Continuous state space, row-major, with one delay (s) for each input.
@@ -192,6 +196,9 @@ fn weights(
     hold: Hold,
 ) -> Result<Vec<Weight>, CoreError> {
     let (lag, f) = split_delay(delay_s, sample_s);
+    if hold == Hold::BandLimited {
+        return smooth_weights(a, n, sample_s, lag as isize, f);
+    }
     let early = HoldIntegrals::new(a, n, f * sample_s)?;
     let split;
     let late = if f == 0.0 {
@@ -209,6 +216,7 @@ fn weights(
     let s = 1.0 / sample_s;
     let first = -(lag as isize) - 1;
     let mut found = match hold {
+        Hold::BandLimited => Vec::new(),
         Hold::Zero => {
             let (past, now) = if f > 0.0 { (1.0, 0.0) } else { (0.0, 1.0) };
             vec![
@@ -249,6 +257,44 @@ fn weights(
         found.remove(0);
     }
     Ok(found)
+}
+
+/// Taps of a smooth input: straight lines between `FINER` points of the interval, whose weights on
+/// the end of the interval are shared out to the samples that make the points.
+fn smooth_weights(
+    a: &Jet,
+    n: usize,
+    sample_s: f64,
+    lag: isize,
+    f: f64,
+) -> Result<Vec<Weight>, CoreError> {
+    let parts = FINER as f64;
+    let step = sample_s / parts;
+    let fine = HoldIntegrals::new(a, n, step)?;
+    let count = a.slopes.len();
+    let at_end = sum(n, count, &[(1.0 / step, &fine.ramp)]);
+    let at_start = sum(n, count, &[(1.0, &fine.constant), (-1.0, &at_end)]);
+    // From the last point to the first: each step back is one more transition.
+    let mut points = vec![at_end.clone()];
+    let (mut start, mut end) = (at_start, at_end);
+    for _ in 1..FINER {
+        end = fine.transition.product(1.0, &end, n);
+        points.push(sum(n, count, &[(1.0, &start), (1.0, &end)]));
+        start = fine.transition.product(1.0, &start, n);
+    }
+    points.push(start);
+    points.reverse();
+    let shares: Vec<_> = (0..=FINER).map(|j| corner(j as f64 / parts - f, parts)).collect();
+    let samples = interpolation(-f);
+    let taps = samples.iter().enumerate().map(|(k, &(value, slope))| {
+        let each: Vec<_> = shares.iter().map(|share| share[k]).collect();
+        let terms: Vec<_> = each.iter().zip(&points).map(|(w, point)| (w.0, point)).collect();
+        let moved: Vec<_> =
+            each.iter().zip(&points).map(|(w, point)| (-w.1 / sample_s, &point.value)).collect();
+        let ahead = k as isize - REACH - lag;
+        weight(ahead, sum(n, count, &terms), combine(&moved), value, -slope / sample_s)
+    });
+    Ok(taps.collect())
 }
 
 /// Derivatives by the delay of what the early piece leaves after the late one: the early piece

@@ -5,3 +5,4 @@ pub mod discretisation;
 pub mod hold_integrals;
 pub mod linear_recursion;
 pub mod linear_simulation;
+pub mod smooth_input;

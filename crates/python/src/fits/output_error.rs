@@ -62,9 +62,17 @@ pub fn driven(records: &[Flown<'_>]) -> PyResult<Vec<RecordInputs>> {
         .collect()
 }
 
-/// Hold by its name's meaning.
-pub fn hold(first_order: bool) -> Hold {
-    if first_order { Hold::First } else { Hold::Zero }
+/// Hold by its name.
+///
+/// # Errors
+/// Another name.
+pub fn hold(name: &str) -> PyResult<Hold> {
+    match name {
+        "zero" => Ok(Hold::Zero),
+        "first" => Ok(Hold::First),
+        "band_limited" => Ok(Hold::BandLimited),
+        _ => Err(pyo3::exceptions::PyValueError::new_err(format!("no such hold: {name}"))),
+    }
 }
 
 /// A linear family on records.
@@ -74,10 +82,10 @@ pub fn hold(first_order: bool) -> Hold {
 pub fn linear<F: LinearFamily>(
     family: Result<F, CoreError>,
     records: &[Flown<'_>],
-    first_order: bool,
+    name: &str,
 ) -> PyResult<LinearTrajectories<F>> {
     let family = family.map_err(from_core)?;
-    LinearTrajectories::new(family, driven(records)?, hold(first_order)).map_err(from_core)
+    LinearTrajectories::new(family, driven(records)?, hold(name)?).map_err(from_core)
 }
 
 /// Measurements and own numbers of the records.

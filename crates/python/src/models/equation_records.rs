@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use crate::error::from_core;
 use crate::fits::frequency_fit::{Beside, WhitenedResponses};
 use crate::fits::output_error::{
-    Flown, NoiseArguments, Own, SearchArguments, driven, fit, hold, record_data, run,
+    Flown, NoiseArguments, Own, SearchArguments, driven, fit, hold as named, record_data, run,
 };
 use crate::models::state_space::StateSpace;
 
@@ -41,7 +41,7 @@ impl EquationRecords {
         values: &[f64],
         free: &[usize],
         records: &[Flown<'_>],
-        first_order_hold: bool,
+        hold: &str,
     ) -> PyResult<EquationTrajectories> {
         let known = self.substeps.iter().zip(&self.plans).skip(places.start);
         let passages = driven(records)?
@@ -54,8 +54,7 @@ impl EquationRecords {
             })
             .collect();
         let ode = self.ode.clone();
-        EquationTrajectories::new(ode, values, free, hold(first_order_hold), passages)
-            .map_err(from_core)
+        EquationTrajectories::new(ode, values, free, named(hold)?, passages).map_err(from_core)
     }
 }
 
@@ -78,11 +77,11 @@ impl EquationRecords {
         Ok(Self { model, ode, substeps, plans })
     }
 
-    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
+    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], hold: str, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
     ///
     /// As `StateSpace.fit_records`.
     #[allow(clippy::too_many_arguments)]
-    #[pyo3(signature = (values, free, records, own, first_order_hold, noise, search, responses = None))]
+    #[pyo3(signature = (values, free, records, own, hold, noise, search, responses = None))]
     fn fit_records<'py>(
         &self,
         py: Python<'py>,
@@ -90,19 +89,19 @@ impl EquationRecords {
         free: Vec<usize>,
         records: Vec<Flown<'py>>,
         own: Vec<Own<'py>>,
-        first_order_hold: bool,
+        hold: &str,
         noise: NoiseArguments,
         search: SearchArguments<'py>,
         responses: Option<WhitenedResponses<'py>>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let places = 0..records.len();
-        let model = self.on(places, values.as_slice()?, &free, &records, first_order_hold)?;
+        let model = self.on(places, values.as_slice()?, &free, &records, hold)?;
         let beside = responses.map(Beside::new).transpose()?;
         let beside = self.model.get().on(beside.as_ref(), values.as_slice()?, &free)?;
         fit(py, &model, &record_data(&records, own)?, noise, beside.as_ref(), search)
     }
 
-    /// run_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], first_order_hold: bool, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    /// run_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     ///
     /// As `StateSpace.run_record`, for the record at a place.
     #[allow(clippy::too_many_arguments, clippy::type_complexity)]
@@ -114,16 +113,16 @@ impl EquationRecords {
         free: Vec<usize>,
         record: Flown<'py>,
         own: Own<'py>,
-        first_order_hold: bool,
+        hold: &str,
         with_slopes: bool,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
         let (values, records) = (values.as_slice()?, [record]);
-        let model = self.on(place..place + 1, values, &free, &records, first_order_hold)?;
+        let model = self.on(place..place + 1, values, &free, &records, hold)?;
         let theta: Vec<f64> = free.iter().map(|&index| values[index]).collect();
         run(py, &model, &record_data(&records, vec![own])?, 0, &theta, with_slopes)
     }
 
-    /// start_of_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], first_order_hold: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    /// start_of_record(self, place: int, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     ///
     /// State at the first sample, and its derivatives by the free values, the record's free initial
     /// numbers and its free shifts, shape (n_states, columns).
@@ -136,10 +135,10 @@ impl EquationRecords {
         free: Vec<usize>,
         record: Flown<'py>,
         own: Own<'py>,
-        first_order_hold: bool,
+        hold: &str,
     ) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray2<f64>>)> {
         let (values, records) = (values.as_slice()?, [record]);
-        let model = self.on(place..place + 1, values, &free, &records, first_order_hold)?;
+        let model = self.on(place..place + 1, values, &free, &records, hold)?;
         let theta: Vec<f64> = free.iter().map(|&index| values[index]).collect();
         let data = record_data(&records, vec![own])?;
         let RecordData { initial, shift, free_initial, free_shift, .. } = &data[0];

@@ -244,7 +244,7 @@ impl StateSpace {
         search(py, model, &data, whitening, &wanted)
     }
 
-    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
+    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], hold: str, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
     ///
     /// Output error from each start (θ, objective, noise covariance, each record's own numbers and
     /// whether they are determined, iterations, termination), or the words of the error that stopped
@@ -253,7 +253,7 @@ impl StateSpace {
     /// a search is (starts, lower, upper, most steps). Responses (data, whitening runs) add the sum of
     /// their whitened squares.
     #[allow(clippy::too_many_arguments)]
-    #[pyo3(signature = (values, free, records, own, first_order_hold, noise, search, responses = None))]
+    #[pyo3(signature = (values, free, records, own, hold, noise, search, responses = None))]
     fn fit_records<'py>(
         &self,
         py: Python<'py>,
@@ -261,20 +261,20 @@ impl StateSpace {
         free: Vec<usize>,
         records: Vec<Flown<'_>>,
         own: Vec<Own<'_>>,
-        first_order_hold: bool,
+        hold: &str,
         noise: NoiseArguments,
         search: SearchArguments<'py>,
         responses: Option<WhitenedResponses<'py>>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let family = StateSpaceFamily::new(&self.tape, &self.point, values.as_slice()?, &free);
-        let trajectories = linear(family, &records, first_order_hold)?;
+        let trajectories = linear(family, &records, hold)?;
         let beside = responses.map(Beside::new).transpose()?;
         let beside = self.on(beside.as_ref(), values.as_slice()?, &free)?;
         let data = record_data(&records, own)?;
         output_error::fit(py, &trajectories, &data, noise, beside.as_ref(), search)
     }
 
-    /// run_record(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], first_order_hold: bool, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    /// run_record(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     ///
     /// Outputs (n_outputs, n_samples) without bias and, if asked, their derivatives by θ, free
     /// initial states and free shifts (n_outputs, n_samples, columns).
@@ -286,12 +286,12 @@ impl StateSpace {
         free: Vec<usize>,
         record: Flown<'_>,
         own: Own<'_>,
-        first_order_hold: bool,
+        hold: &str,
         with_slopes: bool,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
         let family = StateSpaceFamily::new(&self.tape, &self.point, values.as_slice()?, &free);
         let records = [record];
-        let trajectories = linear(family, &records, first_order_hold)?;
+        let trajectories = linear(family, &records, hold)?;
         let data = record_data(&records, vec![own])?;
         let values = values.as_slice()?;
         let theta: Vec<f64> = free.iter().map(|&place| values[place]).collect();

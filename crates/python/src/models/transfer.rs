@@ -119,7 +119,7 @@ impl TransferFunctions {
         search(py, model, &measured(data)?, whitening, &wanted)
     }
 
-    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], first_order_hold: bool, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
+    /// fit_records(self, values: NDArray[np.float64], free: Sequence[int], records: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]], own: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]]], hold: str, noise: tuple[bool, float, float], search: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], int], responses: tuple[Sequence[tuple[NDArray[np.float64], NDArray[np.complex128], NDArray[np.float64], NDArray[np.float64]]], Sequence[tuple[int, int, NDArray[np.float64]]]] | None = ...) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], list[NDArray[np.float64]], list[list[bool]], int, str] | str]
     ///
     /// Output error from each start (θ, objective, noise covariance, each record's own numbers and
     /// whether they are determined, iterations, termination), or the words of the error that stopped
@@ -128,7 +128,7 @@ impl TransferFunctions {
     /// a search is (starts, lower, upper, most steps). Responses (data, whitening runs) add the sum of
     /// their whitened squares.
     #[allow(clippy::too_many_arguments)]
-    #[pyo3(signature = (values, free, records, own, first_order_hold, noise, search, responses = None))]
+    #[pyo3(signature = (values, free, records, own, hold, noise, search, responses = None))]
     fn fit_records<'py>(
         &self,
         py: Python<'py>,
@@ -136,13 +136,13 @@ impl TransferFunctions {
         free: Vec<usize>,
         records: Vec<Flown<'_>>,
         own: Vec<Own<'_>>,
-        first_order_hold: bool,
+        hold: &str,
         noise: NoiseArguments,
         search: SearchArguments<'py>,
         responses: Option<WhitenedResponses<'py>>,
     ) -> PyResult<Vec<Bound<'py, PyAny>>> {
         let family = TransferFamily::new(&self.functions, &self.pairs, values.as_slice()?, &free);
-        let trajectories = linear(family, &records, first_order_hold)?;
+        let trajectories = linear(family, &records, hold)?;
         let beside = responses.map(Beside::new).transpose()?;
         let model = FreeTransfer::new(&self.functions, values.as_slice()?, &free);
         let model = model.map_err(from_core)?;
@@ -151,7 +151,7 @@ impl TransferFunctions {
         output_error::fit(py, &trajectories, &data, noise, beside.as_ref(), search)
     }
 
-    /// run_record(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], first_order_hold: bool, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    /// run_record(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, with_slopes: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     ///
     /// Outputs (n_outputs, n_samples) without bias and, if asked, their derivatives by θ, free
     /// initial states and free shifts (n_outputs, n_samples, columns).
@@ -163,12 +163,12 @@ impl TransferFunctions {
         free: Vec<usize>,
         record: Flown<'_>,
         own: Own<'_>,
-        first_order_hold: bool,
+        hold: &str,
         with_slopes: bool,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
         let family = TransferFamily::new(&self.functions, &self.pairs, values.as_slice()?, &free);
         let records = [record];
-        let trajectories = linear(family, &records, first_order_hold)?;
+        let trajectories = linear(family, &records, hold)?;
         let data = record_data(&records, vec![own])?;
         let values = values.as_slice()?;
         let theta: Vec<f64> = free.iter().map(|&place| values[place]).collect();

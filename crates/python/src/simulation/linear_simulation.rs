@@ -1,12 +1,16 @@
 //! Binding of linear simulation (Python side: `simulation/simulate.py`).
 
 use crate::error::from_core;
+use crate::fits::output_error::hold as named;
 use flightid_core::linear::discretisation::discretise;
 use flightid_core::linear::discretisation::{Hold, StateSpace};
 use flightid_core::linear::linear_simulation::Discrete;
 use flightid_core::numerics::matrix_exponential::exponential;
 use numpy::ndarray::Array2;
-use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyReadonlyArray3, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 pub(crate) type States<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
@@ -93,6 +97,62 @@ fn discretise_linear<'py>(
     Ok((matrix(py, found.transition, n, n)?, taps.collect()))
 }
 
+type Matrices<'py> = (
+    PyReadonlyArray3<'py, f64>,
+    PyReadonlyArray3<'py, f64>,
+    PyReadonlyArray3<'py, f64>,
+    PyReadonlyArray3<'py, f64>,
+    PyReadonlyArray2<'py, f64>,
+);
+type Jets<'py> = (Bound<'py, PyArray3<f64>>, Vec<(usize, isize)>, Bound<'py, PyArray3<f64>>);
+
+/// discretise_directions(matrices: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], sample_time_s: float, hold: str) -> tuple[NDArray[np.float64], list[tuple[int, int]], NDArray[np.float64]]
+///
+/// Φ and weights of taps as `discretise_linear` gives them, and their derivatives. First index of
+/// A, B, C, D and delays: the system, then its derivatives by each direction. Result: (1 + k, n, n),
+/// (input, ahead) of each tap, and weights (1 + k, n_taps, n + p) of states, then outputs.
+#[pyfunction]
+fn discretise_directions<'py>(
+    py: Python<'py>,
+    matrices: Matrices<'py>,
+    sample_time_s: f64,
+    hold: &str,
+) -> PyResult<Jets<'py>> {
+    let (a, b, c, d, delays) = &matrices;
+    let whole = [a.as_slice()?, b.as_slice()?, c.as_slice()?, d.as_slice()?, delays.as_slice()?];
+    let &[count, n, _] = a.shape() else { return Err(odd_shape()) };
+    let n_outputs = c.shape()[1];
+    let each = whole.map(|part| part.len() / count.max(1));
+    if count == 0 || b.shape()[0] != count || c.shape()[0] != count || d.shape()[0] != count {
+        return Err(odd_shape());
+    }
+    let system = |k: usize| {
+        let part = |j: usize| &whole[j][k * each[j]..(k + 1) * each[j]];
+        let (a, b, c, d, delays_s) = (part(0), part(1), part(2), part(3), part(4));
+        StateSpace { a, b, c, d, delays_s, n_outputs }
+    };
+    let slopes: Vec<_> = (1..count).map(system).collect();
+    let hold = named(hold)?;
+    let (found, derived) =
+        py.detach(|| discretise(&system(0), &slopes, sample_time_s, hold)).map_err(from_core)?;
+    let places: Vec<_> = found.taps.iter().map(|tap| (tap.input, tap.ahead)).collect();
+    let (mut transitions, mut weights) = (Vec::new(), Vec::new());
+    for each in std::iter::once(&found).chain(&derived) {
+        transitions.extend(&each.transition);
+        each.taps.iter().for_each(|tap| weights.extend(tap.state.iter().chain(&tap.output)));
+    }
+    let size = [count, places.len(), n + n_outputs];
+    Ok((
+        transitions.into_pyarray(py).reshape([count, n, n])?,
+        places,
+        weights.into_pyarray(py).reshape(size)?,
+    ))
+}
+
+fn odd_shape() -> PyErr {
+    pyo3::exceptions::PyValueError::new_err("one of each matrix for each direction")
+}
+
 /// matrix_exponential(matrix: NDArray[np.float64]) -> NDArray[np.float64]
 ///
 /// Exponential of a square matrix.
@@ -110,6 +170,7 @@ fn matrix_exponential<'py>(
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulate_linear, module)?)?;
     module.add_function(wrap_pyfunction!(discretise_linear, module)?)?;
+    module.add_function(wrap_pyfunction!(discretise_directions, module)?)?;
     module.add_function(wrap_pyfunction!(matrix_exponential, module)?)?;
     Ok(())
 }

@@ -27,6 +27,7 @@ from flightid.identification.filter_error.innovations import (
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.multistart import DenseEnd, cluster, collect, draw_starts
+from flightid.identification.records.held_model import LinearPoint
 from flightid.identification.regression.fit import (
     Inner,
     Knowledge,
@@ -121,16 +122,15 @@ def _problem(
         options.input_bias,
         options.hold,
     )
-    start, _ = limits_of(model, options.maximum_iterations)
-    point, slopes = blank.points(np.concatenate([start, np.zeros(p - 1)]))
+    point = LinearPoint.of(model, model.parameters.independent_values())
     if options.process_noise is None:
-        moved = [np.any(slope.a, axis=1) | np.any(slope.b, axis=1) for slope in slopes]
-        noisy = tuple(map(int, np.flatnonzero(np.any(moved, axis=0)))) or tuple(range(n))
+        moved = np.any(np.concatenate([point.a[1:], point.b[1:]], axis=2), axis=(0, 2))
+        noisy = tuple(map(int, np.flatnonzero(moved))) or tuple(range(n))
     else:
         noisy = _places(options.process_noise, list(model.states))
     spread = np.sqrt(np.mean([np.var(each.outputs, axis=1) for each in data], axis=0))
     level = np.sqrt(np.mean([_levels(each) ** 2 for each in data], axis=0))
-    reach = np.abs(np.linalg.pinv(point.c)) @ spread
+    reach = np.abs(np.linalg.pinv(point.c[0])) @ spread
     reach = np.where(reach > 0.0, reach, reach.mean() or 1.0)
     return replace(
         blank,

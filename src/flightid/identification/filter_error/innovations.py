@@ -20,7 +20,7 @@ from flightid.identification.filter_error.steady_filter import (
     SteadyFilter,
     steady_filter,
 )
-from flightid.identification.records.delayed_inputs import delayed_inputs
+from flightid.identification.records.held_model import HeldModel, LinearPoint
 from flightid.identification.records.nuisance import Nuisance
 from flightid.models import StateSpaceModel
 
@@ -128,27 +128,20 @@ class InnovationsProblem:
 
     def points(self, unknowns: Array) -> tuple[ContinuousPoint, list[ContinuousPoint]]:
         """State space with noise, and its derivatives by all unknowns."""
-        values, free = self._values(unknowns)
-        trim = np.array([self.model.trim.get(name, 0.0) for name in self.model.point_names])
-        n, m, p = len(self.model.states), len(self.model.inputs), len(self.model.outputs)
-        rows = self.model.native.linearise(values, trim)[1]
-        moved = self.model.native.sensitivities(values, trim, free)
-        rates: Array = np.asarray(-np.linalg.solve(rows[:n, :n], rows[:n, n:]), dtype=np.float64)
-        whole = np.vstack([rates, np.eye(n + m)])
-        measured = rows[n:] @ whole
-        d_rates = -np.linalg.solve(rows[:n, :n], moved[:, :n] @ whole)
-        d_measured = moved[:, n:] @ whole + rows[n:, :n] @ d_rates
+        return self._noisy(LinearPoint.of(self.model, self._values(unknowns)), unknowns)
+
+    def _noisy(
+        self, linear: LinearPoint, unknowns: Array
+    ) -> tuple[ContinuousPoint, list[ContinuousPoint]]:
         process, variance = self.noise(unknowns)
-        point = ContinuousPoint(
-            rates[:, :n], rates[:, n:], measured[:, :n], measured[:, n:],
-            np.diag(process), np.diag(variance),
-        )  # fmt: skip
+        p, n = linear.c.shape[1:]
         none_w, none_r = np.zeros((n, n)), np.zeros((p, p))
+        point = ContinuousPoint(linear.a[0], linear.c[0], np.diag(process), np.diag(variance))
         slopes = [
-            ContinuousPoint(dr[:, :n], dr[:, n:], dm[:, :n], dm[:, n:], none_w, none_r)
-            for dr, dm in zip(d_rates, d_measured, strict=True)
+            ContinuousPoint(a, c, none_w, none_r)
+            for a, c in zip(linear.a[1:], linear.c[1:], strict=True)
         ]
-        still = (np.zeros((n, n)), np.zeros((n, m)), np.zeros((p, n)), np.zeros((p, m)))
+        still = np.zeros((n, n)), np.zeros((p, n))
         for state in self.noisy:
             density = np.zeros((n, n))
             density[state, state] = 2.0 * process[state]
@@ -159,11 +152,10 @@ class InnovationsProblem:
             slopes.append(ContinuousPoint(*still, none_w, wider))
         return point, slopes
 
-    def _values(self, unknowns: Array) -> tuple[Array, list[int]]:
+    def _values(self, unknowns: Array) -> Array:
         values = self.model.parameters.independent_values()
-        free = self.model.parameters.free_indices
-        values[free] = unknowns[: self.n_free]
-        return values, free
+        values[self.model.parameters.free_indices] = unknowns[: self.n_free]
+        return values
 
     def records(self, unknowns: Array, *, with_slopes: bool) -> list[Filtered]:
         """Innovations of every record, and the filter's derivatives.
@@ -173,65 +165,65 @@ class InnovationsProblem:
         FitError
             There is no steady filter.
         """
-        point, slopes = self.points(unknowns)
-        filters = {
-            step: steady_filter(point, slopes if with_slopes else [], step)
-            for step in {each.sample_time_s for each in self.data}
-        }
+        linear = LinearPoint.of(self.model, self._values(unknowns))
+        point, slopes = self._noisy(linear, unknowns)
+        known = {}
+        for step in {each.sample_time_s for each in self.data}:
+            filters = steady_filter(point, slopes if with_slopes else [], step)
+            known[step] = (HeldModel.of(linear, step, self.hold), *filters)
         return [
-            (
-                self._record(unknowns, each, *filters[each.sample_time_s]),
-                filters[each.sample_time_s][1],
-            )
+            (self._record(each, *known[each.sample_time_s]), known[each.sample_time_s][2])
             for each in self.data
         ]
 
     def _record(
         self,
-        unknowns: Array,
         data: FilteredData,
+        held: HeldModel,
         found: SteadyFilter,
         slopes: list[SteadyFilter],
     ) -> RecordInnovations:
-        values, _ = self._values(unknowns)
-        delayed, rates, late = delayed_inputs(
-            self.model, values, data.inputs, data.sample_time_s, self.hold
-        )
-        inputs, outputs = delayed.T, data.outputs.T
+        pushes, through = (part.swapaxes(1, 2) for part in held.driven(data.inputs))
+        outputs = data.outputs.T
         whitener = np.linalg.inv(np.linalg.cholesky(found.innovation))
-        n, m, p = len(found.closed), inputs.shape[1], outputs.shape[1]
-        runs = [(np.zeros(n), outputs, inputs), *self._constants(n, m, p)]
-        states = _run(found, runs, len(outputs))
-        seen = np.array(
-            [_seen(found, y, u) - x @ found.c.T for x, (_, y, u) in zip(states, runs, strict=True)]
+        (n_samples, p), n = outputs.shape, len(found.closed)
+        steady = held.steady()
+        runs = [(np.zeros(n), outputs - through[0], pushes[0]), *self._constants(n, p, steady)]
+        states = _run(found, runs, n_samples)
+        left = np.array(
+            [seen - x @ found.c.T for x, (_, seen, _) in zip(states, runs, strict=True)]
         )
-        flat = (seen @ whitener.T).reshape(len(runs), -1)
+        flat = (left @ whitener.T).reshape(len(runs), -1)
         nuisance = Nuisance.best(-flat[1:].T, flat[0])
         state = np.tensordot(np.concatenate([[1.0], nuisance.values]), states, axes=1)
         if self.output_bias:
             outputs = outputs - nuisance.values[n : n + p]
         if self.input_bias:
-            inputs = inputs + nuisance.values[len(nuisance.values) - m :]
-        innovations = _seen(found, outputs, inputs) - state @ found.c.T
-        moved = [
-            rates.T * -late[:, k] if k < self.n_free else np.zeros((1, m))
-            for k in range(len(slopes))
-        ]
-        slope = _slopes(found, slopes, state, (outputs, inputs), moved)
+            shift = nuisance.values[len(nuisance.values) - len(data.inputs) :]
+            pushes, through = (
+                pushes + (steady[0] @ shift)[:, None],
+                through + (steady[1] @ shift)[:, None],
+            )
+        seen = outputs - through[0]
+        slope = _slopes(found, slopes, state, seen, (pushes[1:], through[1:]))
         white = (slope.swapaxes(1, 2) @ whitener.T).swapaxes(1, 2)
         kept = nuisance.removed_from(white.reshape(flat.shape[1], -1)).reshape(white.shape)
         triangle = np.linalg.inv(whitener)
         slope = (kept.swapaxes(1, 2) @ triangle.T).swapaxes(1, 2)
+        innovations = seen - state @ found.c.T
         return RecordInnovations(innovations, state, slope, nuisance.values, nuisance.space, found)
 
-    def _constants(self, n: int, m: int, p: int) -> list[tuple[Array, Array, Array]]:
-        """Start, outputs and inputs of one run for each constant of a record."""
-        no_output, no_input = np.zeros((1, p)), np.zeros((1, m))
-        runs = [(start, no_output, no_input) for start in np.eye(n)]
+    def _constants(
+        self, n: int, p: int, steady: tuple[Array, Array]
+    ) -> list[tuple[Array, Array, Array]]:
+        """Start, z and q of one run for each constant of a record."""
+        no_output, no_push = np.zeros((1, p)), np.zeros((1, n))
+        runs = [(start, no_output, no_push) for start in np.eye(n)]
         if self.output_bias:
-            runs += [(np.zeros(n), -bias[None], no_input) for bias in np.eye(p)]
+            runs += [(np.zeros(n), -bias[None], no_push) for bias in np.eye(p)]
         if self.input_bias:
-            runs += [(np.zeros(n), no_output, shift[None]) for shift in np.eye(m)]
+            pairs = zip(steady[0][0].T, steady[1][0].T, strict=True)
+            runs += [(np.zeros(n), -through[None], push[None]) for push, through in pairs]
         return runs
 
     def residuals(self, unknowns: Array, *, with_slopes: bool) -> tuple[Array, Array]:
@@ -287,54 +279,36 @@ def _lower(matrix: Array) -> Array:
     return np.tril(matrix) - 0.5 * np.diag(np.diag(matrix))
 
 
-def _seen(found: SteadyFilter, outputs: Array, inputs: Array) -> Array:
-    """Z = y − D u."""
-    return np.asarray(outputs - inputs @ found.d.T)
-
-
-def _next(values: Array) -> Array:
-    """Each sample's successor; the last one stays."""
-    return np.concatenate([values[1:], values[-1:]])
-
-
 def _slopes(
     found: SteadyFilter,
     slopes: Sequence[SteadyFilter],
     state: Array,
-    measured: tuple[Array, Array],
-    moved: Sequence[Array],
+    seen: Array,
+    moved: tuple[Array, Array],
 ) -> Array:
-    """Derivatives of the innovations, (n_samples, n_outputs, n_slopes): one more run for each."""
-    outputs, inputs = measured
-    seen, following = _seen(found, outputs, inputs), _next(inputs)
-    forcings, direct = [], []
-    for slope, shift in zip(slopes, moved, strict=True):
-        d_seen = -inputs @ slope.d.T - shift @ found.d.T
-        forcings.append(
-            state @ slope.closed.T
-            + seen @ slope.gain.T
-            + d_seen @ found.gain.T
-            + inputs @ slope.early.T
-            + following @ slope.late.T
-            + shift @ found.early.T
-            + _next(shift) @ found.late.T
-        )
-        direct.append(d_seen - state @ slope.c.T)
+    """Derivatives of the innovations, (n_samples, n_outputs, n_slopes): one more run for each.
+
+    `moved` are the derivatives of q and v by the parameters, the first of the slopes.
+    """
     if not slopes:
-        return np.zeros((*outputs.shape, 0))
+        return np.zeros((*seen.shape, 0))
+    forcings, direct = [], []
+    for place, slope in enumerate(slopes):
+        forcing = state @ slope.closed.T + seen @ slope.gain.T
+        straight = -state @ slope.c.T
+        if place < len(moved[0]):
+            forcing += moved[0][place] - moved[1][place] @ found.gain.T
+            straight -= moved[1][place]
+        forcings.append(forcing)
+        direct.append(straight)
     closed, rest = np.ascontiguousarray(found.closed), np.zeros((len(slopes), len(found.closed)))
     paths = _native.linear_recursion(closed, np.array(forcings), rest)
     return np.moveaxis(np.array(direct) - paths @ found.c.T, 0, 2)
 
 
 def _run(found: SteadyFilter, runs: Sequence[tuple[Array, Array, Array]], n_samples: int) -> Array:
-    forcing = [
-        np.broadcast_to(
-            _seen(found, y, u) @ found.gain.T + u @ found.early.T + _next(u) @ found.late.T,
-            (n_samples, len(found.closed)),
-        )
-        for _, y, u in runs
-    ]
+    shape = (n_samples, len(found.closed))
+    forcing = [np.broadcast_to(seen @ found.gain.T + push, shape) for _, seen, push in runs]
     starts = np.array([start for start, _, _ in runs])
     closed = np.ascontiguousarray(found.closed)
     return np.asarray(_native.linear_recursion(closed, np.array(forcing), starts))

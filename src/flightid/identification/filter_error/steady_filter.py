@@ -1,8 +1,9 @@
 """The steady Kalman filter of a linear model with process noise, and its exact derivatives.
 
-ẋ = A x + B u + w, y = C x + D u + v, sampled. The predicted covariance P solves the discrete
-Riccati equation; its derivative solves a Lyapunov equation of the closed filter, since at its
-optimum the gain does not move P to first order.
+ẋ = A x + w, y = C x + v, sampled; inputs add what `records/held_model.py` says and move no
+covariance. The predicted covariance P solves the discrete Riccati equation; its derivative solves a
+Lyapunov equation of the closed filter, since at its optimum the gain does not move P to first
+order.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ class ContinuousPoint:
 
     Attributes
     ----------
-    a, b, c, d : ndarray
-        State space, (n, n), (n, m), (p, n), (p, m).
+    a, c : ndarray
+        State space, (n, n), (p, n).
     process : ndarray, shape (n, n)
         Spectral density W of the process noise, two-sided, state unit² / s³ per unit of ẋ².
     measurement : ndarray, shape (p, p)
@@ -36,26 +37,22 @@ class ContinuousPoint:
     """
 
     a: Array
-    b: Array
     c: Array
-    d: Array
     process: Array
     measurement: Array
 
 
 @dataclass(frozen=True)
 class SteadyFilter:
-    """One-step predictor x⁺ = Ā x + Γ₀ u + Γ₁ u⁺ + L z with z = y − D u and ε = z − C x.
+    """One-step predictor x⁺ = Ā x + L z + q with z = y − v and ε = z − C x, v and q of the inputs.
 
     Attributes
     ----------
     closed : ndarray, shape (n, n)
         Ā = Φ − L C.
-    early, late : ndarray, shape (n, m)
-        Γ₀ and Γ₁, of the input at this sample and at the next.
     gain : ndarray, shape (n, p)
         L.
-    c, d : ndarray
+    c : ndarray, shape (p, n)
     innovation : ndarray, shape (p, p)
         Covariance B of ε.
     predicted : ndarray, shape (n, n)
@@ -63,11 +60,8 @@ class SteadyFilter:
     """
 
     closed: Array
-    early: Array
-    late: Array
     gain: Array
     c: Array
-    d: Array
     innovation: Array
     predicted: Array
 
@@ -101,33 +95,26 @@ def steady_filter(
 
     Example
     -------
-    >>> one, none = np.eye(1), np.zeros((1, 0))
-    >>> walk = ContinuousPoint(0 * one, none, one, none, one, 2 * one)
+    >>> one = np.eye(1)
+    >>> walk = ContinuousPoint(0 * one, one, one, 2 * one)
     >>> steady_filter(walk, [], 1.0)[0].predicted
     array([[2.]])
     """
-    n, m = point.b.shape
-    forced, noisy = _forced(point, sample_time_s, ramp=1.0), _noisy(point, sample_time_s)
-    whole, spread = np.asarray(expm(forced)), np.asarray(expm(noisy))
-    phi = whole[:n, :n]
+    n = len(point.a)
+    noisy = _noisy(point, sample_time_s)
+    phi, spread = np.asarray(expm(point.a * sample_time_s)), np.asarray(expm(noisy))
     q = _symmetric(phi @ spread[:n, n:])
     predicted = _riccati(phi, point.c, q, point.measurement)
     innovation = point.c @ predicted @ point.c.T + point.measurement
     weight = np.linalg.solve(innovation, point.c @ predicted).T
     keep = np.eye(n) - weight @ point.c
     filtered = _symmetric(keep @ predicted)
-    ramp = whole[:n, n + m :]
     gain = phi @ weight
-    found = SteadyFilter(
-        phi @ keep, whole[:n, n : n + m] - ramp, ramp, gain, point.c, point.d, innovation, predicted
-    )
+    found = SteadyFilter(phi @ keep, gain, point.c, innovation, predicted)
     derived = []
     for slope in slopes:
-        # The ramp itself depends on no parameter.
-        moving = _forced(slope, sample_time_s, ramp=0.0)
-        moved = _moved(forced, moving)
+        d_phi = _moved(point.a * sample_time_s, slope.a * sample_time_s)
         widened = _moved(noisy, _noisy(slope, sample_time_s))
-        d_phi = moved[:n, :n]
         d_q = _symmetric(d_phi @ spread[:n, n:] + phi @ widened[:n, n:])
         turned = weight @ slope.c @ predicted @ keep.T
         kept = weight @ slope.measurement @ weight.T - turned - turned.T
@@ -139,20 +126,8 @@ def steady_filter(
         d_product = d_predicted @ point.c.T + predicted @ slope.c.T
         d_weight = np.linalg.solve(innovation, (d_product - weight @ d_innovation).T).T
         d_gain = d_phi @ weight + phi @ d_weight
-        d_ramp = moved[:n, n + m :]
         d_closed = d_phi - d_gain @ point.c - gain @ slope.c
-        derived.append(
-            SteadyFilter(
-                d_closed,
-                moved[:n, n : n + m] - d_ramp,
-                d_ramp,
-                d_gain,
-                slope.c,
-                slope.d,
-                d_innovation,
-                d_predicted,
-            )
-        )
+        derived.append(SteadyFilter(d_closed, d_gain, slope.c, d_innovation, d_predicted))
     return found, derived
 
 
@@ -163,16 +138,6 @@ def _moved(exponent: Array, direction: Array) -> Array:
 
 def _symmetric(matrix: Array) -> Array:
     return 0.5 * (matrix + matrix.T)
-
-
-def _forced(point: ContinuousPoint, step: float, *, ramp: float) -> Array:
-    """Exponent whose exponential holds Φ, the response to a constant and to a ramp of one step."""
-    n, m = point.b.shape
-    result = np.zeros((n + 2 * m, n + 2 * m))
-    result[:n, :n] = point.a * step
-    result[:n, n : n + m] = point.b * step
-    result[n : n + m, n + m :] = ramp * np.eye(m)
-    return result
 
 
 def _noisy(point: ContinuousPoint, step: float) -> Array:

@@ -38,7 +38,7 @@ def run_with_slopes(
         fitted.parameters.free_indices,
         prepared.arrays[place],
         own.native,
-        prepared.first_order_hold,
+        prepared.hold,
         True,
     )
     outputs, slopes = (

@@ -74,7 +74,7 @@ class EquationRuns:
             fitted.parameters.free_indices,
             prepared.arrays[place],
             own.native,
-            prepared.first_order_hold,
+            prepared.hold,
         )
         return replace(own, start=(state, slopes))
 

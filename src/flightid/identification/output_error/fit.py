@@ -205,7 +205,7 @@ def _overgrown(
     """
     if not (after is not None and after.is_segmented and isinstance(model, StateSpaceModel)):
         return fitted
-    options = FourierOutputErrorOptions(hold="first" if prepared.first_order_hold else "zero")
+    options = FourierOutputErrorOptions(hold=prepared.hold)
     try:
         found: GreyBoxModel = fit_fourier_output_error(model, prepared.records, options).model
         return found
@@ -238,7 +238,7 @@ def search_records(
         model.parameters.free_indices,
         prepared.arrays,
         [numbers.native for numbers in prepared.own],
-        prepared.first_order_hold,
+        prepared.hold,
         (options.noise_covariance == "full", options.limit, options.consistency),
         (
             draw_starts(free, options.starts, options.seed),

@@ -34,7 +34,7 @@ class NonlinearRun:
     inputs : ndarray, shape (n_inputs, n_samples)
         Whole, in the model's units.
     sample_time_s : float
-    first_order_hold : bool
+    hold : {"first", "zero", "band_limited"}
     rows : list of int
         Places of the compared outputs.
     start : OwnNumbers
@@ -45,7 +45,7 @@ class NonlinearRun:
     native: _native.EquationRecords
     inputs: Array
     sample_time_s: float
-    first_order_hold: bool
+    hold: str
     rows: list[int]
     start: OwnNumbers
 
@@ -78,7 +78,7 @@ class NonlinearRun:
             rows if freedom.output_bias else [],
         )
         native = _native.EquationRecords(model.native, [steps], [whole])
-        return cls(model, native, inputs, sample_time_s, hold == "first", rows, start)
+        return cls(model, native, inputs, sample_time_s, hold, rows, start)
 
     def outputs(self, own: OwnNumbers) -> tuple[Array, Array]:
         """Compared outputs (n_rows, n_samples), and their slopes by the free numbers."""
@@ -89,7 +89,7 @@ class NonlinearRun:
             [],
             (self.inputs, blank, self.sample_time_s),
             own.native,
-            self.first_order_hold,
+            self.hold,
             True,
         )
         biases = np.zeros((*blank.shape, len(own.free_bias)))

@@ -18,7 +18,7 @@ Freedom = bool | str | Sequence[str]
 
 ESTIMATE, MEASURED, TRIM = "estimate", "measured", "trim"
 STARTS_OF_STATES = (ESTIMATE, MEASURED, TRIM)
-HOLDS = ("first", "zero")
+HOLDS = ("first", "zero", "band_limited")
 COVARIANCES = ("diagonal", "full")
 LOSSES = ("gaussian", "huber")
 STARTS = ("model", "equation_error")

@@ -101,7 +101,7 @@ class RecordSet:
     own : list of OwnNumbers
         Start of each record's own numbers.
     states : tuple of str
-    first_order_hold : bool
+    hold : {"first", "zero", "band_limited"}
     """
 
     model: GreyBoxModel
@@ -110,7 +110,7 @@ class RecordSet:
     offsets: list[Array]
     own: list[OwnNumbers]
     states: tuple[str, ...]
-    first_order_hold: bool
+    hold: str
 
     @property
     def n_samples(self) -> int:
@@ -217,7 +217,7 @@ def prepare_records(
             )
         )
     _require_length(model, records, own)
-    return RecordSet(model, records, arrays, offsets, own, states, options.hold == "first")
+    return RecordSet(model, records, arrays, offsets, own, states, options.hold)
 
 
 def _measured(model: GreyBoxModel, inputs: Array, outputs: Array, at_trim: Array) -> Array:

@@ -32,11 +32,11 @@ from flightid.identification.regression.options import (
     FourierOptions,
     RegressionOptions,
 )
+from flightid.identification.regression.right_side import RightSide
 from flightid.identification.regression.rounds import Limits, SettledRounds, settle, solve, stack
 from flightid.identification.regression.sampled_equations import (
     MeasuredMotion,
     Reconstruction,
-    RightSide,
 )
 from flightid.identification.regression.weights import (
     fourier_covariance,
@@ -162,13 +162,14 @@ def _finish(
     known: Knowledge,
 ) -> Fit:
     end = settled.end
+    settled_at = problem.renewed(end.x)
 
     def refit(motions: Sequence[MeasuredMotion]) -> Array:
         operators = [
             each.with_motion(motion)
             for each, motion in zip(problem.operators, motions, strict=True)
         ]
-        noisier = replace(problem, motions=tuple(motions), operators=tuple(operators))
+        noisier = replace(settled_at, motions=tuple(motions), operators=tuple(operators))
         return solve(noisier, end.x, settled.weights, limits)[0].x
 
     moved = attenuation(problem.motions, refit, end.x)[inner.mask]

@@ -1,8 +1,9 @@
-"""What equation error does to both sides of ẋ = f(x, u): a local mean, or a Fourier integral.
+"""What equation error does to both sides of ẋ = f(x, u): a local mean, or a Fourier sum.
 
-Each operator is linear and turns the derivative on the left into something that measured states
-give, and the right side into the same thing of computed values. What a constant error of an
-equation (a bias, a trim) or the ends of the record add is a known direction, taken out exactly.
+Each operator is linear and turns the differences of measured states from sample to sample into
+something smooth, and the integrals of the right side over the same intervals into the same. What a
+constant error of an equation (a bias, a trim) or the ends of the record add is a known direction,
+taken out exactly.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conditioning.smoothing import local_derivative, local_mean
-from flightid.identification.regression.fourier_integral import FEWEST_SAMPLES, Harmonics
+from flightid.identification.regression.harmonics import FEWEST_SAMPLES, Harmonics
 from flightid.identification.regression.sampled_equations import MeasuredMotion, require_length
 
 Array = NDArray[np.float64]
@@ -26,8 +27,11 @@ class Operator(Protocol):
     def derivative(self, states: Array) -> Array:
         """Left sides of the state equations, (n_states, n_rows)."""
 
+    def means(self, cells: Array) -> Array:
+        """The same of mean derivatives over the sample intervals, time last: (..., n_rows)."""
+
     def values(self, samples: Array) -> Array:
-        """The same of computed values, time last: (..., n_rows)."""
+        """Outputs at the samples, measured or computed, time last: (..., n_rows)."""
 
     def nuisance(self, *, is_state: bool) -> Array | None:
         """Direction of one unknown constant in each row, (n_rows,), or None."""
@@ -65,6 +69,17 @@ class LocalMeans:
         rows = [local_derivative(state, step, half_width=width) for state in states]
         return np.array(rows).reshape(len(states), -1)[:, width + 1 : -width - 1]
 
+    def means(self, cells: Array) -> Array:
+        """The means over neighbouring intervals that the parabola's slope is made of."""
+        width = self.half_width
+        ahead = np.arange(-width, width + 1)
+        weights = np.cumsum(ahead[::-1])[::-1][1:] / np.sum(ahead**2)
+        count = self.motion.n_samples - 2 * width - 2
+        found = np.zeros((*cells.shape[:-1], count))
+        for place, weight in enumerate(weights, start=1):
+            found += weight * cells[..., place : place + count]
+        return found
+
     def values(self, samples: Array) -> Array:
         """Local means."""
         return local_mean(samples, half_width=self.half_width)
@@ -85,10 +100,10 @@ class LocalMeans:
 
 @dataclass(frozen=True)
 class FourierRows:
-    """Frequency domain: integrals over the record at its harmonics; real parts, then imaginary.
+    """Frequency domain: sums over the record at its harmonics; real parts, then imaginary.
 
-    The integral of ẋ is jω x̃ + [x(T) − x(0)]: what the ends add is one real number for all
-    harmonics, and is estimated, for the measured ends are noisy.
+    With z = exp(jωT) the sum of x(k+1) − x(k) is (z − 1) x̃ + z [x(end) − x(0)]: what the ends add
+    is one real number for all harmonics, and is estimated, for the measured ends are noisy.
 
     Attributes
     ----------
@@ -114,22 +129,26 @@ class FourierRows:
         return float(1.0 / np.sqrt(self.motion.n_samples * self.motion.sample_time_s))
 
     def derivative(self, states: Array) -> Array:
-        """jω x̃; the ends are in `nuisance`."""
+        """(z − 1) x̃ over the sample time; the ends are in `nuisance`."""
         grid = self.grid
-        moved = 1j * grid.omega_rad_s * grid.integral(states) * self._scale()
+        moved = (grid.turn - 1.0) / grid.sample_time_s * grid.total(states) * self._scale()
         return np.concatenate([moved.real, moved.imag], axis=-1)
 
+    def means(self, cells: Array) -> Array:
+        """Sums of the intervals, each at its beginning."""
+        return self.values(cells)
+
     def values(self, samples: Array) -> Array:
-        """Integrals of computed values."""
-        found = self.grid.integral(samples) * self._scale()
+        """Sums over one period."""
+        found = self.grid.total(samples) * self._scale()
         return np.concatenate([found.real, found.imag], axis=-1)
 
     def nuisance(self, *, is_state: bool) -> Array | None:
         """What the ends of the record add to the integral of a derivative."""
         if not is_state:
             return None
-        count = len(self.grid.numbers)
-        return np.repeat([1.0, 0.0], count)
+        turn = self.grid.turn
+        return np.concatenate([turn.real, turn.imag])
 
     def in_time(self, rows: Array) -> Array:
         """What the band holds."""

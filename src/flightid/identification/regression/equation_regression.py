@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FitError
 from flightid.identification.regression.equation_operators import Operator
+from flightid.identification.regression.right_side import Bends, RightSide
 from flightid.identification.regression.rounds import Rows
-from flightid.identification.regression.sampled_equations import MeasuredMotion, RightSide
+from flightid.identification.regression.sampled_equations import MeasuredMotion
 
 Array = NDArray[np.float64]
 
@@ -25,6 +26,8 @@ class EquationRegression:
     right : RightSide
     motions : tuple of MeasuredMotion
     operators : tuple of Operator
+    bends : tuple of Bends
+        What corners of the inputs do to the states between samples, by record.
     used : ndarray of int
         Equations that hold a free parameter.
     """
@@ -32,6 +35,7 @@ class EquationRegression:
     right: RightSide
     motions: tuple[MeasuredMotion, ...]
     operators: tuple[Operator, ...]
+    bends: tuple[Bends, ...]
     used: NDArray[np.intp]
 
     @classmethod
@@ -49,15 +53,24 @@ class EquationRegression:
         FitError
             There is none.
         """
-        slopes = [right.at(start, motion)[1] for motion in motions]
-        moved = np.array([np.any(each != 0.0, axis=(1, 2)) for each in slopes]).any(axis=0)
+        bends = tuple(right.bends(start, motion) for motion in motions)
+        pairs = zip(motions, bends, strict=True)
+        sides = [right.at(start, motion, bent) for motion, bent in pairs]
+        slopes = [part for each in sides for part in (each.rate_slopes, each.other_slopes)]
+        moves = [np.any(part != 0.0, axis=(1, 2)) for part in slopes]
+        moved = np.concatenate([np.any(moves[::2], axis=0), np.any(moves[1::2], axis=0)])
         if not np.any(moved):
             raise FitError(
                 "no equation holds a free parameter",
                 needed="at least one",
                 action="free a parameter, or start it away from zero",
             )
-        return cls(right, tuple(motions), tuple(operators), np.flatnonzero(moved))
+        return cls(right, tuple(motions), tuple(operators), bends, np.flatnonzero(moved))
+
+    def renewed(self, theta: Array) -> EquationRegression:
+        """The same with the bends that these parameters make."""
+        bends = tuple(self.right.bends(theta, motion) for motion in self.motions)
+        return replace(self, bends=bends)
 
     @property
     def n_states(self) -> int:
@@ -81,9 +94,14 @@ class EquationRegression:
         """Residuals and slopes, the unknown constants taken out under these weights."""
         found = []
         for place, (motion, operator) in enumerate(zip(self.motions, self.operators, strict=True)):
-            values, slopes = self.right.at(theta, motion)
-            residuals = self.left(place) - operator.values(values[self.used])
-            moved = -operator.values(np.moveaxis(slopes[self.used], 2, 1))
+            sides = self.right.at(theta, motion, self.bends[place])
+            values = [operator.means(sides.rates), operator.values(sides.others)]
+            residuals = self.left(place) - np.concatenate(values)[self.used]
+            slopes = [
+                operator.means(np.moveaxis(sides.rate_slopes, 2, 1)),
+                operator.values(np.moveaxis(sides.other_slopes, 2, 1)),
+            ]
+            moved = -np.concatenate(slopes)[self.used]
             rows = Rows(residuals, np.moveaxis(moved, 1, 2).copy())
             found.append(self._without_constants(rows, operator, weights[place]))
         return found

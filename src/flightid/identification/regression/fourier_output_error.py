@@ -1,10 +1,14 @@
 """Output error in the frequency domain: a linear model driven by the records' transforms.
 
-With X the transform of the states over a record and c = x(T) − x(0),
-(jωM − F) X = G Ũ − M c and Ỹ = H₀ X + H₁ (jωX + c) + D Ũ at the harmonics of the record: the ends
-need one constant for each state, estimated beside the parameters. Constants (biases, trims,
-reference shifts) have no harmonic and drop out. Nothing is integrated, so unstable models are no
-special case.
+Between samples the inputs are what their hold says, so the states at the samples obey
+x⁺ = Φ x + q exactly (`records/held_model.py`). With z = exp(jωT), X and Q the sums of states and
+of q times z⁻ᵏ over a record and c = x(T) − x(0), (zI − Φ) X = Q − z c and Y = C X + V at its
+harmonics: the ends need one constant for each state, estimated beside the parameters. Constants
+(biases, trims, reference shifts) have no harmonic and drop out. Nothing is integrated, so unstable
+models are no special case.
+
+Reference: Pintelon & Schoukens, *System Identification*, 2nd ed., §6.3.2 (the plant's extended
+transfer function in the z domain: exact for held inputs).
 """
 
 from __future__ import annotations
@@ -17,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, FitError
-from flightid.identification.records.delayed_inputs import delayed_inputs
+from flightid.identification.records.held_model import HeldModel, LinearPoint
 from flightid.identification.records.nuisance import Nuisance
-from flightid.identification.regression.fourier_integral import Harmonics
+from flightid.identification.regression.harmonics import Harmonics
 from flightid.identification.regression.rounds import Rows
 from flightid.models import StateSpaceModel
 from flightid.record import Record
@@ -37,7 +41,7 @@ class TransformedRecord:
     record : Record
     grid : Harmonics
     inputs : ndarray, shape (n_inputs, n_samples)
-        Time histories: a delay acts on them before the transform.
+        Time histories: hold and delay act on them before the transform.
     outputs : ndarray of complex, shape (n_outputs, n_f)
         Scaled by the inverse square root of the length.
     """
@@ -63,7 +67,7 @@ class TransformedRecord:
             The band holds too few harmonics.
         """
         grid = Harmonics.inside(band, record.n_samples, record.sample_time_s)
-        outputs = grid.integral(record.matrix(model.outputs)) * _scale(grid)
+        outputs = grid.total(record.matrix(model.outputs)) * _scale(grid)
         return cls(record, grid, record.matrix(model.inputs), outputs)
 
 
@@ -101,6 +105,10 @@ class FourierOutputError:
         real, imaginary = np.split(rows, 2, axis=1)
         return grid.in_time(np.asarray((real + 1j * imaginary) / _scale(grid), np.complex128))
 
+    def renewed(self, theta: Array) -> FourierOutputError:  # noqa: ARG002
+        """Nothing is held."""
+        return self
+
     def reach(self) -> Array:
         """Root mean square of each output's transform."""
         lefts = [self.left(place) for place in range(len(self.records))]
@@ -118,50 +126,40 @@ class FourierOutputError:
     def rows(self, theta: Array, weights: Sequence[Array]) -> list[Rows]:
         """Residuals and slopes of each record, its ends estimated under the weights."""
         values = self.model.parameters.independent_values()
-        free = self.model.parameters.free_indices
-        values[free] = theta
-        point = np.array([self.model.trim.get(name, 0.0) for name in self.model.point_names])
-        slopes = self.model.native.linearise(values, point)[1]
-        moved = self.model.native.sensitivities(values, point, free)
+        values[self.model.parameters.free_indices] = theta
+        point = LinearPoint.of(self.model, values)
+        steps = {each.grid.sample_time_s for each in self.records}
+        held = {step: HeldModel.of(point, step, self.hold) for step in steps}
         return [
-            self._record(values, slopes, moved, each, weight)
+            self._record(held[each.grid.sample_time_s], each, weight)
             for each, weight in zip(self.records, weights, strict=True)
         ]
 
-    def _record(
-        self, values: Array, slopes: Array, moved: Array, data: TransformedRecord, weight: Array
-    ) -> Rows:
-        n = len(self.model.states)
-        grid, scale = data.grid, _scale(data.grid)
-        delayed, rates, late = delayed_inputs(
-            self.model, values, data.inputs, grid.sample_time_s, self.hold
+    @staticmethod
+    def _record(held: HeldModel, data: TransformedRecord, weight: Array) -> Rows:
+        grid, phi, seen = data.grid, held.transition, held.output
+        taps = grid.total(held.taps(data.inputs)) * _scale(grid)
+        pushes, through = held.weighed(taps)
+        dynamic = grid.turn[:, None, None] * np.eye(phi.shape[1]) - phi[0]
+        # One row of C (zI − Φ)⁻¹ for each output; what the ends add follows it.
+        adjoint = np.swapaxes(
+            _solve(
+                np.swapaxes(dynamic, 1, 2),
+                np.broadcast_to(seen[0].T, (len(dynamic), *seen[0].T.shape)),
+            ),
+            1,
+            2,
         )
-        driven = grid.integral(delayed) * scale
-        s = 1j * grid.omega_rad_s
-        # Derivative and state together, as in the frequency responses: rows are left − right.
-        dynamic = s[:, None, None] * slopes[:, :n] + slopes[:, n : 2 * n]
-        ends_force = np.broadcast_to(-slopes[:n, :n], (len(s), n, n))
-        input_force = (-slopes[:n, 2 * n :] @ driven).T[:, :, None]
-        forced = np.concatenate([ends_force, input_force], axis=2)
-        solved = _solve(dynamic[:, :n], forced)
-        ends_output = dynamic[:, n:] @ solved[:, :, :n] + slopes[n:, :n]
-        output = (dynamic[:, n:] @ solved[:, :, n:])[:, :, 0].T + slopes[n:, 2 * n :] @ driven
-        missing = _split(data.outputs - output)
+        forced = _solve(dynamic, pushes[0].T[:, :, None])[:, :, 0].T
+        missing = _split(data.outputs - seen[0] @ forced - through[0])
+        ends_output = -grid.turn[:, None, None] * adjoint
         directions = _split(np.moveaxis(ends_output, 0, 2)) * weight[:, None, :]
-        flat = np.swapaxes(directions, 1, 2).reshape(-1, n)
+        flat = np.swapaxes(directions, 1, 2).reshape(-1, phi.shape[1])
         ends = Nuisance.best(flat, (missing * weight).ravel())
-        state = (solved[:, :, n] + solved[:, :, :n] @ ends.values).T
-        whole = np.concatenate([s * state + ends.values[:, None], state, driven])
-        by_entry = moved @ whole
-        turned = np.swapaxes(dynamic, 1, 2)
-        adjoint = np.swapaxes(_solve(turned[:, :, :n], turned[:, :, n:]), 1, 2)
-        shift = -(grid.integral(rates) * scale)
-        through = -adjoint @ slopes[:n, 2 * n :] + slopes[n:, 2 * n :]
-        found = (
-            by_entry[:, n:]
-            - np.einsum("kpn,qnk->qpk", adjoint, by_entry[:, :n])
-            + np.einsum("kpm,mq,mk->qpk", through, late, shift)
-        )
+        late = np.multiply.outer(grid.turn, ends.values)[:, :, None]
+        state = forced - _solve(dynamic, late)[:, :, 0].T
+        moved = phi[1:] @ state + pushes[1:]
+        found = np.einsum("kpn,qnk->qpk", adjoint, moved) + seen[1:] @ state + through[1:]
         residuals = ends.removed_from((missing * weight).ravel()).reshape(weight.shape) / weight
         moving = -np.moveaxis(_split(found), 0, 2) * weight[:, :, None]
         kept = ends.removed_from(moving.reshape(flat.shape[0], -1)).reshape(moving.shape)

@@ -16,7 +16,7 @@ class RegressionOptions(Options):
     """What all of them share."""
 
     hold: str = option(
-        "first", choices=HOLDS, doc="What inputs do between samples, where no record knows."
+        "band_limited", choices=HOLDS, doc="What inputs do between samples, where no record knows."
     )
     maximum_iterations: int = option(100, minimum=1, doc="Most steps of each start.")
 
@@ -54,6 +54,9 @@ class FourierOutputErrorOptions(FourierOptions):
 class FilterErrorOptions(RegressionOptions):
     """Options of filter error."""
 
+    hold: str = option(
+        "first", choices=HOLDS, doc="What inputs do between samples, where no record knows."
+    )
     process_noise: Sequence[str] | None = option(
         None, doc="States driven by noise; default: those whose equations hold free parameters."
     )

@@ -45,6 +45,9 @@ class Regression(Protocol):
     def left(self, place: int) -> Array:
         """What is measured of one record, (n_equations, n_rows)."""
 
+    def renewed(self, theta: Array) -> Regression:
+        """The same after what a round holds is computed anew; itself where nothing is held."""
+
     def reach(self) -> Array:
         """Size of each equation's measured side over all records, (n_equations,)."""
 
@@ -150,6 +153,7 @@ def settle(
         pairs = zip(weights, fresh, strict=True)
         change = max(float(np.max(np.abs(after / before - 1.0))) for before, after in pairs)
         weights = fresh
+        problem = problem.renewed(end.x)
         end, rows = solve(problem, end.x, weights, limits)
         if change < SETTLED:
             break

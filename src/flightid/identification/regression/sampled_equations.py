@@ -1,9 +1,4 @@
-"""Equations of motion at every sample of a record whose states are measured (`model_samples.rs`).
-
-The model's state derivatives and its remaining outputs are computed from measured states and
-inputs, with exact derivatives by the free parameters: what equation error, in the time or in the
-frequency domain, compares with the measurement.
-"""
+"""The states of a record that its outputs measure: what equation error starts from."""
 
 from __future__ import annotations
 
@@ -12,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, FitError, ModelError, SingularError
-from flightid.identification.records.delayed_inputs import delayed_inputs
+from flightid.errors import DataError, FitError
 from flightid.models import StateSpaceModel
 from flightid.models.state_space.measured_states import StateOutputs
 from flightid.record import Record
@@ -107,95 +101,6 @@ def _require_states(model: StateSpaceModel, matrix: Array) -> None:
         needed="outputs that are fixed combinations of all states",
         action="use method='output_error' or 'fourier_output_error', which need no states",
     )
-
-
-@dataclass(frozen=True)
-class RightSide:
-    """State derivatives and remaining outputs that a model computes from measured motion.
-
-    Attributes
-    ----------
-    reconstruction : Reconstruction
-    hold : str
-        What the inputs do between samples; ``"zero"`` adds half a sample of delay.
-    """
-
-    reconstruction: Reconstruction
-    hold: str = "band_limited"
-
-    @property
-    def model(self) -> StateSpaceModel:
-        """Model of the equations."""
-        return self.reconstruction.model
-
-    def at(self, theta: Array, motion: MeasuredMotion) -> tuple[Array, Array]:
-        """Values and exact derivatives at free parameters.
-
-        Parameters
-        ----------
-        theta : ndarray, shape (n_free,)
-        motion : MeasuredMotion
-
-        Returns
-        -------
-        values : ndarray, shape (n_states + n_others, n_samples)
-        slopes : ndarray, shape (n_states + n_others, n_samples, n_free)
-
-        Raises
-        ------
-        DataError
-            An equation has no value at a sample.
-        SingularError
-            The equations do not give every state derivative.
-        ModelError
-            State derivatives enter an equation other than linearly.
-        """
-        parameters = self.model.parameters
-        free = parameters.free_indices
-        values = parameters.independent_values()
-        values[free] = theta
-        inputs, rates, late = delayed_inputs(
-            self.model, values, motion.inputs, motion.sample_time_s, self.hold
-        )
-        n, m = len(self.model.states), len(self.model.inputs)
-        still = np.zeros((motion.n_samples, n))
-        rest = np.hstack([motion.states.T, inputs.T])
-        found, slopes = self.model.native.sample(values, np.hstack([still, rest]), list(range(n)))
-        moving = -_solve(slopes[:, :n], found[:, :n, None])[:, :, 0]
-        directions = [*range(n), *range(2 * n, 2 * n + m), *(2 * n + m + k for k in free)]
-        found, slopes = self.model.native.sample(values, np.hstack([moving, rest]), directions)
-        _require_affine(found[:, :n], slopes[:, :n, :n], moving)
-        by_theta = slopes[:, :, n + m :] - (slopes[:, :, n : n + m] * rates.T[:, None]) @ late
-        by_motion = -_solve(slopes[:, :n, :n], by_theta[:, :n])
-        others = [n + place for place in self.reconstruction.others]
-        output_slopes = by_theta[:, others] + slopes[:, others, :n] @ by_motion
-        result = np.hstack([moving, found[:, others]]).T
-        return result, np.concatenate([by_motion, output_slopes], axis=1).transpose(1, 0, 2)
-
-
-def _solve(matrix: Array, right: Array) -> Array:
-    """M⁻¹ of each sample times its right side; one factorisation where M never changes."""
-    try:
-        if np.array_equal(matrix, np.broadcast_to(matrix[:1], matrix.shape)):
-            return np.asarray(np.linalg.inv(matrix[0]) @ right)
-        return np.asarray(np.linalg.solve(matrix, right))
-    except np.linalg.LinAlgError as error:
-        raise SingularError(
-            "the equations do not give every state derivative",
-            found="a singular matrix M of their factors",
-            needed="one independent equation for each state derivative",
-        ) from error
-
-
-def _require_affine(residuals: Array, factors: Array, moving: Array) -> None:
-    size = (np.abs(factors) @ np.abs(moving)[:, :, None])[:, :, 0]
-    worst = float(np.max(np.abs(residuals) - 1e-6 * size, initial=0.0))
-    if worst > 1e-9 * (1.0 + float(size.max(initial=0.0))):
-        raise ModelError(
-            "state derivatives enter an equation other than linearly",
-            found=f"a remainder of {worst:.3g}",
-            needed="equations linear in the state derivatives",
-        )
 
 
 def require_length(motion: MeasuredMotion, needed: int) -> None:

@@ -1,8 +1,8 @@
-"""Finite Fourier integrals ∫ x(t) exp(−jωt) dt of sampled records, by cubics between samples.
+"""Finite Fourier sums Σ x(k) exp(−jωkT) of sampled records at the harmonics of their length.
 
-At the harmonics of a record's length constants vanish, and the ends of the record add one constant
-for all frequencies to the transform of a derivative. A plain sum of samples is wrong at the ends
-of the record and for fast harmonics; cubics between the samples are right to fourth order.
+There constants vanish, and the ends of a record add one number for all frequencies to the transform
+of a difference from sample to sample. Differences of states are known from integrals over the
+sample intervals, whatever the inputs do inside them, so no curve is laid through the samples.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from flightid.errors import DataError, OptionError
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-_NODES = 16
 FEWEST_SAMPLES = 16
 FEWEST_HARMONICS = 4
 HIGHEST_SHARE = 0.4
@@ -95,29 +94,29 @@ class Harmonics:
         length = (self.n_samples - 1) * self.sample_time_s
         return np.asarray(2.0 * np.pi * self.numbers / length)
 
-    def integral(self, samples: Array) -> Complex:
-        """∫ x(t) exp(−jωt) dt from the first sample to the last.
+    def total(self, samples: Array) -> Complex:
+        """Sum of the samples times exp(−jωt) over one period, times the sample time.
+
+        No curve is laid through the samples: for what obeys difference equations, as inputs and
+        outputs of a held model do, with jω x̃ exchanged for (exp(jωT) − 1) x̃.
 
         Parameters
         ----------
         samples : ndarray, shape (..., n_samples)
+            The last one closes the period and is not counted; it may be left out.
 
         Returns
         -------
         ndarray of complex, shape (..., n_f)
             Unit of the samples times s.
-
-        Reference
-        ---------
-        Press et al., *Numerical Recipes*, 3rd ed., §13.9; Klein & Morelli, *Aircraft System
-        Identification*, §10.1 (finite Fourier transform).
         """
-        angle = self.omega_rad_s * self.sample_time_s
-        inner, ends = _weights(angle)
-        # The last sample lies one whole period after the first.
-        summed = fft.fft(samples[..., :-1], axis=-1)[..., self.numbers] + samples[..., -1:]
-        edges = np.concatenate([samples[..., :4], samples[..., -4:]], axis=-1)
-        return np.asarray(self.sample_time_s * (inner * summed + edges @ ends.T))
+        spectrum = fft.fft(samples[..., : self.n_samples - 1], axis=-1)[..., self.numbers]
+        return np.asarray(self.sample_time_s * spectrum)
+
+    @property
+    def turn(self) -> Complex:
+        """exp(jωT): one sample ahead, shape (n_f,)."""
+        return np.asarray(np.exp(1j * self.omega_rad_s * self.sample_time_s))
 
     def in_time(self, integrals: Complex) -> Array:
         """Sum of these harmonics at the samples' times, without mean.
@@ -125,7 +124,7 @@ class Harmonics:
         Parameters
         ----------
         integrals : ndarray of complex, shape (n, n_f)
-            Such as `integral` gives.
+            Such as `total` gives.
 
         Returns
         -------
@@ -137,43 +136,3 @@ class Harmonics:
         spectrum[:, self.numbers] = integrals / self.sample_time_s
         samples = fft.irfft(spectrum, period, axis=1)
         return np.concatenate([samples, samples[:, :1]], axis=1)
-
-
-def _weights(angle: Array) -> tuple[Complex, Complex]:
-    """Weight of the plain sum, and what the four samples at either end need besides.
-
-    Inside, the cubic through four samples stands for the middle interval; at the ends the outer
-    cubic stands for the outer interval too.
-    """
-    first, central, last = (_interval(angle, start) for start in range(3))
-    turn = np.exp(-1j * np.multiply.outer(angle, np.arange(-3, 4)))
-    # Sample m of an interval's four lies m − 1 samples from the interval's start.
-    inner = sum(central[:, m] * turn[:, 3 - (m - 1)] for m in range(4))
-    ends = np.zeros((len(angle), 8), dtype=np.complex128)
-    ends[:, :4] += first
-    ends[:, 4:] += last * turn[:, [2]]  # starts one sample before the end, at phase zero
-    for place in range(4):
-        # Intervals that the plain sum counts but that do not exist, or that the outer cubic takes.
-        for start in range(-2, 1):
-            m = place - start + 1
-            if 0 <= m < 4:
-                ends[:, place] -= central[:, m] * turn[:, 3 + start]
-        for start in range(2, 5):
-            m = place - start + 1
-            if 0 <= m < 4:
-                # Four samples end at 3, the last one; phases count from there, one period on.
-                ends[:, 4 + place] -= central[:, m] * np.exp(-1j * angle * (start - 3))
-    return np.asarray(inner), ends
-
-
-def _interval(angle: Array, start: int) -> Complex:
-    """∫₀¹ L_m(start + s) exp(−jθs) ds for the cubic cardinals L_m at 0, 1, 2, 3."""
-    nodes, weights = np.polynomial.legendre.leggauss(_NODES)
-    s = 0.5 * (nodes + 1.0)
-    cardinal = np.ones((4, _NODES))
-    for m in range(4):
-        for other in range(4):
-            if other != m:
-                cardinal[m] *= (start + s - other) / (m - other)
-    wave = np.exp(-1j * np.multiply.outer(angle, s)) * (0.5 * weights)
-    return np.asarray(wave @ cardinal.T)

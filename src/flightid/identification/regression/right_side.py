@@ -1,0 +1,246 @@
+"""Right sides of the equations of motion, from measured states and inputs (`model_samples.rs`).
+
+ẋ = f(x, u) is compared after integration over each sample interval: x(k+1) − x(k) is measured,
+and the integral of f is a sum over nodes inside. There an input is exactly what its hold says; each
+interval is cut where a delay moves a corner into it (Gauss's rule on the pieces). The states run
+through the samples as cubics; a step of an input bends them, which no cubic follows, so what the
+model's own slope makes of each corner is added to the cubic that leaves it out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import ModelError, SingularError
+from flightid.identification.records.delayed_inputs import DelayedInputs, lagrange
+from flightid.identification.regression.sampled_equations import MeasuredMotion, Reconstruction
+from flightid.models import StateSpaceModel
+
+Array = NDArray[np.float64]
+_GAUSS = 0.5 / np.sqrt(3.0)
+"""Nodes of Gauss's rule from the middle of a piece, over its length: exact for cubics."""
+_NEAR = (-1.0, 0.0, 1.0, 2.0)
+"""Samples through which a state's cubic runs, about an interval from 0 to 1."""
+
+
+@dataclass(frozen=True)
+class RightSides:
+    """Both kinds of equation at one point, with derivatives by the free parameters.
+
+    Attributes
+    ----------
+    rates : ndarray, shape (n_states, n_samples − 1)
+        Mean state derivative over each sample interval.
+    rate_slopes : ndarray, shape (n_states, n_samples − 1, n_free)
+    others : ndarray, shape (n_others, n_samples)
+        Outputs that are no states, at the samples.
+    other_slopes : ndarray, shape (n_others, n_samples, n_free)
+    """
+
+    rates: Array
+    rate_slopes: Array
+    others: Array
+    other_slopes: Array
+
+
+@dataclass(frozen=True)
+class _Computed:
+    """State derivatives, then other outputs, at points: (n_points, n_rows) and derivatives."""
+
+    values: Array
+    by_input: Array
+    by_theta: Array
+
+
+@dataclass(frozen=True)
+class RightSide:
+    """State derivatives and remaining outputs that a model computes from measured motion.
+
+    Attributes
+    ----------
+    reconstruction : Reconstruction
+    hold : {"zero", "first", "band_limited"}
+        What the inputs do between samples.
+    """
+
+    reconstruction: Reconstruction
+    hold: str = "band_limited"
+
+    @property
+    def model(self) -> StateSpaceModel:
+        """Model of the equations."""
+        return self.reconstruction.model
+
+    def bends(self, theta: Array, motion: MeasuredMotion) -> Bends:
+        """What corners of the inputs do to the states between samples, for these parameters."""
+        values, late = self._late(theta, motion)
+        inputs = late.at(0.0)[0]
+        n = len(self.model.states)
+        return Bends.of(late, self._computed(values, motion.states, inputs).by_input[:, :n])
+
+    def at(self, theta: Array, motion: MeasuredMotion, bends: Bends) -> RightSides:
+        """Values and derivatives at free parameters, shape (n_free,), bends held.
+
+        Raises
+        ------
+        DataError
+            An equation has no value at a sample.
+        SingularError
+            The equations do not give every state derivative.
+        ModelError
+            State derivatives enter an equation other than linearly, or a delay is negative.
+        """
+        values, late = self._late(theta, motion)
+        n, cells = len(self.model.states), motion.n_samples - 1
+        pieces = list(pairwise(late.corners))
+        places = [a + (b - a) * (0.5 + side * _GAUSS) for a, b in pieces for side in (-1.0, 1.0)]
+        weights = np.repeat([0.5 * (b - a) for a, b in pieces], 2)
+        paths = [curve(motion.states, place) + bends.at(place) for place in places]
+        driven = [late.at(place) for place in places]
+        inside = self._computed(
+            values,
+            np.concatenate(paths, axis=1),
+            np.concatenate([each[:, :-1] for each, _ in driven], axis=1),
+        )
+
+        def mean(found: Array) -> Array:
+            shaped = found.reshape(len(places), cells, *found.shape[1:])
+            return np.asarray(np.tensordot(weights, shaped, axes=1))
+
+        if self.hold == "zero":
+            moving = late.changes()[1][:, :-1].T / motion.sample_time_s
+            by_delay = mean(inside.by_input[:, :n]) * moving[:, None]
+        else:
+            moving = np.concatenate([rates[:, :-1] for _, rates in driven], axis=1).T
+            by_delay = mean(inside.by_input[:, :n] * moving[:, None])
+        slopes = mean(inside.by_theta[:, :n]) - by_delay @ late.slopes
+        others, other_slopes = self._others(values, motion, late)
+        return RightSides(mean(inside.values[:, :n]).T, slopes.swapaxes(0, 1), others, other_slopes)
+
+    def _late(self, theta: Array, motion: MeasuredMotion) -> tuple[Array, DelayedInputs]:
+        values = self.model.parameters.independent_values()
+        values[self.model.parameters.free_indices] = theta
+        step = motion.sample_time_s
+        return values, DelayedInputs.of(self.model, values, motion.inputs, step, self.hold)
+
+    def _others(
+        self, values: Array, motion: MeasuredMotion, late: DelayedInputs
+    ) -> tuple[Array, Array]:
+        """Outputs that are no states, at the samples, and their derivatives."""
+        n = len(self.model.states)
+        if not self.reconstruction.others:
+            blank = np.zeros((0, motion.n_samples, late.slopes.shape[1]))
+            return np.zeros((0, motion.n_samples)), blank
+        inputs, rates = late.at(0.0)
+        here = self._computed(values, motion.states, inputs)
+        slopes = here.by_theta[:, n:] - (here.by_input[:, n:] * rates.T[:, None]) @ late.slopes
+        return here.values[:, n:].T, slopes.swapaxes(0, 1)
+
+    def _computed(self, values: Array, states: Array, inputs: Array) -> _Computed:
+        n, m = states.shape[0], inputs.shape[0]
+        free = self.model.parameters.free_indices
+        still = np.zeros((states.shape[1], n))
+        rest = np.hstack([states.T, inputs.T])
+        found, slopes = self.model.native.sample(values, np.hstack([still, rest]), list(range(n)))
+        moving = -_solve(slopes[:, :n], found[:, :n, None])[:, :, 0]
+        directions = [*range(n), *range(2 * n, 2 * n + m), *(2 * n + m + k for k in free)]
+        found, slopes = self.model.native.sample(values, np.hstack([moving, rest]), directions)
+        _require_affine(found[:, :n], slopes[:, :n, :n], moving)
+        rates = -_solve(slopes[:, :n, :n], slopes[:, :n, n:])
+        others = [n + place for place in self.reconstruction.others]
+        outputs = slopes[:, others, n:] + slopes[:, others, :n] @ rates
+        whole = np.concatenate([rates, outputs], axis=1)
+        return _Computed(np.hstack([moving, found[:, others]]), whole[:, :, :m], whole[:, :, m:])
+
+
+def curve(states: Array, place: float) -> Array:
+    """States at a place in every sample interval, 0 to 1, by the cubic through four samples.
+
+    Example
+    -------
+    >>> curve(np.arange(6.0)[None] ** 3, 0.5).tolist()
+    [[0.125, 3.375, 15.625, 42.875, 91.125]]
+    """
+    count = states.shape[1]
+    found = np.empty((states.shape[0], count - 1))
+    for first, cells, at in (
+        (0, slice(0, 1), place),
+        (0, slice(1, count - 2), place + 1.0),
+        (count - 4, slice(count - 2, count - 1), place + 2.0),
+    ):
+        wide = cells.stop - cells.start
+        weights = lagrange(at, 4)[0]
+        found[:, cells] = sum(
+            weights[k] * states[:, first + k : first + k + wide] for k in range(4)
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class Bends:
+    """What corners of the inputs do to the states between samples, beyond the cubics.
+
+    Attributes
+    ----------
+    late : DelayedInputs
+    jumps : ndarray, shape (n_inputs, n_states, n_samples)
+        Of ẋ at a step, or of ẍ where a straight line turns.
+    """
+
+    late: DelayedInputs
+    jumps: Array
+
+    @classmethod
+    def of(cls, late: DelayedInputs, by_input: Array) -> Bends:
+        """From derivatives of ẋ by the inputs, shape (n_samples, n_states, n_inputs)."""
+        _, changes = late.changes()
+        return cls(late, by_input.transpose(2, 1, 0) * changes[:, None])
+
+    def at(self, place: float) -> Array:
+        """Added to the curve at a place in every interval, (n_states, n_samples − 1)."""
+        n_states, count = self.jumps.shape[1:]
+        found = np.zeros((n_states, count - 1))
+        if self.late.hold == "band_limited":
+            return found
+        weights = lagrange(place + 1.0, 4)[0]
+        for corner, jumps in zip(self.late.changes()[0], self.jumps, strict=True):
+            for beside in (-1, 0, 1):
+                bent = self._bent(np.array([place, *_NEAR]) - corner - beside)
+                missed = bent[0] - weights @ bent[1:]
+                # The first and the last interval have no neighbours on one side: left as they are.
+                found[:, 1:-1] += missed * jumps[:, 1 + beside : count - 2 + beside]
+        return found
+
+    def _bent(self, since: Array) -> Array:
+        """Motion since a corner of unit size, by times in samples."""
+        after = np.maximum(since, 0.0) * self.late.sample_time_s
+        return after if self.late.hold == "zero" else 0.5 * after**2
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    """M⁻¹ of each sample times its right side; one factorisation where M never changes."""
+    try:
+        if np.array_equal(matrix, np.broadcast_to(matrix[:1], matrix.shape)):
+            return np.asarray(np.linalg.inv(matrix[0]) @ right)
+        return np.asarray(np.linalg.solve(matrix, right))
+    except np.linalg.LinAlgError as error:
+        raise SingularError(
+            "the equations do not give every state derivative",
+            found="a singular matrix M of their factors",
+            needed="one independent equation for each state derivative",
+        ) from error
+
+
+def _require_affine(residuals: Array, factors: Array, moving: Array) -> None:
+    size = (np.abs(factors) @ np.abs(moving)[:, :, None])[:, :, 0]
+    worst = float(np.max(np.abs(residuals) - 1e-6 * size, initial=0.0))
+    if worst > 1e-9 * (1.0 + float(size.max(initial=0.0))):
+        raise ModelError(
+            "state derivatives enter an equation other than linearly",
+            found=f"a remainder of {worst:.3g}",
+            needed="equations linear in the state derivatives",
+        )
