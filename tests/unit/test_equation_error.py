@@ -213,3 +213,21 @@ def test_spectral_covariance_of_white_noise_is_the_plain_one() -> None:
     plain = np.linalg.inv(np.einsum("fp,fq->pq", rows[0].conj(), rows[0]).real)
     assert_close(np.diag(covariance), np.diag(plain), rtol=0.1, why="4000 frequencies")
     assert freedom > 1000.0
+
+
+def test_fourier_output_error_refuses_what_has_no_harmonics_apart() -> None:
+    bent = fid.StateSpaceModel(
+        states={"p": "rad/s"},
+        input_units={"da": "rad"},
+        measurements={"p": fid.Output("p", "rad/s")},
+        equations={"p'": "Lp*p*abs(p) + Lda*da"},
+        parameters=fid.Parameters(
+            [fid.Parameter("Lp", -3.0, "1/rad"), fid.Parameter("Lda", 12.0, "1/s^2")]
+        ),
+        name="bent",
+    )
+    time_s = np.arange(200) * 0.02
+    driven = fid.Record.from_arrays(time_s, inputs={"da": np.sin(3 * time_s)}, units={"da": "rad"})
+    record = fid.simulate(bent, driven)
+    with pytest.raises(FitError, match=r"equations of 'bent'.*'fourier_regression'"):
+        fid.identify(bent, record, method="fourier_output_error")

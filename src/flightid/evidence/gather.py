@@ -51,6 +51,7 @@ BELONGS = {
     "input-not-excited": BAND,
     "residuals-coloured": RESIDUALS,
     "output-unexplained": RESIDUALS,
+    "process-noise": RESIDUALS,
 }
 
 

@@ -30,6 +30,7 @@ from flightid.identification.output_error.equation_records import (
     judge_runs,
     segmented_starts,
 )
+from flightid.identification.output_error.process_noise import judge_process_noise
 from flightid.identification.records.findings import judge_channels, judge_fit
 from flightid.identification.records.options import RecordOptions
 from flightid.identification.records.setup import RecordSet, prepare_records
@@ -151,7 +152,12 @@ def conclude(
     known = record_statistics(
         fitted, prepared, own, best.determined, runs, best.noise, options.limit, beside, starts
     )
-    return _assemble(fitted, prepared, options, groups, runs, known, setup)
+    noise = (
+        []
+        if runs_of is not None and runs_of.is_segmented
+        else judge_process_noise(fitted, prepared.arrays, [outputs for outputs, _ in runs])
+    )
+    return _assemble(fitted, prepared, options, groups, runs, known, setup, noise)
 
 
 def searched(
@@ -301,6 +307,7 @@ def _assemble(
     runs: Sequence[tuple[Array, Array]],
     found: RecordStatistics,
     setup: Sequence[Finding],
+    noise: Sequence[Finding],
 ) -> Fit:
     best = groups[0][0]
     records = _fitted_records(replace(prepared, model=fitted), runs, found)
@@ -311,6 +318,7 @@ def _assemble(
         *judge_parameters(found.parameters),
         *judge_correlation(found.names, found.correlation),
         *judge_fit(costs, found.colour),
+        *noise,
     )
     return Fit(
         model=fitted,

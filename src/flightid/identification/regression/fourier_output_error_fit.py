@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, FlightidError
+from flightid.errors import DataError, FitError, FlightidError
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.multistart import cluster, collect, draw_starts
@@ -36,7 +36,14 @@ Array = NDArray[np.float64]
 def fit_fourier_output_error(
     model: StateSpaceModel, data: Record | Sequence[Record], options: FourierOutputErrorOptions
 ) -> Fit:
-    """Fit outputs at the harmonics of the records; see `flightid.identify`."""
+    """Fit outputs at the harmonics of the records; see `flightid.identify`.
+
+    Raises
+    ------
+    FitError
+        The model is not linear: it has no harmonics apart from each other.
+    """
+    _require_linear(model)
     records = check_records(model, data)
     transformed = tuple(
         TransformedRecord.of(record, model, options.band_rad_s) for record in records
@@ -66,6 +73,18 @@ def fit_fourier_output_error(
         _compared(problem, best.rows),
         options,
         extra={"rounds": best.rounds},
+    )
+
+
+def _require_linear(model: StateSpaceModel) -> None:
+    if model.is_linear:
+        return
+    raise FitError(
+        "Fourier output error needs a linear model",
+        found=f"equations of {model.name!r} whose matrices change with states or inputs",
+        needed="equations that are linear in states and inputs",
+        action="use method='output_error', which integrates them; where all states are measured "
+        "'fourier_regression' or 'equation_error'; or write the equations linear about the trim",
     )
 
 

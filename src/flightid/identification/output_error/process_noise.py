@@ -1,0 +1,176 @@
+"""Whether residuals of a free run are what noise on the states makes of them.
+
+Turbulence drives the states, and a free run does not follow: its residuals are innovations e of a
+Kalman filter, seen through the model's own modes, v = [C (qI - A)^-1 K + I] e. Three accounts
+of v are compared by their likelihood: white noise, autoregressive noise of each output for itself
+(sensors), and noise on the states with the best K. The third has to beat the first at a nominal
+false-alarm rate. Against the second it has to win by the Bayesian information criterion, or outputs
+have to move together at different times, at the same rate: sensors do not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+from scipy.stats import chi2
+
+from flightid.conventions import Light
+from flightid.errors import FlightidError
+from flightid.findings import Finding
+from flightid.identification.output_error.innovation_gain import (
+    ORDER,
+    innovations,
+    log_size,
+    observable,
+)
+from flightid.identification.output_error.sensor_noise import (
+    FALSE_ALARMS,
+    crossed,
+    is_white,
+    sensor_errors,
+)
+from flightid.models import GreyBoxModel, StateSpaceModel
+from flightid.models.sampled.recursion import spectral_radius
+from flightid.models.state_space.measured_states import state_outputs
+
+Array = NDArray[np.float64]
+LONGEST = 3000
+"""Samples of a record that are looked at."""
+SAMPLES_PER_NUMBER = 10
+HALF = 0.5
+"""Share of an output's residual variance that innovations leave, below which it is red."""
+
+
+@dataclass(frozen=True)
+class StateNoise:
+    """What noise on the states explains of residuals.
+
+    Attributes
+    ----------
+    p_value : float
+        Of white residuals against noise on the states.
+    beats_sensors : bool
+        Whether it is the better account than autoregressive noise of each output.
+    left : ndarray, shape (n_outputs,)
+        Variance of one-step innovations over that of the residuals.
+    """
+
+    p_value: float
+    beats_sensors: bool
+    left: Array
+
+    @property
+    def is_found(self) -> bool:
+        """Whether both tests say so."""
+        return self.p_value < FALSE_ALARMS and self.beats_sensors
+
+
+def judge_process_noise(
+    fitted: GreyBoxModel, records: Sequence[tuple[Array, Array, float]], runs: Sequence[Array]
+) -> list[Finding]:
+    """Say where output error was used on a record of turbulence.
+
+    Parameters
+    ----------
+    fitted : TransferFunctionModel or StateSpaceModel
+    records : sequence of tuple
+        Inputs, outputs and sample time of each.
+    runs : sequence of ndarray, shape (n_outputs, n_samples)
+        Free runs with biases.
+    """
+    try:
+        systems = [
+            _system(fitted, inputs, run) for (inputs, _, _), run in zip(records, runs, strict=True)
+        ]
+    except FlightidError:
+        return []
+    steps = [dt for _, _, dt in records]
+    residuals = [y - run for (_, y, _), run in zip(records, runs, strict=True)]
+    found = state_noise(
+        residuals, [(expm(a * dt), c) for (a, c), dt in zip(systems, steps, strict=True)]
+    )
+    if found is None or not found.is_found:
+        return []
+    worst = int(np.argmin(found.left))
+    light = Light.RED if found.left[worst] < HALF else Light.AMBER
+    return [
+        Finding(
+            "process-noise",
+            light,
+            "residuals follow the model's own modes, as turbulence makes them: one sample ahead "
+            f"{np.sqrt(found.left[worst]):.2g} of the free run's error is left in "
+            f"{fitted.outputs[worst]}",
+            "use method='filter_error', which has noise on the states, or fly in calm air",
+        )
+    ]
+
+
+def _system(fitted: GreyBoxModel, inputs: Array, run: Array) -> tuple[Array, Array]:
+    """A and C of the model at the middle of a record."""
+    if not isinstance(fitted, StateSpaceModel) or fitted.is_linear:
+        a, _, c, _, _ = fitted.state_space()
+        return a, c
+    states = state_outputs(fitted, inputs, run).states(run).mean(axis=1)
+    values = map(float, (*states, *inputs.mean(axis=1)))
+    at = dict(zip((*fitted.states, *fitted.inputs), values, strict=True))
+    a, _, c, _, _ = fitted.state_space(at=at)
+    return a, c
+
+
+def state_noise(
+    residuals: Sequence[Array], systems: Sequence[tuple[Array, Array]]
+) -> StateNoise | None:
+    """Compare the three accounts of residuals; None where there is too little to tell.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, shape (n_outputs, n_samples)
+    systems : sequence of tuple of ndarray
+        Sampled A (n, n) and C (n_outputs, n) of each record.
+
+    Returns
+    -------
+    StateNoise or None
+
+    Assumes
+    -------
+    A model whose modes do not grow much over the samples looked at. Missing dynamics that the
+    inputs excite look like noise on the states too.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., sec. 7.4 (innovations); Jategaonkar, *Flight Vehicle
+    System Identification*, 2nd ed., sec. 5.2; Schwarz (1978), Annals of Statistics 6.
+    """
+    cut = [each[:, :LONGEST] for each in residuals]
+    p, n = systems[0][1].shape[0], systems[0][0].shape[0]
+    n_rows = sum(each.shape[1] - ORDER for each in cut)
+    if n == 0 or n_rows < SAMPLES_PER_NUMBER * p * max(ORDER, n):
+        return None
+    scale = np.sqrt(np.mean(np.concatenate(cut, axis=1) ** 2, axis=1))
+    if not np.all(np.isfinite(scale)) or np.any(scale == 0.0):
+        return None
+    white = [each / scale[:, None] for each in cut]
+    placed = [observable(a, c / scale[:, None]) for a, c in systems]
+    n = placed[0][0].shape[0]
+    if any(spectral_radius(a) > 1.0 + 1.0 / LONGEST for a, _ in placed):
+        return None
+    if is_white(white):
+        return None
+    ahead, found = innovations(white, placed)
+    tails = [each[:, ORDER:] for each in white]
+    plain = log_size(tails)
+    sensors, orders = sensor_errors(white)
+    gain = n_rows * (plain - found)
+    bic = n_rows * (log_size([sensors]) - found) + np.log(n_rows) * (orders - n * p)
+    together = crossed(sensors) < FALSE_ALARMS
+    left = _variances([each[:, ORDER:] for each in ahead]) / _variances(tails)
+    return StateNoise(float(chi2.sf(gain, n * p)), bool(bic > 0.0) or together, left)
+
+
+def _variances(parts: Sequence[Array]) -> Array:
+    return np.asarray(np.mean(np.concatenate(parts, axis=1) ** 2, axis=1))

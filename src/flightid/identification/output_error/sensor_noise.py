@@ -1,0 +1,99 @@
+"""Noise of each output by itself: white, autoregressive or drifting; what no states share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_toeplitz
+from scipy.stats import chi2
+
+from flightid.identification.output_error.innovation_gain import ORDER, innovations
+
+Array = NDArray[np.float64]
+FALSE_ALARMS = 0.01
+"""Share of records with white residuals in which something else is found."""
+DRIFTS = (0.9, 0.98, 0.999)
+"""Poles of a sensor's drift."""
+CROSSED = 25
+"""Lags between outputs."""
+
+
+def crossed(errors: Array) -> float:
+    """p-value of no correlation between outputs at different times; 1 for a single output.
+
+    Noise of sensors may be common at one instant; what moves one output now and another later went
+    through the states. Reference: Haugh (1976), J. American Statistical Association 71.
+    """
+    p, n = errors.shape
+    unit = errors / np.sqrt(np.sum(errors**2, axis=1))[:, None]
+    total, count = 0.0, 0
+    for lag in range(1, CROSSED + 1):
+        square = (unit[:, lag:] @ unit[:, :-lag].T) ** 2
+        total += n / (n - lag) * n * float(np.sum(square) - np.trace(square))
+        count += p * (p - 1)
+    return float(chi2.sf(total, count)) if count else 1.0
+
+
+def sensor_errors(residuals: Sequence[Array]) -> tuple[Array, int]:
+    """Errors of noise of each output by itself, and how many numbers it took.
+
+    Autoregressive, or a slow drift under white noise.
+    """
+    n_rows = sum(each.shape[1] - ORDER for each in residuals)
+    errors, count = [], 0
+    for place in range(residuals[0].shape[0]):
+        rows = [each[place : place + 1] for each in residuals]
+        options = [_autoregression(rows), *((_drift(rows, pole), 2) for pole in DRIFTS)]
+        left, order = min(
+            options,
+            key=lambda each: n_rows * np.log(np.mean(each[0] ** 2)) + each[1] * np.log(n_rows),
+        )
+        errors.append(left)
+        count += order
+    return np.array(errors), count
+
+
+def _autoregression(rows: Sequence[Array]) -> tuple[Array, int]:
+    """Errors of the autoregression of the best order, which goes along."""
+    now = np.concatenate([each[0, ORDER:] for each in rows])
+    n = len(now)
+    lags = np.sum([_autocovariance(each[0]) for each in rows], axis=0) / n
+    choices = [(n * float(np.log(lags[0])), np.zeros(0))]
+    for order in range(1, ORDER + 1):
+        weights = solve_toeplitz(lags[:order], lags[1 : order + 1])
+        error = max(float(lags[0] - weights @ lags[1 : order + 1]), 1e-300)
+        choices.append((n * np.log(error) + order * np.log(n), weights))
+    weights = min(choices, key=lambda each: each[0])[1]
+    past = np.concatenate([_lagged(each, len(weights)) for each in rows], axis=1)
+    return np.asarray(now - weights @ past), len(weights)
+
+
+def _autocovariance(row: Array) -> Array:
+    return np.array([row[: len(row) - lag] @ row[lag:] for lag in range(ORDER + 1)])
+
+
+def is_white(residuals: Sequence[Array]) -> bool:
+    """Portmanteau test, Bonferroni over outputs: Ljung & Box (1978), Biometrika 65."""
+    n = sum(each.shape[1] for each in residuals)
+    for place in range(residuals[0].shape[0]):
+        lags = np.sum([_autocovariance(each[place]) for each in residuals], axis=0)
+        sizes = (lags[1:] / lags[0]) ** 2 / (n - np.arange(1, ORDER + 1))
+        if chi2.sf(n * (n + 2) * sizes.sum(), ORDER) < FALSE_ALARMS / residuals[0].shape[0]:
+            return False
+    return True
+
+
+def _drift(rows: Sequence[Array], pole: float) -> Array:
+    system = [(np.array([[pole]]), np.ones((1, 1)))] * len(rows)
+    found = innovations(rows, system)[0]
+    return np.concatenate([each[0, ORDER:] for each in found])
+
+
+def _lagged(rows: Array, order: int) -> Array:
+    """Past values, (n_outputs · order, n_samples - ORDER)."""
+    n = rows.shape[1]
+    if not order:
+        return np.zeros((0, n - ORDER))
+    return np.concatenate([rows[:, ORDER - lag : n - lag] for lag in range(1, order + 1)])

@@ -1,0 +1,92 @@
+"""Residuals that noise on the states makes are told from those of sensors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.conventions import Light
+from flightid.identification.output_error.process_noise import state_noise
+from tests.strangers.noises import ar1
+
+A = np.array([[0.97, 0.02], [-0.06, 0.95]])
+C = np.eye(2)
+
+
+def _of_states(seed: int, n: int = 1500) -> np.ndarray:
+    random = np.random.default_rng(seed)
+    state, rows = np.zeros(2), np.empty((2, n))
+    for place in range(n):
+        rows[:, place] = state
+        state = A @ state + np.array([0.3, 0.0]) * random.standard_normal()
+    return rows + random.standard_normal((2, n))
+
+
+def test_noise_on_states_is_found_and_what_a_filter_leaves() -> None:
+    found = state_noise([_of_states(0)], [(A, C)])
+    assert found is not None
+    assert found.is_found
+    assert np.all(found.left < 0.9)
+    assert np.min(found.left) < 0.6
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.9, 0.98])
+def test_noise_of_sensors_is_not(pole: float) -> None:
+    hits = 0
+    for seed in range(20):
+        random = np.random.default_rng(seed)
+        rows = np.array([ar1(random, 1500, pole), ar1(random, 1500, 0.5 * pole)])
+        found = state_noise([rows], [(A, C)])
+        hits += found is not None and found.is_found
+    assert hits <= 1
+
+
+def test_too_little_and_unseen_states_are_no_ground() -> None:
+    assert state_noise([np.ones((2, 20))], [(A, C)]) is None
+    heading = np.block([[A, np.zeros((2, 1))], [np.array([[0.02, 0.0, 1.0]])]])
+    found = state_noise([_of_states(1)], [(heading, np.eye(2, 3))])
+    assert found is not None
+    assert found.is_found
+
+
+def test_a_fit_in_turbulence_names_filter_error() -> None:
+    model = fid.StateSpaceModel(
+        states={"alpha": "rad", "q": "rad/s"},
+        input_units={"de": "rad"},
+        measurements={"alpha": fid.Output("alpha", "rad"), "q": fid.Output("q", "rad/s")},
+        equations={"alpha'": "q - Za*alpha", "q'": "Ma*alpha + Mq*q + Md*de"},
+        parameters=fid.Parameters(
+            [
+                *(
+                    fid.Parameter(k, v, u)
+                    for k, v, u in (("Ma", -4.0, "1/s^2"), ("Mq", -2.0, "1/s"))
+                ),
+                fid.Parameter("Za", 1.0, "1/s", free=False),
+                fid.Parameter("Md", -8.0, "1/s^2", free=False),
+            ]
+        ),
+    )
+    random = np.random.default_rng(2)
+    n, step = 1500, 0.02
+    stick = 0.03 * np.repeat(random.choice([-1.0, 0.0, 1.0], n // 25), 25)
+    state, rows = np.zeros(2), np.empty((2, n))
+    for place in range(n):
+        rows[:, place] = state
+        for _ in range(4):
+            felt = state[0]
+            state = state + 0.25 * step * np.array(
+                [state[1] - felt, -4.0 * felt - 2.0 * state[1] - 8.0 * stick[place]]
+            )
+        state = state + np.array([0.004, 0.012]) * random.standard_normal()
+    noisy = rows + np.array([[0.003], [0.01]]) * random.standard_normal((2, n))
+    record = fid.Record.from_arrays(
+        np.arange(n) * step, inputs={"de": stick}, outputs={"alpha": noisy[0], "q": noisy[1]},
+        units={"de": "rad", "alpha": "rad", "q": "rad/s"}, hold="zero",
+    )  # fmt: skip
+    fit = fid.identify(model, record, method="output_error")
+    said = next(finding for finding in fit.findings if finding.code == "process-noise")
+    assert said.light is Light.RED
+    assert "filter_error" in said.action
+    assert fit.evidence.light is Light.RED
+    assert "turbulence" in fit.evidence.reason.message
