@@ -38,6 +38,8 @@ from flightid.models.sampled.recursion import spectral_radius
 from flightid.models.state_space.measured_states import state_outputs
 
 Array = NDArray[np.float64]
+ROUNDING = 1e-8
+"""Residuals over outputs below which there is rounding alone."""
 LONGEST = 3000
 """Samples of a record that are looked at."""
 SAMPLES_PER_NUMBER = 10
@@ -90,6 +92,9 @@ def judge_process_noise(
         return []
     steps = [dt for _, _, dt in records]
     residuals = [y - run for (_, y, _), run in zip(records, runs, strict=True)]
+    pairs = zip(residuals, records, strict=True)
+    if any(np.any(_level(each) <= ROUNDING * _level(y)) for each, (_, y, _) in pairs):
+        return []
     found = state_noise(
         residuals, [(expm(a * dt), c) for (a, c), dt in zip(systems, steps, strict=True)]
     )
@@ -170,6 +175,10 @@ def state_noise(
     together = crossed(sensors) < FALSE_ALARMS
     left = _variances([each[:, ORDER:] for each in ahead]) / _variances(tails)
     return StateNoise(float(chi2.sf(gain, n * p)), bool(bic > 0.0) or together, left)
+
+
+def _level(rows: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean(rows**2, axis=1)))
 
 
 def _variances(parts: Sequence[Array]) -> Array:
