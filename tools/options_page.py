@@ -10,22 +10,34 @@ import dataclasses
 import sys
 from pathlib import Path
 
+from flightid import Noise
+from flightid.control.tuning.options import TuneOptions
 from flightid.control.tuning.requirements import TuningRequirements
+from flightid.excitation import Limits, RateAxis
+from flightid.excitation.options import DesignOptions
 from flightid.identification.methods import METHODS
-from flightid.identification.prediction.request import Request
 from flightid.identification.reduction.rules import ReductionLimits
+from flightid.logs.options import PartOptions
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.narx.structure import NarxStructure
+from flightid.models.polynomial.orders import ScanOptions
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.options import Options, options_of
+from flightid.record.options import ChannelOptions, ReadOptions
 from flightid.responses.options import ResponseOptions
+from flightid.simulation.options import SimulationOptions
+from flightid.study.fit_settings import VerifySettings
+from flightid.study.response_settings import ResponseSettings
+from flightid.validation.verification.options import VerifyOptions
+from flightid.vehicles.pilot_inputs import StickOptions
 
 PAGE = Path(__file__).parent.parent / "docs" / "options.md"
 HEAD = """# Options
 
 Every option of every method with its default and range, written from the code by
 `tools/options_page.py`. The same words are arguments in Python, keys of a study file and, with
-dashes, options of the command line; a value outside its range is refused with the range.
+dashes, options of the command line, where some have a short form too (`--band` for
+`--band-rad-s`); a value outside its range is refused with the range.
 """
 
 
@@ -39,9 +51,22 @@ def sections() -> dict[str, type[Options]]:
         "Polynomial structures": PolynomialStructure,
         "Subspace structures": SubspaceStructure,
         "NARX structures": NarxStructure,
-        "predict and verify": Request,
+        "Orders of polynomials, and of a scan": ScanOptions,
+        "predict and verify": VerifyOptions,
+        "simulate": SimulationOptions,
+        "Noise of a simulation": Noise,
+        "simulate model, without records": StickOptions,
         "reduce": ReductionLimits,
+        "tune": TuneOptions,
         "TuningRequirements": TuningRequirements,
+        "excitation.plan (design)": DesignOptions,
+        "RateAxis: the guess of a design": RateAxis,
+        "Limits of a design": Limits,
+        "Reading tables": ReadOptions,
+        "Part of a log or record": PartOptions,
+        "Channels": ChannelOptions,
+        "[response] of a study": ResponseSettings,
+        "[verify] of a study": VerifySettings,
     }
 
 
@@ -54,11 +79,15 @@ def section(title: str, options: type[Options]) -> str:
         "| --- | --- | --- | --- |",
     ]
     for each in options_of(options):
-        usual = "" if each.default is dataclasses.MISSING else f"`{each.default!r}`"
+        usual = "" if each.default is dataclasses.MISSING else f"`{_shown(each.default)}`"
         # A bar inside a cell would end it.
         cells = (f"`{each.name}`", usual, each.needed, each.doc)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join(lines)
+
+
+def _shown(default: object) -> str:
+    return f"{default:.6g}" if isinstance(default, float) and default % 1 else repr(default)
 
 
 def page() -> str:

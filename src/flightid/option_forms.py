@@ -57,10 +57,16 @@ WORD = Form("a word", lambda value: isinstance(value, str))
 NAMES = Form(
     "a list of names", lambda value: _is_list(value, lambda item: isinstance(item, str)), tuple
 )
-NUMBERS = Form("a list of numbers", lambda value: _is_list(value, _is_number), tuple)
+NUMBERS = Form(
+    "a list of numbers", lambda value: _is_list(value, _is_number) and len(value) > 0, tuple
+)
 BAND = Form("two numbers, low and high", lambda value: _is_list(value, _is_number, 2), tuple)
 NOTHING = Form("none", lambda value: value is None)
 TABLE = Form("a table", lambda value: isinstance(value, Mapping))
+WORDS = Form(
+    "words by name",
+    lambda value: isinstance(value, Mapping) and all(isinstance(v, str) for v in value.values()),
+)
 
 
 def forms_of(hint: object) -> Iterable[Form]:
@@ -91,7 +97,7 @@ def forms_of(hint: object) -> Iterable[Form]:
     elif origin is typing.Literal:
         yield WORD
     elif isinstance(origin, type) and issubclass(origin, Mapping):
-        yield TABLE
+        yield WORDS if parts[1] is str else TABLE
     elif isinstance(origin, type) and issubclass(origin, Sequence):
         inner = [part for part in parts if part is not ...]
         if inner == [float, float]:

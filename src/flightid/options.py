@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import typing
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cache
@@ -79,6 +79,8 @@ class Option:
         for form in self.forms:
             if form is WORD and self.choices:
                 parts += [repr(word) for word in self.choices]
+            elif form is NAMES and self.choices:
+                parts.append("a list of " + ", ".join(map(repr, self.choices)))
             elif form in (WHOLE, NUMBER, NUMBERS, BAND):
                 unit = f"[{self.unit}]" if self.unit else ""
                 words = (form.words, self.range_words, unit)
@@ -105,6 +107,8 @@ class Option:
         form = forms[0]
         if form is WORD and self.choices and value not in self.choices:
             return f"{self.name} is not known"
+        if form is NAMES and self.choices and not set(typing.cast("Any", value)) <= {*self.choices}:
+            return f"{self.name} holds a word that is not known"
         if form in (WHOLE, NUMBER):
             return self._outside(float(typing.cast(float, value)))
         if form in (NUMBERS, BAND):
@@ -127,6 +131,7 @@ class Option:
 def option(
     default: Any = dataclasses.MISSING,  # noqa: ANN401 — a default of any type
     *,
+    default_factory: Callable[[], Any] | None = None,
     unit: str = "",
     minimum: float | None = None,
     maximum: float | None = None,
@@ -142,6 +147,8 @@ def option(
     ----------
     default : object
         Left out where a value must be given.
+    default_factory : callable, optional
+        Makes a default that can be changed, such as an empty table.
     unit : str
         Of a number.
     minimum, maximum : float, optional
@@ -177,7 +184,10 @@ def option(
         "choices": tuple(choices),
         "doc": doc,
     }
-    return field(default=default, metadata={_KEY: (facts, tuple(forms))})
+    metadata = {_KEY: (facts, tuple(forms))}
+    if default_factory is not None:
+        return field(default_factory=default_factory, metadata=metadata)
+    return field(default=default, metadata=metadata)
 
 
 @dataclass(frozen=True)
@@ -238,7 +248,9 @@ def _options_of(options: Hashable) -> tuple[Option, ...]:
             continue
         facts, forms = each.metadata[_KEY]
         kinds = forms or tuple(forms_of(hints[each.name]))
-        made.append(Option(each.name, each.default, kinds, **facts))
+        made_here = each.default_factory
+        usual = each.default if made_here is dataclasses.MISSING else made_here()
+        made.append(Option(each.name, usual, kinds, **facts))
     return tuple(made)
 
 

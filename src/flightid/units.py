@@ -148,25 +148,69 @@ def same_dimension(first: str, second: str) -> bool:
     return bool(_parse(first).dimensionality == _parse(second).dimensionality)
 
 
-def require_match(found: str, needed: str, *, subject: str) -> None:
-    """Refuse a unit that is not the very unit needed.
+def is_convertible(source: str, target: str) -> bool:
+    """Tell whether a factor between two stated units is safe: same dimension, and same angle.
+
+    A number without unit may stand for anything, and a cycle for a radian, so neither counts.
+
+    Example
+    -------
+    >>> is_convertible("deg/s", "rad/s"), is_convertible("1", "rad"), is_convertible("Hz", "rad/s")
+    (True, False, False)
+    """
+    if DIMENSIONLESS in (canonical(source), canonical(target)):
+        return False
+    return si_base(source)[1] == si_base(target)[1]
+
+
+def clash(channel: str, found: str, needed: str, *, where: str) -> UnitError:
+    """The error for a channel in another unit than is needed, with what to do about it.
+
+    Parameters
+    ----------
+    channel : str
+    found, needed : str
+        Units.
+    where : str
+        Who needs it, for example ``"than in the model"``.
+
+    Example
+    -------
+    >>> print(clash("um", "1", "ft/s", where="than in the model"))
+    channel 'um' has another unit than in the model: found 1 (no unit is known); needed ft/s. Next:
+    say its unit: head the column 'um [ft/s]' in the file, or read it with --units um=ft/s, in
+    Python units={'um': 'ft/s'}, in a study [record.units].
+    """
+    action = (
+        f"convert it: with Record.to_units({channel}={needed!r}) in Python, or in the file, whose "
+        f"column is then headed '{channel} [{needed}]'"
+    )
+    if canonical(found) == DIMENSIONLESS:
+        found = f"{DIMENSIONLESS} (no unit is known)"
+        action = (
+            f"say its unit: head the column '{channel} [{needed}]' in the file, or read it with "
+            f"--units {channel}={needed}, in Python units={{{channel!r}: {needed!r}}}, "
+            "in a study [record.units]"
+        )
+    return UnitError(
+        f"channel {channel!r} has another unit {where}", found=found, needed=needed, action=action
+    )
+
+
+def require_match(channel: str, found: str, needed: str) -> None:
+    """Refuse a channel whose unit is not the very unit needed.
 
     Raises
     ------
     UnitError
-        The units differ; the message names both and `subject`.
+        The units differ; see `clash`.
 
     Example
     -------
-    >>> require_match("rad/s", "radian/second", subject="channel p")
+    >>> require_match("p", "rad/s", "radian/second")
     """
     if canonical(found) != canonical(needed):
-        raise UnitError(
-            f"{subject} has another unit than is needed",
-            found=canonical(found),
-            needed=canonical(needed),
-            action="convert at the edge with Record.to_units, or declare the model in that unit",
-        )
+        raise clash(channel, canonical(found), canonical(needed), where="than is needed")
 
 
 @cache

@@ -30,7 +30,7 @@ def _run(capsys, *arguments):
 
 def test_a_fit_with_validation(files, capsys):
     code, out, err = _run(
-        capsys, files[0], "--na", "2", "--nb", "2", "--nc", "2", "--validate", files[1], "--json"
+        capsys, files[0], "--na", "2", "--nb", "2", "--nc", "2", "--validation", files[1], "--json"
     )
     assert code == 0, err
     values = json.loads(out)
@@ -41,7 +41,7 @@ def test_a_fit_with_validation(files, capsys):
 
 def test_a_scan(files, capsys):
     code, out, err = _run(
-        capsys, files[0], "--scan", "--na", "2", "--nb", "2", "--nc", "1", "--validate", files[1]
+        capsys, files[0], "--scan", "--na", "2", "--nb", "2", "--nc", "1", "--validation", files[1]
     )
     assert code == 0, err
     assert "ranked by free run" in out
@@ -50,4 +50,4 @@ def test_a_scan(files, capsys):
 def test_what_is_missing_is_said(files, capsys):
     code, _, err = _run(capsys, files[0], "--scan")
     assert code == 2
-    assert "--validate" in err
+    assert "--validation" in err

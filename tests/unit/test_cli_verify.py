@@ -58,7 +58,7 @@ def test_a_value_without_number_is_explained(
     flown: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["verify", "rate_first_order", str(flown), "--value", "Lp"]) == 2
-    assert "is not NAME=NUMBER" in capsys.readouterr().err
+    assert "must be NAME=VALUE" in capsys.readouterr().err
 
 
 def test_residual_tests_on_demand(
@@ -69,7 +69,7 @@ def test_residual_tests_on_demand(
     path = tmp_path / "noisy.parquet"
     fid.write_records([record.replace({"p": record["p"] + noise})], path)
     page = tmp_path / "page.html"
-    options = ["verify", "rate_first_order", str(path), "--value", "Lp=-4", "--residuals"]
+    options = ["verify", "rate_first_order", str(path), "--value", "Lp=-4", "--residual-tests"]
     run([*options, "--html", str(page)])
     shown = capsys.readouterr().out
     assert "Verification(" in shown

@@ -125,7 +125,7 @@ def test_weak_slow_short_and_narrow_designs_are_told() -> None:
 
 
 def test_correlated_inputs_are_red_and_orthogonal_ones_green() -> None:
-    good = excitation.plan("multisine", AXIS, band_rad_s=(1.0, 30.0), names=("a", "b"))
+    good = excitation.plan("multisine", AXIS, band_rad_s=(1.0, 30.0), inputs=("a", "b"))
     assert _findings(good, "design-inputs-correlated")[0].startswith("[green]")
     one = good.excitation.signals[0]
     twin = excitation.Excitation(
@@ -161,7 +161,7 @@ def test_plans_refuse() -> None:
     with pytest.raises(OptionError, match="no such kind of design"):
         excitation.plan("dance", AXIS, band_rad_s=(1.0, 30.0))
     with pytest.raises(OptionError, match="this kind of design excites one input"):
-        excitation.plan("sweep", AXIS, band_rad_s=(1.0, 30.0), names=("a", "b"))
+        excitation.plan("sweep", AXIS, band_rad_s=(1.0, 30.0), inputs=("a", "b"))
     with pytest.raises(OptionError, match="very long record"):
         excitation.plan("sweep", AXIS, band_rad_s=(0.01, 30.0))
     made = excitation.doublet(amplitude=0.1, step_s=0.5, sample_rate_hz=50.0)
@@ -175,7 +175,9 @@ def test_plans_refuse() -> None:
         RateAxis(gain=40.0, time_constant_s=0.2, delay_s=0.1, rate_feedback=0.5).slowest_s()
     with pytest.raises(OptionError, match="absolute_gain must be positive"):
         RateAxis(gain=0.0, time_constant_s=0.2)
-    with pytest.raises(OptionError, match="attitude_rad must be positive"):
+    with pytest.raises(
+        OptionError, match=r"attitude_rad is too small: found 0.0; needed a number above 0"
+    ):
         Limits(attitude_rad=0.0)
     with pytest.raises(OptionError, match="low must be positive"):
         excitation.window_lengths((0.0, 1.0), 10.0, 1)
@@ -258,7 +260,7 @@ def test_csv_reads_back_to_twelve_digits(tmp_path: Path) -> None:
 
 
 def test_pictures_show_every_input() -> None:
-    plan = excitation.plan("multisine", AXIS, band_rad_s=(2.0, 20.0), names=("a", "b"))
+    plan = excitation.plan("multisine", AXIS, band_rad_s=(2.0, 20.0), inputs=("a", "b"))
     assert [trace.name for trace in excitation_history(plan.excitation).data] == ["a", "b"]
     assert len(excitation_spectrum(plan.excitation).data) == 2
     made = plan_spectrum(plan)

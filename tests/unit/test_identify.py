@@ -116,7 +116,7 @@ def test_unidentifiable_parameters_are_named() -> None:
 
 
 def test_data_that_do_not_fit_the_model() -> None:
-    with pytest.raises(UnitError, match="channel p has another unit"):
+    with pytest.raises(UnitError, match="channel 'p' has another unit"):
         fid.identify(MODEL, data_of(units={"p": "deg/s"}))
     with pytest.raises(UnknownNameError, match="q"):
         fid.identify(fid.load_model("rate_first_order", axis="pitch"), data_of())

@@ -127,7 +127,7 @@ def test_data_that_are_no_data() -> None:
     hole[7] = np.nan
     with pytest.raises(DataError, match="not finite"):
         responses({"r/d": hole})
-    with pytest.raises(UnitError, match="channel r has another unit"):
+    with pytest.raises(UnitError, match="channel 'r' has another unit"):
         fitted(model, responses(units={**UNITS, "r": "deg/s"}))
     with pytest.raises(DataError, match="too few points to fit"):
         fitted(model, responses(), band_rad_s={"r/d": (50.0, 90.0)})

@@ -34,7 +34,7 @@ span_s = [40.0, 80.0]
 [[record]]
 name = "unseen"
 path = "rig.mat"
-time = "t"
+time_column = "t"
 columns = { drive = "V" }
 units = { drive = "V" }
 [[model]]
@@ -255,7 +255,7 @@ delay = "tau"
         ('name = "choice"', 'name = "fitted"', "two [[record]]s have one name"),
         ("[[model]]", "[[segment]]\nname='s'\nspan_s=[0,1]\n[[model]]", "cuts a log"),
         ("[[model]]", "[log]\npath = 'x'\n[[model]]", "the source of the data is not clear"),
-        ('time = "t"', 'tme = "t"', "there is no key 'tme'"),
+        ('time_column = "t"', 'tme = "t"', "there is no key 'tme'"),
     ],
 )
 def test_a_study_that_does_not_fit_is_refused(

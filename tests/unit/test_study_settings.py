@@ -90,9 +90,17 @@ def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> 
         ("[fit]", "[fits]", "top level: there is no key 'fits'"),
         ("starts = 3", "starts = 0", "starts is too small"),
         ("starts = 3", "starts = 2.5", "starts has no meaning"),
-        ('estimator = "instrument"', 'estimator = "magic"', "needed one of 'composite'"),
-        ('compare = ["composite"]', 'compare = ["magic"]', "compare does not fit"),
-        ('compare = ["composite"]', "compare = [1]", "a list of different texts"),
+        (
+            'estimator = "instrument"',
+            'estimator = "magic"',
+            "estimator is not known: found 'magic'; needed 'composite'",
+        ),
+        (
+            'compare = ["composite"]',
+            'compare = ["magic"]',
+            "compare holds a word that is not known: found ['magic']",
+        ),
+        ('compare = ["composite"]', "compare = [1]", "compare has no meaning: found [1]"),
         ("span_s = [70, 80]", "span_s = [80, 70]", "the first below the second"),
         ("span_s = [70, 80]", "span_s = [80]", "two numbers"),
         ("span_s = [70, 80]", "", "span_s or sid_axis must be given, not both"),
@@ -114,7 +122,7 @@ def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> 
         ("_percent = 30", '_percent = 30\nafter_rise = "hope"', "needed one of 'stop', 'next'"),
         ("[reduce]\nmaximum_cramer_rao_percent = 30", "", "there is no key 'keep'"),
         ("seed = 7", "seed = 7\nwindow_s = []", "[fit]: there is no key 'window_s'"),
-        ('compare = ["composite"]', "window_s = []", "needed a list of one or more numbers"),
+        ('compare = ["composite"]', "window_s = []", "window_s has no meaning: found []"),
     ],
 )
 def test_each_fault_is_named(tmp_path: Path, old: str, new: str, said: str) -> None:

@@ -87,7 +87,7 @@ def test_settings_are_read_and_checked(study: Path) -> None:
     asked = read_settings(study).tune
     assert asked is not None
     assert asked.requirements.noise_growth == 3.0
-    assert asked.draws == 12
+    assert asked.options.draws == 12
     study.write_text(STUDY + "luck = 1\n", encoding="utf-8")
     with pytest.raises(StudyError, match="there is no key 'luck'"):
         read_settings(study)

@@ -45,7 +45,7 @@ identify = "flown"
 band_rad_s = [2.0, 20.0]
 [[export]]
 model = "Roll, slow"
-file = "roll.c"
+path = "roll.c"
 options = { sample_time_s = 0.0025 }
 [[loop]]
 name = "Rate feedback"
@@ -133,8 +133,8 @@ def test_exports_loops_and_conditions_stand_in_the_report(study: fid.Study) -> N
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('file = "roll.c"', 'file = "../roll.c"', "a name without a folder"),
-        ('model = "Roll, slow"\nfile', 'model = "Roll"\nfile', "there is no such model to use"),
+        ('path = "roll.c"', 'path = "../roll.c"', "a name without a folder"),
+        ('model = "Roll, slow"\npath', 'model = "Roll"\npath', "there is no such model to use"),
         ("gains = { tau_phi = { p = 0.02 } }", "", "gains is missing"),
         ("{ p = 0.02 }", '{ p = "much" }', "a number"),
         ("[[loop]]", "[rotor]\nmodel = 'Recursion'\n[[loop]]", "rotor_speed_rad_s is missing"),

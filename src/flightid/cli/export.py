@@ -6,8 +6,10 @@ from pathlib import Path
 
 import click
 
+from flightid.cli.option_fields import flags_of
 from flightid.cli.output import emit, json_option
 from flightid.cli.pairs import numbers, pairs
+from flightid.cli.sources import load_source, model_options
 
 
 @click.command()
@@ -15,9 +17,13 @@ from flightid.cli.pairs import numbers, pairs
 @click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
 @click.option("--format", help="Left out: by the suffix of FILE.")
 @click.option("--name", help="Of the model in FILE; left out: the file's name.")
-@click.option("--axis", type=click.Choice(["roll", "pitch", "yaw"]), help="Of a library model.")
-@click.option("--value", "values", multiple=True, help="NAME=NUMBER: another parameter value.")
-@click.option("--rate", type=float, help="Steps a second of C, internal steps of an FMU, Hz.")
+@model_options
+@click.option(
+    *flags_of("sample_rate_hz"),
+    "rate",
+    type=click.FloatRange(0.0, min_open=True),
+    help="Steps a second of C, internal steps of an FMU, Hz.",
+)
 @click.option("--hold", type=click.Choice(["zero", "first"]), help="Inputs between samples, in C.")
 @click.option("--substeps", type=click.IntRange(1), help="Runge-Kutta steps in a sample.")
 @click.option("--tunable", is_flag=True, help="C with parameters to change.")
@@ -55,20 +61,15 @@ def command(
     properties: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Write MODEL, a .toml file or a library name, to FILE.
+    """Write MODEL to FILE.
 
-    The suffix of FILE chooses: .toml (flightid), .mat (MATLAB), .json, .npz (matrices), .c
-    (portable C99), .fmu (FMI 3.0), .xml (JSBSim aerodynamics).
+    MODEL is a .toml file, the folder of a study with one model, the JSON of a fit, or the name of a
+    library model. The suffix of FILE chooses: .toml (flightid), .mat (MATLAB), .json, .npz
+    (matrices), .c (portable C99), .fmu (FMI 3.0), .xml (JSBSim aerodynamics).
     """
-    from flightid import export, load_model
-    from flightid.models import load_structure
+    from flightid import export
 
-    changed = numbers("--value", values)
-    chosen = (
-        load_structure(model, axis=axis).with_values(changed)
-        if changed
-        else load_model(model, axis=axis)
-    )
+    chosen = load_source(model, axis, values)
     given: dict[str, object] = {
         "sample_time_s": None if rate is None else 1.0 / rate,
         "hold": hold,

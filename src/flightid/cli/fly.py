@@ -6,15 +6,31 @@ from pathlib import Path
 
 import click
 
+from flightid.cli.option_fields import flags_of
 from flightid.cli.output import emit, json_option, note
 from flightid.cli.pairs import pairs
+from flightid.cli.sources import load_source, model_options
 
 
 @click.command()
 @click.argument("model")
-@click.option("--axis", type=click.Choice(["roll", "pitch", "yaw"]), help="Of a library model.")
-@click.option("--rate", type=float, default=100.0, show_default=True, help="Frames a second.")
-@click.option("--duration", type=float, default=60.0, show_default=True, help="s.")
+@model_options
+@click.option(
+    *flags_of("sample_rate_hz"),
+    "rate",
+    type=click.FloatRange(0.0, min_open=True),
+    default=100.0,
+    show_default=True,
+    help="Frames a second.",
+)
+@click.option(
+    *flags_of("duration_s"),
+    "duration",
+    type=click.FloatRange(0.0, min_open=True),
+    default=60.0,
+    show_default=True,
+    help="s.",
+)
 @click.option("--feedback", multiple=True, help="INPUT=OUTPUT:GAIN: stability augmentation.")
 @click.option("--listen", type=click.IntRange(0, 65535), help="UDP port of the pilot's inputs.")
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen at.")
@@ -29,6 +45,7 @@ from flightid.cli.pairs import pairs
 def command(
     model: str,
     axis: str | None,
+    values: tuple[str, ...],
     rate: float,
     duration: float,
     feedback: tuple[str, ...],
@@ -39,15 +56,17 @@ def command(
     output: Path | None,
     as_json: bool,
 ) -> None:
-    """Fly MODEL, a .toml file or a library name, beside the clock.
+    """Fly MODEL beside the clock.
 
-    Inputs come as JSON datagrams such as {"lat": 0.1}, outputs go to a cockpit each frame.
+    MODEL is a .toml file, the folder of a study with one model, the JSON of a fit, or the name of a
+    library model. Inputs come as JSON datagrams such as {"lat": 0.1}, outputs go to a cockpit
+    each frame.
     """
-    from flightid import load_model, write_records
+    from flightid import write_records
     from flightid.simulation.realtime import UdpLink, fly_in_real_time
     from flightid.simulation.stepper import Stepper
 
-    stepper = Stepper(load_model(model, axis=axis), 1.0 / rate, feedback=_feedback(feedback))
+    stepper = Stepper(load_source(model, axis, values), 1.0 / rate, feedback=_feedback(feedback))
     target = None if send is None else _address(send)
     heard = None if listen is None else (host, listen)
     with UdpLink(stepper.inputs, listen=heard, send=target, style=style) as link:

@@ -1,47 +1,49 @@
-"""``flightid identify``: a model from a log or a record, with its intervals."""
+"""``flightid identify``: a model from logs or records, with its intervals."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from flightid.cli.option_fields import OptionsCommand, given_options
-from flightid.cli.output import emit, json_option, leave_by_verdict, note
+from flightid.cli.black_boxes import KINDS, black_boxes, structure_of
+from flightid.cli.option_fields import OptionsCommand, parted
+from flightid.cli.output import emit, json_option, leave_by_verdict, level_option, note
+from flightid.cli.records import FILES, read_files, reading
+from flightid.cli.sources import AXES
 
 if TYPE_CHECKING:
     from flightid.identification import Fit, Reduction
-    from flightid.models import GreyBoxModel
     from flightid.options import Options
-    from flightid.record import Record
-    from flightid.responses import FrequencyResponse
 
-ON_RESPONSES = "frequency_domain"
+ON_RESPONSES, JOINT = "frequency_domain", "joint"
 
 
-@click.command(cls=OptionsCommand, fields_of=lambda: {"responses": _of_responses(), **_methods()})
-@click.argument("file", type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--model", "model_name", required=True, help="Library name or .toml file.")
-@click.option("--axis", type=click.Choice(["roll", "pitch", "yaw"]), help="Of a library model.")
-@click.option("--span", nargs=2, type=float, help="First and last instant in a log, s.")
-@click.option("--run", "sid_run", type=click.IntRange(0), help="Number of the sweep in a log.")
-@click.option(
-    "--band",
-    "--band-rad-s",
-    "band_rad_s",
-    nargs=2,
-    type=float,
-    help="Lowest and highest frequency, rad/s, of a response or of Fourier methods.",
-)
+def _fields() -> dict[str, type[Options]]:
+    return {"responses": _of_responses(), **_methods(), **black_boxes(), **reading()}
+
+
+@click.command(cls=OptionsCommand, fields_of=_fields)
+@click.argument("files", type=FILES, nargs=-1, required=True)
+@click.option("--model", "model_name", help="Library name or .toml file of a model's equations.")
+@click.option("--kind", type=click.Choice(KINDS), help="Or: the kind of a model without equations.")
+@click.option("--axis", type=AXES, help="Of a library model.")
 @click.option(
     "--method",
-    default=ON_RESPONSES,
-    show_default=True,
-    help="How the model is fitted: frequency_domain to an estimated response; output_error, "
-    "filter_error and others straight to the records.",
+    help="How the model is fitted. With --model: frequency_domain (default) to an estimated "
+    "response; output_error, filter_error and others straight to the records; joint to both. "
+    "With --kind: its own, for example iv4 of arx, n4sid of subspace.",
 )
+@click.option(
+    "--records",
+    type=FILES,
+    multiple=True,
+    help="Of method joint: records fitted beside the response of FILES, best of another flight.",
+)
+@click.option("--records-span-s", nargs=2, type=float, help="Part of --records, s.")
 @click.option(
     "--reduce", "reduced", is_flag=True, help="Drop the parameters that the data do not determine."
 )
@@ -51,65 +53,99 @@ ON_RESPONSES = "frequency_domain"
     type=click.Path(dir_okay=False, path_type=Path),
     help="Model file (.toml) to write: estimates with covariance and evidence.",
 )
+@level_option
 @json_option
 def command(
-    file: Path,
-    model_name: str,
+    files: tuple[Path, ...],
+    model_name: str | None,
+    kind: str | None,
     axis: str | None,
-    span: tuple[float, float] | None,
-    sid_run: int | None,
-    band_rad_s: tuple[float, float] | None,
-    method: str,
+    method: str | None,
+    records: tuple[Path, ...],
+    records_span_s: tuple[float, float] | None,
     reduced: bool,
     written: Path | None,
+    level: float | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields of the method's options
 ) -> None:
-    """Identify a model from FILE, a log or a file of records.
+    """Identify a model from FILES, logs or tables of records.
 
-    The exit code is 1 where a verdict is red.
+    A model with equations is named by --model, one without by --kind. The exit code is 1 where a
+    verdict is red.
     """
     import flightid
     from flightid.logs import is_log
-    from flightid.models import load_structure
     from flightid.progress import progress
 
-    of_response, of_method = _divided(method, options, band_rad_s)
-    model = load_structure(model_name, axis=axis)
+    if (model_name is None) == (kind is None):
+        raise click.UsageError("name a model with equations by --model, or a --kind without")
+    beside = {"records": records, "span_s": records_span_s}
     with progress(3, "Identifying") as advance:
-        data: FrequencyResponse | list[Record]
-        data = records = _records(file, model, span, sid_run)
+        if kind is not None:
+            structure, read = structure_of(kind, method, files, options)
+            data: Any = read
+            advance()
+            fit = flightid.identify(structure, data)
+        else:
+            fit, data = _with_equations(str(model_name), axis, method, files, beside, options)
         advance()
-        if method == ON_RESPONSES:
-            data = flightid.estimate_response(
-                records, inputs=model.inputs, outputs=model.outputs, **of_response
-            )
-        advance()
-        fit = flightid.identify(model, data, method=method, **of_method)
         result = flightid.reduce(fit, data) if reduced else fit
-        if is_log(file):
-            result = _with_inspection(result, file)
+        for log in filter(is_log, files):
+            result = _with_inspection(result, log)
         advance()
     note(repr(result))
     if isinstance(result, flightid.Reduction) and not as_json:
-        emit(result.fit, as_json=False)
-    emit(result, as_json=as_json)
+        emit(result.fit, as_json=False, level=level)
+        level = None
+    emit(result, as_json=as_json, level=level)
     found = result.fit if isinstance(result, flightid.Reduction) else result
     if written is not None:
         note(f"Wrote {flightid.write_model(found, written)}")
     leave_by_verdict((*result.findings, *found.evidence.findings))
 
 
+def _with_equations(
+    name: str,
+    axis: str | None,
+    method: str | None,
+    files: Sequence[Path],
+    beside: dict[str, Any],
+    options: dict[str, Any],
+) -> tuple[Fit, Any]:
+    """Fit of a model with equations, and the data that it was fitted to."""
+    import flightid
+    from flightid.models import load_structure
+
+    way = method or ON_RESPONSES
+    of_response, of_method, *of_files = _divided(way, options)
+    model = load_structure(name, axis=axis)
+    channels: dict[str, Any] = {"inputs": model.inputs, "outputs": model.outputs}
+    read = read_files(
+        files, *of_files, **channels, units=model.units,
+        excitations=of_response.get("excitations"),
+    )  # fmt: skip
+    data: Any = read
+    if (way == JOINT) != bool(beside["records"]):
+        raise click.UsageError(
+            f"--method {JOINT} and --records belong together: the response comes from FILES, "
+            "the records stand beside it"
+        )
+    if way in (ON_RESPONSES, JOINT):
+        data = flightid.estimate_response(read, **channels, **of_response)
+    if way == JOINT:
+        span = {} if beside["span_s"] is None else {"span_s": beside["span_s"]}
+        more = read_files(beside["records"], of_files[0], span, **channels, units=model.units)
+        data = [data, *more]
+    return flightid.identify(model, data, method=way, **of_method), data
+
+
 def _methods() -> dict[str, type[Options]]:
-    """Options of the methods for models with equations, on a response or on records."""
-    from flightid.identification.methods import BOTH, METHODS
+    """Options of the methods for models with equations."""
+    from flightid.identification.methods import METHODS
     from flightid.models import StateSpaceModel
 
-    return {
-        way.name: way.options
-        for way in METHODS
-        if StateSpaceModel in way.kinds and way.data != BOTH
-    }
+    return {way.name: way.options for way in METHODS if StateSpaceModel in way.kinds}
 
 
 def _of_responses() -> type[Options]:
@@ -118,10 +154,8 @@ def _of_responses() -> type[Options]:
     return ResponseOptions
 
 
-def _divided(
-    method: str, options: dict[str, Any], band_rad_s: tuple[float, float] | None
-) -> tuple[dict[str, Any], dict[str, Any]]:
-    """What was given for the estimate of the response, and for the fit."""
+def _divided(method: str, options: dict[str, Any]) -> list[dict[str, Any]]:
+    """What was given for the estimate of the response, for the fit, and for reading files."""
     from flightid.options import options_of
 
     methods = _methods()
@@ -130,18 +164,17 @@ def _divided(
             f"{method!r} is none of {', '.join(methods)}", param_hint="--method"
         )
     fitted = methods[method]
-    band = {} if band_rad_s is None else {"band_rad_s": band_rad_s}
-    if method != ON_RESPONSES:
-        return {}, given_options(fitted, {**options, **band}, method)
-    # One word may serve both: the number of frequencies is that of the fit.
-    of_fit = {each.name for each in options_of(fitted)}
-    estimated = {name: value for name, value in options.items() if name not in of_fit}
-    first = {each.name for each in options_of(_of_responses())} - of_fit
-    rest = {name: value for name, value in options.items() if name not in first}
-    of_response = given_options(
-        _of_responses(), {k: v for k, v in estimated.items() if k in first}, "a response"
+    if method not in (ON_RESPONSES, JOINT):
+        return [{}, *parted(options, {method: fitted, **reading()})]
+    given = {name: value for name, value in options.items() if value not in (None, ())}
+    of_response, of_fit, *of_files = parted(
+        given, {"a response": _of_responses(), method: fitted, **reading()}
     )
-    return {**of_response, **band}, given_options(fitted, rest, method)
+    # One word may serve both: the band is that of the response, the rest that of the fit.
+    shared = {each.name for each in options_of(fitted)} - {"band_rad_s"}
+    of_fit.pop("band_rad_s", None)
+    of_response = {name: value for name, value in of_response.items() if name not in shared}
+    return [of_response, of_fit, *of_files]
 
 
 def _with_inspection(result: Fit | Reduction, file: Path) -> Fit | Reduction:
@@ -160,20 +193,3 @@ def _with_inspection(result: Fit | Reduction, file: Path) -> Fit | Reduction:
         step if step.fit is None else replace(step, fit=examined(step.fit)) for step in result.path
     )
     return replace(result, start=examined(result.start), path=path)
-
-
-def _records(
-    file: Path,
-    model: GreyBoxModel,
-    span: tuple[float, float] | None,
-    sid_run: int | None,
-) -> list[Record]:
-    import flightid
-    from flightid.logs import is_log
-
-    names = [*model.inputs, *model.outputs]
-    if is_log(file):
-        return [flightid.read_log(file).record(names=names, span_s=span, sid_run=sid_run)]
-    if span is not None or sid_run is not None:
-        raise click.UsageError("--span and --run belong to logs")
-    return flightid.read_records(file, inputs=model.inputs, outputs=model.outputs)

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import click
 
-from flightid.cli.output import emit, json_option
-from flightid.cli.pairs import numbers
+from flightid.cli.output import emit, json_option, level_option
+from flightid.cli.sources import load_source, model_options
 
 
 @click.command()
 @click.argument("model")
-@click.option("--axis", type=click.Choice(["roll", "pitch", "yaw"]), help="Of a library model.")
-@click.option("--value", "values", multiple=True, help="NAME=NUMBER: another parameter value.")
+@model_options
+@level_option
 @json_option
-def command(model: str, axis: str | None, values: tuple[str, ...], as_json: bool) -> None:
-    """Modes of MODEL, a .toml file or a library name; a fitted model's file gives intervals too."""
-    from flightid import load_model, modes
-    from flightid.models import load_structure
+def command(
+    model: str, axis: str | None, values: tuple[str, ...], level: float | None, as_json: bool
+) -> None:
+    """Modes of MODEL; of a fitted one with intervals.
 
-    changed = numbers("--value", values)
-    chosen = (
-        load_structure(model, axis=axis).with_values(changed)
-        if changed
-        else load_model(model, axis=axis)
-    )
-    emit(modes(chosen), as_json=as_json)
+    MODEL is a .toml file, the folder of a study with one model, the JSON of a fit, or the name of a
+    library model.
+    """
+    from flightid import modes
+
+    emit(modes(load_source(model, axis, values)), as_json=as_json, level=level)

@@ -3,14 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import MISSING
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from flightid.cli.pairs import pairs
+
 if TYPE_CHECKING:
+    from flightid.option_forms import Form
     from flightid.options import Option, Options
 
 ALL, NONE = "all", "none"
+SHORT = {
+    "attitude_feedback_per_s": "attitude-feedback",
+    "attitude_rad": "attitude-limit",
+    "band_rad_s": "band",
+    "control": "control-limit",
+    "control_rate_per_s": "control-rate-limit",
+    "duration_s": "duration",
+    "excitations": "excitation",
+    "gusts": "gust",
+    "inputs": "input",
+    "noise_rad_s": "noise",
+    "rate_rad_s": "rate-limit",
+    "sample_rate_hz": "rate",
+    "sid_run": "run",
+    "span_s": "span",
+    "time_column": "time",
+    "time_constant_s": "time-constant",
+    "window_s": "window",
+}
+"""What may be typed for a long name, in every command alike."""
 
 
 class OptionsCommand(click.Command):
@@ -40,8 +65,9 @@ class OptionsCommand(click.Command):
         if self._made is None:
             taken = {param.name for param in self.params}
             self._made = list(click_options(self._fields_of(), taken))
-        own = super().get_params(ctx)
-        return [*own[:-1], *self._made, *own[-1:]]
+        # Help stays last.
+        *own, last = super().get_params(ctx)
+        return [*own, *self._made, last]
 
 
 def click_options(
@@ -71,8 +97,30 @@ def click_options(
             yield _click_option(name, uses, everywhere=len(uses) == len(fields_of))
 
 
+def flags_of(name: str) -> list[str]:
+    """How an option is typed: the field's name with dashes, and a short form where it has one.
+
+    Example
+    -------
+    >>> flags_of("band_rad_s"), flags_of("seed")
+    (['--band-rad-s', '--band'], ['--seed'])
+    """
+    short = [f"--{SHORT[name]}"] if name in SHORT else []
+    return ["--" + name.replace("_", "-"), *short]
+
+
 def _click_option(name: str, uses: list[tuple[str, Option]], *, everywhere: bool) -> click.Option:
-    from flightid.option_forms import BAND, FLAG, NAMES, NUMBER, NUMBERS, TABLE, WHOLE, WORD
+    from flightid.option_forms import (
+        BAND,
+        FLAG,
+        NAMES,
+        NUMBER,
+        NUMBERS,
+        TABLE,
+        WHOLE,
+        WORD,
+        WORDS,
+    )  # fmt: skip
 
     each = uses[0][1]
     words = list(dict.fromkeys(use.doc for _, use in uses))
@@ -81,40 +129,66 @@ def _click_option(name: str, uses: list[tuple[str, Option]], *, everywhere: bool
         help_text += f" [{each.unit}]"
     if not everywhere:
         help_text += f" ({', '.join(dict.fromkeys(user for user, _ in uses))})"
-    flag = "--" + name.replace("_", "-")
+    usual = {repr(use.default): use.default for _, use in uses}
+    default = next(iter(usual.values())) if len(usual) == 1 else None
+    if default is MISSING:
+        help_text += " needed"
+    elif default not in (None, (), {}):
+        help_text += f" default: {_shown(default)}"
+    made = partial(click.Option, [*flags_of(name), name])
     forms = {form for _, use in uses for form in use.forms}
     choices = list(dict.fromkeys(word for _, use in uses for word in use.choices))
     if BAND in forms:
-        return click.Option([flag, name], nargs=2, type=float, help=help_text)
-    if NAMES in forms or TABLE in forms:
-        extra = "repeat for several" if NAMES in forms else "or NAME=NUMBER, repeated"
+        return made(nargs=2, type=float, help=help_text)
+    if {NAMES, TABLE, WORDS} & forms:
+        extra = "repeat for several"
+        if {TABLE, WORDS} & forms:
+            extra = f"NAME={'TEXT' if WORDS in forms else 'NUMBER'}, repeated"
+            extra = f"or {extra}" if WORD in forms else extra
         if FLAG in forms:
             extra += f"; '{ALL}' or '{NONE}'"
-        return click.Option([flag, name], multiple=True, help=f"{help_text} ({extra})")
+        return made(multiple=True, help=f"{help_text} ({extra})")
     if NUMBERS in forms:
-        return click.Option([flag, name], multiple=True, type=float, help=help_text)
+        return made(
+            multiple=True,
+            type=int if WHOLE in forms else float,
+            help=f"{help_text} (repeat for several)",
+        )
     if FLAG in forms:
-        return click.Option([f"{flag}/--no-{flag[2:]}", name], default=None, help=help_text)
+        both = "/".join((flags_of(name)[0], f"--no-{name.replace('_', '-')}"))
+        return click.Option([both, name], default=None, help=help_text)
     if WORD in forms and choices and not {NUMBER, WHOLE} & forms:
-        return click.Option([flag, name], type=click.Choice(choices), help=help_text)
+        return made(type=click.Choice(choices), help=help_text)
+    return made(type=_kind(each, forms), help=help_text)
+
+
+def _shown(default: object) -> str:
+    if isinstance(default, bool):
+        return "on" if default else "off"
+    if isinstance(default, float):
+        return f"{default:g}"
+    return ", ".join(map(str, default)) if isinstance(default, tuple) else str(default)
+
+
+def _kind(each: Option, forms: set[Form]) -> click.ParamType[Any]:
+    """What click checks of one number; words beside numbers are left to the field."""
+    from flightid.option_forms import NUMBER, WHOLE, WORD
+
     low, high = each.minimum, each.maximum
-    if WHOLE in forms and WORD not in forms:
-        kind: click.ParamType[Any] = click.IntRange(
+    if WORD in forms:
+        return click.STRING
+    if WHOLE in forms:
+        return click.IntRange(
             None if low is None else int(low), None if high is None else int(high)
         )
-    elif NUMBER in forms and WORD not in forms:
-        kind = click.FloatRange(
-            low if each.above is None else each.above,
-            high if each.below is None else each.below,
-            min_open=each.above is not None,
-            max_open=each.below is not None,
-        )
-    else:
-        kind = click.STRING
-    usual = {use.default for _, use in uses}
-    if len(usual) == 1:
-        help_text += f" default: {each.default}"
-    return click.Option([flag, name], type=kind, help=help_text)
+    if NUMBER not in forms:
+        return click.STRING
+    return click.FloatRange(
+        low if each.above is None else each.above,
+        high if each.below is None else each.below,
+        min_open=each.above is not None,
+        max_open=each.below is not None,
+    )
 
 
 def given_options(options: type[Options], values: Mapping[str, Any], user: str) -> dict[str, Any]:
@@ -138,37 +212,85 @@ def given_options(options: type[Options], values: Mapping[str, Any], user: str) 
     click.UsageError
         An option that belongs to something else was given.
     """
+    (found,) = parted(values, {user: options})
+    return found
+
+
+def parted(
+    values: Mapping[str, Any], fields_of: Mapping[str, type[Options]]
+) -> list[dict[str, Any]]:
+    """What was given, for each of several dataclasses; a name counts for all that have it.
+
+    Parameters
+    ----------
+    values : mapping of str to object
+        Values of the command's options by name; None or nothing where one was not given.
+    fields_of : mapping of str to type
+        Dataclasses by the name of what takes them.
+
+    Returns
+    -------
+    list of dict of str to object
+        One for each dataclass, in their order.
+
+    Raises
+    ------
+    click.UsageError
+        An option that belongs to none of them was given, or one that is needed was not.
+    """
     from flightid.options import options_of
 
-    known = {each.name: each for each in options_of(options)}
+    known = [{each.name: each for each in options_of(options)} for options in fields_of.values()]
     given = {name: value for name, value in values.items() if value not in (None, ())}
     for name in given:
-        if name not in known:
-            flag = "--" + name.replace("_", "-")
-            raise click.UsageError(f"{flag} is no option of {user}; it has {', '.join(known)}")
-    return {name: _read(known[name], value) for name, value in given.items()}
+        if not any(name in one for one in known):
+            user = " or ".join(filter(None, fields_of))
+            names = ", ".join(dict.fromkeys(name for one in known for name in one))
+            raise click.UsageError(f"{flags_of(name)[0]} is no option of {user}; it has {names}")
+    for user, one in zip(fields_of, known, strict=True):
+        for name, each in one.items():
+            if each.default is MISSING and name not in given:
+                raise click.UsageError(f"{user} needs {flags_of(name)[-1]}: {each.doc}")
+    return [
+        {name: _read(one[name], value) for name, value in given.items() if name in one}
+        for one in known
+    ]
 
 
 def _read(each: Option, value: Any) -> Any:  # noqa: ANN401 — whatever the option is
-    from flightid.option_forms import BAND, FLAG, TABLE, WORD
+    from flightid.option_forms import BAND, NUMBER, WHOLE, WORD
 
-    if not isinstance(value, tuple) or BAND in each.forms:
-        return value
+    if isinstance(value, str) and WORD in each.forms and {NUMBER, WHOLE} & set(each.forms):
+        return _number_or_word(value)
+    return _several(each, value) if isinstance(value, tuple) and BAND not in each.forms else value
+
+
+def _several(each: Option, value: tuple[Any, ...]) -> Any:  # noqa: ANN401
+    """Values of an option that may be repeated: all or none, by name, one word, or a list."""
+    from flightid.option_forms import FLAG, TABLE, WORD, WORDS
+
+    flag = flags_of(each.name)[-1]
     if FLAG in each.forms and value in ((ALL,), (NONE,)):
         return value == (ALL,)
-    if TABLE in each.forms and any("=" in str(item) for item in value):
-        return dict(_named(each.name, str(item)) for item in value)
-    if WORD in each.forms and len(value) == 1:
-        return value[0]
-    return value
+    if WORDS in each.forms:
+        return pairs(flag, value)
+    if TABLE in each.forms and (WORD not in each.forms or any("=" in str(v) for v in value)):
+        return {name: _number(flag, text) for name, text in pairs(flag, value).items()}
+    return value[0] if WORD in each.forms and len(value) == 1 else value
 
 
-def _named(option: str, text: str) -> tuple[str, float | str]:
-    name, _, value = text.partition("=")
-    try:
-        return name, float(value)
-    except ValueError:
-        if value:
-            return name, value
-        hint = f"--{option.replace('_', '-')}"
-        raise click.BadParameter(f"{text!r} is not NAME=NUMBER", param_hint=hint) from None
+def _number_or_word(text: str) -> float | str:
+    for read in (int, float):
+        try:
+            return read(text)
+        except ValueError:
+            continue
+    return text
+
+
+def _number(flag: str, text: str) -> float | str | tuple[float | str, ...]:
+    """A number, several with colons between them, or a word."""
+    if not text:
+        raise click.UsageError(f"{flag} must be NAME=NUMBER")
+    parts = tuple(map(_number_or_word, text.split(":")))
+    return parts[0] if len(parts) == 1 else parts

@@ -12,7 +12,6 @@ import click
 if TYPE_CHECKING:
     from flightid.findings import Finding
 
-HOLD_HELP = "Inputs between samples: lines or steps. Default: what the records know, else first."
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -44,7 +43,17 @@ def json_option(function: Function) -> Function:
     return decorate(function)
 
 
-def emit(result: Shown, *, as_json: bool) -> None:
+def level_option(function: Function) -> Function:
+    """Add ``--level`` to a command that prints intervals; its argument is ``level``."""
+    decorate = click.option(
+        "--level",
+        type=click.FloatRange(0.0, 1.0, min_open=True, max_open=True),
+        help="Probability of the intervals printed, for example 0.9; default: 0.95.",
+    )
+    return decorate(function)
+
+
+def emit(result: Shown, *, as_json: bool, level: float | None = None) -> None:
     """Print a result to standard output.
 
     Parameters
@@ -53,8 +62,15 @@ def emit(result: Shown, *, as_json: bool) -> None:
         What the command made.
     as_json : bool
         One JSON document instead of text.
+    level : float, optional
+        Of the intervals in its text.
     """
-    emit_values(result.to_dict()) if as_json else click.echo(str(result.summary()))
+    emit_values(result.to_dict()) if as_json else click.echo(str(at_level(result, level)))
+
+
+def at_level(result: Shown, level: float | None) -> object:
+    """The table of a result, its intervals at a level where one was asked for."""
+    return result.summary() if level is None else result.summary(level=level)  # type: ignore[call-arg]
 
 
 def emit_values(values: object) -> None:

@@ -27,7 +27,9 @@ ORDER = (
     "run",
 )
 """Verbs in the order of the work, as help lists them; others follow in alphabetical order."""
-NOT_VERBS = frozenset({"bar", "option_fields", "output", "pairs", "program"})
+NOT_VERBS = frozenset(
+    {"bar", "black_boxes", "option_fields", "output", "pairs", "program", "records", "sources"}
+)
 
 
 class Verbs(click.Group):

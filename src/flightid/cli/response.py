@@ -3,116 +3,59 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import emit, json_option, leave_by_verdict, note
+from flightid.cli.records import FILES, read_files, reading
 
 if TYPE_CHECKING:
-    from flightid.record import Record
+    from flightid.options import Options
     from flightid.responses import FrequencyResponse
 
 FILE = click.Path(dir_okay=False, path_type=Path)
 
 
-@click.command()
-@click.argument("files", type=click.Path(exists=True, path_type=Path), nargs=-1, required=True)
-@click.option("--input", "inputs", multiple=True, help="Input channel; may be repeated.")
-@click.option("--output", "outputs", multiple=True, help="Output channel; may be repeated.")
-@click.option(
-    "--excitation",
-    "excitations",
-    multiple=True,
-    help="Injected signal, for --estimator instrument.",
-)
-@click.option("--band", type=float, nargs=2, help="Lowest and highest frequency, rad/s.")
-@click.option("--n-omega", type=click.IntRange(2, 10000), default=100, show_default=True)
-@click.option("--window", type=float, multiple=True, help="Window length, s; may be repeated.")
-@click.option("--overlap", type=float, default=0.5, show_default=True)
-@click.option(
-    "--estimator",
-    type=click.Choice(("composite", "instrument", "local_polynomial")),
-    default="composite",
-    show_default=True,
-)
-@click.option("--span", type=float, nargs=2, help="Part of each log, s on its clock.")
-@click.option("--sweep", type=int, help="Number of the system-identification run in the log.")
-@click.option("--time", default="time", show_default=True, help="Time column of a table.")
+def _fields() -> dict[str, type[Options]]:
+    from flightid.record.options import ChannelOptions
+    from flightid.responses.options import ResponseOptions
+
+    return {"channels": ChannelOptions, "response": ResponseOptions, **reading()}
+
+
+@click.command(cls=OptionsCommand, fields_of=_fields)
+@click.argument("files", type=FILES, nargs=-1, required=True)
 @click.option("--netcdf", type=FILE, help="Write the response to this file.")
 @click.option("--html", type=FILE, help="Write a page with pictures to this file.")
 @json_option
 def command(
     files: tuple[Path, ...],
-    inputs: tuple[str, ...],
-    outputs: tuple[str, ...],
-    excitations: tuple[str, ...],
-    band: tuple[float, float] | None,
-    n_omega: int,
-    window: tuple[float, ...],
-    overlap: float,
-    estimator: str,
-    span: tuple[float, float] | None,
-    sweep: int | None,
-    time: str,
     netcdf: Path | None,
     html: Path | None,
     as_json: bool,
+    **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
     """Estimate frequency responses from tables of records or from flight logs.
 
     Prints the usable band, coherence and random error of every pair.
     """
-    from flightid.progress import progress, track
+    from flightid.progress import progress
     from flightid.responses import estimate_response
     from flightid.responses.store import write_response
 
-    records: list[Record] = []
-    for file in track(files, "Reading"):
-        records += _read(file, inputs, outputs, excitations, span, sweep, time)
+    channels, of_response, *of_files = parted(options, _fields())
+    injected = of_response.get("excitations")
+    records = read_files(files, *of_files, **channels, excitations=injected)
     with progress(None, "Estimating"):
-        response = estimate_response(
-            records,
-            inputs=inputs or None,
-            outputs=outputs or None,
-            excitations=excitations or None,
-            band_rad_s=band,
-            n_omega=n_omega,
-            window_s=window or "auto",
-            estimator=estimator,
-            overlap=overlap,
-        )
+        response = estimate_response(records, **channels, **of_response)
     emit(response, as_json=as_json)
     if netcdf is not None:
         note(f"Wrote {write_response(response, netcdf)}")
     if html is not None:
         note(f"Wrote {_write_page(response, html)}")
     leave_by_verdict(response.findings)
-
-
-def _read(
-    file: Path,
-    inputs: tuple[str, ...],
-    outputs: tuple[str, ...],
-    excitations: tuple[str, ...],
-    span: tuple[float, float] | None,
-    sweep: int | None,
-    time: str,
-) -> list[Record]:
-    from flightid.logs import is_log, read_log
-
-    if is_log(file):
-        return [read_log(file).record(span_s=span, sid_run=sweep)]
-    from flightid.record.read import read_records
-
-    records = read_records(
-        file,
-        inputs or None,
-        outputs or None,
-        excitations=excitations or None,
-        time_column=time,
-    )
-    return records if span is None else [record.segment(*span) for record in records]
 
 
 def _write_page(response: FrequencyResponse, path: Path) -> Path:

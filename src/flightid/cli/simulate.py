@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from flightid.cli.output import HOLD_HELP, emit, json_option, note
-from flightid.cli.pairs import numbers, pairs
+from flightid.cli.option_fields import OptionsCommand, flags_of, parted
+from flightid.cli.output import emit, json_option, note
+from flightid.cli.records import FILES, read_files, reading
+from flightid.cli.sources import load_source, model_options
 
 if TYPE_CHECKING:
-    from flightid.models import LinearSystem, StateSpaceModel, TransferFunctionModel
-    from flightid.models.linear.hold_equivalent import Hold
+    from flightid.models import Model
+    from flightid.options import Options
     from flightid.record import Record
-
-    Flown = LinearSystem | StateSpaceModel | TransferFunctionModel
 
 FILE = click.Path(dir_okay=False, path_type=Path)
 
@@ -59,21 +59,18 @@ def quadrotor(output: Path, scenario: str, seed: int, as_json: bool) -> None:
     emit(flight, as_json=as_json)
 
 
-@command.command()
+def _fields() -> dict[str, type[Options]]:
+    from flightid import Noise
+    from flightid.simulation.options import SimulationOptions
+    from flightid.vehicles.pilot_inputs import StickOptions
+
+    return {"shapes": StickOptions, "the run": SimulationOptions, "noise": Noise, **reading()}
+
+
+@command.command(cls=OptionsCommand, fields_of=_fields)
 @click.argument("model")
-@click.argument("records", nargs=-1, type=click.Path(exists=True, dir_okay=False, path_type=Path))
-@click.option("--axis", type=click.Choice(["roll", "pitch", "yaw"]), help="Of a library model.")
-@click.option("--value", "values", multiple=True, help="NAME=NUMBER: another parameter value.")
-@click.option("--input", "shapes", multiple=True, help="NAME=SHAPE, for example lat=step:0.1.")
-@click.option("--duration", type=float, default=10.0, show_default=True, help="Of shapes, s.")
-@click.option("--rate", type=float, default=100.0, show_default=True, help="Of shapes, Hz.")
-@click.option("--span", nargs=2, type=float, help="First and last instant in a log, s.")
-@click.option("--hold", type=click.Choice(["first", "zero"]), help=HOLD_HELP)
-@click.option("--substeps", type=click.IntRange(1), help="Runge-Kutta steps in a sample.")
-@click.option("--sensor", multiple=True, help="OUTPUT=DEVIATION: white noise of a sensor.")
-@click.option("--process", multiple=True, help="STATE=SIZE: white noise on its derivative, 1/√s.")
-@click.option("--gust", multiple=True, help="STATE=DEVIATION:SECONDS: moving air it feels.")
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Of noise.")
+@click.argument("records", nargs=-1, type=FILES)
+@model_options
 @click.option("--output", "written", type=FILE, help="Write .csv, .parquet or .nc.")
 @click.option("--html", type=FILE, help="Write a page with time histories.")
 @json_option
@@ -82,40 +79,31 @@ def model(
     records: tuple[Path, ...],
     axis: str | None,
     values: tuple[str, ...],
-    shapes: tuple[str, ...],
-    duration: float,
-    rate: float,
-    span: tuple[float, float] | None,
-    hold: Hold | None,
-    substeps: int | None,
-    sensor: tuple[str, ...],
-    process: tuple[str, ...],
-    gust: tuple[str, ...],
-    seed: int,
     written: Path | None,
     html: Path | None,
     as_json: bool,
+    **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
-    """Fly MODEL, a .toml file or a library name, on RECORDS, a log, or shapes of its inputs.
+    """Fly MODEL on RECORDS, a log, or shapes of its inputs.
 
-    Linear models are departures from their trim; nonlinear ones take inputs whole, and shapes are
-    added to their trim. Shapes: step:A[:START], pulse:A:WIDTH[:START], doublet:A:WIDTH[:START],
-    3211:A:WIDTH[:START], sine:A:RAD_PER_S[:START], sweep:A:LOW:HIGH.
+    MODEL is a .toml file, the folder of a study with one model, the JSON of a fit, or the name of a
+    library model. Linear models are departures from their trim; nonlinear ones take inputs whole,
+    and shapes are added to their trim. Shapes: step:A[:START], pulse:A:WIDTH[:START],
+    doublet:A:WIDTH[:START], 3211:A:WIDTH[:START], sine:A:RAD_PER_S[:START], sweep:A:LOW:HIGH.
     """
     from flightid import Noise, simulate
     from flightid.progress import progress
 
-    chosen = _model(model, axis, numbers("--value", values))
-    noise = Noise(numbers("--sensor", sensor), numbers("--process", process), _gusts(gust), seed)
-    driven = _driving(chosen, records, pairs("--input", shapes), span, (duration, rate))
+    chosen = load_source(model, axis, values)
+    shapes, of_run, noise, *of_files = parted(options, _fields())
+    if set(noise) == {"seed"}:
+        raise click.UsageError("--seed is of noise: give --sensor, --process or --gust too")
+    driven = _driving(chosen, records, shapes, of_files)
     made = []
     with progress(len(driven), "Simulating") as advance:
         for record in driven:
-            flown = simulate(
-                chosen, record, hold=hold, substeps=substeps, units=chosen.units,
-                noise=noise if sensor or process or gust else None,
-            )  # fmt: skip
-            made.append(flown)
+            added = Noise(**noise) if noise else None
+            made.append(simulate(chosen, record, units=chosen.units, noise=added, **of_run))
             advance()
     if written is not None:
         note(f"Wrote {_write(written, made)}")
@@ -125,63 +113,25 @@ def model(
         emit(flown, as_json=as_json)
 
 
-def _model(name: str, axis: str | None, values: dict[str, float]) -> Flown:
-    from flightid import load_model
-    from flightid.models import StateSpaceModel, TransferFunctionModel, linear_system
-
-    found = load_model(name, axis=axis)
-    if isinstance(found, StateSpaceModel | TransferFunctionModel):
-        return found.with_values(values) if values else found
-    if values:
-        raise click.UsageError("--value needs a model with named parameters")
-    return linear_system(found)
-
-
-def _gusts(given: tuple[str, ...]) -> dict[str, tuple[float, float]]:
-    found = {}
-    for name, text in pairs("--gust", given).items():
-        size, _, time_s = text.partition(":")
-        try:
-            found[name] = (float(size), float(time_s))
-        except ValueError as error:
-            raise click.UsageError(f"--gust {name}={text!r} is not DEVIATION:SECONDS") from error
-    return found
-
-
 def _driving(
-    model: Flown,
-    files: tuple[Path, ...],
-    shapes: dict[str, str],
-    span: tuple[float, float] | None,
-    length: tuple[float, float],
+    model: Model, files: tuple[Path, ...], shapes: dict[str, Any], of_files: list[dict[str, Any]]
 ) -> list[Record]:
     """Records of the files, or one of shapes."""
-    from flightid import read_log, read_records
-    from flightid.logs import is_log
-    from flightid.vehicles.pilot_inputs import stick_record
+    from dataclasses import asdict
+
+    from flightid.vehicles.pilot_inputs import StickOptions, stick_record
 
     inputs = tuple(model.inputs)
-    if not files:
-        units = {name: model.units.get(name, "1") for name in inputs}
-        is_whole = not getattr(model, "is_linear", True)
-        trim = {n: v for n, v in getattr(model, "trim", {}).items() if n in inputs}
-        return [
-            stick_record(
-                units, shapes, duration_s=length[0], sample_rate_hz=length[1],
-                trim=trim if is_whole else {},
-            )
-        ]  # fmt: skip
-    if shapes:
-        raise click.UsageError("--input makes records of its own: give it or RECORDS")
-    found: list[Record] = []
-    for file in files:
-        if is_log(file):
-            found.append(read_log(file).record(names=list(inputs), span_s=span))
-        elif span is not None:
-            raise click.UsageError("--span belongs to logs")
-        else:
-            found += read_records(file, inputs=inputs)
-    return found
+    if files:
+        for name in shapes:
+            flag = flags_of(name)[-1]
+            raise click.UsageError(f"{flag} is of shapes, which make a record: give it or RECORDS")
+        return read_files(files, *of_files, inputs=inputs, units=model.units)
+    stick = asdict(StickOptions(**shapes))
+    units = {name: model.units.get(name, "1") for name in inputs}
+    is_whole = not getattr(model, "is_linear", True)
+    trim = {n: v for n, v in getattr(model, "trim", {}).items() if n in inputs}
+    return [stick_record(units, stick.pop("inputs"), **stick, trim=trim if is_whole else {})]
 
 
 def _write(path: Path, records: list[Record]) -> Path:

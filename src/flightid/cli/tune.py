@@ -4,23 +4,33 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import emit_values, json_option, leave_by_verdict, note
 
 if TYPE_CHECKING:
     from flightid.control.tuning.result import Tuning
+    from flightid.options import Options
+    from flightid.study.tuning import TuneSettings
 
 
-@click.command()
+def _fields() -> dict[str, type[Options]]:
+    from flightid.control.tuning.options import TuneOptions
+    from flightid.control.tuning.requirements import TuningRequirements
+
+    return {"requirements": TuningRequirements, "tuning": TuneOptions}
+
+
+@click.command(cls=OptionsCommand, fields_of=_fields)
 @click.argument(
     "files",
     nargs=-1,
     required=True,
     metavar="STUDY | MODEL...",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=click.Path(exists=True, path_type=Path),
 )
 @click.option(
     "--log",
@@ -47,21 +57,27 @@ def command(
     target: Path | None,
     overwrite: bool,
     as_json: bool,
+    **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
     """Run STUDY, or take fitted MODELs, and tune the autopilot that the log was flown with.
 
-    The table [tune] of the study holds the requirements; without one the usual ones apply. Gains
-    keep their margins for every plant that the data allow. The exit code is 1 where a verdict on
-    the gains is red.
+    A MODEL is a .toml file, the JSON of a fit, or the output folder of a study, all models of which
+    are taken. The table [tune] of the study holds requirements and options; what is given here goes
+    before it, and without either the usual ones apply. Gains keep their margins for every plant
+    that the data allow. The exit code is 1 where a verdict on the gains is red.
     """
+    from flightid.study.tuning import TuneSettings
+
     report = None
+    needs, told = parted(options, _fields())
+    asked = {**needs, **told}
     if _is_study(files):
         from flightid.study import run_study
 
-        result = run_study(files[0], output=output, log=log, tune=True)
+        result = run_study(files[0], output=output, log=log, tune=asked)
         tuning, report = result.tuning, result.output / "report.html"
     else:
-        tuning = _of_models(files, log)
+        tuning = _of_models(files, log, TuneSettings().changed(asked))
     if tuning is None:
         raise click.ClickException("there is no model of a rate that can be tuned")
     if as_json:
@@ -82,7 +98,7 @@ def command(
 
 def _is_study(files: tuple[Path, ...]) -> bool:
     """Whether a study is meant: one file, with the table that every study has."""
-    if len(files) > 1:
+    if len(files) > 1 or files[0].is_dir() or files[0].suffix == ".json":
         return False
     # A file that is no TOML is told as a study that cannot be read.
     try:
@@ -92,10 +108,12 @@ def _is_study(files: tuple[Path, ...]) -> bool:
     return "estimated" not in content and "kind" not in content
 
 
-def _of_models(files: tuple[Path, ...], log: Path | None) -> Tuning | None:
+def _of_models(files: tuple[Path, ...], log: Path | None, settings: TuneSettings) -> Tuning | None:
     from flightid import read_log
-    from flightid.study.tuning import TuneSettings, tune_files
+    from flightid.models.saved_files import models_of
+    from flightid.study.tuning import tune_files
 
     if log is None:
         raise click.UsageError("models hold no gains: name the flight with --log")
-    return tune_files(files, read_log(log), TuneSettings())
+    found = [path for file in files for path in (models_of(file) if file.is_dir() else [file])]
+    return tune_files(found, read_log(log), settings)

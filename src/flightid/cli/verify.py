@@ -3,27 +3,31 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from flightid.cli.output import HOLD_HELP, emit, emit_values, json_option, leave_by_verdict, note
+from flightid.cli.option_fields import OptionsCommand, parted
+from flightid.cli.output import emit, emit_values, json_option, leave_by_verdict, note
+from flightid.cli.records import FILES, read_files, reading
+from flightid.cli.sources import load_source, model_options
 
 if TYPE_CHECKING:
-    from flightid.models.linear.hold_equivalent import Hold
+    from flightid.options import Options
     from flightid.validation import Comparison, ResidualTests, Verification
 
 
-@click.command()
+def _fields() -> dict[str, type[Options]]:
+    from flightid.record.options import ComparedOptions
+    from flightid.validation.verification.options import VerifyOptions
+
+    return {"channels": ComparedOptions, "the prediction": VerifyOptions, **reading()}
+
+
+@click.command(cls=OptionsCommand, fields_of=_fields)
 @click.argument("model")
-@click.argument(
-    "records",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-)
-@click.option("--axis", type=click.Choice(["roll", "pitch", "yaw"]), help="For library models.")
-@click.option("--value", "values", multiple=True, metavar="NAME=NUMBER", help="Parameter value.")
+@click.argument("records", nargs=-1, required=True, type=FILES)
+@model_options
 @click.option(
     "--against",
     "rivals",
@@ -31,17 +35,8 @@ if TYPE_CHECKING:
     metavar="MODEL",
     help="Rival model to verify side by side; may be repeated.",
 )
-@click.option("--output", "outputs", multiple=True, help="Output to compare; default: all.")
 @click.option(
-    "--initial-state",
-    type=click.Choice(["trim", "zero", "measured", "estimate"]),
-    help="Where runs start. Left out: as the kind of model starts.",
-)
-@click.option("--hold", type=click.Choice(["first", "zero"]), help=HOLD_HELP)
-@click.option("--state-bias/--no-state-bias", default=None, help="Solve for state biases.")
-@click.option("--output-bias/--no-output-bias", default=None, help="Solve for shifts of outputs.")
-@click.option(
-    "--residuals",
+    "--residual-tests",
     "with_residuals",
     is_flag=True,
     help="Test measured minus predicted for independence of the inputs (loop taken as open).",
@@ -58,42 +53,30 @@ def command(
     axis: str | None,
     values: tuple[str, ...],
     rivals: tuple[str, ...],
-    outputs: tuple[str, ...],
-    initial_state: str | None,
-    hold: Hold | None,
-    state_bias: bool | None,
-    output_bias: bool | None,
     with_residuals: bool,
     html: Path | None,
     as_json: bool,
+    **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
-    """Predict RECORDS with MODEL, a .toml file or the name of a library model.
+    """Predict RECORDS with MODEL.
 
-    The records (CSV, Parquet, .mat, netCDF) hold the model's channels by name. The exit code is 1
-    where a prediction of MODEL misses its guide, or a residual test that was asked for fails.
+    MODEL is a .toml file, the folder of a study with one model, the JSON of a fit, or the name of a
+    library model; RECORDS (CSV, Parquet, .mat, netCDF, logs) hold its channels by name. The exit
+    code is 1 where a prediction of MODEL misses its guide, or a residual test that was asked for
+    fails.
     """
-    from flightid import Comparison, load_model, read_records, residual_tests, verify
-    from flightid.models import load_structure
+    from flightid import Comparison, residual_tests, verify
 
-    chosen = load_model(model, axis=axis)
-    if values:
-        chosen = load_structure(model, axis=axis).with_values(dict(map(_number, values)))
-    models = [chosen, *(load_model(rival, axis=axis) for rival in rivals)]
-    shared = tuple(name for name in chosen.outputs if all(name in m.outputs for m in models))
-    compared = outputs or shared
-    flown = [
-        record
-        for path in records
-        for record in read_records(path, inputs=chosen.inputs, outputs=compared)
-    ]
+    chosen = load_source(model, axis, values)
+    models = [chosen, *(load_source(rival, axis) for rival in rivals)]
+    channels, given, *of_files = parted(options, _fields())
+    shared = [name for name in chosen.outputs if all(name in m.outputs for m in models)]
+    compared = channels.get("outputs") or shared
+    flown = read_files(
+        records, *of_files, inputs=chosen.inputs, outputs=compared, units=chosen.units
+    )
     result: Verification | Comparison = verify(
-        models if rivals else chosen,
-        flown,
-        state_bias=state_bias,
-        output_bias=output_bias,
-        initial_state=initial_state,
-        outputs=compared,
-        hold=hold,
+        models if rivals else chosen, flown, outputs=compared, **given
     )
     on_trial = result.first if isinstance(result, Comparison) else result
     tests = residual_tests(on_trial) if with_residuals else None
@@ -107,14 +90,6 @@ def command(
     if html is not None:
         note(f"Wrote {_write_page(result, tests, str(chosen), html)}")
     leave_by_verdict((*result.findings, *(() if tests is None else tests.findings)))
-
-
-def _number(text: str) -> tuple[str, float]:
-    name, _, number = text.partition("=")
-    try:
-        return name, float(number)
-    except ValueError:
-        raise click.BadParameter(f"{text!r} is not NAME=NUMBER", param_hint="--value") from None
 
 
 def _write_page(

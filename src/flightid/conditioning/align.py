@@ -163,7 +163,7 @@ def estimate_skew(
     >>> round(estimate_skew(record, "a", "b", band_rad_s=(1.0, 30.0)).skew_s, 3)
     0.035
     """
-    require_match(record.unit(channel), record.unit(reference), subject=f"channel {channel}")
+    require_match(channel, record.unit(channel), record.unit(reference))
     step = record.sample_time_s
     length = record.n_samples // 8 if window_s is None else round(window_s / step)
     usual = 2 / (length * step) if length else 0.0, 0.4 / step

@@ -12,6 +12,7 @@ from flightid.excitation.excitation import Excitation
 from flightid.excitation.multisine import multisine
 from flightid.excitation.multistep import doublet, modified_3211, multistep
 from flightid.excitation.noise import noise
+from flightid.excitation.options import DesignOptions
 from flightid.excitation.plan import Limits, Plan
 from flightid.excitation.prbs import HALF_POWER, HIGHEST_ORDER, LOWEST_ORDER, prbs
 from flightid.excitation.sweep import ardupilot_chirp, sweep
@@ -162,7 +163,7 @@ def plan(
     amplitude: float | None = None,
     duration_s: float | None = None,
     sample_rate_hz: float = 400.0,
-    names: tuple[str, ...] = ("u",),
+    inputs: tuple[str, ...] = ("u",),
     unit: str = "1",
     limits: Limits | None = None,
     n_records: int = 2,
@@ -188,8 +189,8 @@ def plan(
         chirp, whose dwell takes two. Doublets and 3-2-1-1 have the length of their steps.
     sample_rate_hz : float
         Samples per second, Hz.
-    names : tuple of str
-        Inputs; more than one for multisine, noise and prbs only.
+    inputs : tuple of str
+        Inputs to excite; more than one for multisine, noise and prbs only.
     unit : str
         Unit of the inputs.
     limits : Limits, optional
@@ -220,17 +221,28 @@ def plan(
     -------
     >>> axis = RateAxis(gain=40.0, time_constant_s=0.2, delay_s=0.01, rate_feedback=0.1,
     ...                 attitude_feedback_per_s=4.0)
-    >>> made = plan("multisine", axis, band_rad_s=(1.0, 30.0), names=("tau_phi", "tau_theta"))
+    >>> made = plan("multisine", axis, band_rad_s=(1.0, 30.0), inputs=("tau_phi", "tau_theta"))
     >>> made.is_go
     True
     """
     if kind not in KINDS:
         raise OptionError("no such kind of design", found=kind, needed=", ".join(KINDS))
+    DesignOptions(
+        band_rad_s,
+        amplitude,
+        duration_s,
+        sample_rate_hz,
+        tuple(inputs),
+        unit,
+        n_records,
+        seed,
+        axis,
+    )
     rate_hz = float(sample_rate_hz)
     length = _default_length(kind, band_rad_s, rate_hz) if duration_s is None else duration_s
 
     def made(size: float) -> Plan:
-        request = Request(band_rad_s, size, length, rate_hz, tuple(names), unit, seed, axis)
+        request = Request(band_rad_s, size, length, rate_hz, tuple(inputs), unit, seed, axis)
         return assess(
             KINDS[kind](request), vehicle, band_rad_s=band_rad_s, limits=limits, n_records=n_records
         )

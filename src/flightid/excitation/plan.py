@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.excitation.checks import require_positive
 from flightid.excitation.excitation import Excitation
 from flightid.excitation.vehicle import RateAxis
 from flightid.findings import Finding, worst
+from flightid.options import Options, option
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
@@ -23,7 +23,7 @@ PARAMETERS = (("gain", "rad/s"), ("time constant", "s"), ("delay", "s"))
 
 
 @dataclass(frozen=True)
-class Limits:
+class Limits(Options):
     """What the vehicle may do during the manoeuvre, about its trim.
 
     Attributes
@@ -43,18 +43,18 @@ class Limits:
     0.5235987755982988
     """
 
-    control: float = 1.0
-    control_rate_per_s: float | None = None
-    rate_rad_s: float = math.radians(200.0)
-    attitude_rad: float = math.radians(30.0)
-
-    def __post_init__(self) -> None:
-        require_positive(
-            control=self.control,
-            control_rate_per_s=1.0 if self.control_rate_per_s is None else self.control_rate_per_s,
-            rate_rad_s=self.rate_rad_s,
-            attitude_rad=self.attitude_rad,
-        )
+    control: float = option(
+        1.0, above=0.0, doc="Limit: input that is free on either side of trim, in its unit."
+    )
+    control_rate_per_s: float | None = option(
+        None, above=0.0, doc="Limit: fastest change that the actuator follows, unit/s."
+    )
+    rate_rad_s: float = option(
+        math.radians(200.0), unit="rad/s", above=0.0, doc="Limit: largest rate."
+    )
+    attitude_rad: float = option(
+        math.radians(30.0), unit="rad", above=0.0, doc="Limit: largest attitude change."
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,14 +14,15 @@ from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
 from flightid.errors import ModelError
-from flightid.excitation.checks import require_not_negative, require_positive
+from flightid.excitation.checks import require_positive
+from flightid.options import Options, option
 
 MEMORY = 12.0
 """Time constants of the slowest closed-loop mode that the silent end lasts."""
 
 
 @dataclass(frozen=True)
-class RateAxis:
+class RateAxis(Options):
     """Guess of a rate axis: steady gain, lag, delay, measurement noise, and the loop that stays on.
 
     Attributes
@@ -45,22 +46,20 @@ class RateAxis:
     0.2
     """
 
-    gain: float
-    time_constant_s: float
-    delay_s: float = 0.0
-    noise_rad_s: float = 0.02
-    rate_feedback: float = 0.0
-    attitude_feedback_per_s: float = 0.0
+    gain: float = option(unit="rad/s", doc="Guess: steady rate for a unit of input.")
+    time_constant_s: float = option(unit="s", above=0.0, doc="Guess: lag of the rate.")
+    delay_s: float = option(0.0, unit="s", minimum=0.0, doc="Guess: pure delay.")
+    noise_rad_s: float = option(
+        0.02, unit="rad/s", above=0.0, doc="Deviation of the noise on the measured rate."
+    )
+    rate_feedback: float = option(0.0, doc="Loop kept on: input for a unit of rate, 1/(rad/s).")
+    attitude_feedback_per_s: float = option(
+        0.0, unit="1/s", minimum=0.0, doc="Loop kept on: rate command for a unit of attitude."
+    )
 
     def __post_init__(self) -> None:
-        require_positive(
-            absolute_gain=abs(self.gain),
-            time_constant_s=self.time_constant_s,
-            noise_rad_s=self.noise_rad_s,
-        )
-        require_not_negative(
-            delay_s=self.delay_s, attitude_feedback_per_s=self.attitude_feedback_per_s
-        )
+        super().__post_init__()
+        require_positive(absolute_gain=abs(self.gain))
 
     def response(self, omega_rad_s: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Rate over input without feedback, (rad/s)/unit."""

@@ -10,6 +10,7 @@ from pathlib import Path
 from flightid.errors import FileFormatError, ModelError, OptionError, UnknownNameError
 from flightid.models.kinds import GreyBoxModel, model_from_description
 from flightid.models.model import Model
+from flightid.models.saved_files import model_in_json, only_model
 from flightid.models.state_space.model import StateSpaceModel
 from flightid.models.transfer.model import TransferFunctionModel
 
@@ -43,13 +44,14 @@ def library_names() -> list[str]:
 
 
 def load_model(path: str | Path, *, axis: str | None = None) -> Model:
-    """Load a model from a TOML file, or one of the library by its name.
+    """Load a model from a file, a study's results, or the library by its name.
 
     Parameters
     ----------
     path : str or Path
-        Path of a ``.toml`` file, or a name such as ``"rate_first_order"``; the axis may follow the
-        name, as in ``"rate_first_order_pitch"``.
+        Path of a ``.toml`` file; of the ``.json`` of a fit; of the output folder of a study with
+        one model; or a name such as ``"rate_first_order"``, which the axis may follow, as in
+        ``"rate_first_order_pitch"``.
     axis : str, optional
         ``"roll"`` (default), ``"pitch"`` or ``"yaw"``, for a library model written for any axis.
 
@@ -65,9 +67,9 @@ def load_model(path: str | Path, *, axis: str | None = None) -> Model:
     OptionError
         The model is not written for that axis.
     FileFormatError
-        The file is too large, not UTF-8 or not TOML.
+        The file is too large, not UTF-8, not TOML or not JSON.
     ModelError
-        The model contradicts itself.
+        The model contradicts itself; JSON without a fit; a folder with no model or several.
 
     Example
     -------
@@ -76,6 +78,10 @@ def load_model(path: str | Path, *, axis: str | None = None) -> Model:
     q/tau_theta = Mttheta / (s - Mq) * exp(-(tau) s)
     """
     name = str(path)
+    if name.endswith(".json"):
+        return _build(model_in_json(Path(path)), axis, name)
+    if name not in library_names() and Path(path).is_dir():
+        return load_model(only_model(Path(path)), axis=axis)
     if isinstance(path, Path) or name.endswith(".toml"):
         return _build(_parse(_read(Path(path)), name), axis, name)
     if not _LIBRARY_NAME.fullmatch(name):

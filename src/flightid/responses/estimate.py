@@ -122,7 +122,15 @@ def estimate_response(
     >>> bool(np.all(np.abs(np.abs(response.response) - 2.0) < 0.05))
     True
     """
-    ResponseOptions(estimator, n_omega, window_s, overlap, detrend, covariance)
+    ResponseOptions(
+        loop=loop,
+        estimator=estimator,
+        n_omega=n_omega,
+        window_s=window_s,
+        overlap=overlap,
+        detrend=detrend,
+        covariance=covariance,
+    )
     listed = list(as_records(records))
     if estimator == "instrument" and excitations is None and listed:
         excitations = listed[0].excitations

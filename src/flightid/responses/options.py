@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from flightid.options import Options, option
+from flightid.record.hold import LOOPS, Loop
 from flightid.responses.windows.windows import DEFAULT_FREQUENCIES
 
 ESTIMATORS = ("composite", "instrument", "local_polynomial")
@@ -16,6 +17,18 @@ DETRENDS = ("none", "mean", "line")
 class ResponseOptions(Options):
     """Options of `flightid.estimate_response`."""
 
+    band_rad_s: tuple[float, float] | None = option(
+        None,
+        unit="rad/s",
+        above=0.0,
+        doc="Lowest and highest frequency; default: what the records carry.",
+    )
+    excitations: tuple[str, ...] | None = option(
+        None, doc="Injected signals, independent of noise, for estimator 'instrument'."
+    )
+    loop: Loop | None = option(
+        None, choices=LOOPS, doc="Whether a loop was closed; default: a test decides."
+    )
     estimator: str = option(
         "composite",
         choices=ESTIMATORS,

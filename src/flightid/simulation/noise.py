@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +17,16 @@ from flightid.models import LinearModel, StateSpaceModel
 from flightid.models.model import linear_system
 from flightid.models.sampled.recursion import run_recursion
 from flightid.models.state_space.parts import derivative
+from flightid.option_forms import NUMBER
+from flightid.options import Options, option
 
 Array = NDArray[np.float64]
 NOISE_PARTS = 8
 """Values of white noise in a sample of a nonlinear model whose inputs are straight lines."""
 
 
-@dataclass(frozen=True)
-class Noise:
+@dataclass(frozen=True, repr=False)
+class Noise(Options):
     """What disturbs a simulated flight, with its seed.
 
     Attributes
@@ -54,22 +57,25 @@ class Noise:
     Noise(sensor p, gusts v, seed 0)
     """
 
-    sensor: Mapping[str, float] = field(default_factory=dict)
-    process: Mapping[str, float] = field(default_factory=dict)
-    gusts: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    seed: int = 0
+    sensor: Mapping[str, float] = option(
+        default_factory=dict, doc="Deviation of white noise by output, in its unit."
+    )
+    process: Mapping[str, float] = option(
+        default_factory=dict, doc="White noise on a state's derivative, unit of the state/√s."
+    )
+    gusts: Mapping[str, tuple[float, float]] = option(
+        default_factory=dict,
+        doc="Moving air by velocity or rate state: DEVIATION:SECONDS of correlation.",
+    )
+    seed: int = option(0, minimum=0, doc="Seed of the noise.")
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for kind in ("sensor", "process"):
             for name, size in getattr(self, kind).items():
                 _require_size(f"{kind} noise of {name}", size)
-        for name, (size, time_s) in self.gusts.items():
-            _require_size(f"gust on {name}", size)
-            if not (math.isfinite(time_s) and time_s > 0.0):
-                raise OptionError(f"the gust on {name} has no correlation time", found=time_s,
-                                  needed="above 0 s")  # fmt: skip
-        if self.seed < 0:
-            raise OptionError("a seed is negative", found=self.seed)
+        for name, gust in self.gusts.items():
+            _require_gust(name, gust)
 
     @property
     def moves(self) -> bool:
@@ -293,8 +299,22 @@ def _free_name(name: str, model: StateSpaceModel) -> str:
     return name
 
 
-def _require_size(subject: str, size: float) -> None:
-    if not (math.isfinite(size) and size >= 0.0):
+def _require_gust(name: str, gust: Any) -> None:  # noqa: ANN401 — checked here
+    if not (isinstance(gust, tuple | list) and len(gust) == 2):
+        raise OptionError(
+            f"the gust on {name} is not a deviation and a time", found=gust,
+            needed=f"(deviation, seconds); on the command line {name}=DEVIATION:SECONDS",
+        )  # fmt: skip
+    size, time_s = gust
+    _require_size(f"gust on {name}", size)
+    if not (NUMBER.fits(time_s) and time_s > 0.0):
+        raise OptionError(
+            f"the gust on {name} has no correlation time", found=time_s, needed="above 0 s"
+        )
+
+
+def _require_size(subject: str, size: Any) -> None:  # noqa: ANN401 — checked here
+    if not (NUMBER.fits(size) and size >= 0.0):
         raise OptionError(f"{subject} has no meaning", found=size, needed="zero or more")
 
 

@@ -207,7 +207,7 @@ def _filter(reader: TableReader) -> dict[str, Any]:
         raise reader.error("cutoff_hz", "does not fit", found=edges, needed="one number or two")
     given: dict[str, Any] = {
         "cutoff_hz": edges[0] if len(edges) == 1 else edges,
-        "band": reader.choice("band", BANDS, BANDS[0]),
+        "kind": reader.choice("kind", BANDS, BANDS[0]),
         "design": reader.choice("design", [str(each) for each in FilterDesign], "butterworth"),
         "order": reader.integer("order", 4, minimum=1),
         "zero_phase": reader.flag("zero_phase", True),

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flightid.findings import Finding, worst
+from flightid.options import Options
 from flightid.plot.fit import EstimateBar, parameter_intervals
 from flightid.report.blocks import provenance, result_blocks
 from flightid.report.closed_loop import closed_loop_section
@@ -245,13 +246,12 @@ def _options(study: StudyResults) -> dict[str, Cell]:
         return {}
     options: dict[str, Cell] = {"fit": settings.fit.method}
     if settings.fit.on_responses:
-        options |= {
-            "estimator": response.estimator,
-            "frequencies in a model's band": response.n_omega,
-            "windows [s]": ", ".join(f"{value:g}" for value in response.window_s) or "chosen",
-            "least coherence": response.minimum_coherence,
-        }
+        options |= _told("response", response)
     options |= {f"{name} of a fit": str(value) for name, value in settings.fit.options.items()}
+    options |= _told("verification", settings.check)
+    if settings.tune is not None:
+        options |= _told("tuning", settings.tune.requirements)
+        options |= _told("tuning", settings.tune.options)
     if settings.reduce is not None:
         options |= {
             name.replace("_", " "): value for name, value in vars(settings.reduce.limits).items()
@@ -260,3 +260,12 @@ def _options(study: StudyResults) -> dict[str, Cell]:
     if settings.flight is not None and study.truth is not None:
         options["seed of the flight"] = settings.flight.seed
     return options
+
+
+def _told(owner: str, options: Options) -> dict[str, Cell]:
+    """Options by name, without those that nobody set and that have no number by default."""
+    return {
+        f"{name} of the {owner}": str(value)
+        for name, value in options.to_dict().items()
+        if value not in (None, [], {})
+    }

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 from flightid.errors import StudyError
 from flightid.identification.methods import METHODS, RECORDS
 from flightid.identification.prediction.request import FREE_RUN
 from flightid.models import StateSpaceModel
-from flightid.options import options_of, read_options
-from flightid.study.reading import TableReader
+from flightid.option_forms import WHOLE, Form
+from flightid.options import option, options_of, read_options
+from flightid.study.reading import TableReader, read_each
+from flightid.validation.verification.options import VerifyOptions
 
 FREQUENCY_DOMAIN = "frequency_domain"
 METHOD_NAMES = tuple(way.name for way in METHODS if StateSpaceModel in way.kinds)
@@ -38,49 +40,48 @@ class FitSettings:
         return all(way.data != RECORDS for way in METHODS if way.name == self.method)
 
 
+def _are_horizons(value: object) -> bool:
+    listed = value if isinstance(value, list | tuple) else [value]
+    fits = [each == FREE_RUN or (WHOLE.fits(each) and cast(int, each) > 0) for each in listed]
+    return all(fits) and len(set(listed)) == len(listed)
+
+
+HORIZONS = Form(
+    "'free_run', a number of samples from 1 on, or a list of them",
+    _are_horizons,
+    lambda value: tuple(value) if isinstance(value, list | tuple) else (value,),
+)
+
+
 @dataclass(frozen=True)
-class VerifySettings:
-    """How models are verified; see `flightid.verify`.
+class VerifySettings(VerifyOptions):
+    """How models are verified: options of the verb, and what is looked at beside it."""
 
-    Attributes
-    ----------
-    initial_state : str or None
-        None: as the kind of model starts.
-    settle_s : float or None
-    state_bias, output_bias : bool or None
-    against_responses : bool
-        Whether models are also judged against the measured responses.
-    horizons : tuple of int or "free_run"
-        Samples ahead; empty: a free run, and of models without equations one sample as well.
-    residual_tests : bool or None
-        Whether residuals of fits to records are tested; None: of models without equations.
-    spectra : bool or None
-        Whether the spectrum of a free run stands beside the measured one; None: the same.
-    without_equations : bool
-        What of a model is usual where nothing is said.
-    """
-
-    initial_state: str | None = None
-    settle_s: float | None = None
-    state_bias: bool | None = None
-    output_bias: bool | None = None
-    horizons: tuple[int | str, ...] = ()
-    residual_tests: bool | None = None
-    spectra: bool | None = None
-    against_responses: bool = False
+    horizons: tuple[int | str, ...] = option(
+        (), forms=(HORIZONS,), doc="Horizons of the predictions, the one that counts first."
+    )
+    residual_tests: bool | None = option(
+        None, doc="Test residuals of fits to records; default: of models without equations."
+    )
+    spectra: bool | None = option(
+        None, doc="Show the spectrum of a free run beside the measured one; default: the same."
+    )
+    against_responses: bool = option(
+        False, doc="Judge models against the measured responses as well."
+    )
     without_equations: bool = False
 
     @property
     def options(self) -> dict[str, Any]:
-        """What `flightid.verify` is given."""
-        names = ("initial_state", "settle_s", "state_bias", "output_bias")
-        given = {name: getattr(self, name) for name in names}
-        return {name: value for name, value in given.items() if value is not None}
+        """What `flightid.verify` is given beside a horizon."""
+        names = ("initial_state", "settle_s", "state_bias", "output_bias", "hold")
+        return {name: value for name, value in self.given.items() if name in names}
 
     @property
     def ahead(self) -> tuple[int | str, ...]:
         """Horizons of the predictions, the one that counts first."""
-        return self.horizons or ((FREE_RUN, 1) if self.without_equations else (FREE_RUN,))
+        usual = (FREE_RUN, 1) if self.without_equations else (self.horizon,)
+        return self.horizons or usual
 
     @property
     def tests_residuals(self) -> bool:
@@ -120,30 +121,5 @@ def read_verify(reader: TableReader, usual: VerifySettings | None = None) -> Ver
     StudyError
         A key is unknown or a value does not fit.
     """
-    usual = usual or VerifySettings()
-
-    def given(read: Any, key: str, otherwise: Any) -> Any:  # noqa: ANN401
-        value = reader.maybe(read, key)
-        return otherwise if value is None else value
-
-    starts = ("trim", "zero", "measured", "estimate")
-    made = VerifySettings(
-        given(lambda key: reader.choice(key, starts), "initial_state", usual.initial_state),
-        given(reader.positive, "settle_s", usual.settle_s),
-        given(reader.flag, "state_bias", usual.state_bias),
-        given(reader.flag, "output_bias", usual.output_bias),
-        _horizons(reader, usual.horizons),
-        given(reader.flag, "residual_tests", usual.residual_tests),
-        given(reader.flag, "spectra", usual.spectra),
-        reader.flag("against_responses", usual.against_responses),
-    )
-    reader.finish()
-    return made
-
-
-def _horizons(reader: TableReader, usual: tuple[int | str, ...]) -> tuple[int | str, ...]:
-    def fits(value: object) -> bool:
-        counted = isinstance(value, int) and not isinstance(value, bool) and value > 0
-        return counted or value == FREE_RUN
-
-    return reader.several("horizons", fits, "'free_run' or a number of samples", usual)
+    (made,) = read_each((VerifySettings,), reader, (usual,))
+    return cast("VerifySettings", made)

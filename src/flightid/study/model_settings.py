@@ -143,7 +143,7 @@ def read_model(
         reader.maybe(reader.text, "axis"),
         reader.names("identify"),
         reader.names("verify", ()),
-        _band(reader, required=fit.on_responses),
+        _band(reader, response if fit.on_responses else None),
         response,
         fit,
         check,
@@ -173,7 +173,7 @@ def _without_equations(
         None,
         identify,
         reader.names("verify", ()),
-        _band(reader, required=True),
+        _band(reader, response),
         response,
         FitSettings(METHODS.get(structure.kind, "prediction_error")),
         replace(check, without_equations=True),
@@ -185,11 +185,14 @@ def _without_equations(
     return made
 
 
-def _band(reader: TableReader, *, required: bool) -> tuple[float, float] | None:
-    band = (
-        reader.interval("band_rad_s") if required else reader.maybe(reader.interval, "band_rad_s")
-    )
-    if band is not None and band[0] <= 0:
+def _band(reader: TableReader, response: ResponseSettings | None) -> tuple[float, float] | None:
+    """Band of the model, else that of its responses, which need one."""
+    if response is None or response.band_rad_s is not None:
+        band = reader.maybe(reader.interval, "band_rad_s")
+        band = response.band_rad_s if band is None and response is not None else band
+    else:
+        band = reader.interval("band_rad_s")
+    if band is not None and not 0 < band[0] < band[1]:
         raise reader.error("band_rad_s", "does not fit", found=band, needed="positive frequencies")
     return band
 

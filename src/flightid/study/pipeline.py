@@ -14,7 +14,6 @@ from flightid.study.evidence import examined
 from flightid.study.identified import Fitted, Identified
 from flightid.study.model_settings import UNBROKEN
 from flightid.study.reducing import ReduceSettings
-from flightid.study.response_settings import ResponseSettings
 from flightid.study.stage_runner import Staged, StageRunner
 from flightid.study.stages import (
     check,
@@ -144,13 +143,6 @@ def _responses(
     flown = [records[name] for name in settings.flown]
     found = {}
     for estimator in asked.estimators:
-        # Only what the estimator reads: other limits of coherence make no other estimate.
-        reads = ResponseSettings(
-            instruments=asked.instruments,
-            n_omega=asked.n_omega,
-            window_s=asked.window_s,
-            loop=asked.loop,
-        )
         found[estimator] = runner.stage(
             f"response: {settings.name}, {estimator}",
             estimate,
@@ -160,7 +152,7 @@ def _responses(
             settings.outputs or task.outputs,
             settings.band_rad_s,
             estimator,
-            reads,
+            asked.of_estimates,
         )
     return found
 

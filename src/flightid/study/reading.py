@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from typing import Any, TypeVar, cast
 
 from flightid.errors import StudyError
+from flightid.options import Options, options_of, read_options
 
 Value = TypeVar("Value")
 TOP = "top level"
@@ -40,6 +42,10 @@ class TableReader:
     def where(self) -> str:
         """How the study file names the table."""
         return self._where
+
+    def peek(self, key: str) -> object:
+        """A value as the file gives it."""
+        return self._values[key]
 
     def rest(self) -> dict[str, Any]:
         """All values, for a part that checks its own keys."""
@@ -218,6 +224,46 @@ class TableReader:
         if not fits(value):
             raise self.error(key, "does not fit", found=value, needed=needed)
         return value
+
+
+def read_each(
+    kinds: Sequence[type[Options]], reader: TableReader, usual: Sequence[Options | None] = ()
+) -> list[Any]:
+    """One table as several dataclasses of options; what it does not say is as usual.
+
+    Parameters
+    ----------
+    kinds : sequence of type
+        Dataclasses whose options are the table's keys.
+    reader : TableReader
+    usual : sequence of Options, optional
+        In place of their defaults.
+
+    Returns
+    -------
+    list of Options
+        One for each dataclass.
+
+    Raises
+    ------
+    StudyError
+        A key that none of them has, or a value that does not fit.
+    """
+    where = f"study file, {reader.where}"
+    given = reader.rest()
+    names = [[each.name for each in options_of(kind)] for kind in kinds]
+    for key in given:
+        if not any(key in known for known in names):
+            raise unknown_key(reader.where, key, dict.fromkeys(n for known in names for n in known))
+    made = []
+    for place, (kind, known) in enumerate(zip(kinds, names, strict=True)):
+        table = {key: value for key, value in given.items() if key in known}
+        found = read_options(kind, table, where, error=StudyError)
+        base = usual[place] if place < len(usual) else None
+        if base is not None:
+            found = replace(base, **{key: getattr(found, key) for key in table})
+        made.append(found)
+    return made
 
 
 def unknown_key(where: str, key: str, known: Iterable[str]) -> StudyError:

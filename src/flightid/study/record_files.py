@@ -72,7 +72,7 @@ def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
         folder / reader.text("path"),
         reader.maybe(reader.text, "manoeuvre"),
         reader.maybe(reader.interval, "span_s"),
-        reader.text("time", "time"),
+        reader.text("time_column", "time"),
         reader.maybe(reader.positive, "sample_time_s"),
         reader.maybe(reader.positive, "resample_to_s"),
         _texts(reader.table("columns"), reader.values("columns")),

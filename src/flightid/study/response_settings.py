@@ -4,53 +4,39 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, cast
 
+from flightid.options import option
 from flightid.record.hold import LOOPS, Loop
-from flightid.study.reading import TableReader
+from flightid.responses.options import ESTIMATORS, ResponseOptions
+from flightid.study.reading import TableReader, read_each
 
-ESTIMATORS = ("composite", "local_polynomial", "instrument")
 EXCITATION = "excitation"
-
-
 TEST = "test"
 """Word of the key ``loop`` where nobody declares it."""
 
 
 @dataclass(frozen=True)
-class ResponseSettings:
-    """How frequency responses are estimated.
+class ResponseSettings(ResponseOptions):
+    """How frequency responses are estimated: options of the verb, and which ones are fitted."""
 
-    Attributes
-    ----------
-    estimator : str
-        Estimator whose result is fitted.
-    compare : tuple of str
-        Estimators shown beside it.
-    instruments : tuple of str
-        Channels that move the inputs from outside the loop, for the instrument estimator.
-    inputs : tuple of str
-        All inputs that moved: responses are conditioned on those beside the model's own.
-    n_omega : int
-        Frequencies in each model's band, spaced evenly in the logarithm.
-    window_s : tuple of float
-        Window lengths, s; empty: chosen by the estimator.
-    minimum_coherence : float
-        Frequencies below it take no part in a fit.
-    minimum_decades : float
-        Width of the coherent band that a response needs where coherence chooses responses.
-    loop : str
-        "open" or "closed" where it is known, else "test".
-    """
-
-    estimator: str = "composite"
-    compare: tuple[str, ...] = ()
-    instruments: tuple[str, ...] = (EXCITATION,)
-    inputs: tuple[str, ...] = ()
-    n_omega: int = 60
-    window_s: tuple[float, ...] = ()
-    minimum_coherence: float = 0.6
-    minimum_decades: float = 0.3
-    loop: str = TEST
+    compare: tuple[str, ...] = option((), choices=ESTIMATORS, doc="Estimators shown beside it.")
+    excitations: tuple[str, ...] = option(
+        (EXCITATION,), doc="Injected signals, independent of noise, for estimator 'instrument'."
+    )
+    inputs: tuple[str, ...] = option(
+        (), doc="All inputs that moved, on which responses are conditioned."
+    )
+    n_omega: int = option(60, minimum=5, doc="Log-spaced frequencies in each model's band.")
+    minimum_coherence: float = option(
+        0.6, above=0.0, maximum=1.0, doc="Points with less coherence are left out of a fit."
+    )
+    minimum_decades: float = option(
+        0.3, above=0.0, doc="Width of the coherent band that a response needs to be chosen."
+    )
+    loop: str = option(  # type: ignore[assignment]  # a file has no word for None
+        TEST, choices=(TEST, *LOOPS), doc="Whether a loop was closed, where it is known."
+    )
 
     @property
     def declared_loop(self) -> Loop | None:
@@ -69,7 +55,23 @@ class ResponseSettings:
     @property
     def channels(self) -> tuple[str, ...]:
         """Channels that the estimators need beside inputs and outputs."""
-        return self.instruments if "instrument" in self.estimators else ()
+        return self.excitations if "instrument" in self.estimators else ()
+
+    @property
+    def of_estimates(self) -> ResponseSettings:
+        """Only what an estimate reads: other limits of coherence make no other estimate."""
+        kept = ("excitations", "n_omega", "window_s", "overlap", "detrend", "covariance", "loop")
+        return ResponseSettings(**{name: getattr(self, name) for name in kept})
+
+    def of_verb(self, estimator: str) -> dict[str, Any]:
+        """What `flightid.estimate_response` is given for one of the estimators."""
+        return {
+            "estimator": estimator,
+            "excitations": self.excitations if estimator == "instrument" else None,
+            "loop": self.declared_loop,
+            **{name: getattr(self, name) for name in ("n_omega", "window_s", "overlap", "detrend")},
+            "covariance": self.covariance,
+        }
 
 
 def read_response(reader: TableReader, usual: ResponseSettings | None = None) -> ResponseSettings:
@@ -80,21 +82,5 @@ def read_response(reader: TableReader, usual: ResponseSettings | None = None) ->
     StudyError
         A key is unknown or a value does not fit.
     """
-    usual = usual or ResponseSettings()
-    compare = reader.names("compare", usual.compare)
-    for word in compare:
-        if word not in ESTIMATORS:
-            raise reader.error("compare", "does not fit", found=word, needed=", ".join(ESTIMATORS))
-    made = ResponseSettings(
-        reader.choice("estimator", ESTIMATORS, usual.estimator),
-        compare,
-        reader.names("instruments", usual.instruments),
-        reader.names("inputs", usual.inputs),
-        reader.integer("n_omega", usual.n_omega, minimum=5),
-        reader.numbers("window_s", usual.window_s),
-        reader.positive("minimum_coherence", usual.minimum_coherence),
-        reader.positive("minimum_decades", usual.minimum_decades),
-        reader.choice("loop", (TEST, *LOOPS), usual.loop),
-    )
-    reader.finish()
-    return made
+    (made,) = read_each((ResponseSettings,), reader, (usual,))
+    return cast("ResponseSettings", made)

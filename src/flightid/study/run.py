@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import MutableMapping
+from collections.abc import Mapping, MutableMapping
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +24,20 @@ from flightid.study.tuning import TuneSettings, tune_models
 from flightid.study.uses import use_models
 
 
+def _tuning(of_study: TuneSettings | None, asked: bool | Mapping[str, Any]) -> TuneSettings | None:
+    """What the study says of gains, else the usual, changed by what was asked for."""
+    if asked is False:
+        return of_study
+    found = of_study or TuneSettings()
+    return found.changed(asked) if isinstance(asked, Mapping) else found
+
+
 def run_study(
     path: str | Path,
     *,
     output: str | Path | None = None,
     log: str | Path | None = None,
-    tune: bool = False,
+    tune: bool | Mapping[str, Any] = False,
     cache: MutableMapping[str, Any] | None = None,
 ) -> Study:
     """Carry out a study file: log or records, responses, models, verification, report.
@@ -45,8 +53,9 @@ def run_study(
         Folder to write; default: ``<study>-output`` beside the study file.
     log : str or Path, optional
         Log to read instead of the one that the study names.
-    tune : bool
-        Tune gains with the usual requirements where the study does not say any.
+    tune : bool or mapping
+        Tune gains with the usual requirements where the study does not say any; a mapping by the
+        names of `TuningRequirements` and `TuneOptions` goes before what the study says.
     cache : mutable mapping of str to object, optional
         Results of stages by the hash of all that they depend on. Whoever gives the same mapping
         to the next run pays only for the stages behind what has changed.
@@ -87,7 +96,7 @@ def run_study(
         identified, _ = identify_models(
             tasks, taken.records, taken.inspection, settings.reduce, runner, advance
         )
-        wanted = settings.tune or (TuneSettings() if tune else None)
+        wanted = _tuning(settings.tune, tune)
         flown = None if taken.log is None else taken.log.value
         files = {item.name: sha256_of_file(item) for item in (source, *taken.files)}
         faults = Faults()

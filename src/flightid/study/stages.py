@@ -57,12 +57,8 @@ def estimate(
         flown,
         inputs=inputs,
         outputs=held,
-        excitations=settings.instruments if estimator == "instrument" else None,
         band_rad_s=band_rad_s,
-        n_omega=settings.n_omega,
-        window_s=list(settings.window_s) or "auto",
-        estimator=estimator,
-        loop=settings.declared_loop,
+        **settings.of_verb(estimator),
     )
 
 

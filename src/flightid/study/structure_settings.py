@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from flightid.models import NarxStructure, SubspaceStructure
-from flightid.models.innovations.structure import METHODS as SUBSPACE_METHODS
-from flightid.models.narx.structure import CANDIDATES, REGULARISATIONS, STOPS
-from flightid.models.narx.terms import KERNELS, WIDTH_FACTORS
-from flightid.models.polynomial.structure import INITIAL_STATES
-from flightid.models.sampled.channels import OFFSETS
+from flightid.models.polynomial.orders import USED
+from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.option_forms import NOTHING
+from flightid.options import Options, options_of, read_value
 from flightid.study.reading import TableReader
 
 NARX, SUBSPACE = "narx", "subspace"
 ORDERS: dict[str, tuple[str, ...]] = {
-    "arx": ("na", "nb", "nk"),
-    "armax": ("na", "nb", "nc", "nk"),
-    "oe": ("nb", "nf", "nk"),
-    "bj": ("nb", "nc", "nd", "nf", "nk"),
+    **USED,
     NARX: ("output_lags", "input_lags"),
     SUBSPACE: (),
 }
@@ -97,7 +93,7 @@ def read_structure(reader: TableReader, identify: tuple[str, ...]) -> StructureS
         {name: reader.integers(name, (1,) if name == "nk" else None) for name in ORDERS[kind]},
         reader.numbers("width", (NarxStructure.width,)) if is_narx else (),
         reader.choice("choose", CHOICES, "free_run" if is_narx else CHOICES[0]),
-        OPTIONS.get(kind, _polynomial_options)(reader),
+        _options(kind, reader),
     )
     if kind != SUBSPACE and len(made.outputs) != 1:
         raise reader.error("outputs", "does not fit", found=made.outputs, needed="one output")
@@ -115,54 +111,32 @@ def read_structure(reader: TableReader, identify: tuple[str, ...]) -> StructureS
     return made
 
 
-def _polynomial_options(reader: TableReader) -> dict[str, Any]:
-    return {
-        "initial_state": reader.choice("initial_state", INITIAL_STATES, INITIAL_STATES[0]),
-        "backcast": reader.flag("backcast", False),
-        "offsets": reader.choice("offsets", OFFSETS, OFFSETS[0]),
-        "enforce_stability": reader.flag("enforce_stability", False),
-    }
+def _options(kind: str, reader: TableReader) -> dict[str, Any]:
+    """Options of the structure among the keys of the model: those of its fields."""
+    options = STRUCTURES.get(kind, PolynomialStructure)
+    given: dict[str, Any] = {}
+    for each in options_of(options):
+        if each.name in TAKEN[kind]:
+            continue
+        reader.know(each.name)
+        if each.name in reader:
+            # TOML has no word for None.
+            value = reader.peek(each.name)
+            value = None if value == "none" and NOTHING in each.forms else read_value(each, value)
+            problem = each.problem(value)
+            if problem is not None:
+                raise reader.error(
+                    each.name, problem.removeprefix(f"{each.name} "),
+                    found=reader.peek(each.name), needed=each.needed,
+                )  # fmt: skip
+            given[each.name] = value
+    return given
 
 
-def _subspace_options(reader: TableReader) -> dict[str, Any]:
-    usual = SubspaceStructure
-    return {
-        "order": reader.maybe(lambda key: reader.integer(key, minimum=1), "order"),
-        "method": reader.choice("method", SUBSPACE_METHODS, usual.method),
-        "horizon": reader.maybe(lambda key: reader.integer(key, minimum=1), "horizon"),
-        "direct": reader.flag("direct", usual.direct),
-        "refine": reader.flag("refine", usual.refine),
-        "initial_state": reader.choice("initial_state", INITIAL_STATES, INITIAL_STATES[0]),
-        "offsets": reader.choice("offsets", OFFSETS, OFFSETS[0]),
-        "maximum_order": reader.integer("maximum_order", usual.maximum_order, minimum=1),
-    }
-
-
-def _narx_options(reader: TableReader) -> dict[str, Any]:
-    usual = NarxStructure
-    kernel = reader.choice("kernel", (*KERNELS, "none"), usual.kernel or "none")
-    return {
-        "kernel": None if kernel == "none" else kernel,
-        "width_convention": reader.choice("width_convention", WIDTH_FACTORS, "beta"),
-        "candidates": reader.choice("candidates", CANDIDATES, usual.candidates),
-        "n_candidates": reader.integer("n_candidates", usual.n_candidates, minimum=1),
-        "seed": reader.integer("seed", usual.seed),
-        "delay": reader.integer("delay", usual.delay),
-        "constant": reader.flag("constant", usual.constant),
-        "linear": reader.flag("linear", usual.linear),
-        "degree": reader.integer("degree", usual.degree, minimum=1),
-        "stop": reader.choice("stop", STOPS, usual.stop),
-        "goal": reader.number("goal", usual.goal),
-        "maximum_terms": reader.integer("maximum_terms", usual.maximum_terms, minimum=1),
-        "regularisation": reader.choice("regularisation", REGULARISATIONS, usual.regularisation),
-        "penalty": reader.number("penalty", usual.penalty),
-        "held_back": reader.number("held_back", usual.held_back),
-        "guard": reader.number("guard", usual.guard),
-    }
-
-
-OPTIONS: dict[str, Callable[[TableReader], dict[str, Any]]] = {
-    NARX: _narx_options,
-    SUBSPACE: _subspace_options,
+STRUCTURES: dict[str, type[Options]] = {NARX: NarxStructure, SUBSPACE: SubspaceStructure}
+"""What holds the options of a kind; the others are polynomials."""
+TAKEN: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(ORDERS, ()),
+    NARX: ("output_lags", "input_lags", "width"),
 }
-"""Readers of the options of a kind; the others are polynomials."""
+"""Options that are read as several to try."""

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flightid.control.autopilots import axis_loop_of
-from flightid.control.autopilots.axis_loop import Gyro
-from flightid.control.tuning.requirements import OBJECTIVES, TuningRequirements
+from flightid.control.tuning.options import TuneOptions
+from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.result import Tuning
 from flightid.control.tuning.tune import tune
-from flightid.control.tuning.tune_pid import CHANNELS, DRAWS
+from flightid.control.tuning.tune_pid import CHANNELS
 from flightid.errors import StudyError
 from flightid.models import Model, load_model
-from flightid.study.reading import TableReader
+from flightid.options import options_of
+from flightid.study.reading import TableReader, read_each
 from flightid.validation import Comparison, Verification
 
 if TYPE_CHECKING:
@@ -30,17 +31,25 @@ class TuneSettings:
     Attributes
     ----------
     requirements : TuningRequirements
-    gyro : {"filtered", "raw"}
-        Which rate the models end at.
-    angle_loop : bool
-    draws, seed : int
+    options : TuneOptions
     """
 
     requirements: TuningRequirements = field(default_factory=TuningRequirements)
-    gyro: Gyro = "filtered"
-    angle_loop: bool = True
-    draws: int = DRAWS
-    seed: int = 0
+    options: TuneOptions = field(default_factory=TuneOptions)
+
+    def changed(self, given: Mapping[str, Any]) -> TuneSettings:
+        """With some requirements and options replaced, by name.
+
+        Raises
+        ------
+        OptionError
+            A value outside its range, or requirements that contradict each other.
+        """
+        mine = {each.name for each in options_of(TuneOptions)}
+        return TuneSettings(
+            replace(self.requirements, **{k: v for k, v in given.items() if k not in mine}),
+            replace(self.options, **{k: v for k, v in given.items() if k in mine}),
+        )
 
 
 def read_tune(reader: TableReader) -> TuneSettings:
@@ -53,22 +62,8 @@ def read_tune(reader: TableReader) -> TuneSettings:
     OptionError
         Requirements that contradict each other.
     """
-    usual, given = TuneSettings(), {}
-    for each in fields(TuningRequirements):
-        if each.name != "objective":
-            given[each.name] = reader.maybe(reader.positive, each.name)
-    asked: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
-    asked["objective"] = reader.choice("objective", OBJECTIVES, usual.requirements.objective)
-    gyro = reader.choice("gyro", ("filtered", "raw"), usual.gyro)
-    made = TuneSettings(
-        TuningRequirements(**asked),
-        "raw" if gyro == "raw" else "filtered",
-        reader.flag("angle_loop", usual.angle_loop),
-        reader.integer("draws", usual.draws, minimum=1),
-        reader.integer("seed", usual.seed),
-    )
-    reader.finish()
-    return made
+    made = read_each((TuningRequirements, TuneOptions), reader)
+    return TuneSettings(*made)
 
 
 def tune_files(files: Iterable[str | Path], log: Log, settings: TuneSettings) -> Tuning | None:
@@ -155,9 +150,6 @@ def _tuned(
         fits,
         gains={axis: axis_loop_of(log, axis) for axis in fits},
         requirements=settings.requirements,
-        gyro=settings.gyro,
-        angle_loop=settings.angle_loop,
         verifications=checks,
-        draws=settings.draws,
-        seed=settings.seed,
+        **vars(settings.options),
     )

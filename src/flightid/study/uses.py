@@ -18,6 +18,7 @@ from flightid.export import Exported
 from flightid.export.to_file import export
 from flightid.identification import Fit
 from flightid.models import write_model
+from flightid.models.saved_files import MODELS
 from flightid.study.faults import Faults
 from flightid.study.identified import Identified
 from flightid.study.uses_settings import (
@@ -27,7 +28,7 @@ from flightid.study.uses_settings import (
     UsesSettings,
 )
 
-MODELS, EXPORTS = "models", "export"
+EXPORTS = "export"
 """Folders of the output."""
 
 

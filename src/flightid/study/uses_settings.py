@@ -133,9 +133,9 @@ def read_uses(root: TableReader, models: Sequence[str]) -> UsesSettings:
 
 
 def _export(reader: TableReader) -> ExportSettings:
-    file = reader.text("file")
+    file = reader.text("path")
     if "/" in file or "\\" in file or file.startswith("."):
-        raise reader.error("file", "does not fit", found=file, needed="a name without a folder")
+        raise reader.error("path", "does not fit", found=file, needed="a name without a folder")
     made = ExportSettings(
         reader.text("model"),
         file,

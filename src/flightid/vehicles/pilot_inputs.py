@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import OptionError, UnknownNameError
 from flightid.excitation import sweep
+from flightid.options import Options, option
 from flightid.record import Record
 
 Array = NDArray[np.float64]
@@ -29,6 +31,23 @@ _LEVELS = {
     "doublet": (1.0, -1.0),
     "3211": (1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0),
 }
+
+
+@dataclass(frozen=True)
+class StickOptions(Options):
+    """What moves a model by hand, and for how long.
+
+    Example
+    -------
+    >>> StickOptions().duration_s
+    10.0
+    """
+
+    inputs: Mapping[str, str] = option(
+        default_factory=dict, doc="Shape by input, for example lat=step:0.1."
+    )
+    duration_s: float = option(10.0, unit="s", above=0.0, doc="Length of the shapes' record.")
+    sample_rate_hz: float = option(100.0, unit="Hz", above=0.0, doc="Of the shapes' record.")
 
 
 def stick_record(

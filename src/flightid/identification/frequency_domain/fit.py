@@ -181,7 +181,7 @@ def check_channels(model: GreyBoxModel, data: FrequencyResponse) -> None:
     # Outputs of a model that no fitted response needs may be missing from the data.
     needed = (name for each in model.responses for name in (each.output, each.input))
     for name in dict.fromkeys(needed):
-        require_match(data.units[name], model.units[name], subject=f"channel {name}")
+        require_match(name, data.units[name], model.units[name])
 
 
 def response_at(model: GreyBoxModel, omega: Array, place: int) -> NDArray[np.complex128]:

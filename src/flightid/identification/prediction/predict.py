@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, overload
 
-from flightid.errors import ModelError, OptionError, UnitError, UnknownNameError
+from flightid.errors import ModelError, OptionError, UnknownNameError
 from flightid.identification.prediction.continuous import predict_continuous
 from flightid.identification.prediction.narx import predict_narx
 from flightid.identification.prediction.remembered import remembered
@@ -18,7 +18,7 @@ from flightid.models.model import LinearModel, Model, model_of
 from flightid.record import Record
 from flightid.record.chosen_hold import chosen_hold
 from flightid.record.several import as_records
-from flightid.units import canonical
+from flightid.units import canonical, clash
 
 Predictor = Callable[[Any, Record, tuple[str, ...], Request], Prediction]
 # Kind of model -> how it predicts; the first that fits. A new kind adds its line.
@@ -254,9 +254,9 @@ def require_units(model: object, record: Record, outputs: tuple[str, ...]) -> No
     for name in (*getattr(model, "inputs", ()), *outputs):
         expected = units.get(name)
         if expected is not None and canonical(expected) != record.unit(name):
-            raise UnitError(
-                f"channel {name!r} has another unit in the record than in the model",
-                found=record.unit(name),
-                needed=canonical(expected),
-                action="convert the record with to_units",
+            raise clash(
+                name,
+                record.unit(name),
+                canonical(expected),
+                where="in the record than in the model",
             )

@@ -20,7 +20,22 @@ InitialState = str | Mapping[str, float | str]
 
 
 @dataclass(frozen=True)
-class Request(Options):
+class PredictionOptions(Options):
+    """What every prediction may be told."""
+
+    horizon: int | str = option(
+        FREE_RUN, unit="samples", minimum=1, choices=(FREE_RUN,), doc="How far ahead."
+    )
+    initial_state: InitialState | None = option(
+        None, choices=STARTS, doc="Where a state begins; default: by the kind of model."
+    )
+    settle_s: float | None = option(
+        None, unit="s", minimum=0.0, doc="First stretch that tells a start and counts no score."
+    )
+
+
+@dataclass(frozen=True)
+class Request(PredictionOptions):
     """One way to predict.
 
     Attributes
@@ -44,15 +59,6 @@ class Request(Options):
     '1 sample ahead'
     """
 
-    horizon: int | str = option(
-        FREE_RUN, unit="samples", minimum=1, choices=(FREE_RUN,), doc="How far ahead."
-    )
-    initial_state: InitialState | None = option(
-        None, choices=STARTS, doc="Where a state begins; default: by the kind of model."
-    )
-    settle_s: float | None = option(
-        None, unit="s", minimum=0.0, doc="First stretch that tells a start and counts no score."
-    )
     state_bias: bool = option(False, doc="Constants on the state derivatives are solved for.")
     output_bias: bool = option(False, doc="Constants on the outputs are solved for.")
     hold: Hold = option("first", choices=("first", "zero"), doc="What inputs do between samples.")

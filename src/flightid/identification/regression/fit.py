@@ -103,7 +103,7 @@ def check_records(model: StateSpaceModel, data: Record | Sequence[Record]) -> tu
         )
     for record in records:
         for name in (*model.inputs, *model.outputs):
-            require_match(record.unit(name), model.units[name], subject=f"channel {name}")
+            require_match(name, record.unit(name), model.units[name])
     return records
 
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, UnitError
+from flightid.errors import DataError
 from flightid.record import Record
+from flightid.units import clash
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,7 @@ class Scaling:
     def scaled(self, record: Record, name: str) -> NDArray[np.float64]:
         """Samples of a channel in deviations about the training mean, after checks."""
         if record.unit(name) != self.units[name]:
-            raise UnitError(
-                f"channel {name!r} has another unit than in training",
-                found=record.unit(name),
-                needed=self.units[name],
-                action="convert it with Record.to_units",
-            )
+            raise clash(name, record.unit(name), self.units[name], where="than in training")
         self.require_sample_time(record.sample_time_s)
         return np.ascontiguousarray((record[name] - self.mean[name]) / self.deviation[name])
 

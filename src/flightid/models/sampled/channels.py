@@ -10,8 +10,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, OptionError, UnitError
+from flightid.errors import DataError, OptionError
 from flightid.record import Record
+from flightid.units import clash
 
 Array = NDArray[np.float64]
 SAME_SAMPLE_TIME = 1e-6
@@ -133,12 +134,7 @@ def gather_channels(
             )
         for name in names:
             if record.unit(name) != units[name]:
-                raise UnitError(
-                    f"channel {name!r} has another unit in another record",
-                    found=record.unit(name),
-                    needed=units[name],
-                    action="convert it with Record.to_units",
-                )
+                raise clash(name, record.unit(name), units[name], where="in another record")
     removed = tuple(_offsets(record, names, offsets) for record in records)
     rows = [
         np.concatenate([r[name] - o[name] for r, o in zip(records, removed, strict=True)])
@@ -168,12 +164,7 @@ def require_same(model: SampledModel, units: Mapping[str, str], sample_time_s: f
         )
     for name, unit in units.items():
         if unit != model.units.get(name, unit):
-            raise UnitError(
-                f"channel {name!r} has another unit than the model",
-                found=unit,
-                needed=model.units[name],
-                action="convert it with Record.to_units",
-            )
+            raise clash(name, unit, model.units[name], where="than the model")
 
 
 def _offsets(record: Record, names: Sequence[str], kind: str) -> dict[str, float]:

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, OptionError, UnitError
+from flightid.errors import DataError, OptionError
 from flightid.record import Record
 from flightid.record.history import Step
 from flightid.record.several import as_records
+from flightid.units import clash
 
 SAME_SAMPLE_TIME = 1e-6
 """Largest relative difference of sample times that still counts as the same."""
@@ -128,9 +129,4 @@ def _require_agreement(records: Sequence[Record], names: Iterable[str]) -> None:
             )
         for name in names:
             if record.unit(name) != first.unit(name):
-                raise UnitError(
-                    f"channel {name!r} has different units in two records",
-                    found=f"{first.unit(name)} and {record.unit(name)}",
-                    needed="one unit",
-                    action="convert with Record.to_units",
-                )
+                raise clash(name, record.unit(name), first.unit(name), where="in another record")

@@ -18,6 +18,7 @@ from flightid.identification.prediction.predict import predict
 from flightid.identification.prediction.request import usual_stretch
 from flightid.identification.prediction_error.information_criteria import Criteria, criteria
 from flightid.models.polynomial.model import PolynomialModel
+from flightid.models.polynomial.orders import USED, ScanOptions
 from flightid.models.polynomial.structure import PolynomialOptions, PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.progress import progress, track
@@ -28,7 +29,6 @@ from flightid.validation.order_scan.result import OrderScan, OrderTrial
 
 Array = NDArray[np.float64]
 Range = int | Iterable[int]
-KINDS = ("arx", "armax", "oe", "bj")
 MOST = 20_000
 LONGEST = 40
 ITERATIONS = 40
@@ -166,15 +166,9 @@ def _structures(
     orders: dict[str, Range],
     options: PolynomialOptions,
 ) -> list[PolynomialStructure]:
-    used = {
-        "arx": ("na", "nb", "nk"),
-        "armax": ("na", "nb", "nc", "nk"),
-        "oe": ("nb", "nf", "nk"),
-        "bj": ("nb", "nc", "nd", "nf", "nk"),
-    }
-    if kind not in used:
-        raise OptionError("unknown kind of model", found=kind, needed=", ".join(KINDS))
-    choices = [_values(name, orders[name]) for name in used[kind]]
+    ScanOptions(kind=kind)
+    used = USED[kind]
+    choices = [_values(name, orders[name]) for name in used]
     count = int(np.prod([len(choice) for choice in choices]))
     if count > MOST:
         raise OptionError(
@@ -182,7 +176,7 @@ def _structures(
         )
     made = []
     for values in product(*choices):
-        chosen = dict(zip(used[kind], values, strict=True))
+        chosen = dict(zip(used, values, strict=True))
         made.append(PolynomialModel.general(inputs, output, **chosen, **options))
     return made
 

@@ -1,0 +1,119 @@
+"""Records that a command reads from tables and logs, with the options that say how."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from flightid.cli.option_fields import flags_of
+from flightid.cli.output import note
+
+if TYPE_CHECKING:
+    from flightid.options import Options
+    from flightid.record import Record
+
+FILES = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+def reading() -> dict[str, type[Options]]:
+    """Options of reading: of tables, and of a part of a log or record."""
+    from flightid.logs.options import PartOptions
+    from flightid.record.options import ReadOptions
+
+    return {"tables": ReadOptions, "logs": PartOptions}
+
+
+def read_files(
+    files: Iterable[Path],
+    of_tables: Mapping[str, Any],
+    of_logs: Mapping[str, Any],
+    *,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    excitations: Sequence[str] | None = None,
+    units: Mapping[str, str] | None = None,
+) -> list[Record]:
+    """Records of files, in the units that a model has.
+
+    A unit of the same dimension is converted, and a note says so.
+
+    Parameters
+    ----------
+    files : iterable of Path
+        Tables or logs.
+    of_tables, of_logs : mapping of str to object
+        What was given of `reading`.
+    inputs, outputs, excitations : sequence of str, optional
+        Channels by role; without them all of a log, and those with a role of a table.
+    units : mapping of str to str, optional
+        Unit of the model by channel.
+
+    Raises
+    ------
+    click.UsageError
+        An option of tables for a log, or the other way round.
+    """
+    from flightid.logs import is_log
+    from flightid.progress import track
+
+    found: list[Record] = []
+    for file in track(list(files), "Reading"):
+        if is_log(file):
+            _refuse(of_tables, f"tables, and {file.name} is a log")
+            found.append(_from_log(file, of_logs, inputs, outputs))
+            continue
+        _refuse({"sid_run": None} if "sid_run" in of_logs else {}, "logs")
+        found += _from_table(file, of_tables, of_logs, inputs, outputs, excitations)
+    return [_in_units(record, units or {}) for record in found]
+
+
+def _refuse(given: Mapping[str, Any], owner: str) -> None:
+    for name in given:
+        raise click.UsageError(f"{flags_of(name)[-1]} belongs to {owner}")
+
+
+def _from_log(
+    file: Path,
+    of_logs: Mapping[str, Any],
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+) -> Record:
+    from flightid import read_log
+
+    names = [*(inputs or ()), *(outputs or ())]
+    return read_log(file).record(names=names or None, **of_logs)
+
+
+def _from_table(
+    file: Path,
+    of_tables: Mapping[str, Any],
+    of_logs: Mapping[str, Any],
+    inputs: Sequence[str] | None,
+    outputs: Sequence[str] | None,
+    excitations: Sequence[str] | None,
+) -> list[Record]:
+    from flightid import read_records
+
+    records = read_records(
+        file, inputs or None, outputs or None, excitations=excitations or None, **of_tables
+    )
+    span = of_logs.get("span_s")
+    return records if span is None else [record.segment(*span) for record in records]
+
+
+def _in_units(record: Record, units: Mapping[str, str]) -> Record:
+    from flightid.units import canonical, is_convertible
+
+    wanted = {
+        name: canonical(unit)
+        for name, unit in units.items()
+        if name in record.channels
+        and record.unit(name) != canonical(unit)
+        and is_convertible(record.unit(name), canonical(unit))
+    }
+    for name, unit in wanted.items():
+        note(f"{record.name or 'Record'}: {name} converted from {record.unit(name)} to {unit}")
+    return record.to_units(**wanted) if wanted else record

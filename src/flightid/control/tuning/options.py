@@ -1,0 +1,35 @@
+"""Options of tuning beside the requirements; see `flightid.tune`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.tuning.tune_pid import DRAWS
+from flightid.options import Options, option
+
+
+@dataclass(frozen=True)
+class TuneOptions(Options):
+    """What a design of gains is told beside its requirements.
+
+    Example
+    -------
+    >>> TuneOptions(gyro="raw").angle_loop
+    True
+    """
+
+    gyro: Gyro = option(
+        "filtered",
+        choices=("filtered", "raw"),
+        doc="Which rate the models end at: behind the gyro filters or ahead of them.",
+    )
+    angle_loop: bool = option(True, doc="Tune the angle loop too.")
+    band_rad_s: tuple[float, float] | None = option(
+        None,
+        unit="rad/s",
+        above=0.0,
+        doc="Band that the models were identified in; default: what their fits say.",
+    )
+    draws: int = option(DRAWS, minimum=1, doc="Plants drawn from the covariance.")
+    seed: int = option(0, minimum=0, doc="Seed of the draws.")

@@ -1,0 +1,49 @@
+"""Orders of a polynomial model, one structure's or those of a scan; see `flightid.scan_orders`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flightid.options import Options, option
+
+KINDS = ("arx", "armax", "oe", "bj")
+USED = {
+    "arx": ("na", "nb", "nk"),
+    "armax": ("na", "nb", "nc", "nk"),
+    "oe": ("nb", "nf", "nk"),
+    "bj": ("nb", "nc", "nd", "nf", "nk"),
+}
+"""Orders that each kind has."""
+Orders = int | Sequence[int] | None
+
+
+@dataclass(frozen=True)
+class OrderOptions(Options):
+    """Orders of A y = Σ (Bᵢ/Fᵢ) uᵢ(t - nkᵢ) + (C/D) e; of a scan several.
+
+    Example
+    -------
+    >>> OrderOptions(na=2, nb=(1, 2)).to_dict()["nb"]
+    [1, 2]
+    """
+
+    na: Orders = option(None, minimum=0, doc="Degree of A.")
+    nb: Orders = option(None, minimum=0, doc="Coefficients of B.")
+    nc: Orders = option(None, minimum=0, doc="Degree of C.")
+    nd: Orders = option(None, minimum=0, doc="Degree of D.")
+    nf: Orders = option(None, minimum=0, doc="Degree of F.")
+    nk: Orders = option(None, minimum=0, doc="Delay, samples.")
+
+
+@dataclass(frozen=True)
+class ScanOptions(OrderOptions):
+    """A scan of orders: its kind, and what is tried.
+
+    Example
+    -------
+    >>> ScanOptions().kind
+    'armax'
+    """
+
+    kind: str = option("armax", choices=KINDS, doc="Kind of polynomial model.")

@@ -1,0 +1,56 @@
+"""Options of reading records from tables; see `flightid.read_records`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from flightid.options import Options, option
+
+
+@dataclass(frozen=True)
+class ComparedOptions(Options):
+    """Which outputs of records are compared.
+
+    Example
+    -------
+    >>> ComparedOptions(outputs=("p",)).to_dict()
+    {'outputs': ['p']}
+    """
+
+    outputs: tuple[str, ...] | None = option(None, doc="Channels that answer; default: all.")
+
+
+@dataclass(frozen=True)
+class ChannelOptions(ComparedOptions):
+    """Which channels of records are used.
+
+    Example
+    -------
+    >>> ChannelOptions(inputs=("lat",)).to_dict()["inputs"]
+    ['lat']
+    """
+
+    inputs: tuple[str, ...] | None = option(None, doc="Channels that drive; default: all.")
+
+
+@dataclass(frozen=True)
+class ReadOptions(Options):
+    """How tables (CSV, Parquet, MATLAB, netCDF) are read.
+
+    Example
+    -------
+    >>> ReadOptions(sample_time_s=0.01).to_dict()["sample_time_s"]
+    0.01
+    """
+
+    time_column: str = option("time", doc="Column of the time stamps.")
+    units: Mapping[str, str] = option(
+        default_factory=dict, doc="Unit of a column whose heading says none, such as p=rad/s."
+    )
+    sample_time_s: float | None = option(
+        None, unit="s", above=0.0, doc="Sample time of a table without time column."
+    )
+    resample_to_s: float | None = option(
+        None, unit="s", above=0.0, doc="Sample time of a new uniform grid."
+    )

@@ -1,0 +1,195 @@
+"""One name for one thing: fields of options, arguments, options of commands, keys of studies."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import click
+import pytest
+from tools.options_page import sections
+
+import flightid as fid
+from flightid.cli.option_fields import SHORT, OptionsCommand, flags_of
+from flightid.cli.program import program
+from flightid.excitation.options import DesignOptions
+from flightid.logs import Log
+from flightid.logs.options import PartOptions
+from flightid.models.polynomial.orders import ScanOptions
+from flightid.options import Options, options_of
+from flightid.record.options import ReadOptions
+from flightid.responses.options import ResponseOptions
+from flightid.simulation.options import SimulationOptions
+from flightid.study.reading import TableReader
+from flightid.validation.verification.options import VerifyOptions
+from tests.contract.source import PACKAGE, python_files, tree
+from tests.contract.test_arguments import DICTIONARY, WORD_OF
+
+# What a command is told beside the options of its verb: its name, and the one thing it means.
+OF_COMMANDS = {
+    "against": "another model beside the one on trial",
+    "axis": "roll, pitch or yaw, or an autopilot's number of it",
+    "csv": "file of samples",
+    "debug": "traceback of an error",
+    "duration_s": "length in time, s",
+    "feedback": "gains of a loop in real time",
+    "fixed_wing": "kind of vehicle that parameters are for",
+    "format": "tool that an export is for",
+    "help": "this text",
+    "hold": "what inputs do between samples",
+    "host": "address to listen at",
+    "html": "page to write",
+    "inertia": "of a vehicle",
+    "interface": "of an FMU",
+    "json": "print one JSON document",
+    "kind": "of a model without equations",
+    "level": "probability of intervals",
+    "listen": "port to listen at",
+    "log": "a flight log",
+    "mass": "of a vehicle",
+    "method": "algorithm of this verb",
+    "model": "a model by name or file",
+    "name": "name of what is made",
+    "netcdf": "file of a response",
+    "output": "file or folder that is written",
+    "overwrite": "whether a file may be replaced",
+    "pade_order": "degree of an approximated delay",
+    "param": "file of ArduPilot parameters",
+    "params": "file of PX4 parameters",
+    "property": "of JSBSim",
+    "quiet": "no progress",
+    "records": "records beside the data",
+    "records_span_s": "part of those records",
+    "reduce": "drop what the data do not determine",
+    "residual_tests": "test residuals",
+    "sample_rate_hz": "samples, steps or frames a second",
+    "scan": "try several orders",
+    "scenario": "flight to simulate",
+    "seed": "seed of random numbers",
+    "send": "address of a cockpit",
+    "sources_only": "an FMU without a binary",
+    "style": "words of a cockpit",
+    "substeps": "Runge-Kutta steps in a sample",
+    "trim": "operating point",
+    "tunable": "parameters that can be changed",
+    "unpacked": "a page without compression",
+    "validation": "records that a fit has not seen",
+    "value": "another parameter value",
+    "version": "this version",
+    "write": "file of the result, for other commands",
+}
+FIELDS = {each.name for options in sections().values() for each in options_of(options)}
+# A verb -> the dataclass whose fields its arguments are, and fields that a caller gives otherwise.
+VERBS: dict[Callable[..., Any], tuple[type[Options], set[str]]] = {
+    fid.estimate_response: (ResponseOptions, set()),
+    fid.simulate: (SimulationOptions, set()),
+    fid.verify: (VerifyOptions, set()),
+    fid.read_records: (ReadOptions, set()),
+    fid.excitation.plan: (DesignOptions, set()),
+    Log.record: (PartOptions, set()),
+    fid.scan_orders: (ScanOptions, {"na", "nb", "nc", "nd", "nf", "nk"}),  # ranges by default
+}
+KEY_READERS = {name for name in vars(TableReader) if not name.startswith("_")} - {"error", "peek", "know"}
+
+
+def _commands(group: click.Group = program, path: str = "") -> Iterator[tuple[str, click.Command]]:
+    context = click.Context(group)
+    for name in group.list_commands(context):
+        found = group.get_command(context, name)
+        assert found is not None
+        if isinstance(found, click.Group):
+            yield from _commands(found, f"{path}{name} ")
+        else:
+            yield f"{path}{name}", found
+
+
+def _typed() -> Iterator[tuple[str, str, list[str]]]:
+    """Command, name of an option as it is typed, and all its spellings."""
+    for command, found in _commands():
+        for param in found.get_params(click.Context(found)):
+            if isinstance(param, click.Option):
+                spelled = [opt for opt in param.opts if opt.startswith("--")]
+                yield command, spelled[0].removeprefix("--").replace("-", "_"), spelled
+
+
+def _keys() -> Iterator[tuple[str, str]]:
+    """File and key of everything that a study reads key by key."""
+    for path in python_files():
+        if path.parent.name != "study":
+            continue
+        for node in ast.walk(tree(path)):
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
+                continue
+            first = next((arg for arg in node.args if isinstance(arg, ast.Constant)), None)
+            if node.func.attr in KEY_READERS and first is not None and isinstance(first.value, str):
+                yield str(path.relative_to(PACKAGE)), first.value
+
+
+def test_a_command_says_what_the_fields_say_or_a_word_of_commands() -> None:
+    typed = list(_typed())
+    assert len({command for command, _, _ in typed}) > 12
+    stray = [
+        f"{command}: --{word} is neither a field of options nor a word of commands"
+        for command, word, _ in typed
+        if word not in FIELDS and word not in OF_COMMANDS
+    ]
+    assert not stray, "\n".join(stray)
+
+
+def test_every_option_is_spelled_alike_in_all_commands() -> None:
+    spelled: dict[str, set[tuple[str, ...]]] = {}
+    for _, word, options in _typed():
+        spelled.setdefault(word, set()).add(tuple(options))
+    assert not {word: found for word, found in spelled.items() if len(found) > 1}
+    for word in SHORT:
+        assert spelled[word] == {tuple(flags_of(word))}, word
+    assert not set(SHORT.values()) & set(spelled), "a short form is the whole name of another"
+
+
+def test_no_name_is_a_synonym() -> None:
+    names = {word for _, word, _ in _typed()} | FIELDS | {key for _, key in _keys()}
+    assert len({key for _, key in _keys()}) > 40
+    offenders = [f"{name} is called {WORD_OF[name]} here" for name in names if name in WORD_OF]
+    assert not offenders, "\n".join(sorted(offenders))
+
+
+def test_no_word_of_commands_is_left_over() -> None:
+    typed = {word for _, word, _ in _typed()} | {"debug", "quiet", "version"}
+    assert not OF_COMMANDS.keys() - typed
+
+
+@pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb.__name__)
+def test_arguments_of_a_verb_are_the_fields_of_its_options(verb: Callable[..., Any]) -> None:
+    options, otherwise = VERBS[verb]
+    arguments = inspect.signature(verb).parameters
+    assert options_of(options)
+    for each in options_of(options):
+        assert each.name in arguments, f"{verb.__name__} has no {each.name}"
+        default = arguments[each.name].default
+        if each.name in otherwise:
+            continue
+        needed = default is inspect.Parameter.empty
+        assert needed == (each.default is dataclasses.MISSING), each.name
+        assert needed or default == each.default or (default is None and not each.default), (
+            f"{verb.__name__}: {each.name} is {default!r}, its field {each.default!r}"
+        )
+
+
+def test_commands_with_options_of_fields_read_them_all() -> None:
+    """No option of a verb is written by hand: the commands of verbs with fields read the fields."""
+    reading = {name for name, found in _commands() if isinstance(found, OptionsCommand)}
+    assert reading == {
+        "design", "identify", "polynomial", "response", "simulate model", "tune", "verify",
+    }  # fmt: skip
+    for name, found in _commands():
+        if isinstance(found, OptionsCommand):
+            by_hand = {param.name for param in found.params} & FIELDS
+            assert by_hand <= {"axis", "kind", "method"}, (name, by_hand)
+
+
+def test_a_word_of_the_dictionary_has_one_name_in_all_places() -> None:
+    assert not {word for word in OF_COMMANDS if word in WORD_OF}
+    assert {"band_rad_s", "hold", "initial_state", "seed"} <= DICTIONARY.keys() & FIELDS
