@@ -14,6 +14,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.quantiles import LEVEL, interval_words
 
 LEAST_SHOWN = 0.01
 """Participation below which the table of participations leaves a state out."""
@@ -256,8 +257,14 @@ class Modes(Result, schema="flightid.modes/1"):
             return all(mode.root.real <= 0.0 for mode in self.modes)
         return all(abs(mode.root) <= 1.0 for mode in self.modes)
 
-    def table(self) -> Table:
-        """Table of all modes; ± is half a 95 % interval, or the interval where it is not even."""
+    def table(self, *, level: float = LEVEL) -> Table:
+        """Table of all modes; ± is half an interval, or the interval where it is not even.
+
+        Parameters
+        ----------
+        level : float
+            Of the intervals.
+        """
         columns = (
             Column("mode"),
             Column("real", "rad/s"),
@@ -272,26 +279,33 @@ class Modes(Result, schema="flightid.modes/1"):
             Column("time constant", "s"),
             Column("to half", "s"),
             Column("to double", "s"),
-            Column("95 %", "s"),
+            Column(interval_words(level), "s"),
             Column("character and participation"),
         )
-        rows = tuple(_row(mode) for mode in self.modes)
-        table = Table(f"Modes of {self.name}", columns, rows, self._notes())
+        rows = tuple(_row(mode, level) for mode in self.modes)
+        table = Table(f"Modes of {self.name}", columns, rows, self._notes(level))
         return table.without_empty_columns()
 
-    def _notes(self) -> tuple[str, ...]:
+    def _notes(self, level: float) -> tuple[str, ...]:
         notes = ["One line for a complex pair."]
         if self.reason:
             notes.append(f"No intervals: {self.reason}.")
         else:
-            notes.append("± is half a 95 % interval; the last times have their whole interval.")
+            words = interval_words(level)
+            notes.append(f"± is half a {words} interval; the last times have their whole interval.")
             notes += [f"{m.name}: {m.reason}." for m in self.modes if m.reason]
         if self.sample_time_s is not None:
             notes.append(f"From the z plane by s = ln z / T, T = {self.sample_time_s:.4g} s.")
         return (*notes, *map(str, self.findings))
 
-    def participation_table(self) -> Table:
-        """Table of states by mode: share, and size in the eigenvector with its phase."""
+    def participation_table(self, *, level: float = LEVEL) -> Table:
+        """Table of states by mode: share, and size in the eigenvector with its phase.
+
+        Parameters
+        ----------
+        level : float
+            Of the intervals, half of which is ±.
+        """
         columns = (
             Column("mode"),
             Column("state"),
@@ -307,8 +321,8 @@ class Modes(Result, schema="flightid.modes/1"):
             for each in mode.participations:
                 if (each.share.value or 0.0) < LEAST_SHOWN:
                     continue
-                share = (100.0 * (each.share.value or 0.0), _half(each.share, 100.0))
-                size = (each.size.value, _half(each.size), each.unit)
+                share = (100.0 * (each.share.value or 0.0), _half(each.share, level, 100.0))
+                size = (each.size.value, _half(each.size, level), each.unit)
                 rows.append(
                     (mode.name, each.state, *share, *size, float(np.degrees(each.phase_rad)))
                 )
@@ -321,9 +335,9 @@ class Modes(Result, schema="flightid.modes/1"):
             f"Participation of the states, {self.name}", columns, tuple(rows), notes
         ).without_empty_columns()
 
-    def summary(self) -> Table:
+    def summary(self, *, level: float = LEVEL) -> Table:
         """Same as `table`."""
-        return self.table()
+        return self.table(level=level)
 
     def __repr__(self) -> str:
         """Size, least damping of the pairs and stability on one line."""
@@ -340,16 +354,16 @@ def _values(quantities: list[Reading]) -> NDArray[np.float64]:
     return np.array([np.nan if q.value is None else q.value for q in quantities])
 
 
-def _half(quantity: Reading, factor: float = 1.0) -> float | None:
-    if quantity.interval95 is None:
-        return None
-    return factor * (quantity.interval95[1] - quantity.interval95[0]) / 2.0
+def _half(quantity: Reading, level: float, factor: float = 1.0) -> float | None:
+    ends = quantity.interval(level)
+    return None if ends is None else factor * (ends[1] - ends[0]) / 2.0
 
 
-def _row(mode: Mode) -> tuple[Cell, ...]:
+def _row(mode: Mode, level: float) -> tuple[Cell, ...]:
     pair = mode.is_pair
     last = mode.time_to_half if mode.time_to_half.value is not None else mode.time_to_double
-    interval = "" if last.interval95 is None else "{:.3g} to {:.3g}".format(*last.interval95)
+    ends = last.interval(level)
+    interval = "" if ends is None else "{:.3g} to {:.3g}".format(*ends)
     numbers: list[Cell] = []
     for each, there in (
         (mode.real, True),
@@ -357,7 +371,7 @@ def _row(mode: Mode) -> tuple[Cell, ...]:
         (mode.natural_frequency, pair),
         (mode.damping_ratio, pair),
     ):
-        numbers += [each.value, _half(each)] if there else [None, None]
+        numbers += [each.value, _half(each, level)] if there else [None, None]
     times = (mode.period, mode.time_constant, mode.time_to_half, mode.time_to_double)
     parts = f": {mode.named.parts}" if mode.named.parts else ""
     words = f"{mode.named.character}{parts}"
