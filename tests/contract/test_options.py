@@ -92,7 +92,11 @@ VERBS: dict[Callable[..., Any], tuple[type[Options], set[str]]] = {
     Log.record: (PartOptions, set()),
     fid.scan_orders: (ScanOptions, {"na", "nb", "nc", "nd", "nf", "nk"}),  # ranges by default
 }
-KEY_READERS = {name for name in vars(TableReader) if not name.startswith("_")} - {"error", "peek", "know"}
+KEY_READERS = {name for name in vars(TableReader) if not name.startswith("_")} - {
+    "error",
+    "peek",
+    "know",
+}
 
 
 def _commands(group: click.Group = program, path: str = "") -> Iterator[tuple[str, click.Command]]:

@@ -78,4 +78,4 @@ def test_command_identifies_a_record(tmp_path: Path) -> None:
     assert "Cramér–Rao" in shown.stdout
     wrong = CliRunner().invoke(command, [str(path), *options, "--run", "0"])
     assert wrong.exit_code == 2
-    assert "belong to logs" in wrong.output
+    assert "belongs to logs" in wrong.output

@@ -17,7 +17,6 @@ from flightid.identification.fitted_response import FittedResponse
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.training import TrainingChannel, training_channels
 from flightid.models import Estimated, Model
-from flightid.models.kinds import model_to_description
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.record import Record
 from flightid.result import Result
@@ -238,7 +237,7 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
 
     def _computed(self) -> dict[str, object]:
         return {
-            "model": model_to_description(self),
+            "estimated": self.estimated.to_dict(),
             "structure": repr(self.structure),
             "responses": {each.name: each for each in self.responses},
             "training": self.training,

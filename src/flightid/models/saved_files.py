@@ -79,7 +79,13 @@ def model_in_json(path: Path) -> dict[str, object]:
             action="take a file of the models folder beside a study's results.json, or write one "
             "with identify --write",
         )
-    return {key: _told(item) for key, item in model.items() if key != "schema" and item is not None}
+    known = {key: item for key, item in model.items() if key != "schema"}
+    return {key: _told(item) for key, item in (known | _estimated(fit)).items() if item is not None}
+
+
+def _estimated(fit: dict[str, object]) -> dict[str, object]:
+    """What the fit knew of the numbers; absent in the JSON of earlier versions."""
+    return {"estimated": fit["estimated"]} if "estimated" in fit else {}
 
 
 def _told(item: object) -> object:
