@@ -24,7 +24,7 @@ def flown(path: Path, seed: int = 0) -> Path:
         time_s, inputs={"tau_phi": drive}, units={"tau_phi": "1"}, hold="first"
     )
     seen = fid.simulate(TRUTH, driven, noise=fid.Noise(sensor={"p": 0.01}, seed=seed))
-    return fid.write_records(path, seen)
+    return fid.write_records(seen, path)
 
 
 @pytest.fixture(scope="module")
