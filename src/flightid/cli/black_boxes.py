@@ -101,7 +101,7 @@ def structure_of(
     if kind == NARX:
         if method is not None:
             raise click.UsageError("--method is no option of kind narx")
-        return NarxStructure(output, inputs, **given[-1]), records
+        return NarxStructure(inputs, output, **given[-1]), records
     return PolynomialModel.general(inputs, output, **one_each(kind, given[0]), **given[-1]), records
 
 
