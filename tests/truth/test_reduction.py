@@ -11,8 +11,9 @@ import pytest
 import flightid as fid
 from flightid.errors import DataError, FitError, ModelError, OptionError, UnknownNameError
 from flightid.identification.reduction.reduce import resume
-from flightid.identification.reduction.rules import ReductionLimits, choose
+from flightid.identification.reduction.rules import ReductionLimits, choose, explained_rise
 from flightid.plot.reduction import reduction_path
+from flightid.uncertainty.quantiles import half_width
 from tests.closeness import assert_close
 from tests.roll_and_yaw import ABSENT, REAL, lateral, measured
 
@@ -86,6 +87,45 @@ def test_a_marked_rise_ends_the_path_or_tries_the_next(
     every = fid.reduce(fit, data, after_rise="next", **strict)
     assert {step.name for step in every.path} == {*REAL, *ABSENT}
     assert set(every.dropped) == set(ABSENT)
+
+
+def test_the_rise_is_judged_in_one_step_and_from_the_start() -> None:
+    limits = ReductionLimits()
+    assert limits.excess(1.0, 1.0, 1.019, 0.0, ()) == ""
+    # Nine in a hundred at once are no longer hidden by a floor of 0.1.
+    assert limits.excess(0.774, 0.774, 0.844, 0.0, ()) == "by 9.04 % in one step"
+    assert limits.excess(1.0, 1.04, 1.055, 0.0, (0.0, 0.0)) == "by 5.5 % from the start"
+    # What random error explains is no reason to keep a parameter; exact data have none.
+    assert limits.excess(0.774, 0.774, 0.844, 0.08, ()) == ""
+    assert limits.excess(1e-9, 1e-9, 5e-4, 0.0, ()) == ""
+    assert ReductionLimits(negligible_cost=0.0).excess(1e-9, 1e-9, 5e-4, 0.0, ()) != ""
+
+
+def test_random_error_explains_what_a_parameter_of_zero_costs() -> None:
+    rises, explained = [], []
+    for seed in range(20):
+        data = measured(seed)
+        fit = full_fit(data)
+        without = fid.reduce(fit, data, drop=["Ld"], keep=fit.names)
+        rises.append(without.path[0].rise_percent * fit.average_cost / 100.0)
+        explained.append(explained_rise(fit, "Ld"))
+    # Its square is of one degree of freedom: its mean is the explained rise over 2.97 squared.
+    assert 0.4 < np.mean(rises) / np.mean(explained) * half_width(0.997) ** 2 < 2.2
+    assert explained_rise(full_fit(measured(0)), "La") < 1.0
+
+
+def test_what_the_cost_needs_makes_the_path_red(fit: fid.Fit, data: fid.FrequencyResponse) -> None:
+    def light(reduction: fid.Reduction) -> str:
+        return reduction.path_findings[0].light.value
+
+    assert light(fid.reduce(fit, data)) == "green"
+    assert light(fid.reduce(fit, data, drop=["Np"])) == "red"
+    held = fid.reduce(fit, data, keep=ABSENT)
+    assert light(held) == "amber"
+    ended = fid.reduce(fit, data, maximum_insensitivity_percent=1e-3)
+    codes = {each.code: each for each in ended.path_findings}
+    assert "reduction-ended" in codes
+    assert 'after_rise="next"' in codes["reduction-ended"].action
 
 
 def test_by_hand_keep_drop_and_values(fit: fid.Fit, data: fid.FrequencyResponse) -> None:

@@ -61,6 +61,8 @@ class Identified:
         Of the first record of the responses, measured and in free run.
     reference : TransferFunctionModel, StateSpaceModel or None
         Model that stands beside the estimates.
+    reduction_judged : tuple of Finding
+        Whether the reduced model predicts unseen records as the full one does.
     """
 
     settings: ModelSettings
@@ -71,6 +73,7 @@ class Identified:
     verifications: Mapping[str, Verification | Comparison] = field(default_factory=dict)
     spectra: SpectrumComparison | None = None
     reference: GreyBoxModel | None = None
+    reduction_judged: tuple[Finding, ...] = ()
 
     @property
     def name(self) -> str:
@@ -126,6 +129,7 @@ class Identified:
         """Verdicts of what came before and after the fit."""
         checks = (self.tests, *self.verifications.values())
         found = [each for part in checks if part is not None for each in part.findings]
+        found += self.reduction_judged
         if self.settings.structure is None:
             return tuple(found)
         chosen = (*self.left_out, *self.choice_findings, *goal_findings(self.fit))
@@ -140,7 +144,7 @@ class Identified:
         path = () if self.reduction is None else self.reduction.path_findings
         found = (each for part in parts if part is not None for each in part.findings)
         chosen = (*self.left_out, *self.choice_findings, *goal_findings(self.fit))
-        return (*first, *chosen, *path, *found)
+        return (*first, *chosen, *path, *self.reduction_judged, *found)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values of every result."""
@@ -157,5 +161,6 @@ class Identified:
             "responses": {key: value.to_dict() for key, value in self.responses.items()},
             "fits": {key: value.to_dict() for key, value in self.fits.items()},
             **{key: None if part is None else part.to_dict() for key, part in stages.items()},
+            "reduction_judged": [finding.to_dict() for finding in self.reduction_judged],
             "verifications": {key: value.to_dict() for key, value in self.verifications.items()},
         }

@@ -89,7 +89,7 @@ def _parts(item: Identified, truth: Truth | None) -> Iterator[Section]:
     if item.choice is not None:
         yield section_of("Choice of the structure", choice_blocks, item)
     if item.reduction is not None:
-        yield section_of("Reduction of the structure", reduction_blocks, item.reduction)
+        yield section_of("Reduction of the structure", _reduction, item)
     if item.tests is not None:
         yield section_of("Residual tests", _tests, item.tests)
     if fit is not None and isinstance(fit.model, StateSpaceModel):
@@ -109,6 +109,14 @@ def _coherence(item: Identified, truth: Truth | None) -> Iterator[Block]:
     yield from result_blocks(item.coherent, title=f"Coherence, at least {limits} decades needed")
     if item.settings.structure is not None:
         yield from response_figures(item, truth)
+
+
+def _reduction(item: Identified) -> Iterator[Block]:
+    """The path, and what unseen records say of it."""
+    assert item.reduction is not None
+    if item.reduction_judged:
+        yield Lights(item.reduction_judged)
+    yield from reduction_blocks(item.reduction)
 
 
 def _spectra(spectra: SpectrumComparison) -> Iterator[Block]:

@@ -23,6 +23,7 @@ from flightid.study.stages import (
     examine_residuals,
     fit_equations,
     fit_without_equations,
+    judge_reduction,
     select_coherent,
 )
 from flightid.study.task import Task
@@ -231,7 +232,24 @@ def _examine(
             f"spectra: {settings.name}", compare_free_run, counts, seen, settings.check.options
         ).value
     verified = _verifications(part, counts, records, fitted, runner)
-    return replace(found, tests=tests, spectra=spectra, verifications=verified)
+    found = replace(found, tests=tests, spectra=spectra, verifications=verified)
+    if found.reduction is None or not found.reduction.dropped:
+        return found
+    start = Staged(found.reduction.start, f"start of {part.fitted.key}")
+    outputs = settings.outputs or fit.model.outputs
+    judged = tuple(
+        runner.stage(
+            f"reduction: {settings.name}, {name}",
+            judge_reduction,
+            counts,
+            start,
+            records[name],
+            outputs,
+            settings.check.options,
+        ).value
+        for name in settings.verify
+    )
+    return replace(found, reduction_judged=judged)
 
 
 def _verifications(

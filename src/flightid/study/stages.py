@@ -7,9 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
+from flightid.conventions import Light
 from flightid.errors import DataError
+from flightid.findings import Finding
 from flightid.identification import Fit, Reduction, identify, reduce
 from flightid.identification.prediction.predict import output_names
+from flightid.identification.reduction.rules import TOTAL_COST_RISE_PERCENT
 from flightid.models import GreyBoxModel, Model
 from flightid.record import Record
 from flightid.responses import CoherentPairs, FrequencyResponse, coherent_pairs, estimate_response
@@ -33,6 +38,8 @@ from flightid.validation.verification.baseline import baseline_of
 
 Group = Sequence[Record]
 """What a name in a study stands for: one record, or all manoeuvres of a file."""
+MUCH_WORSE = 1.5
+"""Ratio of mean square errors from which a reduction has cost the model its prediction."""
 BASELINE = "linear, same lags"
 """Name of the linear model that stands beside a NARX model."""
 
@@ -232,6 +239,30 @@ def check(
         horizon=horizon,
         **options,
     )
+
+
+def judge_reduction(
+    fitted: Fit, start: Fit, records: Group, outputs: Sequence[str], options: Mapping[str, Any]
+) -> Finding:
+    """Whether a reduced structure predicts records that no fit has seen as the full one does.
+
+    By the mean square errors of the free run, output by output, in their mean ratio.
+    """
+    held = [output for output in outputs if all(output in record for record in records)]
+    after, before = (
+        verify(each, records, outputs=held, horizon="free_run", **options)
+        for each in (fitted, start)
+    )
+    tiny = np.finfo(np.float64).tiny
+    squares = [(after.rms_error[name] + tiny) / (before.rms_error[name] + tiny) for name in held]
+    ratio = float(np.mean(np.square(squares)))
+    said = (
+        f"{records[0].name}: mean square error of the reduced model {ratio:.3g} of the full one's"
+    )
+    if ratio <= 1.0 + TOTAL_COST_RISE_PERCENT / 100.0:
+        return Finding("reduction-predicts", Light.GREEN, said)
+    light = Light.AMBER if ratio <= MUCH_WORSE else Light.RED
+    return Finding("reduction-predicts", light, said, "keep what the prediction needs")
 
 
 def examine_residuals(fitted: Fit) -> ResidualTests | None:

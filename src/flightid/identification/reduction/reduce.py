@@ -10,7 +10,12 @@ from flightid.errors import DataError, FitError, ModelError, OptionError
 from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
 from flightid.identification.reduction.result import Reduction, ReductionStep
-from flightid.identification.reduction.rules import Candidate, ReductionLimits, choose
+from flightid.identification.reduction.rules import (
+    Candidate,
+    ReductionLimits,
+    choose,
+    explained_rise,
+)
 from flightid.models import GreyBoxModel
 from flightid.progress import progress
 from flightid.record import Record
@@ -28,6 +33,8 @@ def reduce(
     maximum_cramer_rao_percent: float = ReductionLimits.maximum_cramer_rao_percent,
     maximum_correlation: float = ReductionLimits.maximum_correlation,
     maximum_cost_rise_percent: float = ReductionLimits.maximum_cost_rise_percent,
+    maximum_total_cost_rise_percent: float = ReductionLimits.maximum_total_cost_rise_percent,
+    negligible_cost: float = ReductionLimits.negligible_cost,
     keep: Iterable[str] = (),
     drop: Iterable[str] = (),
     at: Mapping[str, float] | None = None,
@@ -39,7 +46,8 @@ def reduce(
     The parameter with the largest insensitivity above its guide is dropped first; where there is
     none, the one with the largest Cramér–Rao bound above its guide; then one of each pair that is
     too correlated. The rest is fitted again from where it stood. A step whose average cost rises
-    markedly is undone.
+    markedly, by itself or with the steps before it, is undone. A rise is not marked where the
+    random error of the parameter explains it: a parameter that is truly zero costs that much.
 
     Parameters
     ----------
@@ -51,6 +59,11 @@ def reduce(
         Guides; a parameter that meets all of them stays.
     maximum_cost_rise_percent : float
         Rise of the average cost by one step that counts as marked.
+    maximum_total_cost_rise_percent : float
+        Rise of the average cost from the start, after what is dropped by hand, that counts as
+        marked.
+    negligible_cost : float
+        Average cost of responses that stands for none, as fits of exact data leave.
     keep : iterable of str
         Parameters that stay whatever the guides say.
     drop : iterable of str
@@ -114,6 +127,8 @@ def reduce(
         maximum_cramer_rao_percent,
         maximum_correlation,
         maximum_cost_rise_percent,
+        maximum_total_cost_rise_percent,
+        negligible_cost,
     )
     if after_rise not in AFTER_RISE:
         raise OptionError(
@@ -218,9 +233,9 @@ class _Walk:
 
     def follow(self, limits: ReductionLimits, after_rise: str, advance: Any) -> str:  # noqa: ANN401
         """Drop what the guides say; why it ended."""
-        stay = set(self.keep)
+        stay, start = set(self.keep), self.fit.average_cost
         while (candidate := choose(self.fit, limits, stay)) is not None:
-            step = self._attempt(candidate, limits)
+            step = self._attempt(candidate, limits, start)
             advance()
             if step.accepted:
                 self._accept(step)
@@ -229,9 +244,11 @@ class _Walk:
             stay.add(step.name)
             if step.cost_after is not None and after_rise == "stop":
                 return f"dropping {step.name} raises the cost markedly"
-        return "all parameters that may go meet the guides"
+        return "no other parameter that may go breaks a guide"
 
-    def _attempt(self, candidate: Candidate, limits: ReductionLimits) -> ReductionStep:
+    def _attempt(
+        self, candidate: Candidate, limits: ReductionLimits, start: float
+    ) -> ReductionStep:
         name = candidate.name
         model, value, note = _without(self.fit.model, name, self.at)
         try:
@@ -239,11 +256,15 @@ class _Walk:
         except (FitError, ModelError) as error:
             cost = self.fit.average_cost
             return ReductionStep(name, value, candidate.reason, cost, None, False, None, str(error))
-        step = ReductionStep(name, value, candidate.reason, *self._costs(found), True, found, note)
-        if not limits.is_marked(self.fit, found):
+        explained = explained_rise(self.fit, name)
+        costs = self._costs(found)
+        step = ReductionStep(name, value, candidate.reason, *costs, True, found, note, explained)
+        so_far = [each.explained for each in self.path if each.accepted]
+        excess = limits.excess(start, *costs, explained, so_far)
+        if not excess:
             return step
-        word = f"the average cost would rise to {found.average_cost:.4g}"
-        return replace(step, accepted=False, note=word)
+        word = f"the average cost would rise to {found.average_cost:.4g}, {excess}"
+        return replace(step, accepted=False, note=word, explained=0.0)
 
     def _refit(self, model: GreyBoxModel) -> Fit:
         found: Fit = identify(model, self.data, **self.options)

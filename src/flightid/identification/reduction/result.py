@@ -9,7 +9,7 @@ from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
-from flightid.identification.reduction.rules import ReductionLimits
+from flightid.identification.reduction.rules import ReductionLimits, choose
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
@@ -34,6 +34,8 @@ class ReductionStep:
         Of the smaller model.
     note : str
         Why it had to stay, or why it was not fixed at zero.
+    explained : float
+        Rise of the average cost that the random error of the parameter explains.
 
     Example
     -------
@@ -49,6 +51,7 @@ class ReductionStep:
     accepted: bool
     fit: Fit | None = None
     note: str = ""
+    explained: float = 0.0
 
     @property
     def rise_percent(self) -> float | None:
@@ -146,31 +149,60 @@ class Reduction(Result, schema="flightid.reduction/1", untold={"data": "response
     @property
     def path_findings(self) -> tuple[Finding, ...]:
         """Verdict on the path alone."""
-        before, after = self.start.average_cost, self.fit.average_cost
-        out = ", ".join(self.dropped) or "nothing"
-        found = [
-            Finding(
-                "reduction",
-                Light.GREEN,
-                f"dropped {out}; average cost {before:.4g} to {after:.4g}; {self.stopped}",
-            )
-        ]
+        found = [self._verdict()]
         found += [
             Finding("reduction-held", Light.AMBER, f"{each.name}: {each.note}")
             for each in self.path
             if each.accepted and each.note
         ]
-        last = self.path[-1] if self.path else None
-        if last is not None and not last.accepted:
+        stay = [each for each in self.path if not each.accepted]
+        if stay:
+            names, last = ", ".join(each.name for each in stay), stay[-1]
             found.append(
                 Finding(
                     "reduction-stays",
                     Light.AMBER,
-                    f"{last.name} stays though it breaks a guide ({last.reason}): {last.note}",
-                    f"go on without it by resume(keep=[{last.name!r}]), or judge its interval",
+                    f"staying though they break a guide: {names}; {last.name} last "
+                    f"({last.reason}): {last.note}",
+                    "judge their intervals",
+                )
+            )
+        open_ = self.untried
+        if open_:
+            found.append(
+                Finding(
+                    "reduction-ended",
+                    Light.AMBER,
+                    f"the path ended there; not tried, though they break a guide: "
+                    f"{', '.join(open_)}",
+                    'try them: after_rise="next"',
                 )
             )
         return tuple(found)
+
+    @property
+    def untried(self) -> tuple[str, ...]:
+        """Parameters that break a guide, and that the path did not come to."""
+        stay = {*self.keep, *(each.name for each in self.path)}
+        found: list[str] = []
+        while (each := choose(self.fit, self.limits, {*stay, *found})) is not None:
+            found.append(each.name)
+        return tuple(found)
+
+    def _verdict(self) -> Finding:
+        """What is out, and whether the cost and the guides are kept."""
+        before, after = self.start.average_cost, self.fit.average_cost
+        out = ", ".join(self.dropped) or "nothing"
+        said = f"dropped {out}; average cost {before:.4g} to {after:.4g}; {self.stopped}"
+        explained = [each.explained for each in self.path if each.accepted]
+        allowed = self.limits.total_allowed(before, explained)
+        if after > self.limits.negligible_cost and after - before > allowed:
+            action = "keep what the cost needs, or judge the predictions of unseen records"
+            most = f"{self.limits.maximum_total_cost_rise_percent:g} %"
+            said += f"; that is a rise by more than {most} and than random error explains"
+            return Finding("reduction", Light.RED, said, action)
+        left = choose(self.fit, self.limits, ())
+        return Finding("reduction", Light.GREEN if left is None else Light.AMBER, said)
 
     def __repr__(self) -> str:
         """Parameters before and after, steps and average cost on one line."""

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
@@ -15,11 +16,14 @@ from flightid.identification.fit_findings import (
 )
 from flightid.options import Options, option
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.quantiles import half_width
 
 COST_RISE_PERCENT = 2.0
-NEGLIGIBLE_COST_RISE = 0.1
-"""Rise of the average cost of responses that no eye sees in a plot: a hundredth of a weighted dB²
-at each of 20 points. Below it a rise in percent of a cost near zero has no meaning."""
+TOTAL_COST_RISE_PERCENT = 5.0
+NEGLIGIBLE_COST = 1e-3
+"""Average cost of responses that exact data leave: percent of less have no meaning."""
+EXPLAINED_LEVEL = 0.997
+"""Of what random error explains: a path tries many parameters, and one in twenty would stay."""
 
 
 @dataclass(frozen=True)
@@ -39,12 +43,77 @@ class ReductionLimits(Options):
         COST_RISE_PERCENT, unit="%", above=0.0, doc="Largest rise of the cost in one step."
     )
 
-    def is_marked(self, before: Fit, after: Fit) -> bool:
-        """Whether the cost has risen markedly from one fit to the next."""
-        allowed = self.maximum_cost_rise_percent / 100.0 * before.average_cost
-        if before.responses:
-            allowed = max(allowed, NEGLIGIBLE_COST_RISE)
-        return after.average_cost - before.average_cost > allowed
+    maximum_total_cost_rise_percent: float = option(
+        TOTAL_COST_RISE_PERCENT, unit="%", above=0.0, doc="Largest rise of the cost by all steps."
+    )
+    negligible_cost: float = option(
+        NEGLIGIBLE_COST, minimum=0.0, doc="Average cost of responses that stands for none."
+    )
+
+    def excess(
+        self, start: float, before: float, after: float, explained: float, so_far: Sequence[float]
+    ) -> str:
+        """Why a step's rise of the average cost is too much; empty where it is not.
+
+        Parameters
+        ----------
+        start, before, after : float
+            Average cost at the start of the path, and before and after the step.
+        explained : float
+            Rise by this step that the random error of its parameter explains.
+        so_far : sequence of float
+            The same of every earlier step.
+        """
+        if after <= self.negligible_cost:
+            return ""
+        if after - before > max(explained, self.maximum_cost_rise_percent / 100.0 * before):
+            return f"by {_percent_of(before, after)} in one step"
+        if after - start > self.total_allowed(start, (*so_far, explained)):
+            return f"by {_percent_of(start, after)} from the start"
+        return ""
+
+    def total_allowed(self, start: float, explained: Sequence[float]) -> float:
+        """Largest rise of the average cost by all steps, of which random error explains some.
+
+        Squares of several estimates add up to less than the sum of what each may be alone.
+        """
+        limit = self.maximum_total_cost_rise_percent / 100.0 * start
+        if not explained:
+            return limit
+        together = chi2.ppf(EXPLAINED_LEVEL, len(explained)) / chi2.ppf(EXPLAINED_LEVEL, 1)
+        return max(limit, float(together * np.mean(explained)))
+
+
+def _percent_of(before: float, after: float) -> str:
+    return f"{100.0 * (after / before - 1.0):.3g} %" if before > 0.0 else "any percentage"
+
+
+def explained_rise(fit: Fit, name: str) -> float:
+    """Rise of the average cost that the random error of a parameter explains, 997 of 1000 times.
+
+    A parameter that is truly what it is fixed at is estimated beside it by its standard error σ;
+    without it the cost rises by its square over (JᵀJ)⁻¹, which is twice the Cramér–Rao bound
+    squared.
+
+    Parameters
+    ----------
+    fit : Fit
+        To responses, before the step.
+    name : str
+
+    Returns
+    -------
+    float
+        Zero where no random error is known, and of records, whose cost is no sum of squares.
+    """
+    parameter = fit.parameters[name]
+    percent, value, stderr = parameter.cramer_rao_percent, parameter.value, parameter.stderr
+    if not fit.responses or not percent or not value or stderr is None:
+        return 0.0
+    bound = percent / 100.0 * abs(value)
+    return float(
+        (half_width(EXPLAINED_LEVEL) * stderr) ** 2 / (2.0 * bound**2) / len(fit.responses)
+    )
 
 
 @dataclass(frozen=True)
