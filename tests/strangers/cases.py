@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
-from tests.strangers import aircraft, holds, output_error
+from tests.strangers import aircraft, holds, output_error, parts
 from tests.strangers.counting import Case
 
-CASES: tuple[Case, ...] = (*output_error.CASES, *aircraft.CASES, *holds.CASES)
+CASES: tuple[Case, ...] = (
+    *output_error.CASES,
+    *aircraft.CASES,
+    *holds.CASES,
+    *parts.CASES,
+)

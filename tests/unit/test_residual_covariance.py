@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from flightid.uncertainty.blocks import Block
 from flightid.uncertainty.residual_covariance import (
-    Block,
     ResidualCovariance,
     colour_findings,
     residual_covariance,

@@ -24,6 +24,7 @@ from flightid.evidence.evidence import (
     Evidence,
 )
 from flightid.evidence.parameter_checks import declared_signs
+from flightid.evidence.part_checks import agreement_check
 from flightid.evidence.spans import Span, judge_coherence, judge_span
 from flightid.findings import Finding, worst
 from flightid.inspection import Inspection
@@ -31,6 +32,7 @@ from flightid.models.narx.structure import STOPS
 from flightid.record import Record
 from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
+from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.feedback import declared_loop
 
 FROM_LOG = "Log.record"
@@ -75,6 +77,8 @@ class FitFacts:
         Parameters whose bounds declare a sign.
     loop : {"open", "closed"} or None
         The caller's word.
+    agreement : Agreement or None
+        Of parts of the data, where they were compared.
     """
 
     data: Sequence[FrequencyResponse | Record]
@@ -85,6 +89,7 @@ class FitFacts:
     termination: str
     signs: Mapping[str, tuple[int, float, tuple[float, float] | None, str]]
     loop: Loop | None = None
+    agreement: Agreement | None = None
 
 
 def gather_evidence(made: FitFacts) -> Evidence:
@@ -97,7 +102,6 @@ def gather_evidence(made: FitFacts) -> Evidence:
     Returns
     -------
     Evidence
-        Agreement of parts is required and not examined here, so none is green yet.
     """
     responses = [each for each in made.data if isinstance(each, FrequencyResponse)]
     records = [each for each in made.data if isinstance(each, Record)]
@@ -111,6 +115,8 @@ def gather_evidence(made: FitFacts) -> Evidence:
     if loop is None and records:
         loop = loop_of_records(tuple(records), made.inputs, made.outputs)
     checks += [] if loop is None else [loop]
+    if made.agreement is not None:
+        checks.append(agreement_check(made.agreement))
     if made.signs:
         checks.append(declared_signs(made.signs))
     checks = _with_findings(checks, made)

@@ -17,6 +17,7 @@ from flightid.identification.local_minimum import LocalMinimum
 from flightid.models import Model
 from flightid.record import Channel, Record, Step
 from flightid.uncertainty import correlation
+from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.estimate import Estimate
 from flightid.version import VERSION
 
@@ -47,12 +48,13 @@ class BlackBoxRuns:
 
 @dataclass(frozen=True, eq=False)
 class BlackBoxEstimates:
-    """Estimates of a model with their covariance, if there is one, and what it rests on."""
+    """Estimates of a model with their covariance, what it rests on, and whether parts agree."""
 
     parameters: Mapping[str, Estimate]
     names: tuple[str, ...]
     covariance: Array | None
     source: str = WHITE
+    agreement: Agreement | None = None
 
 
 def black_box_fit(
@@ -99,6 +101,7 @@ def black_box_fit(
         ),
         residual_horizon=1 if runs.white else "free_run",
         details=details,
+        agreement=estimates.agreement,
     )
 
 

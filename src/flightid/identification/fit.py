@@ -21,6 +21,7 @@ from flightid.models.linear.linear_system import LinearSystem
 from flightid.record import Record
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.quantiles import LEVEL, interval_words
 from flightid.uncertainty.uncertain import Uncertain
@@ -80,6 +81,8 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
         What is special to the kind: `PolynomialDetails`, `SubspaceDetails`, `NarxDetails`.
     evidence : Evidence
         What was examined of data and fit, and the light that follows.
+    agreement : Agreement or None
+        Of records and of their halves, in the order of `names`.
 
     Example
     -------
@@ -119,6 +122,7 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
     method: str = ""
     details: Any = None
     evidence: Evidence = field(default_factory=Evidence)
+    agreement: Agreement | None = None
 
     @property
     def residuals(self) -> tuple[Record, ...]:

@@ -47,6 +47,7 @@ def evidence_of(fit: Fit, data: Sequence[Any], loop: Loop | None = None) -> Evid
             fit.termination,
             _signs(asked, fit.parameters) if isinstance(asked, Parameters) else {},
             loop,
+            fit.agreement,
         )
     )
 

@@ -19,6 +19,15 @@ from scipy.linalg import solve_triangular
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.uncertainty.agreement import Agreed, Agreement, compare_parts
+from flightid.uncertainty.blocks import (
+    Beside,
+    Block,
+    flights_of,
+    joined,
+    noise_heard,
+    rest_of,
+)
 from flightid.uncertainty.input_noise import InputNoise
 from flightid.uncertainty.residual_noise import Autoregression, Taken, noise_models, periodogram
 
@@ -34,64 +43,14 @@ LARGEST_RATIO, SMALLEST_RATIO = 50.0, 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
-    """One record, whitened across outputs; rows are outputs after outputs.
-
-    Attributes
-    ----------
-    projected : ndarray, shape (n_rows, n)
-        Sensitivities with the record's own numbers taken out.
-    shared_on_own : ndarray, shape (n_own, n)
-        What was taken out.
-    basis, triangle : ndarray, shapes (n_rows, n_own) and (n_own, n_own)
-        Orthonormal basis and triangle of the own numbers' sensitivities.
-    residual : ndarray, shape (n_outputs, n_samples)
-    """
-
-    projected: Array
-    shared_on_own: Array
-    basis: Array
-    triangle: Array
-    residual: Array
-
-    @classmethod
-    def of(cls, shared: Array, own: Array, residual: Array) -> Block:
-        """From sensitivities by shared parameters and by own numbers, (n_outputs, n_samples, k)."""
-        rows = residual.size
-        shared, own = shared.reshape(rows, -1), own.reshape(rows, -1)
-        basis, triangle = np.linalg.qr(own)
-        on_own = basis.T @ shared
-        return cls(shared - basis @ on_own, on_own, basis, triangle, residual)
-
-
-@dataclass(frozen=True, eq=False)
-class Beside:
-    """Residuals of unit variance, fitted together with the records, and what they answer to.
-
-    Attributes
-    ----------
-    slopes : ndarray, shape (n_residuals, n)
-        Derivatives by the parameters, the data being as they are.
-    total : ndarray, shape (n_residuals, n)
-        The same with data that follow the parameters, as corrected points do.
-    """
-
-    slopes: Array
-    total: Array
-
-    def of(self, parameters: NDArray[np.bool_]) -> Beside:
-        """Columns of some parameters."""
-        return Beside(self.slopes[:, parameters], self.total[:, parameters])
-
-
-@dataclass(frozen=True, eq=False)
 class ResidualCovariance:
     """What is known of estimates whose residuals are coloured.
 
     Attributes
     ----------
     covariance, white : ndarray, shape (n, n)
-        Of the shared parameters, for residuals of the colour found and for white ones.
+        Of the shared parameters, for residuals of the colour found, or the scatter between parts
+        where they disagree; and for white residuals.
     freedom : ndarray, shape (n,)
         Degrees of freedom of each variance: noise models are themselves estimates.
     own, crossed : tuple of ndarray
@@ -99,6 +58,8 @@ class ResidualCovariance:
         these and the parameters.
     orders : tuple of int
         Of the outputs' noise models.
+    agreement : Agreement
+        Of records, and of halves of each.
     """
 
     covariance: Array
@@ -107,11 +68,12 @@ class ResidualCovariance:
     own: tuple[Array, ...]
     crossed: tuple[Array, ...]
     orders: tuple[int, ...]
+    agreement: Agreement
 
     @property
     def ratios(self) -> Array:
         """Standard errors over those for white residuals, shape (n,)."""
-        return np.sqrt(np.diag(self.covariance) / np.diag(self.white))
+        return np.asarray(self.agreement.by_noise / np.sqrt(np.diag(self.white)))
 
     @property
     def colour(self) -> tuple[float, float]:
@@ -194,8 +156,8 @@ def residual_covariance(
 
     Assumes
     -------
-    Noise of each whitened output that is stationary and independent of the others'. Too small
-    where records differ from each other by more than their noise.
+    Noise of each whitened output that is stationary within a record, of one colour in all records
+    though not of one level, and independent of the others'.
 
     Reference
     ---------
@@ -214,14 +176,15 @@ def residual_covariance(
     """
     triangle = triangle_of(blocks, None if beside is None else beside.slopes)
     root = _inverse_root(triangle)
-    turned = _gain(root, beside)
+    turned = _gain(root, beside, blocks)
     taken = []
     for block in blocks:
         parts = (block.basis, block.projected @ root)
         taken.append(Taken(*(part.reshape(*block.residual.shape, -1) for part in parts)))
     walks = None if noise is None else _walks(taken[0], *noise)
     models = noise_models([block.residual for block in blocks], taken, walks)
-    answers = [_answers(models, block) for block in blocks]
+    apart = noise_heard(models, blocks)
+    answers = [joined(each, block) for each, block in zip(apart, blocks, strict=True)]
     sizes = [block.basis.shape[1] for block in blocks]
     heard = sum(each[:, m:, m:] for each, m in zip(answers, sizes, strict=True))
     variances = turned @ heard @ turned.T
@@ -244,15 +207,54 @@ def residual_covariance(
         found = direct.T @ heard_here @ direct + through @ others @ through.T
         own.append(_lifted(found, back @ back.T))
         crossed.append(direct.T @ heard_here @ gain - through @ others)
-    white = np.asarray(root @ root.T)
+    plain = turned @ np.linalg.inv(root).T
+    white = np.asarray(root @ root.T) if blocks[0].answering is None else plain @ plain.T
+    freedom = _freedom(shared, variances, models)
+    # Random walks from noise of inputs join whatever parts a record is cut into.
+    compared = flights_of(apart, blocks) if noise is None else []
+    rest = rest_of(compared, beside)
+    agreed = compare_parts(compared, turned, _lifted(shared, white), freedom, rest)
     return ResidualCovariance(
-        _lifted(shared, white),
+        agreed.covariance,
         white,
-        _freedom(shared, variances, models),
+        agreed.freedom,
         tuple(own),
         tuple(crossed),
         tuple(model.weights.size for model in models),
+        agreed.agreement,
     )
+
+
+def white_covariance(blocks: Sequence[Block], covariance: Array, freedom: float) -> Agreed:
+    """Covariance of estimates whose errors their own noise model whitens, parts compared.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        By record.
+    covariance : ndarray, shape (n, n)
+        By white errors.
+    freedom : float
+        Degrees of freedom of their variance.
+
+    Returns
+    -------
+    Agreed
+
+    Reference
+    ---------
+    See `flightid.uncertainty.agreement.compare_parts`.
+    """
+    total = sum(block.residual.shape[1] for block in blocks)
+    power = [
+        np.sum([np.sum(block.residual[o] ** 2) for block in blocks]) / total
+        for o in range(len(blocks[0].residual))
+    ]
+    models = [Autoregression(np.array([level]), np.empty(0), total, 0) for level in power]
+    root = _inverse_root(triangle_of(blocks))
+    degrees = np.full(len(covariance), freedom)
+    flights = flights_of(noise_heard(models, blocks), blocks)
+    return compare_parts(flights, root @ root.T, covariance, degrees)
 
 
 def triangle_of(blocks: Sequence[Block], beside: Array | None = None) -> Array:
@@ -269,21 +271,16 @@ def _inverse_root(triangle: Array) -> Array:
     return np.asarray(solve_triangular(triangle / size, np.eye(len(size))) / size[:, None])
 
 
-def _answers(models: Sequence[Autoregression], block: Block) -> Array:
-    """[basis, projected]ᵀ Ω [basis, projected] for the noise of each output of one record."""
-    directions = np.hstack([block.basis, block.projected])
-    parts = directions.reshape(len(models), -1, directions.shape[1])
-    return np.array(
-        [part.T @ model.product(part) for model, part in zip(models, parts, strict=True)]
-    )
-
-
-def _gain(root: Array, beside: Beside | None) -> Array:
+def _gain(root: Array, beside: Beside | None, blocks: Sequence[Block]) -> Array:
     """What turns a gradient into a change of the estimates, from the root R⁻¹ of the information.
 
     Where data follow the parameters, the equations that the estimates solve bend less than the
     cost does, and the gain is larger than the inverse of the information.
     """
+    answering = [each.answering for each in blocks if each.answering is not None]
+    if answering:
+        pairs = zip(blocks, answering, strict=True)
+        return np.linalg.inv(np.sum([each.projected.T @ slopes for each, slopes in pairs], axis=0))
     if beside is None:
         return np.asarray(root @ root.T)
     follows = (beside.slopes @ root).T @ ((beside.slopes - beside.total) @ root)

@@ -63,11 +63,22 @@ class Autoregression:
             )[0]
         return result
 
-    def product(self, columns: Array) -> Array:
-        """Covariance matrix of the residual times columns, shape (n, k)."""
+    def squared(self, columns: Array) -> Array:
+        """Columns' covariance by this noise: XᵀΩX, shape (k, k)."""
         if not self.weights.size:
-            return np.asarray(self.lags[0] * columns)
-        return toeplitz_product(self.autocovariance(len(columns)), columns)
+            return np.asarray(self.lags[0] * (columns.T @ columns))
+        n = len(columns)
+        length = _length(n)
+        spectrum = fft.rfft(_ring(self.autocovariance(n), length)).real
+        twice = np.full(spectrum.size, 2.0 / length)
+        twice[0] = 1.0 / length
+        if length % 2 == 0:
+            twice[-1] = 1.0 / length
+        moved = fft.rfft(np.ascontiguousarray(columns.T), length, axis=1)
+        weight = spectrum * twice
+        return np.asarray(
+            (moved.real * weight) @ moved.real.T + (moved.imag * weight) @ moved.imag.T
+        )
 
     def freedom(self) -> float:
         """Degrees of freedom of the model's level at zero frequency, where slow sensitivities look.
@@ -320,12 +331,10 @@ def _lost(
     return lost / sum(lengths)
 
 
-def toeplitz_product(first: Array, columns: Array) -> Array:
-    """Product of a symmetric Toeplitz matrix with columns, by one circulant of twice the size."""
+def _ring(first: Array, length: int) -> Array:
+    """First column of a circulant that holds a symmetric Toeplitz matrix."""
     n = first.size
-    length = _length(n)
     ring = np.zeros(length)
     ring[:n] = first
     ring[length - n + 1 :] = first[:0:-1]
-    spectrum = fft.rfft(ring)[:, None] * fft.rfft(columns, length, axis=0)
-    return np.asarray(fft.irfft(spectrum, length, axis=0)[:n])
+    return ring

@@ -82,6 +82,7 @@ def fit_filter_error(
         found.freedom[:count],
         "innovations",
         found.colour_of(count),
+        found.agreement.of(count),
     )
     noise = _noises(problem, end, filtered)
     return assemble(

@@ -47,7 +47,7 @@ from flightid.identification.records.setup import RecordSet, prepare_records
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
-from flightid.uncertainty.residual_covariance import Beside
+from flightid.uncertainty.blocks import Beside
 
 Array = NDArray[np.float64]
 

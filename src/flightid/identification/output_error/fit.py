@@ -45,7 +45,7 @@ from flightid.identification.regression.options import FourierOutputErrorOptions
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.measured_states import state_outputs
 from flightid.record import Channel, Record, Step
-from flightid.uncertainty.residual_covariance import Beside
+from flightid.uncertainty.blocks import Beside
 from flightid.version import VERSION
 
 Array = NDArray[np.float64]
@@ -339,6 +339,7 @@ def _assemble(
         provenance=_provenance(prepared, options),
         records=records,
         noise_covariance=best.noise,
+        agreement=found.agreement,
     )
 
 

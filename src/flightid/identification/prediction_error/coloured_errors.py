@@ -8,6 +8,7 @@ one, its errors are white or the structure is wrong, which the residual tests te
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +16,8 @@ from scipy.signal import lfilter
 
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
-from flightid.uncertainty.residual_covariance import Block, ResidualCovariance, residual_covariance
+from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.residual_covariance import ResidualCovariance, residual_covariance
 
 Array = NDArray[np.float64]
 INDEPENDENT = 1e-9
@@ -150,20 +152,13 @@ def instrumental_covariance(
     """
     total = np.concatenate(list(errors))
     size = float(np.sqrt(total @ total / total.size)) or 1.0
-    found = residual_covariance(
+    blocks = [
+        Block.of(each[None] / size, np.zeros((1, len(each), 0)), error[None] / size)
+        for each, error in zip(instruments, errors, strict=True)
+    ]
+    return residual_covariance(
         [
-            Block.of(each[None] / size, np.zeros((1, len(each), 0)), error[None] / size)
-            for each, error in zip(instruments, errors, strict=True)
+            replace(block, answering=each / size)
+            for block, each in zip(blocks, regressors, strict=True)
         ]
-    )
-    product = sum(z.T @ r for z, r in zip(instruments, regressors, strict=True))
-    square = sum(z.T @ z for z in instruments)
-    turn = np.linalg.solve(product, square)
-    return ResidualCovariance(
-        turn @ found.covariance @ turn.T,
-        turn @ found.white @ turn.T,
-        found.freedom,
-        found.own,
-        found.crossed,
-        found.orders,
     )

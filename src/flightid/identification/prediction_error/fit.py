@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +32,7 @@ from flightid.identification.prediction_error.information_criteria import criter
 from flightid.identification.prediction_error.instrumental_variables import four_stage
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
 from flightid.identification.prediction_error.linear_regression import regress, require_independent
+from flightid.identification.prediction_error.part_blocks import part_blocks
 from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
 from flightid.identification.prediction_error.starts import polynomial_starts
 from flightid.models.polynomial.model import PolynomialModel
@@ -39,8 +41,9 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels, hold_diverged
 from flightid.record import Record
 from flightid.record.several import as_records
+from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.residual_covariance import colour_findings
+from flightid.uncertainty.residual_covariance import colour_findings, white_covariance
 
 Array = NDArray[np.float64]
 BACKCASTS = 6
@@ -63,6 +66,7 @@ class _SearchResult:
     skip: int
     freedom: Array | None = None
     colour: tuple[float, float] = (1.0, 1.0)
+    agreement: Agreement | None = None
 
 
 def fit_polynomial(structure: PolynomialStructure, data: Record | Sequence[Record]) -> Fit:
@@ -117,7 +121,7 @@ def _regression(structure: PolynomialStructure, data: SampledChannels) -> _Searc
     if structure.method == "iv4":
         theta, known = four_stage(structure, data)
         found = _linear(structure, theta, known.covariance, degrees, "instruments", skip)
-        return replace(found, freedom=known.freedom, colour=known.colour)
+        return replace(found, freedom=known.freedom, colour=known.colour, agreement=known.agreement)
     covariance = made.sum_of_squares / degrees * _inverse_square(made.factor)
     return _linear(structure, made.theta, covariance, degrees, "regression", skip)
 
@@ -228,16 +232,8 @@ def _assemble(
     data: SampledChannels,
     found: _SearchResult,
 ) -> Fit:
-    errors = _native.polynomial_errors(
-        data.output,
-        data.inputs,
-        list(data.lengths),
-        structure.native,
-        found.theta,
-        BEFORE[structure.past],
-        found.memory,
-    )
-    found = _coloured(structure, data, found, errors)
+    errors = _errors_at(structure, data, found.memory, found.theta)
+    found = _compared(structure, data, found, errors)
     counted = tuple(errors[span][found.skip :] for span in data.spans)
     squares = float(sum(row @ row for row in counted))
     n_counted = sum(row.size for row in counted)
@@ -275,7 +271,8 @@ def _assemble(
             parameters,
             structure.names,
             found.covariance,
-            WHITE if found.freedom is None else COLOURED,
+            WHITE if has_noise_model(structure) and structure.method != "iv4" else COLOURED,
+            found.agreement,
         ),
         minima,
         iterations=found.iterations,
@@ -299,14 +296,48 @@ def _assemble(
     )
 
 
-def _coloured(
+def _errors_at(
+    structure: PolynomialStructure, data: SampledChannels, memory: list[list[float]], theta: Array
+) -> Array:
+    """Errors one step ahead of all samples, records after records."""
+    return np.asarray(
+        _native.polynomial_errors(
+            data.output,
+            data.inputs,
+            list(data.lengths),
+            structure.native,
+            theta,
+            BEFORE[structure.past],
+            memory,
+        )
+    )
+
+
+def _compared(
     structure: PolynomialStructure, data: SampledChannels, found: _SearchResult, errors: Array
 ) -> _SearchResult:
-    """Errors of the coefficients by the colour of residuals that no noise model answers for."""
-    if found.covariance is None or structure.kernel is not None or has_noise_model(structure):
+    """Covariance of the coefficients after parts of the data were compared.
+
+    By the colour of residuals where no noise model answers for it.
+    """
+    if found.covariance is None or found.agreement is not None:
         return found
+    if has_noise_model(structure) or structure.kernel is not None:
+        at = partial(_errors_at, structure, data, found.memory)
+        blocks = part_blocks(at, data, found.theta, found.skip)
+        agreed = white_covariance(blocks, found.covariance, found.degrees)
+        freedom = agreed.freedom if agreed.agreement.by_scatter is not None else None
+        return replace(
+            found, covariance=agreed.covariance, freedom=freedom, agreement=agreed.agreement
+        )
     known = output_error_covariance(structure, data, found.theta, errors, found.skip)
-    return replace(found, covariance=known.covariance, freedom=known.freedom, colour=known.colour)
+    return replace(
+        found,
+        covariance=known.covariance,
+        freedom=known.freedom,
+        colour=known.colour,
+        agreement=known.agreement,
+    )
 
 
 def _parameters(model: PolynomialModel, found: _SearchResult) -> dict[str, Estimate]:

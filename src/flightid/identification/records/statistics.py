@@ -22,13 +22,10 @@ from flightid.identification.frequency_domain.estimates import (
 from flightid.identification.records.setup import OwnNumbers, RecordSet
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.uncertainty import correlation as correlation_of
+from flightid.uncertainty.agreement import Agreement
+from flightid.uncertainty.blocks import Beside, Block
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.residual_covariance import (
-    Beside,
-    Block,
-    residual_covariance,
-    triangle_of,
-)
+from flightid.uncertainty.residual_covariance import residual_covariance, triangle_of
 
 Array = NDArray[np.float64]
 Own = tuple[dict[str, Estimate], dict[str, Estimate], dict[str, Estimate]]
@@ -51,6 +48,8 @@ class RecordStatistics:
         Initial state, biases, reference shifts of each record.
     colour : tuple of float
         Smallest and largest ratio of a standard error to that for white residuals.
+    agreement : Agreement
+        Of records and of their halves.
     """
 
     parameters: Mapping[str, Estimate]
@@ -59,6 +58,7 @@ class RecordStatistics:
     correlation: Array
     own: list[Own]
     colour: tuple[float, float]
+    agreement: Agreement
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +144,7 @@ def record_statistics(
             )
         ],
         known.colour,
+        known.agreement,
     )
 
 

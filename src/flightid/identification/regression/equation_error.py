@@ -46,7 +46,8 @@ from flightid.identification.regression.weights import (
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
 from flightid.record.several import as_records
-from flightid.uncertainty.residual_covariance import Block, residual_covariance
+from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.residual_covariance import residual_covariance
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,12 @@ def fit_equation_error(
     )
     jacobian = stack([slopes for _, slopes in weighed])
     known = Knowledge(
-        jacobian, coloured.covariance, coloured.freedom, "coloured residuals", coloured.colour
+        jacobian,
+        coloured.covariance,
+        coloured.freedom,
+        "coloured residuals",
+        coloured.colour,
+        coloured.agreement,
     )
     return _finish("equation error", problem, data, options, settled, limits, inner, known)
 

@@ -27,6 +27,7 @@ from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
 from flightid.record.several import as_records
 from flightid.uncertainty import correlation as correlation_of
+from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.cramer_rao import inverse_hessian
 from flightid.units import require_match
 from flightid.version import VERSION
@@ -71,6 +72,8 @@ class Knowledge:
         Where the intervals come from.
     colour : tuple of float
         Smallest and largest ratio of a standard error to that for white residuals.
+    agreement : Agreement or None
+        Of records and of their halves.
     """
 
     jacobian: Array
@@ -78,6 +81,7 @@ class Knowledge:
     freedom: Array
     source: str
     colour: tuple[float, float] = (1.0, 1.0)
+    agreement: Agreement | None = None
 
 
 def check_records(model: StateSpaceModel, data: Record | Sequence[Record]) -> tuple[Record, ...]:
@@ -174,6 +178,7 @@ def assemble(
         provenance={**_provenance(method, fitted, records, options), **(extra or {})},
         records=tuple(fitted_records),
         noise_covariance=noise_covariance,
+        agreement=known.agreement,
     )
 
 

@@ -1,0 +1,52 @@
+"""Errors of a polynomial model and how they answer to its coefficients, record by record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.models.sampled.channels import SampledChannels
+from flightid.uncertainty.blocks import Block
+
+Array = NDArray[np.float64]
+STEP = 1e-6
+"""Share of a coefficient, or of one, for differences of errors that bend little."""
+
+
+def part_blocks(
+    errors_at: Callable[[Array], Array], data: SampledChannels, theta: Array, skip: int
+) -> list[Block]:
+    """Blocks of unit variance, by differences: whatever the structure, its start included.
+
+    Parameters
+    ----------
+    errors_at : callable
+        Errors one step ahead of all samples, by the coefficients.
+    data : SampledChannels
+    theta : ndarray, shape (n,)
+        Estimates.
+    skip : int
+        First errors of each record that the fit left out.
+
+    Returns
+    -------
+    list of Block
+        By record.
+    """
+    errors = errors_at(theta)
+    slopes = np.empty((errors.size, theta.size))
+    for place, value in enumerate(theta):
+        moved = theta.copy()
+        moved[place] += STEP * max(abs(value), 1.0)
+        slopes[:, place] = (errors - errors_at(moved)) / (moved[place] - value)
+    size = float(np.sqrt(errors @ errors / errors.size)) or 1.0
+    return [
+        Block.of(
+            slopes[None, span][:, skip:] / size,
+            np.zeros((1, slopes[span][skip:].shape[0], 0)),
+            errors[None, span][:, skip:] / size,
+        )
+        for span in data.spans
+    ]

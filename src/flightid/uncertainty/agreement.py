@@ -1,0 +1,194 @@
+"""Whether parts of the data agree on one estimate, and the bars that follow where they do not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.uncertainty.parts import Flight, chance_alike, larger, scatter
+from flightid.uncertainty.quantiles import LEVEL, half_width
+
+Array = NDArray[np.float64]
+FALSE_ALARM = 0.005
+"""Share of sound data that fails each of the two tests: halves, and records."""
+CERTAIN = 1.0 - 1e-15
+DOUBT = 0.1
+"""Chance below which scatter between records is carried on: what is not proven may be there."""
+FEWEST_RECORDS = 3
+"""Records whose scatter tells enough of the others for their mean to be used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """What parts of the data say of each other.
+
+    Attributes
+    ----------
+    n_records : int
+    halves, records : float or None
+        Chance that halves of the records, and records, of one vehicle differ by as much; None
+        where that cannot be tested.
+    by_noise : ndarray, shape (n,)
+        Standard errors of the estimates by the noise within records.
+    by_scatter : ndarray, shape (n,), or None
+        Standard errors by how far the parts lie apart; None where nothing speaks for that.
+    freedom : ndarray, shape (n,), or None
+        Degrees of freedom of `by_scatter`; None for halves.
+
+    Example
+    -------
+    >>> Agreement(1, 0.2, None, np.ones(1)).agree
+    True
+    """
+
+    n_records: int
+    halves: float | None
+    records: float | None
+    by_noise: Array
+    by_scatter: Array | None = None
+    freedom: Array | None = None
+
+    @property
+    def tested(self) -> bool:
+        """Whether any parts could be compared."""
+        return self.halves is not None or self.records is not None
+
+    @property
+    def agree(self) -> bool:
+        """Whether all parts that were compared agree."""
+        return not (_differ(self.halves) or _differ(self.records))
+
+    @property
+    def halves_differ(self) -> bool:
+        """Whether halves of a record differ by more than their noise."""
+        return _differ(self.halves)
+
+    @property
+    def factor(self) -> float:
+        """Largest ratio of a standard error by scatter to that by noise; one at least."""
+        if self.by_scatter is None:
+            return 1.0
+        return float(max(1.0, np.max(self.by_scatter / self.by_noise, initial=1.0)))
+
+    def of(self, count: int) -> Agreement:
+        """The same of the first parameters alone."""
+        return Agreement(
+            self.n_records,
+            self.halves,
+            self.records,
+            self.by_noise[:count],
+            None if self.by_scatter is None else self.by_scatter[:count],
+            None if self.freedom is None else self.freedom[:count],
+        )
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "n_records": self.n_records,
+            "halves_p": self.halves,
+            "records_p": self.records,
+            "stderr_by_noise": self.by_noise.tolist(),
+            "stderr_by_scatter": None if self.by_scatter is None else self.by_scatter.tolist(),
+            "freedom_of_scatter": None if self.freedom is None else self.freedom.tolist(),
+            "factor": self.factor,
+        }
+
+
+def _differ(chance: float | None) -> bool:
+    return chance is not None and chance < FALSE_ALARM
+
+
+@dataclass(frozen=True, eq=False)
+class Agreed:
+    """Covariance and degrees of freedom that stand after parts were compared."""
+
+    covariance: Array
+    freedom: Array
+    agreement: Agreement
+
+
+def compare_parts(
+    flights: Sequence[Flight],
+    solve: Array,
+    covariance: Array,
+    freedom: Array,
+    rest: Flight | None = None,
+) -> Agreed:
+    """Test halves and records against their noise; carry on the larger covariance.
+
+    Parameters
+    ----------
+    flights : sequence of Flight
+        Records with two halves each.
+    solve : ndarray, shape (n, n)
+        What turns scores into changes of the estimates.
+    covariance : ndarray, shape (n, n)
+        By the noise within records.
+    freedom : ndarray, shape (n,)
+        Degrees of freedom of its diagonal.
+    rest : Flight, optional
+        One more part that is neither compared nor halved: what was fitted beside the records.
+
+    Returns
+    -------
+    Agreed
+        With several records that differ: covariance by leaving out one after the other, where it
+        is larger, and Student's degrees of freedom. With halves that differ: by leaving out halves.
+
+    Assumes
+    -------
+    Records of vehicles drawn from one fleet, whose mean is asked. One record does not tell how far
+    flights differ.
+    """
+    whole = [flight.whole for flight in flights]
+    level = float(np.median(freedom)) if len(freedom) else np.inf
+    halves = _combined([chance_alike([flight], level) for flight in flights])
+    records = chance_alike(whole, level) if len(whole) > 1 else None
+    plain = Agreement(len(flights), halves, records, np.sqrt(np.diag(covariance)))
+    by_records = len(whole) > 1
+    if plain.agree and not (records is not None and records < DOUBT):
+        return Agreed(covariance, freedom, plain)
+    parts = whole if by_records else _halved(flights[0])
+    found = scatter([*parts, *([] if rest is None else [rest])], solve, covariance)
+    apart = np.sqrt(np.diag(found.covariance))
+    student = found.freedom if by_records else None
+    stated = freedom if student is None else _of_wider(plain.by_noise, freedom, apart, student)
+    agreement = Agreement(len(flights), halves, records, plain.by_noise, apart, student)
+    return Agreed(larger(covariance, found.covariance), stated, agreement)
+
+
+def _combined(chances: Sequence[float | None]) -> float | None:
+    """Least chance of several independent tests, for their number (Šidák)."""
+    known = [each for each in chances if each is not None]
+    return None if not known else float(-np.expm1(len(known) * np.log1p(-min(*known, CERTAIN))))
+
+
+def _halved(flight: Flight) -> list[Flight]:
+    return [
+        Flight(
+            flight.scores[k : k + 1],
+            flight.information[k : k + 1],
+            flight.noise[k : k + 1, :, k : k + 1],
+        )
+        for k in range(len(flight.scores))
+    ]
+
+
+def _of_wider(noise: Array, freedom: Array, apart: Array, student: Array) -> Array:
+    """Degrees of freedom of whichever makes the wider interval."""
+    widths = [
+        (
+            half_width(LEVEL, float(a)) * one,
+            half_width(LEVEL, float(b)) * other,
+        )
+        for one, a, other, b in zip(noise, freedom, apart, student, strict=True)
+    ]
+    return np.array(
+        [
+            b if wide > narrow else a
+            for (narrow, wide), a, b in zip(widths, freedom, student, strict=True)
+        ]
+    )

@@ -1,0 +1,149 @@
+"""Least-squares problems as covariances need them: sensitivities by record, and their halves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.uncertainty.parts import Flight
+from flightid.uncertainty.residual_noise import Autoregression
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """One record, whitened across outputs; rows are outputs after outputs.
+
+    Attributes
+    ----------
+    projected : ndarray, shape (n_rows, n)
+        Sensitivities with the record's own numbers taken out.
+    shared_on_own : ndarray, shape (n_own, n)
+        What was taken out.
+    basis, triangle : ndarray, shapes (n_rows, n_own) and (n_own, n_own)
+        Orthonormal basis and triangle of the own numbers' sensitivities.
+    residual : ndarray, shape (n_outputs, n_samples)
+    answering : ndarray, shape (n_rows, n), optional
+        How residuals go down with the parameters, where `projected` are instruments instead.
+    """
+
+    projected: Array
+    shared_on_own: Array
+    basis: Array
+    triangle: Array
+    residual: Array
+    answering: Array | None = None
+
+    @classmethod
+    def of(cls, shared: Array, own: Array, residual: Array) -> Block:
+        """From sensitivities by shared parameters and by own numbers, (n_outputs, n_samples, k)."""
+        rows = residual.size
+        shared, own = shared.reshape(rows, -1), own.reshape(rows, -1)
+        basis, triangle = np.linalg.qr(own)
+        on_own = basis.T @ shared
+        return cls(shared - basis @ on_own, on_own, basis, triangle, residual)
+
+
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Residuals of unit variance, fitted together with the records, and what they answer to.
+
+    Attributes
+    ----------
+    slopes : ndarray, shape (n_residuals, n)
+        Derivatives by the parameters, the data being as they are.
+    total : ndarray, shape (n_residuals, n)
+        The same with data that follow the parameters, as corrected points do.
+    measured : bool
+        Whether the residuals are of data; else they bring curvature alone.
+    """
+
+    slopes: Array
+    total: Array
+    measured: bool = True
+
+    def of(self, parameters: NDArray[np.bool_]) -> Beside:
+        """Columns of some parameters."""
+        return replace(self, slopes=self.slopes[:, parameters], total=self.total[:, parameters])
+
+
+def flights_of(apart: Sequence[Array], blocks: Sequence[Block]) -> list[Flight]:
+    """Records with their halves, from what `_heard` gives of each."""
+    return [_flight(each.sum(axis=0), block) for each, block in zip(apart, blocks, strict=True)]
+
+
+def _levels(blocks: Sequence[Block]) -> Array:
+    """Residual variance of each record and output over that of all, (n_records, n_outputs).
+
+    Records of one colour need not be of one level: a harder manoeuvre may be a noisier one.
+    """
+    squares = np.array([np.sum(block.residual**2, axis=1) for block in blocks])
+    counts = np.array([block.residual.shape[1] for block in blocks])
+    common = squares.sum(axis=0) / counts.sum()
+    known = common > 0.0
+    return np.where(known, squares / counts[:, None] / np.where(known, common, 1.0), 1.0)
+
+
+def _halves(block: Block) -> Array:
+    """[basis, projected in the first half, projected in the second], (n_outputs, n, m + 2 n)."""
+    n_outputs, n_samples = block.residual.shape
+    own, shared = (
+        part.reshape(n_outputs, n_samples, -1) for part in (block.basis, block.projected)
+    )
+    m, count = own.shape[2], shared.shape[2]
+    wide = np.zeros((n_outputs, n_samples, m + 2 * count))
+    half = n_samples // 2
+    wide[:, :, :m] = own
+    wide[:, :half, m : m + count] = shared[:, :half]
+    wide[:, half:, m + count :] = shared[:, half:]
+    return wide
+
+
+def noise_heard(models: Sequence[Autoregression], blocks: Sequence[Block]) -> list[Array]:
+    """XᵀΩX of `_halves` by output of each record, for noise of these models and its own level."""
+    return [
+        level[:, None, None]
+        * np.array([noise.squared(part) for noise, part in zip(models, _halves(each), strict=True)])
+        for each, level in zip(blocks, _levels(blocks), strict=True)
+    ]
+
+
+def joined(apart: Array, block: Block) -> Array:
+    """[basis, projected]ᵀ Ω [basis, projected] from halves."""
+    m, count = block.basis.shape[1], block.projected.shape[1]
+    turn = np.zeros((m + 2 * count, m + count))
+    turn[:m, :m] = np.eye(m)
+    turn[m : m + count, m:] = turn[m + count :, m:] = np.eye(count)
+    return np.asarray(turn.T @ apart @ turn)
+
+
+def _flight(answers: Array, block: Block) -> Flight:
+    """Scores of both halves, their information, and their noise with the own numbers taken out."""
+    wide = _halves(block).reshape(block.residual.size, -1)
+    m, count = block.basis.shape[1], block.projected.shape[1]
+    halves = wide[:, m:]
+    turn = np.vstack([-block.basis.T @ halves, np.eye(2 * count)])
+    parts = np.split(halves, 2, axis=1)
+    # A half is zero in the other, so it meets all of what answers there alone.
+    answering = block.projected if block.answering is None else block.answering
+    square = np.stack([part.T @ answering for part in parts])
+    return Flight(
+        (halves.T @ block.residual.ravel()).reshape(2, count),
+        square,
+        (turn.T @ answers @ turn).reshape(2, count, 2, count),
+    )
+
+
+def rest_of(flights: Sequence[Flight], beside: Beside | None) -> Flight | None:
+    """Data that were fitted beside the records, as one more part: its score balances theirs."""
+    if beside is None or not beside.measured:
+        return None
+    score = -sum(flight.scores.sum(axis=0) for flight in flights)
+    noise = beside.slopes.T @ beside.slopes
+    return Flight(
+        np.asarray(score)[None], (beside.slopes.T @ beside.total)[None], noise[None, :, None]
+    )
