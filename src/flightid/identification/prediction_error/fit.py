@@ -32,7 +32,7 @@ from flightid.identification.prediction_error.information_criteria import criter
 from flightid.identification.prediction_error.instrumental_variables import four_stage
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
 from flightid.identification.prediction_error.linear_regression import regress, require_independent
-from flightid.identification.prediction_error.part_blocks import part_blocks
+from flightid.identification.prediction_error.part_blocks import BEFORE, errors_at, part_blocks
 from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
 from flightid.identification.prediction_error.starts import polynomial_starts
 from flightid.models.polynomial.model import PolynomialModel
@@ -50,7 +50,6 @@ BACKCASTS = 6
 SETTLED = 1e-6
 SAME_MINIMUM = 1e-6
 SPARE_SAMPLES = 3
-BEFORE = {"estimate": "unknown", "zero": "rest", "backcast": "given"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +231,7 @@ def _assemble(
     data: SampledChannels,
     found: _SearchResult,
 ) -> Fit:
-    errors = _errors_at(structure, data, found.memory, found.theta)
+    errors = errors_at(structure, data, found.memory, found.theta)
     found = _compared(structure, data, found, errors)
     counted = tuple(errors[span][found.skip :] for span in data.spans)
     squares = float(sum(row @ row for row in counted))
@@ -296,23 +295,6 @@ def _assemble(
     )
 
 
-def _errors_at(
-    structure: PolynomialStructure, data: SampledChannels, memory: list[list[float]], theta: Array
-) -> Array:
-    """Errors one step ahead of all samples, records after records."""
-    return np.asarray(
-        _native.polynomial_errors(
-            data.output,
-            data.inputs,
-            list(data.lengths),
-            structure.native,
-            theta,
-            BEFORE[structure.past],
-            memory,
-        )
-    )
-
-
 def _compared(
     structure: PolynomialStructure, data: SampledChannels, found: _SearchResult, errors: Array
 ) -> _SearchResult:
@@ -323,7 +305,7 @@ def _compared(
     if found.covariance is None or found.agreement is not None:
         return found
     if has_noise_model(structure) or structure.kernel is not None:
-        at = partial(_errors_at, structure, data, found.memory)
+        at = partial(errors_at, structure, data, found.memory)
         blocks = part_blocks(at, data, found.theta, found.skip)
         agreed = white_covariance(blocks, found.covariance, found.degrees)
         freedom = agreed.freedom if agreed.agreement.by_scatter is not None else None

@@ -1,0 +1,109 @@
+"""Parts of data against analytic truth: their test, the scatter between them, the bars."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from flightid.conventions import Light
+from flightid.evidence.part_checks import agreement_check
+from flightid.uncertainty.agreement import Agreement, compare_parts
+from flightid.uncertainty.parts import Flight, chance_alike, larger, scatter
+from tests.closeness import assert_close
+from tests.strangers.parts import by_arx, by_output_error, changed_midway, steps_flown
+
+Array = NDArray[np.float64]
+
+
+def _flights(means: Array, informations: Array) -> list[Flight]:
+    """Records that each know a mean, scalar or not, with noise of unit variance."""
+    total = informations.sum(axis=0)
+    common = np.linalg.solve(total, np.einsum("kij,kj->i", informations, means))
+    made = []
+    for mean, information in zip(means, informations, strict=True):
+        half = 0.5 * information
+        noise = np.einsum("kl,ij->kilj", np.eye(2), half)
+        made.append(Flight(np.tile(half @ (mean - common), (2, 1)), np.stack([half, half]), noise))
+    return made
+
+
+def test_homogeneity_of_means_is_the_chi_square_of_analysis_of_variance() -> None:
+    means, weights = np.array([1.0, 2.0, 4.0]), np.array([3.0, 1.0, 2.0])
+    flights = [f.whole for f in _flights(means[:, None], weights[:, None, None])]
+    centre = means @ weights / weights.sum()
+    expected = stats.chi2.sf(np.sum(weights * (means - centre) ** 2), 2)
+    assert_close(chance_alike(flights, np.inf), expected, rtol=1e-12, why="rounding")
+    wide = stats.f.sf(np.sum(weights * (means - centre) ** 2) / 2, 2, 20.0)
+    assert_close(chance_alike(flights, 20.0), wide, rtol=1e-12, why="rounding")
+
+
+def test_scatter_of_equal_records_is_the_error_of_their_mean() -> None:
+    random = np.random.default_rng(3)
+    means = random.standard_normal((5, 2))
+    information = np.array([[2.0, 0.5], [0.5, 1.0]])
+    flights = [f.whole for f in _flights(means, np.tile(information, (5, 1, 1)))]
+    spread = np.linalg.inv(5.0 * information)
+    found = scatter(flights, spread, spread)
+    assert_close(found.covariance, np.cov(means.T) / 5.0, rtol=1e-9, why="rounding")
+    assert_close(found.freedom, [4.0, 4.0], rtol=1e-9, why="rounding")
+
+
+def test_a_parameter_that_one_record_alone_sees_has_no_scatter() -> None:
+    informations = np.array([np.diag([1.0, 1.0]), np.diag([1.0, 0.0]), np.diag([1.0, 0.0])])
+    means = np.array([[0.0, 3.0], [1.0, 0.0], [2.0, 0.0]])
+    flights = [f.whole for f in _flights(means, informations)]
+    spread = np.linalg.inv(informations.sum(axis=0))
+    found = scatter(flights, spread, spread)
+    assert_close(
+        found.covariance, [[1.0 / 3.0, 0.0], [0.0, 0.0]], rtol=1e-9, atol=1e-12, why="rounding"
+    )
+    assert_close(chance_alike(flights, np.inf), stats.chi2.sf(2.0, 2), rtol=1e-9, why="rounding")
+
+
+def test_the_larger_covariance_is_below_neither() -> None:
+    random = np.random.default_rng(0)
+    one, other = (a @ a.T for a in random.standard_normal((2, 4, 4)))
+    both = larger(one, other)
+    for less in (one, other):
+        assert np.min(np.linalg.eigvalsh(both - less)) > -1e-9
+
+
+def test_records_that_differ_carry_the_scatter_and_students_freedom() -> None:
+    flights = _flights(np.array([[0.0], [10.0], [20.0]]), np.ones((3, 1, 1)))
+    third = np.full((1, 1), 1.0 / 3.0)
+    agreed = compare_parts(flights, third, third, np.array([np.inf]))
+    assert_close(agreed.covariance, [[100.0 / 3.0]], rtol=1e-9, why="rounding")
+    assert_close(agreed.freedom, [2.0], rtol=1e-9, why="rounding")
+    assert agreement_check(agreed.agreement).light is Light.AMBER
+    two = compare_parts(flights[:1] + flights[2:], third, third, np.array([np.inf]))
+    assert agreement_check(two.agreement).light is Light.RED
+
+
+def test_one_record_says_that_it_cannot_know() -> None:
+    found = agreement_check(Agreement(1, 0.5, None, np.ones(1)))
+    assert found.light is Light.GREEN
+    assert "one record does not tell how far flights differ" in found.what
+
+
+def test_a_vehicle_that_changes_midway_is_red_and_its_bars_reach_both() -> None:
+    same, changed = (
+        by_output_error([changed_midway(np.random.default_rng(1), share)]) for share in (0.0, 0.2)
+    )
+    assert same.agreement is not None
+    assert same.agreement.agree
+    light = next(c.light for c in changed.evidence.checks if c.name == "agreement of parts")
+    assert light is Light.RED
+    low, high = changed.parameters["Lp"].interval95 or (0.0, 0.0)
+    assert low < -3.3 < -2.7 < high
+    assert changed.agreement is not None
+    assert changed.agreement.factor > 3.0
+
+
+def test_vehicles_apart_widen_bars_of_grey_and_black_boxes() -> None:
+    random = np.random.default_rng(2)
+    records = [steps_flown(random, 0.05) for _ in range(3)]
+    for fit in (by_output_error(records), by_arx(records)):
+        assert fit.agreement is not None
+        assert fit.agreement.by_scatter is not None
+        assert all((p.freedom or 99.0) < 3.0 for p in fit.parameters.values())
