@@ -35,6 +35,7 @@ from flightid.identification.regression.fit import (
     check_records,
     limits_of,
     require_seen,
+    require_states,
 )
 from flightid.identification.regression.options import FilterErrorOptions
 from flightid.models import StateSpaceModel
@@ -63,6 +64,7 @@ def fit_filter_error(
     model: StateSpaceModel, data: Record | Sequence[Record], options: FilterErrorOptions
 ) -> Fit:
     """Fit in process noise; see `flightid.identify`."""
+    require_states(model, "filter error")
     records = check_records(model, data)
     problem = _problem(model, records, options)
     groups = cluster(_search(problem, options))

@@ -99,8 +99,11 @@ def at_bound(parameter: Parameter) -> bool:
     return value - parameter.minimum <= margin or parameter.maximum - value <= margin
 
 
-def require_identifiable(names: tuple[str, ...], jacobian: Array) -> None:
-    """Refuse parameters that the data cannot see.
+APART = "fix or tie one of them, widen the band, or excite them apart"
+
+
+def require_identifiable(names: tuple[str, ...], jacobian: Array, action: str = APART) -> None:
+    """Refuse parameters that the data cannot see; `action` is what to do.
 
     Raises
     ------
@@ -119,7 +122,7 @@ def require_identifiable(names: tuple[str, ...], jacobian: Array) -> None:
         else "the data do not see a parameter",
         found=", ".join(guilty),
         needed="a different effect of each on the data",
-        action="fix or tie one of them, widen the band, or excite them apart",
+        action=action,
     )
 
 

@@ -178,7 +178,7 @@ def _transition(model: StateSpaceModel, at: Mapping[str, float]) -> Array:
 
 
 def _fastest_growth(transition: Array) -> float:
-    return max(0.0, float(np.max(np.linalg.eigvals(transition).real)))
+    return max(0.0, float(np.max(np.linalg.eigvals(transition).real, initial=0.0)))
 
 
 def _segments(

@@ -88,7 +88,7 @@ def judge_process_noise(
         systems = [
             _system(fitted, inputs, run) for (inputs, _, _), run in zip(records, runs, strict=True)
         ]
-    except FlightidError:
+    except (FlightidError, np.linalg.LinAlgError):
         return []
     steps = [dt for _, _, dt in records]
     residuals = [y - run for (_, y, _), run in zip(records, runs, strict=True)]

@@ -99,6 +99,8 @@ class FreeRun:
     def free(self) -> tuple[list[Answer], list[Answer]]:
         """Answers to each free state, and to a constant 1 added to each state derivative."""
         n = self.n_states
+        if not n:
+            return [], []
         modes = self._modes(np.eye(n), np.zeros((len(self.matrices[2]), n)), np.zeros(n))
         found = [
             self._answer(column)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import OptionError
 from flightid.identification.fit import Fit
+from flightid.identification.frequency_domain.estimates import APART
 from flightid.identification.regression.attenuation import attenuation, judge_attenuation
 from flightid.identification.regression.compared_equations import compared_costs, compared_records
 from flightid.identification.regression.equation_operators import FourierRows, LocalMeans, Operator
@@ -68,7 +69,8 @@ def fit_equation_error(
         (rows.residuals * weight, rows.slopes[:, :, inner.mask] * weight[:, :, None])
         for rows, weight in zip(settled.rows, settled.weights, strict=True)
     ]
-    require_seen(inner, stack([slopes for _, slopes in weighed]))
+    action = f"{APART}; output_bias=False where equations have constants of their own"
+    require_seen(inner, stack([slopes for _, slopes in weighed]), action)
     constants = [_constants(each[0].shape, options.output_bias) for each in weighed]
     coloured = residual_covariance(
         [_block(*each, basis) for each, basis in zip(weighed, constants, strict=True)]
@@ -109,7 +111,8 @@ def fit_fourier_regression(
     jacobian = stack(
         [each.slopes * w[:, :, None] for each, w in zip(kept, settled.weights, strict=True)]
     )
-    require_seen(inner, jacobian)
+    action = f"{APART}; constants have no harmonic: method='equation_error', output_bias=False"
+    require_seen(inner, jacobian, action)
     covariance, freedom = fourier_covariance(kept, settled.weights, omegas)
     known = Knowledge(
         jacobian, covariance, np.full(len(inner.names), freedom), "spectra of residuals"

@@ -67,7 +67,7 @@ class LocalMeans:
         """Left sides of the state equations."""
         step, width = self.motion.sample_time_s, self.half_width
         rows = [local_derivative(state, step, half_width=width) for state in states]
-        return np.array(rows).reshape(len(states), -1)[:, width + 1 : -width - 1]
+        return np.array(rows).reshape(states.shape)[:, width + 1 : -width - 1]
 
     def means(self, cells: Array) -> Array:
         """The means over neighbouring intervals that the parabola's slope is made of."""

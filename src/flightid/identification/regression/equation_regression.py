@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FitError
-from flightid.identification.regression.equation_operators import Operator
+from flightid.identification.regression.equation_operators import FourierRows, Operator
 from flightid.identification.regression.right_side import Bends, RightSide
 from flightid.identification.regression.rounds import Rows
 from flightid.identification.regression.sampled_equations import MeasuredMotion
 
 Array = NDArray[np.float64]
+ROUNDING = 1e-10
+"""Share of a slope's length below which what constants leave of it is rounding."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,10 @@ class EquationRegression:
             ]
             moved = -np.concatenate(slopes)[self.used]
             rows = Rows(residuals, np.moveaxis(moved, 1, 2).copy())
+            if isinstance(operator, FourierRows):
+                # Constants have no harmonic; what rounding leaves of them is no slope.
+                still = [_constant(each) for each in (sides.rate_slopes, sides.other_slopes)]
+                rows.slopes[:] *= ~np.concatenate(still)[self.used][:, None, :]
             found.append(self._without_constants(rows, operator, weights[place]))
         return found
 
@@ -114,7 +120,11 @@ class EquationRegression:
             weighed = direction * weights[row] ** 2
             weighed /= weighed @ direction
             rows.residuals[row] -= direction * (weighed @ rows.residuals[row])
+            before = np.linalg.norm(rows.slopes[row], axis=0)
             rows.slopes[row] -= np.multiply.outer(direction, weighed @ rows.slopes[row])
+            # A parameter that is a constant of its equation leaves rounding, which is no slope.
+            left = np.linalg.norm(rows.slopes[row], axis=0)
+            rows.slopes[row][:, left <= ROUNDING * before] = 0.0
         return rows
 
     def reach(self) -> Array:
@@ -132,3 +142,10 @@ class EquationRegression:
                 action="fix the parameters of that equation, or add records that excite it",
             )
         return np.asarray(size)
+
+
+def _constant(slopes: Array) -> NDArray[np.bool_]:
+    """Where slopes (n_equations, n_samples, n_free) stay the same over a record."""
+    if not slopes.size:
+        return np.zeros((slopes.shape[0], slopes.shape[2]), dtype=bool)
+    return np.asarray(np.ptp(slopes, axis=1) <= ROUNDING * np.abs(slopes).max(axis=1))

@@ -15,6 +15,7 @@ from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import judge_correlation, judge_parameters, judge_search
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.frequency_domain.estimates import (
+    APART,
     at_bound,
     fitted_parameters,
     require_identifiable,
@@ -111,6 +112,23 @@ def check_records(model: StateSpaceModel, data: Record | Sequence[Record]) -> tu
     return records
 
 
+def require_states(model: StateSpaceModel, method: str) -> None:
+    """Refuse a model without states for a method that follows them.
+
+    Raises
+    ------
+    FitError
+        There is none.
+    """
+    if not model.states:
+        raise FitError(
+            f"{method} follows states, and the model has none",
+            found=", ".join(model.outputs),
+            needed="one state or more",
+            action="use method='output_error', least squares on the outputs",
+        )
+
+
 def limits_of(model: GreyBoxModel, maximum_iterations: int) -> tuple[Array, Limits]:
     """Start values and bounds of the free parameters."""
     free = model.parameters.free
@@ -120,15 +138,15 @@ def limits_of(model: GreyBoxModel, maximum_iterations: int) -> tuple[Array, Limi
     return start, Limits(lower, upper, maximum_iterations)
 
 
-def require_seen(inner: Inner, jacobian: Array) -> None:
-    """Refuse parameters that the data cannot tell apart.
+def require_seen(inner: Inner, jacobian: Array, action: str = APART) -> None:
+    """Refuse parameters that the data cannot tell apart; `action` is what to do.
 
     Raises
     ------
     FitError
         Some combination of them leaves the residuals as they are.
     """
-    require_identifiable(inner.names, jacobian)
+    require_identifiable(inner.names, jacobian, action)
 
 
 def assemble(

@@ -19,6 +19,7 @@ from flightid.identification.regression.fit import (
     check_records,
     limits_of,
     require_seen,
+    require_states,
 )
 from flightid.identification.regression.fourier_output_error import (
     FourierOutputError,
@@ -43,6 +44,7 @@ def fit_fourier_output_error(
     FitError
         The model is not linear: it has no harmonics apart from each other.
     """
+    require_states(model, "Fourier output error")
     _require_linear(model)
     records = check_records(model, data)
     transformed = tuple(

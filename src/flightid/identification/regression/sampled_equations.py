@@ -90,6 +90,8 @@ class Reconstruction:
 
 def _require_states(model: StateSpaceModel, matrix: Array) -> None:
     n = len(model.states)
+    if not n:
+        return
     if len(matrix) and np.linalg.matrix_rank(matrix) == n:
         return
     _, sizes, right = np.linalg.svd(np.vstack([matrix, np.zeros((n, n))]))

@@ -84,8 +84,9 @@ def _check_sizes(model: Linearised) -> None:
         )
     for kind, limit in limits.items():
         count = len(getattr(model, kind))
-        if not 1 <= count <= limit:
-            raise ModelError(f"number of {kind}", found=count, needed=f"1 to {limit}")
+        least = 0 if kind == "states" else 1
+        if not least <= count <= limit:
+            raise ModelError(f"number of {kind}", found=count, needed=f"{least} to {limit}")
     if len(model.equations) != len(model.states):
         raise ModelError(
             "a model needs one equation for each state",

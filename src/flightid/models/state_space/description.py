@@ -68,7 +68,7 @@ def from_plain(content: Mapping[str, object]) -> tuple[Description, tuple[Block,
         A key is missing, unknown or of the wrong type.
     """
     require_keys(content, _KEYS, "the model")
-    states = read_texts(read_table(content, "states"), "states")
+    states = read_texts(read_table(content, "states", required=False), "states")
     trim = read_table(content, "trim", required=False)
     described = Description(
         states=states,
@@ -77,7 +77,7 @@ def from_plain(content: Mapping[str, object]) -> tuple[Description, tuple[Block,
             name: _output(name, item, states)
             for name, item in read_table(content, "outputs").items()
         },
-        equations=_formulas(content, "equations"),
+        equations=_formulas(content, "equations", required=bool(states)),
         parameters=_parameters(content),
         delays=_formulas(content, "delays", required=False),
         trim={name: read_number(value, f"trim.{name}") for name, value in trim.items()},

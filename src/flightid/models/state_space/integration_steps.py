@@ -61,7 +61,7 @@ def steps_per_sample(
             )
         return substeps
     try:
-        fastest = float(np.max(np.abs(model.eigenvalues(at=at))))
+        fastest = float(np.max(np.abs(model.eigenvalues(at=at)), initial=0.0))
     except (DataError, SingularError):
         # The trim may be no point of the flight; the run itself judges whether the model has a
         # value where it goes.

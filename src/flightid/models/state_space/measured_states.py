@@ -82,7 +82,7 @@ class StateOutputs:
         found, slopes = model.native.sample(values, probes, places)
         rows = slopes[:, n:, :]
         scale = np.abs(rows).max(axis=(0, 2)) + 1e-300
-        spread = np.abs(rows[:, :, n : 2 * n] - rows[0, :, n : 2 * n]).max(axis=(0, 2))
+        spread = np.abs(rows[:, :, n : 2 * n] - rows[0, :, n : 2 * n]).max(axis=(0, 2), initial=0.0)
         elsewhere = np.abs(rows[:, :, [*range(n), *range(2 * n, len(places))]])
         strange = elsewhere.max(axis=(0, 2), initial=0.0) + spread > _SAME * scale
         strange |= ~np.all(np.isfinite(outputs), axis=1)
