@@ -2,10 +2,13 @@
 
 Inside flightid values are SI and radians unless a record or model is labelled otherwise; nothing
 converts in silence. Two units *match* when they are the same unit (`deg/s` and `rad/s` do not).
+A lone `g` is what its partner makes of it: standard gravity beside an acceleration, a load factor
+beside a plain number, a gram beside a mass.
 """
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -18,6 +21,22 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 DIMENSIONLESS = "1"
+GRAM, GRAVITY = "gram", "standard_gravity"
+SPELLINGS = {
+    "G": "g",
+    "gn": "g0",
+    "KTS": "kt",
+    "KIAS": "kt",
+    "KTAS": "kt",
+    "fps": "ft/s",
+    "fpm": "ft/min",
+    "mps": "m/s",
+    "nd": "1",
+    "psf": "lbf/ft^2",
+}
+"""Spellings of logs and test reports that pint does not read, or reads as something else."""
+DIGIT_POWER = re.compile(r"(?<![A-Za-z_0-9])(s|sec|m|ft|in|kg|rad|deg|slug)([2-4])(?![A-Za-z_0-9])")
+"""A power without its sign, as in ``ft/s2``."""
 
 
 @cache
@@ -33,6 +52,7 @@ def _registry() -> pint.UnitRegistry[float]:
 @cache
 def _parse(unit: str) -> pint.Unit:
     text = unit.strip()
+    text = DIGIT_POWER.sub(r"\1^\2", SPELLINGS.get(text, text))
     if text in ("", "1", "-"):
         return _registry().dimensionless
     try:
@@ -44,6 +64,22 @@ def _parse(unit: str) -> pint.Unit:
             needed="a unit such as 'rad/s', 'deg', 'ft/s^2', 'm/s', 'V' or '1'",
             action="correct the spelling, or declare '1' for a number without unit",
         ) from error
+
+
+def _pair(source: str, target: str) -> tuple[pint.Unit, pint.Unit]:
+    """Both units, a lone gram read as gravity or as a load factor where the other is no mass."""
+    first, second = _parse(source), _parse(target)
+    return _beside(first, second), _beside(second, first)
+
+
+def _beside(unit: pint.Unit, other: pint.Unit) -> pint.Unit:
+    registry = _registry()
+    gram, gravity = registry.Unit(GRAM), registry.Unit(GRAVITY)
+    if unit in (gram, gravity) and other == registry.dimensionless:
+        return registry.dimensionless
+    if unit == gram and other.dimensionality == gravity.dimensionality:
+        return gravity
+    return unit
 
 
 @cache
@@ -126,11 +162,14 @@ def convert(values: ArrayLike, source: str, target: str) -> NDArray[np.float64]:
     -------
     >>> convert([180.0], "deg", "rad")
     array([3.14159265])
+    >>> convert([1.0], "g", "m/s^2"), convert([1.0], "g", "1")
+    (array([9.80665]), array([1.]))
     """
     registry = _registry()
-    quantity = registry.Quantity(np.asarray(values, dtype=np.float64), _parse(source))
+    first, second = _pair(source, target)
+    quantity = registry.Quantity(np.asarray(values, dtype=np.float64), first)
     try:
-        return np.asarray(quantity.to(_parse(target)).magnitude, dtype=np.float64)
+        return np.asarray(quantity.to(second).magnitude, dtype=np.float64)
     except Exception as error:
         raise UnitError(
             "units do not have the same dimension", found=source, needed=target
@@ -145,7 +184,8 @@ def same_dimension(first: str, second: str) -> bool:
     >>> same_dimension("deg", "rad"), same_dimension("ft", "s")
     (True, False)
     """
-    return bool(_parse(first).dimensionality == _parse(second).dimensionality)
+    one, two = _pair(first, second)
+    return bool(one.dimensionality == two.dimensionality)
 
 
 def is_convertible(source: str, target: str) -> bool:
@@ -158,12 +198,13 @@ def is_convertible(source: str, target: str) -> bool:
     >>> is_convertible("deg/s", "rad/s"), is_convertible("1", "rad"), is_convertible("Hz", "rad/s")
     (True, False, False)
     """
-    if DIMENSIONLESS in (canonical(source), canonical(target)):
+    one, two = (f"{each:~C}" for each in _pair(source, target))
+    if DIMENSIONLESS in (canonical(one), canonical(two)):
         return False
-    return si_base(source)[1] == si_base(target)[1]
+    return si_base(one)[1] == si_base(two)[1]
 
 
-def clash(channel: str, found: str, needed: str, *, where: str) -> UnitError:
+def clash(channel: str, found: str, needed: str, *, where: str, record: str = "") -> UnitError:
     """The error for a channel in another unit than is needed, with what to do about it.
 
     Parameters
@@ -173,6 +214,8 @@ def clash(channel: str, found: str, needed: str, *, where: str) -> UnitError:
         Units.
     where : str
         Who needs it, for example ``"than in the model"``.
+    record : str
+        Where the channel is, where that is known.
 
     Example
     -------
@@ -182,8 +225,8 @@ def clash(channel: str, found: str, needed: str, *, where: str) -> UnitError:
     Python units={'um': 'ft/s'}, in a study [record.units].
     """
     action = (
-        f"convert it: with Record.to_units({channel}={needed!r}) in Python, or in the file, whose "
-        f"column is then headed '{channel} [{needed}]'"
+        f"convert it: in a study with units of a [[conditioning]], in Python with "
+        f"Record.to_units({channel}={needed!r}), or in the file, headed '{channel} [{needed}]'"
     )
     if canonical(found) == DIMENSIONLESS:
         found = f"{DIMENSIONLESS} (no unit is known)"
@@ -192,13 +235,17 @@ def clash(channel: str, found: str, needed: str, *, where: str) -> UnitError:
             f"--units {channel}={needed}, in Python units={{{channel!r}: {needed!r}}}, "
             "in a study [record.units]"
         )
+    of = f" of record {record!r}" if record else ""
     return UnitError(
-        f"channel {channel!r} has another unit {where}", found=found, needed=needed, action=action
+        f"channel {channel!r}{of} has another unit {where}",
+        found=found,
+        needed=needed,
+        action=action,
     )
 
 
-def require_match(channel: str, found: str, needed: str) -> None:
-    """Refuse a channel whose unit is not the very unit needed.
+def require_match(channel: str, found: str, needed: str, *, record: str = "") -> None:
+    """Refuse a channel whose unit is not the very unit needed; a load factor may be in g.
 
     Raises
     ------
@@ -209,8 +256,22 @@ def require_match(channel: str, found: str, needed: str) -> None:
     -------
     >>> require_match("p", "rad/s", "radian/second")
     """
-    if canonical(found) != canonical(needed):
-        raise clash(channel, canonical(found), canonical(needed), where="than is needed")
+    if not match(found, needed):
+        raise clash(
+            channel, canonical(found), canonical(needed), where="than is needed", record=record
+        )
+
+
+def match(found: str, needed: str) -> bool:
+    """Whether two units are the same, or a load factor in g and a plain number.
+
+    Example
+    -------
+    >>> match("g", "1"), match("g", "m/s^2"), match("deg/s", "rad/s")
+    (True, False, False)
+    """
+    one, two = _pair(found, needed)
+    return bool(one == two)
 
 
 @cache

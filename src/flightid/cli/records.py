@@ -100,6 +100,10 @@ def _from_table(
     records = read_records(
         file, inputs or None, outputs or None, excitations=excitations or None, **of_tables
     )
+    for record in records:
+        for channel in record.channels.values():
+            if channel.is_declared:
+                note(f"{record.name}: {channel.name} {channel.note}")
     span = of_logs.get("span_s")
     return records if span is None else [record.segment(*span) for record in records]
 

@@ -188,7 +188,7 @@ def _sources(record: Record, channels: Mapping[str, str]) -> dict[str, str]:
     source = {name: channels.get(name, name) for name in UNITS}
     source = {name: label for name, label in source.items() if name in channels or label in record}
     for name, label in source.items():
-        require_match(label, record.unit(label), UNITS[name])
+        require_match(label, record.unit(label), UNITS[name], record=str(record.name))
     if missing := [name for name in RATES if name not in source]:
         raise DataError(
             "the consistency check needs all three rates",

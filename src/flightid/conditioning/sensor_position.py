@@ -216,7 +216,7 @@ def _arm(position_m: tuple[float, float, float]) -> NDArray[np.float64]:
 def _require_units(record: Record, needed: dict[str, tuple[str, ...]]) -> None:
     for unit, names in needed.items():
         for name in names:
-            require_match(name, record.unit(name), unit)
+            require_match(name, record.unit(name), unit, record=str(record.name))
 
 
 def _replaced(

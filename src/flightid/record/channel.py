@@ -7,6 +7,9 @@ from dataclasses import dataclass, replace
 from flightid.conventions import Role
 from flightid.units import canonical
 
+DECLARED = "unit declared as"
+"""In the note of a channel whose unit was declared against its heading."""
+
 
 @dataclass(frozen=True)
 class Channel:
@@ -33,6 +36,11 @@ class Channel:
     unit: str
     role: Role = Role.OTHER
     note: str = ""
+
+    @property
+    def is_declared(self) -> bool:
+        """Whether the unit was declared against what the file says; the note tells both."""
+        return DECLARED in self.note
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "unit", canonical(self.unit))

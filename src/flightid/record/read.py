@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Role
 from flightid.errors import DataError, FileFormatError, OptionError, UnitError, UnknownNameError
 from flightid.files import sha256_of_file
-from flightid.record.channel import Channel
+from flightid.record.channel import DECLARED, Channel
 from flightid.record.formats import ColumnTable, FileFormat, csv, file_format, matlab, netcdf
 from flightid.record.formats import parquet as parquet_format
 from flightid.record.formats.columns import is_unit
@@ -73,7 +73,8 @@ def read_records(
     time_column : str
         Column of the time stamps; in s unless the file or `units` says otherwise.
     units : mapping of str to str, optional
-        Unit by channel name, or by the name of the time column.
+        Unit by channel name, or by the name of the time column. It goes over what a heading says,
+        and the channel's note says so; converting is `Record.to_units`.
     sample_time_s : float, optional
         Sample time of a file without time column, s; the first sample is at 0 s.
     resample_to_s : float, optional
@@ -101,7 +102,7 @@ def read_records(
     UnknownNameError
         A column that is not there.
     UnitError
-        A unit that is not known or contradicts the file.
+        A unit that is not known, or against what a stored record says of itself.
     OptionError
         Time stated twice, or not at all; a channel named twice; a hold against the file's.
     DataError
@@ -241,14 +242,17 @@ def _unit(
                 needed=f"units={{{name!r}: ...}}, the unit declared",
             )
         return canonical(stated) if stated is not None else default
-    if stated is not None and is_unit(stated) and canonical(stated) != canonical(declared):
-        raise UnitError(
-            f"the declared unit of {name!r} contradicts the file",
-            found=f"{canonical(stated)} in {table.path.name}",
-            needed=canonical(declared),
-            action="leave the declaration out and convert with Record.to_units",
-        )
     return canonical(declared)
+
+
+def _note(table: ColumnTable, column: str, name: str, units: Mapping[str, str]) -> str:
+    """Where samples and unit come from, where not from a column of that name."""
+    notes = [] if name == column else [f"column {column}"]
+    stated, declared = table.units.get(column), units.get(name)
+    known = stated is not None and is_unit(stated)
+    if known and declared is not None and canonical(stated) != canonical(declared):
+        notes.append(f"{DECLARED} {canonical(declared)}; the file says {canonical(stated)}")
+    return ", ".join(notes)
 
 
 def _wanted(
@@ -284,7 +288,7 @@ def _wanted(
                 name,
                 _unit(table, column, name, units, default="1"),
                 role,
-                "" if name == column else f"column {column}",
+                _note(table, column, name, units),
             ),
             column,
         )

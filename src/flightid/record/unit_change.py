@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.errors import UnitError
 from flightid.record.channel import Channel
 from flightid.record.samples import LabelledSamples
 from flightid.units import convert
@@ -20,13 +21,21 @@ def in_units(record: LabelledSamples, units: Mapping[str, str]) -> Converted:
     Raises
     ------
     UnitError
-        A dimension differs.
+        A dimension differs; the message names channel and record.
     """
     samples: dict[str, NDArray[np.float64]] = {}
     trim, channels = record.trim, record.channels
     for key, unit in units.items():
         old = channels[key]
-        samples[key] = convert(record[key], old.unit, unit)
+        try:
+            samples[key] = convert(record[key], old.unit, unit)
+        except UnitError as error:
+            raise UnitError(
+                f"channel {key} of record {record.name!r} cannot be converted: {error.problem}",
+                found=error.found,
+                needed=error.needed,
+                action=error.action or "say what the channel holds by units where it is read",
+            ) from error
         if key in trim:
             trim[key] = float(convert(trim[key], old.unit, unit))
         channels[key] = Channel(key, unit, old.role, old.note)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flightid.conventions import Light
 from flightid.findings import Finding, worst
 from flightid.options import Options
 from flightid.plot.fit import EstimateBar, parameter_intervals
@@ -188,6 +189,19 @@ def _in_short(item: Identified) -> Finding:
 
 
 def _source_blocks(study: StudyResults) -> Iterator[Block]:
+    declared = tuple(
+        Finding(
+            "unit-declared",
+            Light.AMBER,
+            f"record {name}, channel {channel.name}: {channel.note}",
+            "see that the file is wrong, and not the study",
+        )
+        for name, record in study.records.items()
+        for channel in record.channels.values()
+        if channel.is_declared
+    )
+    if declared:
+        yield Lights(declared)
     if study.inspection is None:
         yield TableBlock(_record_table(study))
         return

@@ -18,7 +18,7 @@ from flightid.models.model import LinearModel, Model, model_of
 from flightid.record import Record
 from flightid.record.chosen_hold import chosen_hold
 from flightid.record.several import as_records
-from flightid.units import canonical, clash
+from flightid.units import canonical, clash, match
 
 Predictor = Callable[[Any, Record, tuple[str, ...], Request], Prediction]
 # Kind of model -> how it predicts; the first that fits. A new kind adds its line.
@@ -253,7 +253,7 @@ def require_units(model: object, record: Record, outputs: tuple[str, ...]) -> No
     units = getattr(model, "units", None) or {}
     for name in (*getattr(model, "inputs", ()), *outputs):
         expected = units.get(name)
-        if expected is not None and canonical(expected) != record.unit(name):
+        if expected is not None and not match(record.unit(name), expected):
             raise clash(
                 name,
                 record.unit(name),

@@ -171,7 +171,7 @@ def prepare_records(
     arrays, offsets, own = [], [], []
     for record in records:
         for name in (*model.inputs, *model.outputs):
-            require_match(name, record.unit(name), model.units[name])
+            require_match(name, record.unit(name), model.units[name], record=str(record.name))
         shift_in, shift_out = (
             np.array(
                 [

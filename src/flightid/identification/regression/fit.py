@@ -108,7 +108,7 @@ def check_records(model: StateSpaceModel, data: Record | Sequence[Record]) -> tu
         )
     for record in records:
         for name in (*model.inputs, *model.outputs):
-            require_match(name, record.unit(name), model.units[name])
+            require_match(name, record.unit(name), model.units[name], record=str(record.name))
     return records
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.record import Record
-from flightid.units import clash
+from flightid.units import clash, match
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Scaling:
 
     def scaled(self, record: Record, name: str) -> NDArray[np.float64]:
         """Samples of a channel in deviations about the training mean, after checks."""
-        if record.unit(name) != self.units[name]:
+        if not match(record.unit(name), self.units[name]):
             raise clash(name, record.unit(name), self.units[name], where="than in training")
         self.require_sample_time(record.sample_time_s)
         return np.ascontiguousarray((record[name] - self.mean[name]) / self.deviation[name])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
 from flightid.record import Record
-from flightid.units import clash
+from flightid.units import clash, match
 
 Array = NDArray[np.float64]
 SAME_SAMPLE_TIME = 1e-6
@@ -163,7 +163,7 @@ def require_same(model: SampledModel, units: Mapping[str, str], sample_time_s: f
             action="resample it with conditioning.resample",
         )
     for name, unit in units.items():
-        if unit != model.units.get(name, unit):
+        if not match(unit, model.units.get(name, unit)):
             raise clash(name, unit, model.units[name], where="than the model")
 
 
