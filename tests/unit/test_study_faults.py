@@ -102,3 +102,17 @@ def test_a_use_that_fails_costs_itself_alone(folder: Path, monkeypatch: pytest.M
     results = json.loads((made.output / "results.json").read_text("utf-8"))
     assert results["faults"][0]["light"] == "red"
     assert results["uses"]["files"] == {"Roll": "models/roll.toml"}
+
+
+def test_outputs_free_a_model_from_the_other_columns(folder: Path) -> None:
+    with_load = MODEL.replace(
+        'p = "p"\n[par', 'p = "p"\nay = { expression = "p*3", unit = "1/s" }\n[par'
+    )
+    assert with_load != MODEL
+    (folder / "roll.toml").write_text(with_load, "utf-8")
+    with pytest.raises(fid.FlightidError, match="ay"):
+        fid.run_study(folder / "study.toml", output=folder / "all")
+    told = STUDY.replace('identify = "a"', 'identify = "a"\noutputs = ["p"]')
+    (folder / "study.toml").write_text(told, "utf-8")
+    made = fid.run_study(folder / "study.toml")
+    assert made.identified[0].fit.model.outputs == ("p",)

@@ -22,7 +22,7 @@ class Task:
     settings : ModelSettings
         What was asked.
     inputs, outputs : tuple of str
-        Channels of the model.
+        Channels that the model takes from its records: of the outputs those that are asked for.
     model : TransferFunctionModel, StateSpaceModel or None
         Equations and start values, overrides applied; None for a structure without equations.
     reference : TransferFunctionModel, StateSpaceModel or None
@@ -76,13 +76,16 @@ def load_task(settings: ModelSettings, others: tuple[str, ...] = ()) -> Task:
     for name, given in settings.parameters.items():
         parameters = parameters.with_parameter(replace(parameters[name], **given))
     model = replace(model, parameters=parameters)
+    outputs = settings.outputs or model.outputs
     if settings.outputs:
-        model = with_responses(model, _of_outputs(model, settings.outputs))
+        model = with_responses(model, _of_outputs(model, outputs))
+        if isinstance(model, StateSpaceModel) and not settings.fit.on_responses:
+            model = model.with_outputs(*outputs)
     if settings.responses and not settings.by_coherence:
         model = with_responses(model, settings.responses)
     reference = settings.reference
     beside = None if reference is None else load_structure(source_of(reference), axis=settings.axis)
-    return Task(settings, model.inputs, model.outputs, model, beside, rivals)
+    return Task(settings, model.inputs, outputs, model, beside, rivals)
 
 
 def _of_outputs(model: GreyBoxModel, outputs: tuple[str, ...]) -> tuple[str, ...]:

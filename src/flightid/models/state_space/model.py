@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from flightid import _native
-from flightid.errors import ModelError
+from flightid.errors import ModelError, UnknownNameError
 from flightid.models.estimated import Estimated
 from flightid.models.language.blocks import Block
 from flightid.models.language.record_values import RecordValue
@@ -159,6 +159,27 @@ class StateSpaceModel(Linearised, Tabled):
             There is no such pair.
         """
         return replace(self, pairs=names)
+
+    def with_outputs(self, *names: str) -> StateSpaceModel:
+        """Copy that measures these outputs alone; records then need no others.
+
+        Raises
+        ------
+        UnknownNameError
+            There is no such output.
+        """
+        for name in names:
+            if name not in self.measurements:
+                raise UnknownNameError(
+                    "the model has no such output", found=name, needed=", ".join(self.measurements)
+                )
+        return replace(
+            self,
+            measurements={key: self.measurements[key] for key in self.outputs if key in names},
+            pairs=tuple(pair for pair in self.pairs if pair.split("/")[0] in names),
+            biases={k: v for k, v in self.biases.items() if k in names or k in self.inputs},
+            bare=None if self.bare is None else self.bare.with_outputs(*names),
+        )
 
     def linearise(self, at: Mapping[str, float]) -> StateSpaceModel:
         """Copy whose matrices are those at another point.
