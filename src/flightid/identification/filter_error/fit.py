@@ -13,17 +13,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid import _native
 from flightid.conditioning.smoothing import fourier_smooth
 from flightid.conventions import Light
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
+from flightid.identification.filter_error.gusts import GUST, GUST_UNKNOWNS, Gust
 from flightid.identification.filter_error.innovation_covariance import innovation_covariance
 from flightid.identification.filter_error.innovations import (
     FilteredData,
     InnovationsProblem,
     RecordInnovations,
 )
+from flightid.identification.filter_error.search import minimise, with_gust
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.multistart import DenseEnd, cluster, collect, draw_starts
@@ -43,9 +44,6 @@ from flightid.record import Record, Step
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
-PROCESS_REACH = 12.0
-MEASUREMENT_REACH = 8.0
-"""Logarithms by which noises may differ from their first guess."""
 _FIRST_SHARE = 0.1
 _FLOOR = 1e-6
 _QUARTER_RATE = 0.25
@@ -58,6 +56,7 @@ class _Noise:
     process: Mapping[str, float]
     measurement: Array
     innovation: Array
+    gust: Mapping[str, object] | None
 
 
 def fit_filter_error(
@@ -68,11 +67,15 @@ def fit_filter_error(
     records = check_records(model, data)
     problem = _problem(model, records, options)
     groups = cluster(_search(problem, options))
+    if options.gust_states:
+        problem, groups = with_gust(
+            problem, groups, limits_of(model, options.maximum_iterations)[1]
+        )
     end = groups[0][0]
     inner = Inner.of(model, end.x[: problem.n_free])
     filtered = [found for found, _ in problem.records(end.x, with_slopes=False)]
     freedom = _freedom(problem, filtered)
-    bounded = _noise_at_bound(problem, end)
+    bounded = np.abs(end.x[problem.n_free :]) >= problem.reach - 1e-6
     columns = np.concatenate([inner.mask, ~bounded])
     jacobian = end.jacobian[:, columns] / np.sqrt(end.cost / freedom)
     require_seen(inner, jacobian[:, : len(inner.names)])
@@ -100,6 +103,7 @@ def fit_filter_error(
         extra={
             "process_noise": dict(noise.process),
             "innovation_covariance": noise.innovation.tolist(),
+            "gust": noise.gust,
         },
         noise_covariance=noise.measurement,
     )
@@ -159,50 +163,16 @@ def _levels(data: FilteredData) -> Array:
     return np.array([row.noise for row in rows])
 
 
-class _LastPoint:
-    """Residuals and Jacobian, computed once where both are asked for at one point."""
-
-    def __init__(self, problem: InnovationsProblem) -> None:
-        self._problem = problem
-        self._x = np.empty(0)
-        self._found = (np.empty(0), np.empty((0, 0)))
-
-    def residuals(self, x: Array) -> Array:
-        return self._at(x)[0]
-
-    def jacobian(self, x: Array) -> Array:
-        return self._at(x)[1]
-
-    def _at(self, x: Array) -> tuple[Array, Array]:
-        if not np.array_equal(x, self._x):
-            self._found = self._problem.residuals(x, with_slopes=True)
-            self._x = x.copy()
-        return self._found
-
-
 def _search(problem: InnovationsProblem, options: FilterErrorOptions) -> list[DenseEnd]:
     model = problem.model
     _, limits = limits_of(model, options.maximum_iterations)
-    others = problem.n_all - problem.n_free
-    reach = np.full(others, MEASUREMENT_REACH)
-    reach[: len(problem.noisy)] = PROCESS_REACH
     found: list[DenseEnd | str] = []
     for start in draw_starts(model.parameters.free, options.starts, options.seed):
-        whole = np.concatenate([start, np.zeros(others)])
-        if not np.all(np.isfinite(problem.residuals(whole, with_slopes=False)[0])):
+        whole = np.concatenate([start, np.zeros(problem.n_all - problem.n_free)])
+        if np.all(np.isfinite(problem.residuals(whole, with_slopes=False)[0])):
+            found.append(minimise(problem, whole, limits))
+        else:
             found.append("no steady filter at the start")
-            continue
-        point = _LastPoint(problem)
-        ending = _native.least_squares(
-            point.residuals,
-            point.jacobian,
-            whole,
-            np.concatenate([limits.lower, -reach]),
-            np.concatenate([limits.upper, reach]),
-            problem.n_residuals,
-            limits.maximum_iterations,
-        )
-        found.append(DenseEnd.of_native(ending))
     return collect(found)
 
 
@@ -210,13 +180,6 @@ def _freedom(problem: InnovationsProblem, filtered: Sequence[RecordInnovations])
     """Measured numbers less what was estimated."""
     own = sum(len(each.constants) for each in filtered)
     return float(sum(each.outputs.size for each in problem.data) - own - problem.n_free)
-
-
-def _noise_at_bound(problem: InnovationsProblem, end: DenseEnd) -> NDArray[np.bool_]:
-    logs = np.abs(end.x[problem.n_free :])
-    reach = np.full(len(logs), MEASUREMENT_REACH)
-    reach[: len(problem.noisy)] = PROCESS_REACH
-    return np.asarray(logs >= reach - 1e-6)
 
 
 def _noises(
@@ -231,7 +194,25 @@ def _noises(
     process, measured = problem.noise(end.x)
     states = list(problem.model.states)
     densities = {states[k]: float(np.sqrt(common * process[k])) for k in problem.noisy}
-    return _Noise(densities, np.diag(common * measured), common * filtered[0].filter.innovation)
+    return _Noise(
+        densities,
+        np.diag(common * measured),
+        common * filtered[0].filter.innovation,
+        None if problem.gust is None else _described(problem, problem.gust, end.x, common),
+    )
+
+
+def _described(
+    problem: InnovationsProblem, gust: Gust, unknowns: Array, common: float
+) -> dict[str, object]:
+    deviation, time_s = gust.size(unknowns[-GUST_UNKNOWNS:])
+    names = list(problem.model.outputs)
+    return {
+        "state": list(problem.model.states)[gust.state],
+        "deviation": float(np.sqrt(common)) * deviation,
+        "time_s": time_s,
+        "outputs": [names[row] for row in np.flatnonzero(gust.seen)],
+    }
 
 
 def _costs(
@@ -251,8 +232,9 @@ def _fitted_records(
     filtered: Sequence[RecordInnovations],
 ) -> list[FittedRecord]:
     model = problem.model
-    n, m, p = len(model.states), len(model.inputs), len(model.outputs)
-    found = []
+    m, p = len(model.inputs), len(model.outputs)
+    states = [*model.states, *([] if problem.gust is None else [GUST])]
+    found, n = [], len(states)
     for record, each in zip(records, filtered, strict=True):
         predicted = record.matrix(model.outputs) - each.innovations.T
         names = [*model.inputs, *model.outputs]
@@ -268,10 +250,10 @@ def _fitted_records(
                 record,
                 made,
                 model.outputs,
-                _own(model.states, constants[:n], model.states),
+                _own(model.states, constants[: len(model.states)], model.states),
                 _own(model.outputs, bias, model.units),
                 _own(model.inputs, shift, model.units),
-                dict(zip(model.states, each.states.T, strict=True)),
+                dict(zip(states, each.states.T, strict=True)),
             )
         )
     return found
@@ -297,5 +279,5 @@ def _judge(problem: InnovationsProblem, bounded: NDArray[np.bool_]) -> list[Find
             "leave it out of process_noise; where no state has any, output error is the method",
         )
         for place, at_bound in zip(problem.noisy, bounded, strict=False)
-        if at_bound
+        if at_bound and problem.gust is None
     ]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import FlightidError
+from flightid.identification.filter_error.gusts import GUST_REACH, GUST_UNKNOWNS, Gust
 from flightid.identification.filter_error.steady_filter import (
     ContinuousPoint,
     SteadyFilter,
@@ -25,6 +26,8 @@ from flightid.identification.records.nuisance import Nuisance
 from flightid.models import StateSpaceModel
 
 Array = NDArray[np.float64]
+PROCESS_REACH = 12.0
+MEASUREMENT_REACH = 8.0
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,8 @@ class InnovationsProblem:
     output_bias, input_bias : bool
         Whether each record has unknown output biases and input shifts.
     hold : str
+    gust : Gust or None
+        Its logarithms are the last two unknowns, its state the last of all states.
     """
 
     model: StateSpaceModel
@@ -101,6 +106,7 @@ class InnovationsProblem:
     output_bias: bool
     input_bias: bool
     hold: str
+    gust: Gust | None = None
 
     @property
     def n_free(self) -> int:
@@ -110,7 +116,16 @@ class InnovationsProblem:
     @property
     def n_all(self) -> int:
         """All unknowns."""
-        return self.n_free + len(self.noisy) + len(self.model.outputs) - 1
+        white = len(self.noisy) + len(self.model.outputs) - 1
+        return self.n_free + white + (0 if self.gust is None else GUST_UNKNOWNS)
+
+    @property
+    def reach(self) -> Array:
+        """Logarithms by which the noises may differ from their first guesses."""
+        outputs = len(self.model.outputs) - 1
+        gust = 0 if self.gust is None else GUST_UNKNOWNS
+        counts = len(self.noisy), outputs, gust
+        return np.repeat([PROCESS_REACH, MEASUREMENT_REACH, GUST_REACH], counts)
 
     @property
     def n_residuals(self) -> int:
@@ -120,15 +135,22 @@ class InnovationsProblem:
     def noise(self, unknowns: Array) -> tuple[Array, Array]:
         """Process densities by state and output variances, relative to the common factor."""
         process = np.zeros(len(self.model.states))
-        logs = unknowns[self.n_free :]
         count = len(self.noisy)
-        process[list(self.noisy)] = self.process_scale**2 * np.exp(2.0 * logs[:count])
-        measured = self.output_scale**2 * np.exp(2.0 * np.concatenate([[0.0], logs[count:]]))
-        return process, measured
+        driven, rest = np.split(unknowns[self.n_free :], [count])
+        process[list(self.noisy)] = self.process_scale**2 * np.exp(2.0 * driven)
+        logs = np.concatenate([[0.0], rest[: len(self.model.outputs) - 1]])
+        if self.gust is not None:
+            process = self.gust.process(process, unknowns[-GUST_UNKNOWNS:])
+        return process, self.output_scale**2 * np.exp(2.0 * logs)
+
+    def linear(self, unknowns: Array) -> LinearPoint:
+        """The model at its parameters, with the state of the gust where there is one."""
+        point = LinearPoint.of(self.model, self._values(unknowns))
+        return point if self.gust is None else self.gust.added(point, unknowns[-GUST_UNKNOWNS:])
 
     def points(self, unknowns: Array) -> tuple[ContinuousPoint, list[ContinuousPoint]]:
         """State space with noise, and its derivatives by all unknowns."""
-        return self._noisy(LinearPoint.of(self.model, self._values(unknowns)), unknowns)
+        return self._noisy(self.linear(unknowns), unknowns)
 
     def _noisy(
         self, linear: LinearPoint, unknowns: Array
@@ -150,7 +172,7 @@ class InnovationsProblem:
             wider = np.zeros((p, p))
             wider[output, output] = 2.0 * variance[output]
             slopes.append(ContinuousPoint(*still, none_w, wider))
-        return point, slopes
+        return point, slopes if self.gust is None else [*slopes, *self.gust.slopes(point)]
 
     def _values(self, unknowns: Array) -> Array:
         values = self.model.parameters.independent_values()
@@ -165,7 +187,7 @@ class InnovationsProblem:
         FitError
             There is no steady filter.
         """
-        linear = LinearPoint.of(self.model, self._values(unknowns))
+        linear = self.linear(unknowns)
         point, slopes = self._noisy(linear, unknowns)
         known = {}
         for step in {each.sample_time_s for each in self.data}:

@@ -62,5 +62,9 @@ class FilterErrorOptions(RegressionOptions):
     )
     output_bias: bool = option(True, doc="Constants added to outputs of each record, estimated.")
     input_bias: bool = option(False, doc="Constants added to inputs of each record, estimated.")
+    gust_states: bool = option(
+        True,
+        doc="Whether a gust with a memory is tried, and kept where it is likelier.",
+    )
     starts: int = option(1, minimum=1, doc="Number of starts, the model's values first.")
     seed: int = option(0, minimum=0, doc="Seed of the starts.")

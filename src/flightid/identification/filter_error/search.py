@@ -1,0 +1,96 @@
+"""The search of filter error, and the gust state that coloured innovations ask for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid import _native
+from flightid.identification.filter_error.gusts import GUST_UNKNOWNS, candidates
+from flightid.identification.filter_error.innovations import InnovationsProblem
+from flightid.identification.multistart import DenseEnd
+from flightid.identification.records.held_model import LinearPoint
+from flightid.identification.regression.rounds import Limits
+
+Array = NDArray[np.float64]
+TRIAL_ITERATIONS = 12
+"""Of each candidate's search, before the best one goes on."""
+
+
+class _LastPoint:
+    """Residuals and Jacobian, computed once where both are asked for at one point."""
+
+    def __init__(self, problem: InnovationsProblem) -> None:
+        self._problem = problem
+        self._x = np.empty(0)
+        self._found = (np.empty(0), np.empty((0, 0)))
+
+    def residuals(self, x: Array) -> Array:
+        return self._at(x)[0]
+
+    def jacobian(self, x: Array) -> Array:
+        return self._at(x)[1]
+
+    def _at(self, x: Array) -> tuple[Array, Array]:
+        if not np.array_equal(x, self._x):
+            self._found = self._problem.residuals(x, with_slopes=True)
+            self._x = x.copy()
+        return self._found
+
+
+def minimise(
+    problem: InnovationsProblem, start: Array, limits: Limits, *, iterations: int | None = None
+) -> DenseEnd:
+    """Search from one start: parameters inside their bounds, noises inside their reach."""
+    point, reach = _LastPoint(problem), problem.reach
+    ending = _native.least_squares(
+        point.residuals,
+        point.jacobian,
+        start,
+        np.concatenate([limits.lower, -reach]),
+        np.concatenate([limits.upper, reach]),
+        problem.n_residuals,
+        limits.maximum_iterations if iterations is None else iterations,
+    )
+    return DenseEnd.of_native(ending)
+
+
+def with_gust(
+    problem: InnovationsProblem, groups: list[list[DenseEnd]], limits: Limits
+) -> tuple[InnovationsProblem, list[list[DenseEnd]]]:
+    """The problem and its ends, with a gust state where the likelihood asks for one.
+
+    Each candidate continues from the best end for a few iterations; the likeliest goes on to its
+    end and replaces all others if it gains more than its two unknowns may by chance (BIC). A test
+    of the innovations alone would not do: a gust as long as the vehicle's own motion bends its
+    derivatives and leaves hardly any colour. Nothing is tried where no state has process noise.
+
+    Reference
+    ---------
+    Schwarz (1978), Annals of Statistics 6; Ljung, *System Identification*, 2nd ed., §16.4.
+    """
+    end = groups[0][0]
+    noisy = slice(problem.n_free, problem.n_free + len(problem.noisy))
+    if np.all(end.x[noisy] <= -problem.reach[: len(problem.noisy)] + 1e-6):
+        return problem, groups
+    filtered = [found for found, _ in problem.records(end.x, with_slopes=False)]
+    values = problem.model.parameters.independent_values()
+    values[problem.model.parameters.free_indices] = end.x[: problem.n_free]
+    states = np.sqrt(np.mean([np.var(each.states, axis=0) for each in filtered], axis=0))
+    step = min(each.sample_time_s for each in problem.data)
+    longest = max(each.outputs.shape[1] * each.sample_time_s for each in problem.data)
+    start = np.concatenate([end.x, np.zeros(GUST_UNKNOWNS)])
+    trials = []
+    for gust in candidates(LinearPoint.of(problem.model, values), states, step, longest):
+        tried = replace(problem, gust=gust)
+        trials.append((tried, minimise(tried, start, limits, iterations=TRIAL_ITERATIONS)))
+    if not trials:
+        return problem, groups
+    tried, begun = min(trials, key=lambda trial: trial[1].cost)
+    ended = minimise(tried, begun.x, limits)
+    total = sum(each.outputs.size for each in problem.data)
+    if total * np.log(end.cost / ended.cost) <= GUST_UNKNOWNS * np.log(total):
+        return problem, groups
+    return tried, [[ended]]
