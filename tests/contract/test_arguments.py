@@ -159,8 +159,8 @@ OWN = {
                    "predicted substeps weights"),
     "study": ("a folder, and a stage to run", "cache output tune"),
     "table": ("a column by number", "index"),
-    "uncertainty": ("a function that carries a covariance", "count factor function missing place "
-                    "reason scale thing"),
+    "uncertainty": ("a function that carries a covariance", "count digits factor function missing "
+                    "place reason scale thing"),
     "validation": (
         "orders of a scan; correlations of residuals by output and input",
         "criterion fitted_input fitted_noise input lags maximum_lag measured na nb nc nd "

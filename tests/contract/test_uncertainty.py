@@ -43,3 +43,30 @@ def test_no_result_keeps_an_interval_of_its_own() -> None:
         and HAND_MADE.search(path.read_text())
     ]
     assert not offenders, "hold an Estimate instead of a standard error or interval beside a value"
+
+
+LITERAL = re.compile(r"Column\([^)]*\b9[59] %")
+METHOD = re.compile(r"    def (\w+)\(self([^)]*)\)(.*?)(?=\n    def |\n\n\n|\Z)", re.DOTALL)
+SPEAKS = re.compile(r"\b(interval_words|estimate_table)\(")
+OF_STUDIES = "study/"  # a page has one level
+
+
+def _without_level(text: str) -> list[str]:
+    """Methods that print intervals and take no level; what they call is told it."""
+    return [
+        found[1]
+        for found in METHOD.finditer(text)
+        if SPEAKS.search(found[3]) and "level" not in found[2]
+    ]
+
+
+def test_tables_with_intervals_take_a_level() -> None:
+    offenders = []
+    for path in sorted(SOURCE.rglob("*.py")):
+        place, text = str(path.relative_to(SOURCE)), path.read_text()
+        if LITERAL.search(text) and not place.startswith(OF_STUDIES):
+            offenders.append(f"{place}: a column at a level that nobody can choose")
+        offenders += [f"{place}: {name} takes no level" for name in _without_level(text)]
+    assert not offenders, "\n".join(offenders)
+    assert LITERAL.search('Column("frequency, 95 %")')
+    assert _without_level("    def table(self) -> Table:\n        estimate_table(x)") == ["table"]

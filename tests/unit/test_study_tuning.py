@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -57,7 +56,7 @@ def study(tmp_path: Path) -> Path:
 
 
 def test_a_study_is_tuned_from_its_log_and_its_models_beside_it(
-    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     target = tmp_path / "gains.param"
     code = run(["--quiet", "tune", str(study), "--write", str(target), "--json"])
@@ -74,9 +73,8 @@ def test_a_study_is_tuned_from_its_log_and_its_models_beside_it(
     assert "Roll gains" in (made / "report.txt").read_text(encoding="utf-8")
 
     file, log = str(made / "models" / "roll_rate.toml"), str(made / "flight.bin")
-    quick = partial(TuneSettings, draws=12, angle_loop=False)
-    monkeypatch.setattr("flightid.study.tuning.TuneSettings", quick)
-    code = run(["--quiet", "tune", file, "--log", log, "--json"])
+    quick = ["--draws", "12", "--no-angle-loop", "--json"]
+    code = run(["--quiet", "tune", file, "--log", log, *quick])
     assert code in (0, 1)
     assert list(json.loads(capsys.readouterr().out)["designs"]) == ["roll"]
     assert run(["--quiet", "tune", file]) == 2

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import emit_values, json_option, leave_by_verdict, note
+from flightid.cli.output import emit_values, json_option, leave_by_verdict, level_option, note
 
 if TYPE_CHECKING:
     from flightid.control.tuning.result import Tuning
@@ -49,6 +49,7 @@ def _fields() -> dict[str, type[Options]]:
     help="Parameter file to write, for example gains.param; every step with its way back.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace parameter files that exist.")
+@level_option
 @json_option
 def command(
     files: tuple[Path, ...],
@@ -56,6 +57,7 @@ def command(
     output: Path | None,
     target: Path | None,
     overwrite: bool,
+    level: float | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
@@ -84,8 +86,9 @@ def command(
         emit_values(tuning.to_dict())
     else:
         click.echo(str(tuning.summary()))
+        at = {} if level is None else {"level": level}
         for design in tuning.designs:
-            click.echo(f"\n{design.promise_table()}")
+            click.echo(f"\n{design.promise_table(**at)}")
         if tuning.together:
             click.echo(f"\n{tuning.together_table()}")
     if report is not None:

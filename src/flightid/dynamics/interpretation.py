@@ -26,6 +26,7 @@ from flightid.models.sampled.discrete_modes import AT_ORIGIN, NO_COUNTERPART
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.quantiles import LEVEL, interval_words
 from flightid.uncertainty.uneven import turned
 
 LIGHT_DAMPING = 0.3
@@ -119,8 +120,14 @@ class Interpretation(Result, schema="flightid.interpretation/1"):
         """What the model says about the vehicle, one sentence for each root."""
         return tuple(_sentence(item) for item in self.roots)
 
-    def summary(self) -> Table:
-        """Table of poles and zeros with their meaning; transfer functions and findings below."""
+    def summary(self, *, level: float = LEVEL) -> Table:
+        """Table of poles and zeros with their meaning; transfer functions and findings below.
+
+        Parameters
+        ----------
+        level : float
+            Of the intervals.
+        """
         columns = (
             Column("response"),
             Column("root"),
@@ -137,19 +144,19 @@ class Interpretation(Result, schema="flightid.interpretation/1"):
         rows: list[tuple[Cell, ...]] = []
         for item in self.roots:
             root, tau = item.root, item.time_constant
-            half = _half(root.natural_frequency)
+            half = _half(root.natural_frequency, level)
             rows.append(
                 (
                     root.response, root.kind, root.z.real, root.z.imag, item.frequency_hz,
                     None if half is None else half / (2 * math.pi),
                     None if root.damping is None or not root.z.imag else root.damping.value,
-                    _half(root.damping) if root.z.imag else None,
-                    None if tau is None else tau.value, _half(tau), item.character,
+                    _half(root.damping, level) if root.z.imag else None,
+                    None if tau is None else tau.value, _half(tau, level), item.character,
                 )
             )  # fmt: skip
         notes = (
             *(f"{name} = {text}" for name, text in self.transfer_functions.items()),
-            "one line for each conjugate pair; ± is half a 95 % interval",
+            f"one line for each conjugate pair; ± is half a {interval_words(level)} interval",
             *map(str, self.findings),
         )
         return Table(repr(self), columns, tuple(rows), notes)
@@ -356,7 +363,5 @@ def _sentence(item: InterpretedRoot) -> str:
     return f"{text}; {item.character}." if item.character else f"{text}."
 
 
-def _half(item: Estimate | None) -> float | None:
-    if item is None or item.interval95 is None:
-        return None
-    return (item.interval95[1] - item.interval95[0]) / 2
+def _half(item: Estimate | None, level: float) -> float | None:
+    return None if item is None else item.half(level)

@@ -100,6 +100,28 @@ class Estimate(Generic[Number_co]):
         half = half_width(level, self.freedom) * self.stderr
         return self.value - half, self.value + half
 
+    def half(self, level: float = LEVEL) -> float | None:
+        """Half the width of the interval, in `unit`; None where there is none.
+
+        Example
+        -------
+        >>> round(Estimate("Lp", -4.0, "1/s", 0.1).half(), 3)
+        0.196
+        """
+        ends = self.interval(level)
+        return None if ends is None else (ends[1] - ends[0]) / 2.0
+
+    def range_words(self, level: float = LEVEL, digits: int = 4) -> str:
+        """The interval in words, empty where there is none.
+
+        Example
+        -------
+        >>> Estimate("Lp", -4.0, "1/s", 0.1).range_words(0.9)
+        '-4.164 to -3.836'
+        """
+        ends = self.interval(level)
+        return "" if ends is None else f"{ends[0]:.{digits}g} to {ends[1]:.{digits}g}"
+
     @property
     def interval95(self) -> Interval | None:
         """95 % interval, in `unit`."""

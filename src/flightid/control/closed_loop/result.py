@@ -12,6 +12,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.quantiles import LEVEL, interval_words
 from flightid.uncertainty.uncertain import Uncertain
 
 
@@ -137,25 +138,36 @@ class ClosedLoop(
         names = ", ".join(self.actuators)
         return f"ClosedLoop({n} actuator{'' if n == 1 else 's'} [{names}], {verdict}{pole})"
 
-    def summary(self) -> Table:
-        """Table of the poles with 95 % intervals.
+    def summary(self, *, level: float = LEVEL) -> Table:
+        """Table of the poles with intervals.
+
+        Parameters
+        ----------
+        level : float
+            Of the intervals.
 
         Returns
         -------
         Table
         """
+        words = interval_words(level)
         columns = (
-            Column("real", "rad/s"), Column("real, 95 %"), Column("imaginary", "rad/s"),
-            Column("frequency", "rad/s"), Column("frequency, 95 %"), Column("damping", digits=3),
-            Column("damping, 95 %"),
-        )  # fmt: skip
+            Column("real", "rad/s"),
+            Column(f"real, {words}"),
+            Column("imaginary", "rad/s"),
+            Column("frequency", "rad/s"),
+            Column(f"frequency, {words}"),
+            Column("damping", digits=3),
+            Column(f"damping, {words}"),
+        )
         rows = tuple(
             (
-                each.real.value, _interval(each.real), each.imaginary.value, each.frequency.value,
-                _interval(each.frequency), each.damping.value, _interval(each.damping),
+                *(each.real.value, each.real.range_words(level), each.imaginary.value),
+                *(each.frequency.value, each.frequency.range_words(level)),
+                *(each.damping.value, each.damping.range_words(level)),
             )
             for each in self.poles
-        )  # fmt: skip
+        )
         notes = [str(finding) for finding in self.findings]
         if self.draws:
             notes.append(f"{self.unstable_draws} of {self.draws} drawn vehicles are unstable.")
@@ -165,9 +177,3 @@ class ClosedLoop(
 
     def _computed(self) -> dict[str, object]:
         return {"stable": self.is_stable}
-
-
-def _interval(quantity: Reading) -> str:
-    if quantity.interval95 is None:
-        return ""
-    return f"{quantity.interval95[0]:.4g} to {quantity.interval95[1]:.4g}"

@@ -21,6 +21,7 @@ from flightid.errors import DataError, UnknownNameError
 from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty.quantiles import LEVEL, interval_words
 
 
 @dataclass(frozen=True)
@@ -210,15 +211,22 @@ class PidDesign(
         ]
         return Table(f"Gains of {self.axis}", columns, tuple(rows), self._words())
 
-    def promise_table(self) -> Table:
-        """Margins and bandwidths beside those of the flown gains."""
+    def promise_table(self, *, level: float = LEVEL) -> Table:
+        """Margins and bandwidths beside those of the flown gains.
+
+        Parameters
+        ----------
+        level : float
+            Of the intervals; what the worst plant promises has its own confidence.
+        """
+        words = interval_words(level)
         columns = (
             Column("loop"),
             Column("quantity"),
             Column("required"),
             Column("nominal", digits=3),
-            Column("95 % low", digits=3),
-            Column("95 % high", digits=3),
+            Column(f"{words} low", digits=3),
+            Column(f"{words} high", digits=3),
             Column("worst", digits=3),
             Column("unit"),
             Column("flown", digits=3),
@@ -226,7 +234,7 @@ class PidDesign(
         )
         rows: list[tuple[Cell, ...]] = []
         for each in self.promises:
-            low, high = each.estimate.interval95 or (None, None)
+            low, high = each.estimate.interval(level) or (None, None)
             rows.append(
                 (
                     *(each.loop, each.name, each.required, each.nominal, low, high, each.worst),

@@ -12,6 +12,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.quantiles import LEVEL, interval_words
 
 
 @dataclass(frozen=True)
@@ -123,15 +124,21 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
             needed=", ".join(number.name for number in self.parameters),
         )
 
-    def summary(self) -> Table:
-        """Table of the common parameters, ratios to the first condition and findings."""
+    def summary(self, *, level: float = LEVEL) -> Table:
+        """Table of the common parameters, ratios to the first condition and findings.
+
+        Parameters
+        ----------
+        level : float
+            Of the intervals.
+        """
         notes = [
             f"Only in {name}: {', '.join(alone)}."
             for name, alone in self.only_parameters.items()
             if alone
         ]
         title = "Parameters, " + " and ".join(self.conditions)
-        return self._table(title, self.parameters, (*notes, *self.verdicts))
+        return self._table(title, self.parameters, (*notes, *self.verdicts), level)
 
     @property
     def verdicts(self) -> tuple[str, ...]:
@@ -140,36 +147,44 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
         said = [f"Changed beyond noise: {'; '.join(changed)}."] if changed else []
         return (*said, *(str(f) for f in self.findings if f.light is not Light.GREEN))
 
-    def modes_table(self) -> Table:
-        """Table of the modes that answer to each other."""
+    def modes_table(self, *, level: float = LEVEL) -> Table:
+        """Table of the modes that answer to each other.
+
+        Parameters
+        ----------
+        level : float
+            Of the intervals.
+        """
         numbers = [number for mode in self.modes for number in mode.numbers]
         notes = tuple(
             f"Only in {name}: {', '.join(alone)}."
             for name, alone in self.only_modes.items()
             if alone
         )
-        return self._table("Modes, " + " and ".join(self.conditions), numbers, notes)
+        return self._table("Modes, " + " and ".join(self.conditions), numbers, notes, level)
 
     def _table(
         self,
         title: str,
         numbers: tuple[ComparedNumber, ...] | list[ComparedNumber],
         notes: tuple[str, ...],
+        level: float,
     ) -> Table:
         columns = [Column("quantity"), Column("unit")]
         for name in self.conditions:
             columns += [Column(name), Column("±", digits=2)]
         for name in self.conditions[1:]:
-            columns += [Column(f"{name} / {self.conditions[0]}", digits=3), Column("95 %")]
+            columns += [Column(f"{name} / {self.conditions[0]}", digits=3)]
+            columns += [Column(interval_words(level))]
             columns += [Column("chance", digits=2)]
         rows: list[tuple[Cell, ...]] = []
         for number in numbers:
             unit = next(iter(number.values.values())).unit
             cells: list[Cell] = [number.name, "" if unit == "1" else unit]
             for name in self.conditions:
-                cells += _value(number.values.get(name))
+                cells += _value(number.values.get(name), level)
             for name in self.conditions[1:]:
-                cells += [*_ratio(number.ratios.get(name)), number.chances.get(name)]
+                cells += [*_ratio(number.ratios.get(name), level), number.chances.get(name)]
             rows.append(tuple(cells))
         said: tuple[str, ...] = ("chance: of so large a difference between equal truths.",)
         if not any(number.chances for number in numbers):
@@ -191,15 +206,13 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
         return (self.summary(), self.modes_table())
 
 
-def _value(quantity: Reading | None) -> list[Cell]:
+def _value(quantity: Reading | None, level: float) -> list[Cell]:
     if quantity is None:
         return [None, None]
-    ends = quantity.interval95
-    return [quantity.value, None if ends is None else (ends[1] - ends[0]) / 2.0]
+    return [quantity.value, quantity.half(level)]
 
 
-def _ratio(ratio: Reading | None) -> list[Cell]:
+def _ratio(ratio: Reading | None, level: float) -> list[Cell]:
     if ratio is None or ratio.value is None:
         return [None, ""]
-    ends = ratio.interval95
-    return [ratio.value, "" if ends is None else f"{ends[0]:.3g} to {ends[1]:.3g}"]
+    return [ratio.value, ratio.range_words(level, 3)]

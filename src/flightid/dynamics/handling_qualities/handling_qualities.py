@@ -20,6 +20,7 @@ from flightid.responses import FrequencyResponse
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
+from flightid.uncertainty.quantiles import LEVEL, interval_words
 
 ATTITUDES = {"roll": ("phi", "p"), "pitch": ("theta", "q"), "yaw": ("psi", "r")}
 CONTROLS = {
@@ -79,14 +80,21 @@ class HandlingQualities(Result, schema="flightid.handling_qualities/1"):
         )
         return f"HandlingQualities({words}" + (f", worst {self.worst})" if self.worst else ")")
 
-    def summary(self) -> Table:
-        """One table: each number with its interval, and each level with its probability."""
+    def summary(self, *, level: float = LEVEL) -> Table:
+        """One table: each number with its interval, and each level with its probability.
+
+        Parameters
+        ----------
+        level : float
+            Of the intervals; what a standard calls a level is not meant.
+        """
+        words = interval_words(level)
         columns = (
             Column("what"),
             Column("quantity"),
             Column("value"),
-            Column("95 % low"),
-            Column("95 % high"),
+            Column(f"{words} low"),
+            Column(f"{words} high"),
             Column("unit"),
             Column("level"),
             Column("probability of level 1", "%", 3),
@@ -96,11 +104,12 @@ class HandlingQualities(Result, schema="flightid.handling_qualities/1"):
         for axis, found in self.bandwidths.items():
             own = [each for each in self.ratings if each.subject == found.name]
             for place, quantity in enumerate(found.quantities):
-                rows.append(_row(axis, quantity, own[0] if own and place == 0 else None))
+                rated = own[0] if own and place == 0 else None
+                rows.append(_row(axis, quantity, rated, level))
         named = {found.name for found in self.bandwidths.values()}
         for rating in self.ratings:
             if rating.subject not in named:
-                rows += _mode_rows(rating)
+                rows += _mode_rows(rating, level)
         doubts = {rating.chart.doubt for rating in self.ratings if rating.chart.doubt}
         case = ", ".join(f"{name} {value}" for name, value in self.conditions.items())
         notes = (f"{self.vehicle}: {case}.", FOR_PILOTS, *sorted(doubts), *map(str, self.findings))
@@ -113,8 +122,8 @@ FOR_PILOTS = (
 )
 
 
-def _row(what: str, quantity: Reading, rating: Rating | None) -> tuple[Cell, ...]:
-    low, high = quantity.interval95 if quantity.interval95 is not None else (None, None)
+def _row(what: str, quantity: Reading, rating: Rating | None, level: float) -> tuple[Cell, ...]:
+    low, high = quantity.interval(level) or (None, None)
     unit = "" if quantity.unit == "1" else quantity.unit
     return (what, quantity.name, quantity.value, low, high, unit, *_level(rating))
 
@@ -126,10 +135,10 @@ def _level(rating: Rating | None) -> tuple[Cell, ...]:
     return (rating.text, None if shares is None else 100.0 * shares[0], rating.chart.standard)
 
 
-def _mode_rows(rating: Rating) -> list[tuple[Cell, ...]]:
+def _mode_rows(rating: Rating, level: float) -> list[tuple[Cell, ...]]:
     rows = []
     for place, quantity in enumerate(rating.quantities):
-        rows.append(_row(rating.subject, quantity, rating if place == 0 else None))
+        rows.append(_row(rating.subject, quantity, rating if place == 0 else None, level))
     return rows
 
 

@@ -19,6 +19,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.quantiles import LEVEL
 from flightid.uncertainty.uncertain import Uncertain
 from flightid.units import convert, same_dimension
 
@@ -149,8 +150,14 @@ class ApproximateModes(Result, schema="flightid.approximate_modes/1"):
             needed=", ".join(each.name for each in self.approximations),
         )
 
-    def summary(self) -> Table:
-        """Table of the approximations beside the full modes, formulas and sources below."""
+    def summary(self, *, level: float = LEVEL) -> Table:
+        """Table of the approximations beside the full modes, formulas and sources below.
+
+        Parameters
+        ----------
+        level : float
+            Of the intervals.
+        """
         columns = (
             Column("approximation"),
             Column("ω_n or root", "rad/s"),
@@ -162,7 +169,7 @@ class ApproximateModes(Result, schema="flightid.approximate_modes/1"):
             Column("difference", "%", 3),
             Column("of ζ", digits=2),
         )
-        rows = tuple(_row(each) for each in self.approximations)
+        rows = tuple(_row(each, level) for each in self.approximations)
         notes = [f"{e.name}: {e.formula}; {e.source}." for e in self.approximations]
         notes += [f"{e.name}: {e.reason}." for e in self.approximations if e.reason]
         if self.quasi_static:
@@ -301,7 +308,7 @@ def _match(rule: Rule, root: complex, full: Modes, read: StateMatrix) -> tuple[M
     return min(alike, key=lambda mode: abs(mode.root - root)), ""
 
 
-def _row(each: ApproximateMode) -> tuple[Cell, ...]:
+def _row(each: ApproximateMode, level: float) -> tuple[Cell, ...]:
     full = each.full
     theirs: tuple[Cell, ...] = (None, None)
     if full is not None and full.is_pair:
@@ -309,14 +316,8 @@ def _row(each: ApproximateMode) -> tuple[Cell, ...]:
     elif full is not None:
         theirs = (full.root.real, None)
     mine = (each.natural_frequency, each.damping_ratio)
-    cells = [cell for q in mine for cell in (q.value, _half(q))]
+    cells = [cell for q in mine for cell in (q.value, q.half(level))]
     return (each.name, *cells, *theirs, each.difference_percent, each.damping_difference)
-
-
-def _half(quantity: Reading) -> float | None:
-    if quantity.interval95 is None:
-        return None
-    return (quantity.interval95[1] - quantity.interval95[0]) / 2.0
 
 
 def _judge(found: tuple[ApproximateMode, ...]) -> Iterator[Finding]:

@@ -321,8 +321,8 @@ class Modes(Result, schema="flightid.modes/1"):
             for each in mode.participations:
                 if (each.share.value or 0.0) < LEAST_SHOWN:
                     continue
-                share = (100.0 * (each.share.value or 0.0), _half(each.share, level, 100.0))
-                size = (each.size.value, _half(each.size, level), each.unit)
+                share = (100.0 * (each.share.value or 0.0), _percent(each.share.half(level)))
+                size = (each.size.value, each.size.half(level), each.unit)
                 rows.append(
                     (mode.name, each.state, *share, *size, float(np.degrees(each.phase_rad)))
                 )
@@ -354,16 +354,14 @@ def _values(quantities: list[Reading]) -> NDArray[np.float64]:
     return np.array([np.nan if q.value is None else q.value for q in quantities])
 
 
-def _half(quantity: Reading, level: float, factor: float = 1.0) -> float | None:
-    ends = quantity.interval(level)
-    return None if ends is None else factor * (ends[1] - ends[0]) / 2.0
+def _percent(share: float | None) -> float | None:
+    return None if share is None else 100.0 * share
 
 
 def _row(mode: Mode, level: float) -> tuple[Cell, ...]:
     pair = mode.is_pair
     last = mode.time_to_half if mode.time_to_half.value is not None else mode.time_to_double
-    ends = last.interval(level)
-    interval = "" if ends is None else "{:.3g} to {:.3g}".format(*ends)
+    interval = last.range_words(level, 3)
     numbers: list[Cell] = []
     for each, there in (
         (mode.real, True),
@@ -371,7 +369,7 @@ def _row(mode: Mode, level: float) -> tuple[Cell, ...]:
         (mode.natural_frequency, pair),
         (mode.damping_ratio, pair),
     ):
-        numbers += [each.value, _half(each, level)] if there else [None, None]
+        numbers += [each.value, each.half(level)] if there else [None, None]
     times = (mode.period, mode.time_constant, mode.time_to_half, mode.time_to_double)
     parts = f": {mode.named.parts}" if mode.named.parts else ""
     words = f"{mode.named.character}{parts}"
