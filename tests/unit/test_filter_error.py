@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
@@ -9,10 +11,12 @@ from scipy.linalg import solve_discrete_are
 import flightid as fid
 from flightid import _native
 from flightid.errors import FitError
+from flightid.identification.filter_error.gusts import Gust
 from flightid.identification.filter_error.innovations import FilteredData, InnovationsProblem
 from flightid.identification.filter_error.steady_filter import ContinuousPoint, steady_filter
 from tests.closeness import assert_close
 from tests.regression_flights import fly, noisy, short_period, values
+from tests.strangers import gusts
 
 
 def test_steady_filter_is_the_textbook_one() -> None:
@@ -99,3 +103,47 @@ def test_without_turbulence_it_agrees_with_output_error() -> None:
     assert set(record.states) == {"alpha", "q"}
     assert record.states["q"].shape == (flight.n_samples,)
     assert filtered.to_dict()["schema"] == "flightid.fit/1"
+
+
+def test_slopes_of_a_gust_are_exact() -> None:
+    problem, start = _problem(short_period())
+    gust = Gust(0, np.array([True, True]), np.array([False, False, True]), 0.02, 0.4)
+    problem, start = replace(problem, gust=gust), np.concatenate([start, [0.3, -0.2]])
+    residuals, jacobian = problem.residuals(start, with_slopes=True)
+    gradient = 2.0 * jacobian.T @ residuals
+
+    def cost(x: np.ndarray) -> float:
+        return float(np.sum(problem.residuals(x, with_slopes=False)[0] ** 2))
+
+    for place in (0, 1, len(start) - 2, len(start) - 1):
+        step = 1e-5 * np.eye(len(start))[place]
+        central = (cost(start + step) - cost(start - step)) / 2e-5
+        assert_close(gradient[place], central, rtol=2e-6, atol=1e-6, why="central differences")
+
+
+def test_a_gust_felt_as_the_velocity_is_found_and_unbends_its_derivatives() -> None:
+    """SciPy's flight in Dryden's gust: white noise alone misses Zw by five standard errors."""
+    record = gusts.flight(4, 1.0, 0.3)
+    fit = fid.identify(gusts.model(), record, method="filter_error")
+    white = fid.identify(gusts.model(), record, method="filter_error", gust_states=False)
+    heave, bent = fit.parameters["Zw"], white.parameters["Zw"]
+    truth = gusts.TRUTH["Zw"]
+    assert abs(heave.value - truth) < 3.0 * heave.stderr < 0.2
+    assert abs(bent.value - truth) > 3.0 * bent.stderr
+    gust = fit.provenance["gust"]
+    assert gust["state"] == "w"
+    assert gust["outputs"] == ["az"]
+    assert_close(gust["deviation"], 1.0, rtol=0.15, why="60 s of a gust of 1 m/s")
+    assert fit.records[0].states["gust"].shape == (record.n_samples,)
+    assert white.provenance["gust"] is None
+
+
+def test_a_model_that_bends_is_refused() -> None:
+    model = fid.load_model("quadrotor_6dof")
+    driven = {name: np.zeros(50) for name in model.inputs}
+    seen = {name: np.zeros(50) for name in model.outputs}
+    record = fid.Record.from_arrays(
+        np.arange(50) * 0.02, inputs=driven, outputs=seen, units=dict(model.units)
+    )
+    with pytest.raises(FitError, match="filter error needs a linear model"):
+        fid.identify(model, record, method="filter_error")

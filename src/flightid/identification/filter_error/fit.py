@@ -35,6 +35,7 @@ from flightid.identification.regression.fit import (
     assemble,
     check_records,
     limits_of,
+    require_linear,
     require_seen,
     require_states,
 )
@@ -62,7 +63,14 @@ class _Noise:
 def fit_filter_error(
     model: StateSpaceModel, data: Record | Sequence[Record], options: FilterErrorOptions
 ) -> Fit:
-    """Fit in process noise; see `flightid.identify`."""
+    """Fit in process noise; see `flightid.identify`.
+
+    Raises
+    ------
+    FitError
+        The model is not linear, or the data cannot tell parameters apart.
+    """
+    require_linear(model, "filter error")
     require_states(model, "filter error")
     records = check_records(model, data)
     problem = _problem(model, records, options)

@@ -138,6 +138,25 @@ def limits_of(model: GreyBoxModel, maximum_iterations: int) -> tuple[Array, Limi
     return start, Limits(lower, upper, maximum_iterations)
 
 
+def require_linear(model: StateSpaceModel, method: str) -> None:
+    """Refuse a model that one linearisation does not describe.
+
+    Raises
+    ------
+    FitError
+        Its matrices change with states or inputs.
+    """
+    if model.is_linear:
+        return
+    raise FitError(
+        f"{method} needs a linear model",
+        found=f"equations of {model.name!r} whose matrices change with states or inputs",
+        needed="equations that are linear in states and inputs",
+        action="use method='output_error', which integrates them; where all states are measured "
+        "'fourier_regression' or 'equation_error'; or write the equations linear about the trim",
+    )
+
+
 def require_seen(inner: Inner, jacobian: Array, action: str = APART) -> None:
     """Refuse parameters that the data cannot tell apart; `action` is what to do.
 

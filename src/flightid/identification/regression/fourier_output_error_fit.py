@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, FitError, FlightidError
+from flightid.errors import DataError, FlightidError
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.multistart import cluster, collect, draw_starts
@@ -18,6 +18,7 @@ from flightid.identification.regression.fit import (
     assemble,
     check_records,
     limits_of,
+    require_linear,
     require_seen,
     require_states,
 )
@@ -44,8 +45,8 @@ def fit_fourier_output_error(
     FitError
         The model is not linear: it has no harmonics apart from each other.
     """
+    require_linear(model, "Fourier output error")
     require_states(model, "Fourier output error")
-    _require_linear(model)
     records = check_records(model, data)
     transformed = tuple(
         TransformedRecord.of(record, model, options.band_rad_s) for record in records
@@ -75,18 +76,6 @@ def fit_fourier_output_error(
         _compared(problem, best.rows),
         options,
         extra={"rounds": best.rounds},
-    )
-
-
-def _require_linear(model: StateSpaceModel) -> None:
-    if model.is_linear:
-        return
-    raise FitError(
-        "Fourier output error needs a linear model",
-        found=f"equations of {model.name!r} whose matrices change with states or inputs",
-        needed="equations that are linear in states and inputs",
-        action="use method='output_error', which integrates them; where all states are measured "
-        "'fourier_regression' or 'equation_error'; or write the equations linear about the trim",
     )
 
 
