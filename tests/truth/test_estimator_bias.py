@@ -14,12 +14,13 @@ from scipy.stats import binom
 import flightid as fid
 from flightid import excitation as ex
 from flightid.errors import DataError, ModelError, OptionError, ShapeError
-from flightid.identification.frequency_domain import bias_rounds
+from flightid.identification.frequency_domain import bias_search, without_bias
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.responses.arithmetic import add_delay
 from flightid.responses.store import read_response, write_response
 from flightid.simulation.model_outputs import systems_of
 from tests.closeness import assert_close
+from tests.strangers.responses import fly_feedthrough
 
 RATE_HZ = 200.0
 BAND = (1.5, 35.0)
@@ -238,14 +239,70 @@ def test_refusals() -> None:
         fid.identify(MODEL, estimated(flown()), hold="cubic")
 
 
-def test_rounds_that_do_not_settle_are_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_correction_that_does_not_settle_leaves_no_intervals(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     response = estimated(flown(0.0002))
-    monkeypatch.setattr(bias_rounds, "MOST_ROUNDS", 1)
+    monkeypatch.setattr(bias_search, "MOST_STEPS", 1)
     fit = fid.identify(START, response)
-    assert any("the rounds did not settle" in f.message for f in fit.findings)
-    monkeypatch.setattr(bias_rounds, "TOLERABLE", 1e9)
+    said = [f for f in fit.findings if f.code == "estimator-bias-not-corrected"]
+    assert [f.light.value for f in said] == ["red"]
+    assert "the search stopped" in said[0].message
+    assert fit.covariance is None
+    assert all(p.stderr is None for p in fit.parameters.values())
+    assert "leakage of the estimate is not corrected" in fit.parameters["Lp"].reason
+    assert fit.evidence.light.value == "red"
+    monkeypatch.setattr(without_bias, "TOLERABLE", 1e9)
     kept = fid.identify(START, response)
     assert [f.light.value for f in kept.findings if f.code == "estimator-bias"] == ["amber"]
+
+
+def _oscillator(u: NDArray[np.float64], wn2: float, zeta: float) -> fid.Record:
+    """Exact steps of a lightly damped vehicle, noise of a twentieth beside."""
+    a = np.array([[0.0, 1.0], [-wn2, -2.0 * zeta * np.sqrt(wn2)]])
+    b, c = np.array([[0.0], [8.0]]), np.array([[1.0, 0.0]])
+    ad, bd, *_ = cont2discrete((a, b, c, np.zeros((1, 1))), 0.02)
+    state, y = np.zeros(2), np.zeros(len(u))
+    for k, value in enumerate(u):
+        y[k] = state[0]
+        state = ad @ state + bd[:, 0] * value
+    noise = 0.05 * y.std() * np.random.default_rng(1).standard_normal(len(u))
+    return fid.Record.from_arrays(
+        0.02 * np.arange(len(u)), inputs={"u": u}, outputs={"y": y + noise}, hold="zero"
+    )
+
+
+@pytest.mark.parametrize("zeta", [0.02, 0.05])
+def test_light_damping_in_a_short_record_is_found_at_no_higher_cost(zeta: float) -> None:
+    t = 0.02 * np.arange(1000)
+    record = _oscillator(0.1 * np.sin(0.5 * t + 0.28 * t**2), 4.09, zeta)
+    response = fid.estimate_response(record)
+    parameters = [
+        fid.Parameter("K", 6.0, "1/s^2"),
+        fid.Parameter("d", 0.3, "1/s", minimum=1e-4, maximum=20.0),
+        fid.Parameter("w2", 3.5, "1/s^2", minimum=0.1, maximum=100.0),
+    ]
+    path = fid.TransferFunction("y", "u", "K", denominator=("s^2 + d*s + w2",))
+    model = fid.TransferFunctionModel((path,), fid.Parameters(parameters))
+    plain = fid.identify(model, response, correct_bias=False)
+    fit = fid.identify(model, response)
+    assert fit.objective < plain.objective
+    truth = {"K": 8.0, "d": 2.0 * zeta * np.sqrt(4.09), "w2": 4.09}
+    assert abs(fit.parameters["K"].value / 8.0 - 1.0) < 0.05
+    assert abs(plain.parameters["w2"].value - 4.09) > 1.0
+    for name, value in truth.items():
+        error = fit.parameters[name].stderr
+        assert error is not None
+        assert abs(fit.parameters[name].value - value) < 3.5 * error
+
+
+@pytest.mark.parametrize("delay_s", [0.1, 0.1137])
+def test_a_held_input_that_feeds_through_late(delay_s: float) -> None:
+    trial = fly_feedthrough(0, delay_s=delay_s)
+    assert not trial.refusal
+    for each in trial.readings:
+        assert each.stderr is not None, each.name
+        assert abs(each.value - each.truth) < 3.5 * each.stderr, each
 
 
 def _standard_scores(noise: float, seed: int) -> NDArray[np.float64]:

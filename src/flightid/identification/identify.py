@@ -93,8 +93,9 @@ def identify(
         the complex response with the covariance of its errors; smaller intervals, less tolerant
         of a model that is too simple.
     correct_bias : bool
-        Responses: take out, in rounds of fit and correction, what windows or local polynomials add
-        by leakage and finite resolution. Where that is impossible a finding says so.
+        Responses: take out what windows or local polynomials add by leakage and finite resolution,
+        by comparing what was estimated with what the estimator makes of the model. Where that is
+        impossible a finding says so; where it fails the fit is red and has no intervals.
     initial_state : "estimate", "measured", "trim" or mapping
         Records: state at the first sample of each: estimated (the search begins at the
         measurement), held at the measurement, whose noise then widens the intervals, or at the

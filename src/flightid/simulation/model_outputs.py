@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
-from scipy.linalg import schur, solve_sylvester
+from scipy.linalg import expm, schur, solve_sylvester
 
 from flightid import _native
 from flightid.errors import ModelError
@@ -187,17 +187,32 @@ def free_outputs(modes: list[Modes], n_samples: int, sample_time_s: float) -> Ar
     ndarray, shape (n_states + m, p, n_samples)
         States at the first sample, or at the last for modes that are followed backwards.
     """
-    columns = []
-    m = len(modes[0].delays_s)
-    still = np.zeros((m, n_samples))
+    states, steady = [], np.zeros((len(modes[0].delays_s), len(modes[0].matrices[2]), n_samples))
     for each in modes:
-        for start in np.eye(len(each.matrices[0])):
-            found = _run(each, still, start, each.delays_s, sample_time_s, first=True)
-            columns.append(found[:, ::-1] if each.backwards else found)
-    for steady in np.eye(m):
-        values = np.repeat(steady[:, None], n_samples, axis=1)
-        columns.append(driven_outputs(modes, values, sample_time_s, "first"))
-    return np.stack(columns)
+        found = _free(each, n_samples, sample_time_s)
+        states.append(found[: len(each.matrices[0])])
+        steady += found[len(each.matrices[0]) :]
+    return np.concatenate([*states, steady])
+
+
+def _free(modes: Modes, n_samples: int, sample_time_s: float) -> Array:
+    """Motion from each unit state and under each unit of a steady input, (n + m, p, n_samples).
+
+    Outputs at sample k are C Eᵏ, E the transition of states and steady inputs together; each pass
+    doubles how many samples are known.
+    """
+    a, b, c, d = modes.matrices
+    n, m = b.shape
+    system = np.zeros((n + m, n + m))
+    system[:n] = np.hstack([a, b])
+    ahead = -sample_time_s if modes.backwards else sample_time_s
+    power = expm(ahead * system)
+    rows, needed = np.hstack([c, d]), n_samples * len(c)
+    while len(rows) < needed:
+        more = rows[: needed - len(rows)] @ power
+        rows, power = np.concatenate([rows, more]), power @ power
+    found = rows.reshape(n_samples, len(c), n + m).transpose(2, 1, 0)
+    return found[:, :, ::-1] if modes.backwards else found
 
 
 def _driven(modes: Modes, values: Array, sample_time_s: float, hold: str) -> Array:

@@ -46,6 +46,8 @@ class Statistics:
         Where the intervals come from.
     outputs_apart : bool
         Whether errors of different outputs were taken as independent for want of knowledge.
+    withheld : str
+        Why there are no intervals though errors are known; empty where there are.
     """
 
     parameters: Mapping[str, Estimate]
@@ -54,6 +56,7 @@ class Statistics:
     correlation: Array
     source: str
     outputs_apart: bool
+    withheld: str = ""
 
 
 def statistics(
@@ -63,12 +66,11 @@ def statistics(
     end: DenseEnd,
     *,
     sensitivity: Array | None,
-    following: Array | None = None,
+    withheld: str = "",
 ) -> Statistics:
     """Standard errors, bounds and correlations at the end of a search.
 
-    `following` holds the derivatives of the data by the free parameters, where a correction makes
-    the data follow them.
+    `withheld` says why there shall be no intervals, though errors of the data are known.
 
     Raises
     ------
@@ -81,14 +83,14 @@ def statistics(
     jacobian = end.jacobian[:, inner]
     require_identifiable(names, jacobian)
     covariance = None
-    if sensitivity is not None and names:
-        total = None if following is None else jacobian + sensitivity @ following[:, inner]
-        covariance = errors.propagated(estimator_gain(jacobian, sensitivity, total=total))
+    if sensitivity is not None and names and not withheld:
+        covariance = errors.propagated(estimator_gain(jacobian, sensitivity))
     weighted = coherence_jacobian(fitted, selected)[:, inner]
     correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
-    parameters = fitted_parameters(fitted, names, covariance, weighted)
+    parameters = fitted_parameters(fitted, names, covariance, weighted, withheld=withheld)
+    source = UNKNOWN if withheld else errors.source
     return Statistics(
-        parameters, names, covariance, correlation, errors.source, errors.outputs_apart
+        parameters, names, covariance, correlation, source, errors.outputs_apart, withheld
     )
 
 
@@ -151,6 +153,8 @@ def fitted_parameters(
     covariance: Array | None,
     weighted: Array,
     freedom: Array | None = None,
+    *,
+    withheld: str = "",
 ) -> dict[str, Estimate]:
     """Every parameter with what is known of it.
 
@@ -166,6 +170,8 @@ def fitted_parameters(
         Derivatives of residuals whose squares add up to the cost, for the bounds of CIFER.
     freedom : ndarray, shape (n,), optional
         Degrees of freedom of the variances.
+    withheld : str
+        Why there is no covariance, where it is not for want of errors.
 
     Returns
     -------
@@ -184,7 +190,7 @@ def fitted_parameters(
             value,
             parameter.unit,
             errors.get(name),
-            _reason(parameter, at_bound=bound, known=covariance is not None, value=value),
+            _reason(parameter, bound, covariance is not None, value, withheld),
             degrees.get(name),
             status="at bound" if bound else parameter.status,
             cramer_rao_percent=_percent(bounds.get(name), value),
@@ -197,11 +203,13 @@ def _percent(size: float | None, value: float) -> float | None:
     return None if size is None or value == 0.0 else float(100.0 * size / abs(value))
 
 
-def _reason(parameter: Parameter, *, at_bound: bool, known: bool, value: float) -> str:
-    if at_bound:
+def _reason(parameter: Parameter, bound: bool, known: bool, value: float, withheld: str) -> str:
+    if bound:
         return "at bound: the data would move it further"
     if parameter.status == "fixed":
         return "fixed"
+    if withheld:
+        return withheld
     if not known:
         return f"errors of the response: {UNKNOWN} known"
     if parameter.status == "tied":

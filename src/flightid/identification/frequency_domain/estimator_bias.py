@@ -2,7 +2,8 @@
 
 An estimate is linear in the outputs, Ĥ = L[y]. For a model that gives y* on the measured inputs the
 estimator's bias is L[y*] − H, and the estimate without it is H + L[y − y*]: no error where the
-model is right, whatever the windows. The model that this needs comes from the fit, in rounds.
+model is right, whatever the windows. A fit compares L[y*] with Ĥ, and its steps take the weights
+of the estimate to the model's sensitivities.
 """
 
 from __future__ import annotations
@@ -11,13 +12,28 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
-from flightid.errors import DataError
+from flightid.errors import DataError, ModelError, SingularError
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
-from flightid.models import GreyBoxModel
+from flightid.models import GreyBoxModel, Parameter
 from flightid.responses import FrequencyResponse
 from flightid.responses.errors.linear_estimate import Functional, LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource
+from flightid.simulation.model_outputs import systems_of
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+Places = NDArray[np.intp]
+
+OUTSIDE = (DataError, ModelError, SingularError)
+"""Ends of models that cannot be followed over the records."""
+DIFFERENCE = 1e-5
+"""Relative change of a parameter for derivatives of modelled outputs."""
+WHOLE = 1e-9
+"""Samples by which a delay may miss a whole number of them."""
+JUST = 1e-6
+"""Samples by which a delay stands clear of the jump at its lower end."""
 
 
 def why_unknown(data: FrequencyResponse) -> str:
@@ -42,7 +58,7 @@ def why_unknown(data: FrequencyResponse) -> str:
 
 @dataclass(frozen=True)
 class Correction:
-    """Takes the estimator's bias out of one response for model after model.
+    """What the estimator of one response makes of model after model.
 
     Weights and transforms belong to the records, not to the model: they are made once.
 
@@ -56,6 +72,11 @@ class Correction:
 
     data: FrequencyResponse
     hold: str
+
+    @property
+    def n_samples(self) -> int:
+        """Samples of all outputs of all records."""
+        return sum(each.size for each in self._linear.output_records)
 
     def apply(self, model: GreyBoxModel) -> FrequencyResponse:
         """The measured response without the bias that its estimator has for this model.
@@ -74,7 +95,7 @@ class Correction:
             The weights are not known, or the model diverges on the records.
         """
         data = self.data
-        left = self._weights(self._records.of(model))
+        left = self.left(model, np.arange(len(data.omega_rad_s)))
         values = np.array(data.response)
         curves = model.frequency_response(data.omega_rad_s)
         for each in model.responses:
@@ -82,6 +103,24 @@ class Correction:
             place = model.outputs.index(each.output), model.inputs.index(each.input)
             values[row, column] = curves[place] + left[row, column]
         return replace(data, response=values)
+
+    def left(self, model: GreyBoxModel, frequencies: Places) -> Complex:
+        """The estimate of what the model leaves of the outputs, shape (n_out, n_in, n_f).
+
+        The measured response less this is what the estimator makes of the model. Raises as
+        `apply`.
+        """
+        return self._weights(frequencies)(self._records.of(model))
+
+    def slopes(self, model: GreyBoxModel, frequencies: Places) -> Complex:
+        """Derivatives of what the estimator makes of the model, (n_free, n_out, n_in, n_f).
+
+        Raises as `apply`.
+        """
+        moved = [self._moved(model, parameter) for parameter in model.parameters.free]
+        changes = self._records.slopes(model, moved)
+        weights = self._weights(frequencies)
+        return np.stack([weights(one) for one in zip(*changes, strict=True)])
 
     def errors(self, model: GreyBoxModel) -> CovarianceSource | None:
         """Errors of a corrected response: their noise is what the model leaves.
@@ -97,6 +136,66 @@ class Correction:
             return None
         return self._linear.errors_of(self._records.of(model))
 
+    def _moved(self, model: GreyBoxModel, parameter: Parameter) -> tuple[GreyBoxModel, float]:
+        """The model a small step away, on the side where no held input reaches another sample."""
+        value = parameter.value or 0.0
+        step = DIFFERENCE * (abs(value) or 1.0)
+        ways = [
+            way for way in (step, -step) if parameter.minimum <= value + way <= parameter.maximum
+        ]
+        for way in ways:
+            moved = model.with_values({parameter.name: value + way})
+            if np.array_equal(self._lags(moved), self._lags(model)):
+                return moved, way
+        way = (ways or [step])[0]
+        return model.with_values({parameter.name: value + way}), way
+
+    def cell(self, model: GreyBoxModel) -> tuple[Array, Array] | None:
+        """Bounds of the free parameters between which no held input reaches another sample.
+
+        A step that is held and fed straight through moves an output by a whole sample at once when
+        its delay passes one. None where nothing jumps.
+        """
+        delays = self._jumping(model)
+        if not len(delays):
+            return None
+        step = self._linear.sample_time_s
+        last = np.ceil(delays / step - WHOLE)
+        low, high = (last - 1.0 + JUST) * step - delays, last * step - delays
+        free = model.parameters.free
+        bounds = np.full((2, len(free)), [[-np.inf], [np.inf]])
+        values = np.array([parameter.value or 0.0 for parameter in free])
+        for place, parameter in enumerate(free):
+            change = DIFFERENCE * (abs(values[place]) or 1.0)
+            moved = model.with_values({parameter.name: values[place] + change})
+            slope = (self._jumping(moved) - delays) / change
+            for each in np.flatnonzero(slope):
+                ends = np.sort([low[each] / slope[each], high[each] / slope[each]])
+                bounds[0, place] = max(bounds[0, place], values[place] + ends[0])
+                bounds[1, place] = min(bounds[1, place], values[place] + ends[1])
+        return bounds[0], bounds[1]
+
+    def _lags(self, model: GreyBoxModel) -> Array:
+        return np.ceil(self._jumping(model) / self._linear.sample_time_s - WHOLE)
+
+    def _jumping(self, model: GreyBoxModel) -> Array:
+        """Delays of held inputs that are fed straight through, s."""
+        if self.hold != "zero":
+            return np.zeros(0)
+        systems = systems_of(model)
+        return np.concatenate(
+            [each.delays_s[np.any(each.matrices[3] != 0.0, axis=0)] for each in systems]
+        )
+
+    def _weights(self, frequencies: Places) -> Functional:
+        key = frequencies.tobytes()
+        if key not in self._made:
+            linear = self._linear
+            rows, columns, points = linear.places
+            made = linear.weights.functional(rows, columns, points[frequencies])
+            self._made[key] = made
+        return self._made[key]
+
     @property
     def _linear(self) -> LinearEstimate:
         if self.data.linear is None:
@@ -105,8 +204,8 @@ class Correction:
         return self.data.linear
 
     @cached_property
-    def _weights(self) -> Functional:
-        return self._linear.functional()
+    def _made(self) -> dict[bytes, Functional]:
+        return {}
 
     @cached_property
     def _records(self) -> ModelResiduals:

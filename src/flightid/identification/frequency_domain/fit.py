@@ -24,14 +24,7 @@ from flightid.identification.fit_findings import (
     judge_search,
 )
 from flightid.identification.fitted_response import FittedResponse
-from flightid.identification.frequency_domain.bias_rounds import (
-    BiasRounds,
-    iterate,
-    judge_bias,
-    provenance,
-    sizes,
-)
-from flightid.identification.frequency_domain.bias_statistics import errors_after, points_follow
+from flightid.identification.frequency_domain.bias_objective import Curves, Objective
 from flightid.identification.frequency_domain.error_model import (
     ErrorModel,
     coherence_sensitivity,
@@ -47,6 +40,7 @@ from flightid.identification.frequency_domain.selection import (
     select_points,
 )
 from flightid.identification.frequency_domain.setup_checks import check_setup
+from flightid.identification.frequency_domain.without_bias import take_out
 from flightid.identification.multistart import DenseEnd, cluster, local_minima
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
@@ -86,24 +80,23 @@ def _fit_selected(
 ) -> Fit:
     errors = error_model(data, selected)
     groups = cluster(_minimise(model, selected, errors, options))
-    fitted = _at(model, groups[0][0])
-    found = _statistics(fitted, selected, errors, groups[0][0], options)
     correction: dict[str, object] = {"applied": False, "reason": "correct_bias=False"}
+    fitted, curves, withheld = _at(model, groups[0][0]), None, ""
     if options.correct_bias:
         without = Correction(data, options.hold)
-        done = _without_bias(fitted, without, errors, found, options)
-        after = select_by(model, done.data, options)
-        if done.applied:
-            errors = errors_after(done, without, after) or errors
-        changes = sizes(selected, after, errors) if done.applied else {}
-        setup += judge_bias(done, changes)
-        correction = provenance(done, changes, options.hold)
-        if done.applied:
-            best = _minimise(done.model, after, errors, replace(options, starts=1))[0]
-            groups[0] = [best, *groups[0][1:]]
-            selected, fitted = after, _at(model, best)
-            following = points_follow(done, fitted, without, selected, errors)
-            found = _statistics(fitted, selected, errors, best, options, following)
+        objective = Objective(model, without, selected, errors, options.cost)
+        done = take_out(objective, groups[0][0], lambda found: select_by(model, found, options))
+        outcome, withheld = done.outcome, done.outcome.withheld
+        setup += outcome.findings()
+        correction = outcome.provenance(options.hold)
+        if outcome.applied:
+            groups = [*cluster(done.ends), *groups[1:]]
+            selected, errors, fitted = list(done.selected), done.errors, done.model
+            curves = done.estimates
+    sensitivity = _sensitivity(fitted, selected, errors, options, curves)
+    found = statistics(
+        fitted, selected, errors, groups[0][0], sensitivity=sensitivity, withheld=withheld
+    )
     responses = compare_responses(fitted, selected)
     fit = _assemble(fitted, options, data, groups, responses, found, setup)
     return replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
@@ -127,35 +120,6 @@ def select_by(
 def _at(model: GreyBoxModel, end: DenseEnd) -> GreyBoxModel:
     names = (parameter.name for parameter in model.parameters.free)
     return model.with_values(dict(zip(names, map(float, end.x), strict=True)))
-
-
-def _statistics(
-    fitted: GreyBoxModel,
-    selected: Sequence[SelectedResponse],
-    errors: ErrorModel,
-    end: DenseEnd,
-    options: FrequencyDomainOptions,
-    following: Array | None = None,
-) -> Statistics:
-    sensitivity = _sensitivity(fitted, selected, errors, options)
-    return statistics(fitted, selected, errors, end, sensitivity=sensitivity, following=following)
-
-
-def _without_bias(
-    fitted: GreyBoxModel,
-    correction: Correction,
-    errors: ErrorModel,
-    found: Statistics,
-    options: FrequencyDomainOptions,
-) -> BiasRounds:
-    once = replace(options, starts=1)
-
-    def refit(model: GreyBoxModel, corrected: FrequencyResponse) -> GreyBoxModel:
-        selected = select_by(model, corrected, options)
-        return _at(model, _minimise(model, selected, errors, once)[0])
-
-    scales = {p.name: p.stderr for p in found.parameters.values() if p.stderr}
-    return iterate(fitted, correction, scales, refit)
 
 
 def check_channels(model: GreyBoxModel, data: FrequencyResponse) -> None:
@@ -238,15 +202,20 @@ def _sensitivity(
     selected: Sequence[SelectedResponse],
     errors: ErrorModel,
     options: FrequencyDomainOptions,
+    curves: Curves | None,
 ) -> Array | None:
-    """Derivatives of the minimised residuals with respect to the measured points."""
+    """Derivatives of the minimised residuals with respect to the measured points.
+
+    `curves` are what the points are compared with; default: the model's responses.
+    """
     if not errors.runs:
         return None
     if options.cost == "likelihood":
         from scipy.linalg import block_diag  # noqa: PLC0415
 
         return np.asarray(-block_diag(*(matrix for *_, matrix in whitening(errors))))
-    curves = [response_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
+    if curves is None:
+        curves = [response_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
     return coherence_sensitivity(selected, curves, errors)
 
 
@@ -287,7 +256,11 @@ def _assemble(
         *judge_cost(costs, total / len(costs)),
         *judge_parameters(found.parameters),
         *judge_correlation(found.names, found.correlation),
-        *judge_intervals(found.source, outputs_apart=found.outputs_apart),
+        *(
+            ()
+            if found.withheld
+            else judge_intervals(found.source, outputs_apart=found.outputs_apart)
+        ),
     )
     minima = local_minima(groups, free)
     return Fit(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -50,17 +51,42 @@ class _Motion:
 
 
 @dataclass(frozen=True)
+class _Fitter:
+    """Least squares for unknown motion, with each output's weight.
+
+    Attributes
+    ----------
+    gain : ndarray, shape (n_unknowns, n_outputs, k)
+        From parts inside each output's basis to coefficients.
+    normal : ndarray, shape (n_unknowns, n_unknowns)
+        Inverse of the normal equations.
+    scale : ndarray, shape (n_outputs,)
+        By which outputs were divided.
+    """
+
+    gain: Array
+    normal: Array
+    scale: Array
+
+
+@dataclass(frozen=True)
 class _Unknown:
     """Motion by unknown initial states and trims in each fitted output, ready for least squares.
 
     Attributes
     ----------
+    motions : ndarray, shape (n_unknowns, n_outputs, n)
+        Means removed, of length one.
+    lengths : ndarray, shape (n_unknowns,)
+        By which they were divided.
     bases : ndarray, shape (n_outputs, n, k)
         Orthonormal in each output.
     triangles : ndarray, shape (n_outputs, k, n_unknowns)
         Each output's motion is its basis times its triangle.
     """
 
+    motions: Array
+    lengths: Array
     bases: Array
     triangles: Array
 
@@ -68,18 +94,18 @@ class _Unknown:
     def of(cls, free: Array) -> _Unknown:
         """Of motions, shape (n_unknowns, n_outputs, n)."""
         free = free - free.mean(axis=2, keepdims=True)
-        free = free / np.maximum(np.linalg.norm(free, axis=(1, 2), keepdims=True), TINY)
+        lengths = np.maximum(np.linalg.norm(free, axis=(1, 2)), TINY)
+        free = free / lengths[:, None, None]
         bases, triangles = np.linalg.qr(free.transpose(1, 2, 0))
-        return cls(bases, triangles)
+        return cls(free, lengths, bases, triangles)
 
-    def less(self, rest: Array) -> Array:
-        """Take out the motion that fits best in all outputs together, shape (n_outputs, n).
+    def fitter(self, rest: Array) -> _Fitter:
+        """Least squares of all outputs together.
 
         Fitted to each output by itself, so many unknowns would take what little a record says of
-        its lowest frequencies with them. Outputs count by what they leave in such a fit of their
-        own.
+        its lowest frequencies with them. Outputs count by what they leave of `rest`, shape
+        (n_outputs, n), in such a fit of their own.
         """
-        rest = rest - rest.mean(axis=1, keepdims=True)
         inside = np.einsum("ynk,yn->yk", self.bases, rest, optimize=True)
         scales = []
         for basis, triangle, part, each in zip(
@@ -88,11 +114,41 @@ class _Unknown:
             alone = np.linalg.lstsq(triangle, part, rcond=_RANK)[0]
             scales.append(max(float(np.std(each - basis @ (triangle @ alone))), TINY))
         scale = np.array(scales)
-        stacked = self.triangles / scale[:, None, None]
-        target = (inside / scale[:, None]).ravel()
-        found = np.linalg.lstsq(stacked.reshape(len(target), -1), target, rcond=_RANK)[0]
-        moved = (self.bases @ (self.triangles @ found)[:, :, None])[:, :, 0]
+        stacked = (self.triangles / scale[:, None, None]).reshape(-1, self.triangles.shape[2])
+        inverse = np.linalg.pinv(stacked, rcond=_RANK)
+        gain = inverse.reshape(-1, *self.triangles.shape[:2]) / scale[:, None]
+        return _Fitter(gain, inverse @ inverse.T, scale)
+
+    def coefficients(self, fitter: _Fitter, rest: Array) -> Array:
+        """Of the motions that fit best, shape (…, n_unknowns), for rests of shape (…, n_out, n)."""
+        inside = np.einsum("ynk,...yn->...yk", self.bases, rest, optimize=True)
+        return np.asarray(np.einsum("uyk,...yk->...u", fitter.gain, inside, optimize=True))
+
+    def less(self, fitter: _Fitter, rest: Array) -> Array:
+        """Take these motions out."""
+        moved = np.tensordot(self.coefficients(fitter, rest), self.motions, axes=1)
         return np.asarray(rest - moved)
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """One record with a model beside it.
+
+    Attributes
+    ----------
+    rest : ndarray, shape (n_out, n)
+        Measured less modelled.
+    driven : ndarray, shape (n_fitted, n)
+        Modelled, without unknown motion.
+    fitter : _Fitter
+    start : ndarray, shape (n_unknowns,)
+        Initial states and trims.
+    """
+
+    rest: Array
+    driven: Array
+    fitter: _Fitter
+    start: Array
 
 
 @dataclass(frozen=True)
@@ -124,26 +180,85 @@ class ModelResiduals:
         DataError
             The model diverges on the records.
         """
+        return [each.rest for each in self._followed(model)[0]]
+
+    def slopes(
+        self, model: GreyBoxModel, moved: Sequence[tuple[GreyBoxModel, float]]
+    ) -> list[Array]:
+        """Derivatives of the modelled outputs, shape (n_moved, n_out, n_samples) for each record.
+
+        By differences between a model and others a step away from it, initial states and trims
+        held and then fitted anew.
+
+        Parameters
+        ----------
+        model : GreyBoxModel
+        moved : sequence of (GreyBoxModel, float)
+            Other models, each with its step.
+
+        Reference
+        ---------
+        Golub & Pereyra, "The differentiation of pseudo-inverses and nonlinear least squares
+        problems whose variables separate", *SIAM J. Numerical Analysis* 10 (1973).
+        """
+        followed, known = self._followed(model)
+        kept = self._kept(model)
+        changes = [np.zeros((len(moved), *each.shape)) for each in self.linear.output_records]
+        for place, (other, step) in enumerate(moved):
+            motions: dict[int, tuple[list[_Motion], Array]] = {}
+            for change, one, between in zip(changes, followed, self._between, strict=True):
+                n = change.shape[2]
+                free, unknown = known[n][1:]
+                if n not in motions:
+                    there, beyond = self._motion(other, kept, n)
+                    motions[n] = there, (beyond - free) / step
+                driven = self._driven(motions[n][0], kept, between, n)
+                turned = motions[n][1]
+                direct = (driven - one.driven) / step + np.tensordot(one.start, turned, axes=1)
+                direct -= direct.mean(axis=1, keepdims=True)
+                # What is left of the outputs turns with the space that was taken out of them.
+                left = one.rest[kept] / one.fitter.scale[:, None] ** 2
+                against = np.tensordot(turned, left, axes=2) / unknown.lengths
+                again = np.tensordot(one.fitter.normal @ against, unknown.motions, axes=1)
+                change[place, kept] = unknown.less(one.fitter, direct) + again
+        return changes
+
+    def _kept(self, model: GreyBoxModel) -> Places:
         fitted = {each.output for each in model.responses}
-        kept = np.array([row for row, name in enumerate(self.outputs) if name in fitted])
-        known: dict[int, tuple[list[_Motion], _Unknown]] = {}
+        return np.array([row for row, name in enumerate(self.outputs) if name in fitted])
+
+    def _followed(
+        self, model: GreyBoxModel
+    ) -> tuple[list[_Followed], dict[int, tuple[list[_Motion], Array, _Unknown]]]:
+        kept = self._kept(model)
+        known: dict[int, tuple[list[_Motion], Array, _Unknown]] = {}
         found = []
         for measured, between in zip(self.linear.output_records, self._between, strict=True):
             n = measured.shape[1]
             if n not in known:
-                known[n] = self._motion(model, kept, n)
-            motions, unknown = known[n]
-            rest = measured.copy()
-            for each in motions:
-                driven = driven_outputs(
-                    each.modes, between[each.inputs], self.linear.sample_time_s, self.hold
-                )
-                rest[each.rows] -= driven[each.places]
+                motions, free = self._motion(model, kept, n)
+                known[n] = motions, free, _Unknown.of(free)
+            motions, _, unknown = known[n]
+            driven = self._driven(motions, kept, between, n)
+            rest = measured[kept] - driven
             if not np.all(np.isfinite(rest)):
                 raise self._diverges(kept, "a simulation without bounds")
-            rest[kept] = unknown.less(rest[kept])
-            self._check(kept, rest, measured)
-            found.append(rest)
+            rest = rest - rest.mean(axis=1, keepdims=True)
+            fitter = unknown.fitter(rest)
+            start = unknown.coefficients(fitter, rest) / unknown.lengths
+            left = measured.copy()
+            left[kept] = unknown.less(fitter, rest)
+            self._check(kept, left, measured)
+            found.append(_Followed(left, driven, fitter, start))
+        return found, known
+
+    def _driven(self, motions: list[_Motion], kept: Places, between: Array, n: int) -> Array:
+        found = np.zeros((len(kept), n))
+        for each in motions:
+            outputs = driven_outputs(
+                each.modes, between[each.inputs], self.linear.sample_time_s, self.hold
+            )
+            found[np.searchsorted(kept, each.rows)] += outputs[each.places]
         return found
 
     @cached_property
@@ -151,7 +266,8 @@ class ModelResiduals:
         """Inputs of each record, with what they do between their samples."""
         return [between_samples(each, self.hold) for each in self.linear.input_records]
 
-    def _motion(self, model: GreyBoxModel, kept: Places, n: int) -> tuple[list[_Motion], _Unknown]:
+    def _motion(self, model: GreyBoxModel, kept: Places, n: int) -> tuple[list[_Motion], Array]:
+        """How each system of a model moves, and what unknown states and trims add."""
         step = self.linear.sample_time_s
         motions, free = [], []
         for each in systems_of(model):
@@ -167,7 +283,7 @@ class ModelResiduals:
         together = np.concatenate(free)
         if not np.all(np.isfinite(together)):
             raise self._diverges(kept, "a simulation without bounds")
-        return motions, _Unknown.of(together)
+        return motions, together
 
     def _check(self, kept: Places, left: Array, measured: Array) -> None:
         for row in kept:

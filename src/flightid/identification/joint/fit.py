@@ -13,16 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
-from flightid.findings import Finding
 from flightid.identification.fit import Fit
-from flightid.identification.fit_findings import judge_cost, judge_intervals
-from flightid.identification.frequency_domain.bias_rounds import (
-    iterate,
-    judge_bias,
-    provenance,
-    sizes,
-)
-from flightid.identification.frequency_domain.bias_statistics import errors_after, points_follow
+from flightid.identification.fit_findings import UNKNOWN, judge_cost, judge_intervals
+from flightid.identification.frequency_domain.bias_findings import BiasOutcome, sizes
+from flightid.identification.frequency_domain.bias_objective import Objective
+from flightid.identification.frequency_domain.bias_rounds import iterate
 from flightid.identification.frequency_domain.error_model import ErrorModel, error_model, whitening
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.fit import (
@@ -111,15 +106,24 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
         *check_start(model, points.selected),
     ]
     found = searched(model, prepared, options, points.native)
-    correction: dict[str, object] = {"applied": False, "reason": "correct_bias=False"}
-    following: Array | None = None
+    outcome, following = BiasOutcome("correct_bias=False", possible=False), None
     if options.correct_bias:
-        found, points, following, correction, said = _without_bias(
+        found, points, following, outcome = _without_bias(
             found, prepared, response, points, options
         )
-        setup += said
+        setup += outcome.findings()
     fit = conclude(found, options, setup, points.beside(found.fitted, following))
-    return _with_responses(fit, response, points, correction)
+    fit = _with_responses(fit, response, points, outcome.provenance(options.hold))
+    return _without_intervals(fit, outcome.withheld) if outcome.withheld else fit
+
+
+def _without_intervals(fit: Fit, reason: str) -> Fit:
+    """The fit with no error bars, each with the reason."""
+    bare = {
+        name: replace(each, stderr=None, reason=each.reason or reason)
+        for name, each in fit.parameters.items()
+    }
+    return replace(fit, parameters=bare, covariance=None, intervals_from=UNKNOWN)
 
 
 def _divided(data: Sequence[object]) -> tuple[FrequencyResponse, list[Record]]:
@@ -147,7 +151,7 @@ def _without_bias(
     response: FrequencyResponse,
     points: ChosenPoints,
     options: JointOptions,
-) -> tuple[Searched, ChosenPoints, Array | None, dict[str, object], list[Finding]]:
+) -> tuple[Searched, ChosenPoints, Array | None, BiasOutcome]:
     """Take the estimator's bias out of the response, and fit again, until nothing moves."""
     once = replace(options, starts=1)
 
@@ -162,19 +166,20 @@ def _without_bias(
     scales = {p.name: p.stderr for p in first.parameters.values() if p.stderr}
     without = Correction(response, options.hold)
     done = iterate(found.fitted, without, scales, refit)
-    if not done.applied:
-        return found, points, None, provenance(done, {}, options.hold), judge_bias(done, {})
+    if not done.outcome.applied:
+        return found, points, None, done.outcome
     after = corrected_points(done.data)
-    known = errors_after(done, without, after.selected)
-    after = after if known is None else replace(after, errors=known)
+    known = without.errors(done.model)
+    if known is not None:
+        errors = error_model(replace(done.data, errors=known), after.selected)
+        after = replace(after, errors=errors)
     # The last search weighs the points by the errors that the intervals are computed from.
     last = searched(done.model, prepared, once, after.native)
-    following = points_follow(done, last.fitted, without, after.selected, after.errors)
+    objective = Objective(last.fitted, without, after.selected, after.errors, "likelihood")
     moved = sizes(points.selected, after.selected, after.errors)
     # The other minima are those of the first search.
     found = replace(last, groups=[last.groups[0], *found.groups[1:]])
-    said = judge_bias(done, moved)
-    return found, after, following, provenance(done, moved, options.hold), said
+    return found, after, objective.following(), replace(done.outcome, sizes=moved)
 
 
 def _with_responses(

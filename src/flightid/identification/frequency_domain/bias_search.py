@@ -1,0 +1,236 @@
+"""Gauss–Newton search with the estimator inside: there is one cost, which no step raises."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import FitError
+from flightid.identification.frequency_domain.bias_findings import ENOUGH
+from flightid.identification.frequency_domain.bias_objective import Curves, Objective
+from flightid.identification.frequency_domain.estimator_bias import OUTSIDE
+from flightid.identification.multistart import DenseEnd
+
+Array = NDArray[np.float64]
+
+MOST_STEPS = 40
+ROUNDING = 1e-9
+"""Relative step of every parameter below which nothing moves."""
+CURVED = 0.5
+"""Share of a step's effect that its derivatives missed, from which on they are worked out anew."""
+ACROSS = 0.01
+"""Share of a sample by which the other side of a jump is tried."""
+STRETCH, NEAR = 4.0, 0.3
+"""Most by which a step is stretched or shortened, and the share below which it stays."""
+SMALLEST_DAMPING, LARGEST_DAMPING = 1e-9, 1e6
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Where a search with the estimator inside ended.
+
+    Attributes
+    ----------
+    end : DenseEnd
+        With the residuals and derivatives of what the estimator makes of the model.
+    estimates : list of ndarray
+        That itself, by response.
+    step : float
+        Last Gauss–Newton step over the scatter of the residuals.
+    begun : float
+        Cost at the start.
+    reason : str
+        Why the search did not settle; empty where it did.
+    """
+
+    end: DenseEnd
+    estimates: Curves
+    step: float
+    begun: float
+    reason: str = ""
+
+
+@dataclass
+class _Place:
+    """A point of the search."""
+
+    x: Array
+    estimates: Curves
+    residuals: Array
+    cost: float
+
+    @classmethod
+    def of(cls, objective: Objective, x: Array) -> _Place | None:
+        """None where the model cannot be followed over the records."""
+        try:
+            estimates = objective.estimates(x)
+        except OUTSIDE:
+            return None
+        with np.errstate(all="ignore"):
+            residuals = objective.residuals(estimates)
+        if not np.all(np.isfinite(residuals)):
+            return None
+        return cls(x, estimates, residuals, float(residuals @ residuals))
+
+
+def search(objective: Objective, start: Array) -> Settled:
+    """Minimise from one start.
+
+    The slopes that the estimator adds to the model's own change slowly: they are kept while steps
+    do what they were to do.
+
+    Raises
+    ------
+    FitError
+        The model cannot be followed over the records at the start.
+
+    Reference
+    ---------
+    Madsen, Nielsen & Tingleff, *Methods for Non-linear Least Squares Problems* (2004), §3.2.
+    """
+    here = _Place.of(objective, start)
+    if here is None:
+        objective.estimates(start)  # says why, if it is a simulation that cannot be
+        raise FitError(
+            "the model cannot be followed over the records",
+            found="a response of zero, or without bounds",
+            needed="a simulation that stays near the measured outputs",
+            action="check the structure, or fit shorter records",
+        )
+    free = objective.model.parameters.free
+    limits = np.array([p.minimum for p in free]), np.array([p.maximum for p in free])
+    bounds, begun = limits, here.cost
+    extra, fresh, damping, step = _extra(objective, here.x), True, 0.0, np.inf
+    jacobian = np.zeros((0, len(start)))
+    for count in range(MOST_STEPS):
+        jacobian = _jacobian(objective, here, extra)
+        whole = _step(jacobian, here, bounds, 0.0)
+        step = _size(jacobian @ whole, here)
+        small = np.all(np.abs(whole) <= ROUNDING * np.maximum(np.abs(here.x), 1e-300))
+        if step <= ENOUGH or (small and fresh):
+            step = step if step <= ENOUGH else 0.0
+            beyond = None if bounds is limits else _beyond(objective, here, bounds, limits)
+            if beyond is None:
+                return Settled(_end(here, jacobian, count, "step"), here.estimates, step, begun)
+            here, bounds = beyond, limits
+            extra, fresh = _extra(objective, here.x), True
+            continue
+        tried = _step(jacobian, here, bounds, damping) if damping else whole
+        there = _Place.of(objective, np.clip(here.x + tried, *bounds))
+        if there is None or there.cost >= here.cost:
+            cell = objective.correction.cell(objective.at(here.x)) if bounds is limits else None
+            if cell is not None:
+                bounds = np.maximum(cell[0], limits[0]), np.minimum(cell[1], limits[1])
+            elif not fresh:
+                extra, fresh = _extra(objective, here.x), True
+            else:
+                damping = max(10.0 * damping, 1e-3)
+                if damping > LARGEST_DAMPING:
+                    break
+            continue
+        expected = here.residuals + jacobian @ (there.x - here.x)
+        moved = float(np.linalg.norm(expected - here.residuals))
+        missed = float(np.linalg.norm(there.residuals - expected)) / max(moved, 1e-300)
+        extra = _learned(objective, extra, here, there, np.linalg.norm(jacobian, axis=0))
+        here, fresh = _along(objective, here, there, jacobian, bounds), False
+        damping = 0.0 if damping <= 1e-3 else 0.1 * damping
+        if missed > CURVED:
+            extra, fresh = _extra(objective, here.x), True
+    reason = f"the search stopped {step:.2g} of the residuals' scatter away from a minimum"
+    return Settled(_end(here, jacobian, MOST_STEPS, "stalled"), here.estimates, step, begun, reason)
+
+
+def _along(
+    objective: Objective, here: _Place, there: _Place, jacobian: Array, bounds: tuple[Array, Array]
+) -> _Place:
+    """The better of a step and its stretch to the lowest point of the parabola along it.
+
+    Where residuals curve, steps overshoot or fall short by the same share again and again.
+    """
+    way = there.x - here.x
+    slope = 2.0 * float(here.residuals @ (jacobian @ way))
+    bend = there.cost - here.cost - slope
+    if bend <= 0.0:
+        return there
+    share = min(max(-0.5 * slope / bend, 1.0 / STRETCH), STRETCH)
+    if abs(share - 1.0) < NEAR:
+        return there
+    better = _Place.of(objective, np.clip(here.x + share * way, *bounds))
+    return there if better is None or better.cost >= there.cost else better
+
+
+def _beyond(
+    objective: Objective, here: _Place, bounds: tuple[Array, Array], limits: tuple[Array, Array]
+) -> _Place | None:
+    """A lower cost just across a jump at which the search stands."""
+    best = None
+    for edge, limit, way in zip(bounds, limits, (-1.0, 1.0), strict=True):
+        for place in np.flatnonzero((here.x == edge) & (edge != limit)):
+            x = here.x.copy()
+            x[place] += way * ACROSS * (bounds[1][place] - bounds[0][place])
+            there = _Place.of(objective, np.clip(x, *limits))
+            if there is not None and there.cost < (best or here).cost:
+                best = there
+    return best
+
+
+def _end(place: _Place, jacobian: Array, count: int, termination: str) -> DenseEnd:
+    return DenseEnd(place.x, place.cost, count, termination, place.residuals, jacobian)
+
+
+def _extra(objective: Objective, x: Array) -> Curves:
+    both = zip(objective.slopes(x), objective.model_slopes(x), strict=True)
+    return [whole - own for whole, own in both]
+
+
+def _learned(
+    objective: Objective, extra: Curves, here: _Place, there: _Place, scale: Array
+) -> Curves:
+    """The slopes that the estimator adds, made to give what the last step did.
+
+    Reference
+    ---------
+    Broyden, "A class of methods for solving nonlinear simultaneous equations", *Mathematics of
+    Computation* 19 (1965), of the estimator's own part alone.
+    """
+    way = there.x - here.x
+    along = way * scale**2
+    power = float(way @ along)
+    if power <= 0.0:
+        return extra
+    found = []
+    slopes = objective.model_slopes(here.x), objective.model_slopes(there.x)
+    for place, known in enumerate(extra):
+        own = 0.5 * (slopes[0][place] + slopes[1][place])
+        missed = there.estimates[place] - here.estimates[place] - way @ (own + known)
+        found.append(known + np.multiply.outer(along / power, missed))
+    return found
+
+
+def _jacobian(objective: Objective, here: _Place, extra: Curves) -> Array:
+    own = objective.model_slopes(here.x)
+    slopes = [a + b for a, b in zip(own, extra, strict=True)]
+    return objective.jacobian(here.estimates, slopes)
+
+
+def _size(effect: Array, here: _Place) -> float:
+    """A step's effect on the residuals over their scatter."""
+    return float(np.linalg.norm(effect) / max(np.sqrt(here.cost / len(effect)), 1e-300))
+
+
+def _step(jacobian: Array, here: _Place, bounds: tuple[Array, Array], damping: float) -> Array:
+    """Damped Gauss–Newton step; parameters at a bound that they press against stay there."""
+    gradient = jacobian.T @ here.residuals
+    low, high = bounds
+    held = ((here.x <= low) & (gradient > 0.0)) | ((here.x >= high) & (gradient < 0.0))
+    scale = np.linalg.norm(jacobian, axis=0)
+    held |= scale == 0.0
+    step = np.zeros_like(here.x)
+    kept = np.flatnonzero(~held)
+    scaled = jacobian[:, kept] / scale[kept]
+    wide = np.vstack([scaled, np.sqrt(max(damping, SMALLEST_DAMPING**2)) * np.eye(len(kept))])
+    target = np.concatenate([-here.residuals, np.zeros(len(kept))])
+    step[kept] = np.linalg.lstsq(wide, target, rcond=None)[0] / scale[kept]
+    return step
