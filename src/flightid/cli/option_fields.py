@@ -144,7 +144,7 @@ def _click_option(name: str, uses: list[tuple[str, Option]], *, everywhere: bool
         extra = "repeat for several"
         if {TABLE, WORDS} & forms:
             extra = f"NAME={'TEXT' if WORDS in forms else 'NUMBER'}, repeated"
-            extra = f"or {extra}" if WORD in forms else extra
+            extra = f"{', '.join(choices)} or {extra}" if WORD in forms else extra
         if FLAG in forms:
             extra += f"; '{ALL}' or '{NONE}'"
         return made(multiple=True, help=f"{help_text} ({extra})")
