@@ -11,14 +11,17 @@ from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.evidence.evidence import BAND, COHERENCE, LOOP, Check
 from flightid.evidence.feedback import feedback_test
-from flightid.evidence.spans import Span, judge_coherence, judge_span
+from flightid.evidence.spans import judge_coherence, judge_span, spans_of
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
-from flightid.responses.bands import usable_band
+from flightid.responses.windows.windows import CYCLES_AT_LOWEST, HIGHEST_FRACTION
 from flightid.uncertainty.feedback import FeedbackTest
 
 KEPT = 4
 """Sets of records whose examination is kept: a scan fits the same ones many times."""
+FREQUENCIES = 40
+LONGEST, SHORTEST = 1.0 / 3.0, 1.0 / 15.0
+"""Windows of the quick response: shares of the longest record, if all together are as long."""
 CLOSED_ACTION = (
     "use the injected excitation as instrument, a method with a noise model, or fly with the loop "
     "open; loop='open' overrides where you know it"
@@ -62,26 +65,45 @@ def loop_of_records(
         return None
 
 
+def _windows(records: Sequence[Record]) -> tuple[float, float]:
+    durations = [record.n_samples * record.sample_time_s for record in records]
+    longest = min(max(durations), sum(durations) / 1.5)
+    return LONGEST * longest, SHORTEST * longest
+
+
+def _band(records: Sequence[Record]) -> tuple[float, float]:
+    step = max(record.sample_time_s for record in records)
+    low = CYCLES_AT_LOWEST * 2.0 * np.pi / _windows(records)[0]
+    return low, max(HIGHEST_FRACTION * 2.0 * np.pi / step, 2.0 * low)
+
+
 @lru_cache(maxsize=KEPT)
 def power_of_records(
     records: tuple[Record, ...], inputs: tuple[str, ...], outputs: tuple[str, ...]
 ) -> tuple[Check, ...]:
     """Band and coherence of each output with all inputs together, from a quick response.
 
-    Multiple coherence counts: an input that does little for one output may move another.
+    Its longest window is longer than that of an estimate that is to be fitted: coherence alone is
+    asked, and low frequencies lie in the longest windows.
     """
     try:
         found = estimate_response(
-            records, inputs=inputs, outputs=outputs, covariance=False, loop="open"
+            records,
+            inputs=inputs,
+            outputs=outputs,
+            n_omega=FREQUENCIES,
+            band_rad_s=_band(records),
+            window_s=_windows(records),
+            covariance=False,
+            loop="open",
         )
     except FlightidError as error:
         said = f"the records give no response: {error}"
         return tuple(Check(name, Light.UNKNOWN, said) for name in (BAND, COHERENCE))
-    spans = []
-    for name, coherence in zip(found.outputs, found.multiple_coherence, strict=True):
-        band = usable_band(found.omega_rad_s, coherence)
-        inside = np.ones(coherence.size, dtype=bool)
-        if band is not None:
-            inside = (found.omega_rad_s >= band[0]) & (found.omega_rad_s <= band[1])
-        spans.append(Span(name, band, float(np.mean(coherence[inside]))))
+    return band_checks(found)
+
+
+def band_checks(response: FrequencyResponse) -> tuple[Check, Check]:
+    """Band and coherence that a response of the fitted channels shows."""
+    spans = spans_of(response)
     return judge_span(spans), judge_coherence(spans)

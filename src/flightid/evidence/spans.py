@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from flightid.conventions import Light
 from flightid.evidence.evidence import BAND, COHERENCE, Check
 from flightid.inspection.thresholds import BAND_GOOD, BAND_LEAST, MINIMUM_COHERENCE
+from flightid.responses import FrequencyResponse
+from flightid.responses.bands import COHERENT, coherent_band
 
 MORE = "fly a sweep or multisine over a decade around the crossover, or excite more"
 
@@ -24,6 +28,8 @@ class Span:
         rad/s; None where no two neighbouring frequencies have the coherence.
     coherence : float
         Mean γ² in the band; over all frequencies where there is none.
+    decades : float or None
+        Width of the coherent frequencies, gaps left out; None: no gap.
 
     Example
     -------
@@ -34,10 +40,13 @@ class Span:
     name: str
     band_rad_s: tuple[float, float] | None
     coherence: float
+    decades: float | None = None
 
     @property
     def ratio(self) -> float:
-        """Highest over lowest frequency; one where there is no band."""
+        """Highest over lowest frequency, gaps left out; one where there is no band."""
+        if self.decades is not None:
+            return float(10.0**self.decades)
         return 1.0 if self.band_rad_s is None else self.band_rad_s[1] / self.band_rad_s[0]
 
     def __str__(self) -> str:
@@ -46,6 +55,27 @@ class Span:
             return f"{self.name} has no band with coherence"
         low, high = self.band_rad_s
         return f"{self.name} {low:.3g} to {high:.3g} rad/s"
+
+
+def spans_of(response: FrequencyResponse) -> list[Span]:
+    """The band of each output, from its coherence with all inputs together.
+
+    Multiple coherence counts: an input that does little for one output may move another.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> seen = FrequencyResponse.from_values(np.geomspace(1, 10, 21), np.ones(21),
+    ...                                      inputs=["a"], outputs=["y"])
+    >>> [str(span) for span in spans_of(seen)]
+    ['y 1 to 10 rad/s']
+    """
+    spans = []
+    for name, coherence in zip(response.outputs, response.multiple_coherence, strict=True):
+        band, decades = coherent_band(response.omega_rad_s, coherence)
+        counted = coherence[coherence >= COHERENT] if band is not None else coherence
+        spans.append(Span(name, band, float(np.mean(counted)), decades))
+    return spans
 
 
 def judge_span(spans: Sequence[Span]) -> Check:

@@ -7,9 +7,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError
 
+COHERENT = 0.6
+"""Coherence γ² from which a frequency counts."""
+
 
 def usable_band(
-    omega_rad_s: NDArray[np.float64], coherence: NDArray[np.float64], minimum: float = 0.6
+    omega_rad_s: NDArray[np.float64], coherence: NDArray[np.float64], minimum: float = COHERENT
 ) -> tuple[float, float] | None:
     """Widest unbroken band, in decades, in which coherence stays at or above a minimum.
 
@@ -36,6 +39,40 @@ def usable_band(
         return None
     low, high = max(runs, key=lambda run: omega_rad_s[run[1]] / omega_rad_s[run[0]])
     return float(omega_rad_s[low]), float(omega_rad_s[high])
+
+
+def coherent_band(
+    omega_rad_s: NDArray[np.float64], coherence: NDArray[np.float64], minimum: float = COHERENT
+) -> tuple[tuple[float, float] | None, float]:
+    """Lowest and highest coherent frequency, and the width of all coherent ones together.
+
+    Gaps may lie between: near a lightly damped mode a pilot in the loop keeps the input small, and
+    coherence dips in the middle of a good response.
+
+    Parameters
+    ----------
+    omega_rad_s, coherence : ndarray, shape (n_f,)
+    minimum : float
+        Smallest coherence γ².
+
+    Returns
+    -------
+    tuple of (tuple of float, or None) and float
+        rad/s, and decades; None where nothing is coherent.
+
+    Example
+    -------
+    >>> coherent_band(np.array([1.0, 10.0, 100.0]), np.array([0.9, 0.1, 0.8]))
+    ((1.0, 100.0), 1.0)
+    """
+    coherent = coherence >= minimum
+    if not np.any(coherent):
+        return None, 0.0
+    # Each frequency stands for half the way to its neighbours.
+    middles = np.log10(omega_rad_s)
+    edges = np.concatenate([middles[:1], (middles[1:] + middles[:-1]) / 2, middles[-1:]])
+    low, high = (float(omega_rad_s[coherent][place]) for place in (0, -1))
+    return (low, high), float(np.sum(np.diff(edges)[coherent]))
 
 
 def nearest(grid: NDArray[np.float64], wanted: NDArray[np.float64]) -> NDArray[np.intp]:

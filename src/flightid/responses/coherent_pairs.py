@@ -8,6 +8,7 @@ import numpy as np
 
 from flightid.errors import OptionError
 from flightid.findings import Finding
+from flightid.responses.bands import coherent_band
 from flightid.responses.pair import PairResponse
 from flightid.responses.response import FrequencyResponse
 from flightid.result import Result
@@ -182,17 +183,13 @@ def coherent_pairs(
 def _judged(pair: PairResponse, minimum: float, needed: float) -> CoherentPair:
     name, coherent = f"{pair.output}/{pair.input}", pair.coherence >= minimum
     highest = float(np.max(pair.coherence))
-    if not np.any(coherent):
+    band, decades = coherent_band(pair.omega_rad_s, pair.coherence, minimum)
+    if band is None:
         reason = f"coherence reaches {highest:.2f} at most: no response above the noise"
         return CoherentPair(name, None, 0.0, highest, False, reason)
-    # Each frequency stands for half the way to its neighbours.
-    middles = np.log10(pair.omega_rad_s)
-    edges = np.concatenate([middles[:1], (middles[1:] + middles[:-1]) / 2, middles[-1:]])
-    decades = float(np.sum(np.diff(edges)[coherent]))
-    low, high = (float(pair.omega_rad_s[coherent][place]) for place in (0, -1))
     if decades < needed:
         reason = f"coherent over {decades:.2f} decades only: too narrow to fit"
-        return CoherentPair(name, (low, high), decades, highest, False, reason)
+        return CoherentPair(name, band, decades, highest, False, reason)
     gaps = int(np.sum(np.diff(coherent.astype(np.int8)) == 1)) - (0 if coherent[0] else 1)
     reason = "coherent" if gaps == 0 else f"coherent but for {gaps} gap{'s' if gaps > 1 else ''}"
-    return CoherentPair(name, (low, high), decades, highest, True, reason)
+    return CoherentPair(name, band, decades, highest, True, reason)

@@ -130,7 +130,15 @@ def _examined(item: Identified, inspection: Inspection | None) -> Identified:
         return item
     beyond = [finding for finding in item.findings_beyond if finding not in fit.findings]
     first, *others = item.fits.items()
-    fits = dict([(first[0], examined(fit, inspection, beyond)), *others])
+    fits = dict(
+        [
+            (
+                first[0],
+                examined(fit, inspection, beyond, next(iter(item.responses.values()), None)),
+            ),
+            *others,
+        ]
+    )
     return replace(item, fitted=replace(item.fitted, fits=fits))
 
 
