@@ -64,11 +64,47 @@ def test_a_rotorcraft_model_in_one_table() -> None:
     assert {"gain-limited", "phase-nonlinear", "level-attitude-bandwidth"} <= codes
 
 
-def test_a_control_of_the_other_sign_is_not_rated() -> None:
-    found = fid.handling_qualities(fid.load_model("r50_hover"), band_rad_s=(1.0, 60.0))
-    assert "theta/lon" not in {rating.subject for rating in found.ratings}
-    told = [each for each in found.findings if each.code in ("no-bandwidth", "sign-doubtful")]
-    assert any("pitch" in finding.message for finding in told)
+def test_a_control_of_the_other_sign_is_found_and_said() -> None:
+    hover = fid.load_model("r50_hover")
+    found = fid.handling_qualities(hover, band_rad_s=(1.0, 60.0))
+    told = fid.handling_qualities(hover, signs={"pitch": -1}, band_rad_s=(1.0, 60.0))
+    ours, theirs = found.bandwidths["pitch"].uncertain, told.bandwidths["pitch"].uncertain
+    assert_close(ours.numbers, theirs.numbers, rtol=1e-12, why="the same sign")
+    (said,) = [each for each in found.findings if each.code == "sign-found"]
+    assert said.message.startswith("pitch: the control pulls the other way")
+    assert "sign-found" not in {each.code for each in told.findings}
+    # Told wrongly, it is not rated.
+    wrong = fid.handling_qualities(hover, signs={"pitch": 1}, band_rad_s=(1.0, 60.0))
+    assert "theta/lon" not in {rating.subject for rating in wrong.ratings}
+
+
+def unstable_pitch() -> fid.StateSpaceModel:
+    return fid.load_model("short_period").with_values({"Malpha": 20.0})
+
+
+def test_a_divergence_is_red_with_its_time_to_double() -> None:
+    found = fid.handling_qualities(unstable_pitch(), vehicle="aeroplane", category="B")
+    growth = max(unstable_pitch().eigenvalues().real)
+    (said,) = [each for each in found.findings if each.code == "divergence"]
+    assert said.light.value == "red"
+    assert f"time to double {np.log(2.0) / growth:.3g}"[:18] in said.message
+    assert "no-level" in {each.code for each in found.findings}
+
+
+def test_the_load_factor_slope_is_computed_or_named_as_missing() -> None:
+    model = fid.load_model("short_period")
+    found = fid.handling_qualities(model, vehicle="aeroplane", category="B")
+    (cap,) = [each for each in found.ratings if each.chart.key == "control_anticipation"]
+    slope = 108.6 / 9.80665
+    frequency = abs(model.eigenvalues()[0])
+    assert_close(cap.values["cap"], frequency**2 / slope, rtol=1e-9, why="-Zalpha/g")
+    assert "n-alpha" in {each.code for each in found.findings}
+    told = fid.handling_qualities(model, vehicle="aeroplane", category="B", n_alpha=12.0)
+    assert "n-alpha" not in {each.code for each in told.findings}
+    system = model.linear_system()
+    bare = fid.handling_qualities(system, vehicle="aeroplane", category="B", axes={})
+    named = {each.code for each in bare.findings}
+    assert ("no-n-alpha" in named) == any(mode.name == "short period" for mode in bare.modes or ())
 
 
 def test_modes_of_an_aeroplane_have_their_levels() -> None:

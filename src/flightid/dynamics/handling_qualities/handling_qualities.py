@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from flightid.conventions import Light
 from flightid.dynamics.handling_qualities.attitude_bandwidth import attitude_bandwidth
@@ -11,6 +12,13 @@ from flightid.dynamics.handling_qualities.mode_ratings import mode_ratings
 from flightid.dynamics.handling_qualities.rating import Rating
 from flightid.dynamics.handling_qualities.rating_charts_reading import rating_chart
 from flightid.dynamics.handling_qualities.result import AttitudeBandwidth
+from flightid.dynamics.handling_qualities.unrated import (
+    ASK_N_ALPHA,
+    divergence_findings,
+    gaps,
+    load_factor_slope,
+    with_found_sign,
+)
 from flightid.dynamics.modes.modes import modes
 from flightid.dynamics.modes.result import Modes
 from flightid.errors import DataError, ModelError, OptionError
@@ -167,7 +175,7 @@ def handling_qualities(
         Output and control by axis (``"roll"``, ``"pitch"``, ``"yaw"``); default: phi, theta, psi,
         or p, q, r, and the control that goes by a usual name or is alone.
     signs : mapping of str to int, optional
-        −1 for an axis whose control pulls the other way.
+        −1 for an axis whose control pulls the other way; left out: as the phase shows.
     vehicle : {"rotorcraft", "aeroplane"}
         By ADS-33E, or by MIL-F-8785C and MIL-STD-1797A.
     response_type : {"rate", "attitude"}
@@ -182,7 +190,8 @@ def handling_qualities(
     aircraft_class : {"I", "II", "II-L", "II-C", "III", "IV"}
         Of aeroplanes.
     n_alpha : float, optional
-        Of aeroplanes: g/rad, for the control anticipation parameter.
+        Of aeroplanes: g/rad, for the control anticipation parameter; left out: from Zalpha, or
+        from Zw and U0, of the model.
     charts : str, optional
         File of charts in place of ours.
 
@@ -226,29 +235,55 @@ def handling_qualities(
     bandwidths: dict[str, AttitudeBandwidth] = {}
     ratings: list[Rating] = []
     for axis, (output, control) in pairs.items():
-        try:
-            found = attitude_bandwidth(
+
+        def bandwidth(
+            sign: int, axis: str = axis, pair: tuple[str, str] = (control, output)
+        ) -> Any:  # noqa: ANN401
+            return attitude_bandwidth(
                 source,
-                control,
-                output,
+                *pair,
                 band_rad_s=band_rad_s,
                 response_type=response_type,
-                output_is="rate" if output == ATTITUDES[axis][1] else "attitude",
-                sign=(signs or {}).get(axis, 1),
+                output_is="rate" if pair[1] == ATTITUDES[axis][1] else "attitude",
+                sign=sign,
             )
+
+        try:
+            found, said = with_found_sign(axis, signs or {}, bandwidth)
         except DataError as error:
             findings.append(_absent("no-bandwidth", f"{axis}: {error.problem}", error.action or ""))
             continue
         bandwidths[axis] = found
+        findings += said
         findings += _prefixed(axis, found.findings)
         ratings += _bandwidth_ratings(axis, found, vehicle, conditions, charts)
     seen = _modes(source, findings)
     if seen is not None:
+        if vehicle == "aeroplane" and n_alpha is None:
+            n_alpha = _slope(source, seen, findings)
         ratings += mode_ratings(
             seen, vehicle=vehicle, conditions=conditions, n_alpha=n_alpha, path=charts
         )
+        rated = {rating.subject for rating in ratings} if vehicle == "aeroplane" else set()
+        findings += divergence_findings(seen, rated)
+    names = () if seen is None else (mode.name for mode in seen)
+    findings += gaps(ratings, [*bandwidths, *names])
     findings += [finding for rating in ratings for finding in rating.findings]
     return HandlingQualities(vehicle, conditions, bandwidths, seen, tuple(ratings), tuple(findings))
+
+
+def _slope(source: object, seen: Modes, findings: list[Finding]) -> float | None:
+    """n/α from the model's own derivatives, where it has a short period to rate with it."""
+    if not any(mode.name == "short period" for mode in seen):
+        return None
+    found = load_factor_slope(source)
+    if found is None:
+        text = "natural frequency against n/α is not rated: the model has no Zalpha, or Zw and U0"
+        findings.append(_absent("no-n-alpha", text, ASK_N_ALPHA))
+        return None
+    text = f"n/α {found[0]:.3g} g/rad, as {found[1]} of the model, without the elevator's lift"
+    findings.append(_absent("n-alpha", text, f"{ASK_N_ALPHA}, where it is known better"))
+    return found[0]
 
 
 def _bandwidth_ratings(
