@@ -114,6 +114,7 @@ def fit_filter_error(
             "gust": noise.gust,
         },
         noise_covariance=noise.measurement,
+        residual_horizon=1,
     )
 
 

@@ -181,6 +181,7 @@ def assemble(
     findings: Sequence[Finding] = (),
     extra: Mapping[str, object] | None = None,
     noise_covariance: Array | None = None,
+    residual_horizon: int | str = "free_run",
 ) -> Fit:
     """The result of a regression method."""
     fitted, names = inner.fitted, inner.names
@@ -215,6 +216,7 @@ def assemble(
         provenance={**_provenance(method, fitted, records, options), **(extra or {})},
         records=tuple(fitted_records),
         noise_covariance=noise_covariance,
+        residual_horizon=residual_horizon,
         agreement=known.agreement,
     )
 
