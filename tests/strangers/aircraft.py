@@ -149,6 +149,34 @@ def gusty(seed: int) -> Flight:
     return Flight(seed, 40.0, gust_m_s=1.0)
 
 
+def fleet(seed: int) -> Trial:
+    """Three manoeuvres: mass is declared, the moment's constant differs with the loading."""
+    random = np.random.default_rng(seed)
+    loadings = zip((1000.0, 1200.0, 1400.0), 0.04 + 0.01 * random.standard_normal(3), strict=True)
+    records = []
+    for place, (mass, constant) in enumerate(loadings):
+        flight = Flight(1000 * seed + place, 12.0, mass=mass, others={"Cm0": constant})
+        record = flown(flight)
+        records.append(
+            fid.Record.from_arrays(
+                record.time_s,
+                inputs={name: record[name] for name in record.inputs},
+                outputs={name: record[name] for name in record.outputs},
+                others={"m": np.full(record.n_samples, mass)},
+                units={**{name: record.unit(name) for name in record.channels}, "m": "kg"},
+                hold="zero",
+            )
+        )
+    truth = {name: value for name, value in TRUTH.items() if name != "Cm0"}
+    own = ["m", "Cm0"]
+    return fit_trial(
+        lambda: fid.identify(
+            model(), records, method="output_error", output_bias=False, record_parameters=own
+        ),
+        truth,
+    )
+
+
 def at_trim(seed: int) -> Trial:
     """Fourier output error where a trim is declared: far from it the equations bend."""
     record = flown(Flight(seed))
@@ -201,5 +229,6 @@ CASES = (
         "aircraft in a gust, output error",
         partial(fitted, method="output_error", flight=gusty, output_bias=False),
     ),
+    Case("three loadings, mass declared, Cm0 by record", fleet),
     Case("moment without states, output error", moment),
 )

@@ -28,6 +28,8 @@ class FittedRecord:
     initial_state, bias, reference_shift : mapping of str to Estimate
         By state, output and input: what was estimated or held in this record. A bias is added to
         the model's output, a reference shift to its input.
+    constants : mapping of str to Estimate
+        By parameter that each record has for itself (`record_parameters`).
     states : mapping of str to ndarray, shape (n_samples,)
         Filter error: states predicted one sample ahead; empty for other methods.
 
@@ -51,6 +53,7 @@ class FittedRecord:
     bias: Mapping[str, Estimate] = field(default_factory=dict)
     reference_shift: Mapping[str, Estimate] = field(default_factory=dict)
     states: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    constants: Mapping[str, Estimate] = field(default_factory=dict)
 
     def residual(self, name: str) -> NDArray[np.float64]:
         """Measured minus model of one output, shape (n_samples,)."""
@@ -84,6 +87,7 @@ class FittedRecord:
             "initial_state": self.initial_state,
             "bias": self.bias,
             "reference_shift": self.reference_shift,
+            "constants": self.constants,
         }
         return {
             "name": self.measured.name,

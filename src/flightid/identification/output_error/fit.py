@@ -32,7 +32,8 @@ from flightid.identification.output_error.equation_records import (
 )
 from flightid.identification.output_error.process_noise import judge_process_noise
 from flightid.identification.records.findings import judge_channels, judge_fit
-from flightid.identification.records.options import RecordOptions
+from flightid.identification.records.options import RecordOptions, chosen
+from flightid.identification.records.record_parameters import RecordParameters
 from flightid.identification.records.setup import RecordSet, prepare_records
 from flightid.identification.records.statistics import (
     HeldStart,
@@ -79,6 +80,12 @@ def fit_output_error(
     model: GreyBoxModel, data: Record | Sequence[Record], options: RecordOptions
 ) -> Fit:
     """Fit a model to records by output error; see `flightid.identify`."""
+    if options.record_parameters:
+        own = RecordParameters.of(model, data, options.record_parameters)
+        shifted = chosen(options.input_bias, model.inputs, "input_bias")
+        freed = (*(model.inputs[place] for place in shifted), *own.estimated)
+        inner = replace(options, record_parameters=(), input_bias=freed)
+        return own.restored(fit_output_error(own.model, own.records, inner))
     if options.start_from == "equation_error":
         model = equation_error_start(model, data)
     prepared = prepare_records(model, data, options)

@@ -106,10 +106,10 @@ def judge_process_noise(
         Finding(
             "process-noise",
             light,
-            "residuals follow the model's own modes, as turbulence makes them: one sample ahead "
-            f"{np.sqrt(found.left[worst]):.2g} of the free run's error is left in "
-            f"{fitted.outputs[worst]}",
-            "use method='filter_error', which has noise on the states, or fly in calm air",
+            "residuals follow the model's own modes, as turbulence makes them, or dynamics that it "
+            f"lacks: one sample ahead {np.sqrt(found.left[worst]):.2g} of the free run's error is "
+            f"left in {fitted.outputs[worst]}",
+            "use method='filter_error', which has noise on the states; in calm air mend the model",
         )
     ]
 

@@ -8,7 +8,7 @@ from typing import Any, overload
 from flightid.errors import ModelError, OptionError, UnknownNameError
 from flightid.identification.prediction.continuous import predict_continuous
 from flightid.identification.prediction.narx import predict_narx
-from flightid.identification.prediction.remembered import remembered
+from flightid.identification.prediction.remembered import of_record, remembered
 from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.sampled import predict_sampled
@@ -158,7 +158,7 @@ def predict(
         require_units(model, record, chosen)
     made = tuple(
         way(
-            model,
+            of_record(source, model, record),
             record,
             chosen,
             Request(

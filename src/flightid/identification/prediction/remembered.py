@@ -6,7 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from flightid.identification.records.record_parameters import with_record_values
+from flightid.models import StateSpaceModel
 from flightid.models.model import model_of
+from flightid.record import Record
 
 WORDS = ("estimate", "measured", "trim")
 
@@ -21,11 +24,14 @@ class Remembered:
         Numbers by state belong to the records of the fit and are not carried on.
     output_bias, input_bias : bool or None
         Whether any was free.
+    record_parameters : tuple of str
+        Parameters that each record has for itself.
     """
 
     initial_state: str | None = None
     output_bias: bool | None = None
     input_bias: bool | None = None
+    record_parameters: tuple[str, ...] = ()
 
 
 def remembered(source: object) -> Remembered:
@@ -34,7 +40,7 @@ def remembered(source: object) -> Remembered:
     Example
     -------
     >>> remembered(object())
-    Remembered(initial_state=None, output_bias=None, input_bias=None)
+    Remembered(initial_state=None, output_bias=None, input_bias=None, record_parameters=())
     """
     told = _told(source)
     start = told.get("initial_state")
@@ -42,7 +48,22 @@ def remembered(source: object) -> Remembered:
         name: None if told.get(name) is None else bool(told[name])
         for name in ("output_bias", "input_bias")
     }
-    return Remembered(start if start in WORDS else None, **biases)
+    own = tuple(told.get("record_parameters", ()))
+    return Remembered(start if start in WORDS else None, **biases, record_parameters=own)
+
+
+def of_record(source: object, model: object, record: Record) -> object:
+    """The model with what a record holds of the parameters that a fit was told to be its own.
+
+    Example
+    -------
+    >>> of_record(None, 1.0, None)
+    1.0
+    """
+    names = remembered(source).record_parameters
+    if not names or not isinstance(model, StateSpaceModel):
+        return model
+    return with_record_values(model, record, names)
 
 
 def _told(source: object) -> Mapping[str, Any]:

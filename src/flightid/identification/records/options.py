@@ -43,6 +43,9 @@ class RecordOptions(Options):
     input_bias: Freedom = option(
         False, doc="Constants added to inputs of each record, estimated: all, none, or names."
     )
+    record_parameters: Sequence[str] = option(
+        (), doc="Parameters that each record has for itself: of its channel, else estimated."
+    )
     noise_covariance: str = option(
         "diagonal", choices=COVARIANCES, doc="Whether noise of outputs may be correlated."
     )

@@ -166,7 +166,7 @@ def prepare_records(
     # A nonlinear model takes its channels whole: no point stands for another.
     whole = isinstance(model, StateSpaceModel) and not model.is_linear
     trim = dict(model.trim) if isinstance(model, StateSpaceModel) else {}
-    points = ((model.inputs, trim), (model.outputs, _output_trim(model)))
+    points = ((model.inputs, trim), (model.outputs, {} if whole else _output_trim(model)))
     at_trim = np.array([float(trim.get(name, 0.0)) for name in states])
     arrays, offsets, own = [], [], []
     for record in records:

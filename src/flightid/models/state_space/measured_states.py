@@ -156,7 +156,7 @@ def measured_point(model: StateSpaceModel, records: Sequence[Record]) -> dict[st
     dict of str to float
         States and inputs; empty where the model declares a trim or is linear.
     """
-    if model.trim or model.is_linear:
+    if model.is_linear or any(name in model.trim for name in model.states):
         return {}
     inputs, outputs = records[0].matrix(model.inputs), records[0].matrix(model.outputs)
     start = state_outputs(model, inputs, outputs).states(outputs[:, :1])[:, 0]

@@ -8,7 +8,9 @@ from typing import Any, overload
 
 import numpy as np
 
+from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
+from flightid.findings import Finding
 from flightid.identification.prediction.continuous import is_whole, predict_continuous
 from flightid.identification.prediction.predict import (
     Predictor,
@@ -17,7 +19,7 @@ from flightid.identification.prediction.predict import (
     predictor_of,
     require_units,
 )
-from flightid.identification.prediction.remembered import remembered
+from flightid.identification.prediction.remembered import of_record, remembered
 from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.models.linear.hold_equivalent import Hold
@@ -178,10 +180,12 @@ def verify(
         for each, (model, way) in zip(several, models, strict=True)
     ]
     runs = []
-    for (model, way), request in zip(models, requests, strict=True):
+    for each, (model, way), request in zip(several, models, requests, strict=True):
         for record in flown:
             require_units(model, record, chosen)
-        runs.append([way(model, record, chosen, request) for record in flown])
+        runs.append(
+            [way(of_record(each, model, record), record, chosen, request) for record in flown]
+        )
     results = []
     for each, (model, way), request, made in zip(
         several, models, requests, _scored_alike(runs), strict=True
@@ -190,6 +194,7 @@ def verify(
         judged = judge(tuple(made), chosen, request, seen)
         beside = baseline_findings(each, made, request)
         said = held.findings if way is predict_continuous else ()
+        said = (*said, *_at_mean(each, flown))
         results.append(replace(judged, findings=(*judged.findings, *beside, *said)))
     if not isinstance(source, list | tuple):
         return results[0]
@@ -212,6 +217,22 @@ def _request(
         initial_state=asked.initial_state or known.initial_state,
         state_bias=asked.state_bias if told[0] else state,
         output_bias=asked.output_bias if told[1] else output,
+    )
+
+
+def _at_mean(source: object, records: tuple[Record, ...]) -> tuple[Finding, ...]:
+    """Say which parameters a fit estimated for each of its records, which no other record has."""
+    names = remembered(source).record_parameters
+    unknown = [name for name in names if not all(name in record for record in records)]
+    if not unknown:
+        return ()
+    return (
+        Finding(
+            "verification-record-parameters",
+            Light.UNKNOWN,
+            f"{', '.join(unknown)}: estimated in each record of the fit, here the mean of those",
+            "give the records a channel of that name, or judge with output_bias=True",
+        ),
     )
 
 
