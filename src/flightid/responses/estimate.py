@@ -16,6 +16,7 @@ from flightid.record.hold import InputShape, Loop, common_hold, common_loop
 from flightid.record.several import as_records
 from flightid.responses.errors.linear_estimate import LinearEstimate, WindowedWeights
 from flightid.responses.estimators.local_polynomial import estimate_local_polynomial
+from flightid.responses.estimators.periodic import estimate_periodic
 from flightid.responses.estimators.windowed import (
     estimate_windowed,
     windowed_errors,
@@ -71,9 +72,10 @@ def estimate_response(
     excitations : str or iterable of str, optional
         Channels of injected signals that are independent of the noise; needed by "instrument".
         Default for that method: the channels with the role excitation.
-    estimator : {"composite", "instrument", "local_polynomial"}
+    estimator : {"composite", "instrument", "local_polynomial", "periodic"}
         "composite": directly from inputs to outputs. "instrument": for records with a loop closed,
         by way of the excitation. "local_polynomial": without windows, for short records.
+        "periodic": at the harmonics of inputs that repeat (`Record.period_s`), whole periods alone.
     overlap : float
         Overlap of neighbouring windows: 0, 0.5, 0.75, 0.8 …
     detrend : {"mean", "line", "none"}
@@ -148,6 +150,10 @@ def estimate_response(
     if estimator == "local_polynomial":
         step = Step("estimate_response", options, VERSION)
         response = estimate_local_polynomial(samples, omega, step, covariance=covariance)
+        return _with_inputs(response, samples, listed, loop)
+    if estimator == "periodic":
+        step = Step("estimate_response", options, VERSION)
+        response = estimate_periodic(samples, listed, omega, step, covariance=covariance)
         return _with_inputs(response, samples, listed, loop)
     plans = plan_windows(window_s, samples, float(omega[-1]), shifts_of(overlap))
     lengths = ", ".join(f"{plan.length * samples.sample_time_s:.6g}" for plan in plans)

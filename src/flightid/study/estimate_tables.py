@@ -23,6 +23,7 @@ HZ = 1 / (2 * math.pi)
 WORDS = {
     "composite": "direct estimate",
     "local_polynomial": "local polynomial estimate",
+    "periodic": "estimate at harmonics",
     "instrument": "instrument estimate",
     "output_error": "output error on the records",
     "equation_error": "equation error on the records",

@@ -60,24 +60,31 @@ def estimate_local_polynomial(
                 action="leave out an input, or narrow omega_rad_s",
             )
         fits.append(fit)
-    return _response(samples, omega, records, fits, step, covariance)
+    return response_of_fits(samples, omega, records, fits, step, covariance)
 
 
-def _response(
+def response_of_fits(
     samples: Samples,
     omega: NDArray[np.float64],
     records: Sequence[Bins],
     fits: Sequence[LocalFit],
     step: Step,
     covariance: bool,
+    *,
+    estimator: str = "local_polynomial",
+    n_independent: float | None = None,
 ) -> FrequencyResponse:
+    """The response of fits on bins of whole records, one at each frequency.
+
+    `n_independent` counts independent measurements; default: the bins of a fit.
+    """
     n_in = len(samples.inputs)
     response = np.array([fit.gain.T for fit in fits]).transpose(1, 2, 0)
     residuals = np.array([fit.residual for fit in fits])
     noise = np.real(np.einsum("fii->if", residuals))
     # Variance of a gain for unit noise: what conditioning on other inputs and leakage leave.
     spread = np.array([sum(np.sum(np.abs(w) ** 2, axis=1) for w in fit.weights) for fit in fits]).T
-    n_bins = np.array([fit.n_bins for fit in fits], dtype=np.float64)
+    n_bins = np.array([n_independent or fit.n_bins for fit in fits], dtype=np.float64)
     unexplained = n_bins * spread[None] * noise[:, None]
     power = np.abs(response) ** 2
     coherence = power / np.maximum(power + unexplained, np.finfo(float).tiny)
@@ -98,7 +105,7 @@ def _response(
         input_spectrum=spectrum[:n_in, :n_in],
         cross_spectrum=spectrum[:n_in, n_in:].transpose(1, 0, 2),
         output_spectrum=outputs,
-        estimator="local_polynomial",
+        estimator=estimator,
         findings=tuple(correlation_findings(samples.inputs, spectrum[:n_in, :n_in])),
         history=(*samples.history, step),
         errors=LocalErrors(tuple(fits), NoiseSpectrum.of_matrices(omega, residuals))
