@@ -44,7 +44,8 @@ def test_an_unknown_hold_is_as_before_and_said() -> None:
     fit = fid.identify(MODEL, record)
     told = fid.identify(MODEL, record, hold="first")
     assert fit.parameters["Lp"].value == told.parameters["Lp"].value
-    (said,) = _said(fit)
+    said, sized = _said(fit)
+    assert "steps" in sized
     assert "straight lines between samples, yet tau_phi" in said
     assert "every 3 samples" in said
     assert not _said(told)
@@ -59,7 +60,8 @@ def test_a_response_carries_the_hold_to_the_fit() -> None:
     silent = fid.estimate_response(_flown("zero", known=False), band_rad_s=(1.0, 15.0))
     fit = fid.identify(MODEL, silent)
     assert fit.provenance["inputs"] == {"hold": "band_limited", "hold_from": "assumed"}
-    assert _said(fit) == ["inputs taken as smooth between samples; the record does not say"]
+    (said,) = _said(fit)
+    assert said.startswith("inputs were taken as smooth between samples, for no record says; steps")
     assert not _said(fid.identify(MODEL, silent, correct_bias=False))
 
 

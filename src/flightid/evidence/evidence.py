@@ -16,12 +16,13 @@ INSPECTION = "inspection"
 BAND = "excitation band"
 COHERENCE = "coherence"
 LOOP = "loop"
+HOLD = "input hold"
 SETTLED = "estimator settled"
 AGREEMENT = "agreement of parts"
 SIGNS = "declared signs"
 RESIDUALS = "residuals"
 GUIDELINES = "guidelines"
-NAMES = (INSPECTION, BAND, COHERENCE, LOOP, SETTLED, AGREEMENT, SIGNS, RESIDUALS, GUIDELINES)
+NAMES = (INSPECTION, BAND, COHERENCE, LOOP, HOLD, SETTLED, AGREEMENT, SIGNS, RESIDUALS, GUIDELINES)
 ALWAYS = (BAND, COHERENCE, LOOP, SETTLED, AGREEMENT)
 """What every result needs before it may be green."""
 
@@ -30,6 +31,7 @@ _ABSENT: Mapping[str, tuple[str, str]] = {
     BAND: ("the band that the inputs excite was not examined", "fit records or their responses"),
     COHERENCE: ("coherence was not examined", "fit records or a response estimated from them"),
     LOOP: ("whether a loop was closed was not examined", "declare loop='open' or 'closed'"),
+    HOLD: ("how inputs move between samples was not examined", "declare hold=…"),
     SETTLED: ("whether the estimator settled was not examined", ""),
     AGREEMENT: (
         "whether parts of the data agree was not examined",

@@ -16,6 +16,7 @@ from flightid.evidence.evidence import (
     ALWAYS,
     BAND,
     GUIDELINES,
+    HOLD,
     INSPECTION,
     RESIDUALS,
     SETTLED,
@@ -136,8 +137,9 @@ def _with_findings(checks: list[Check], made: FitFacts) -> list[Check]:
     """The checks with the fit's findings among them, the worst word of each name first."""
     groups: dict[str, list[Finding]] = {SETTLED: [], GUIDELINES: []}
     for finding in made.findings:
-        if not finding.code.startswith("hold-"):
-            groups.setdefault(BELONGS.get(finding.code, GUIDELINES), []).append(finding)
+        code = finding.code
+        name = HOLD if code.startswith("hold-") else BELONGS.get(code, GUIDELINES)
+        groups.setdefault(name, []).append(finding)
     found = {check.name: check for check in checks}
     for name, findings in groups.items():
         said = _of_findings(name, findings, made.termination)

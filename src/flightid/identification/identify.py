@@ -11,6 +11,7 @@ from flightid.errors import OptionError
 from flightid.identification.fit import Fit
 from flightid.identification.fit_evidence import evidence_of
 from flightid.identification.held_inputs import hold_for, with_hold_said
+from flightid.identification.hold_test import with_hold_tested
 from flightid.identification.methods import flat, method_of
 from flightid.models import GreyBoxModel
 from flightid.models.innovations.structure import SubspaceStructure
@@ -181,7 +182,8 @@ def identify(
     given = options if held is None else {**options, "hold": held.hold}
     fit = replace(chosen.run(model, data, given), structure=model, method=chosen.name)
     fit = replace(fit, provenance={**fit.provenance, "told": options})
-    fit = fit if held is None else with_hold_said(fit, held)
+    if held is not None:
+        fit = with_hold_said(*with_hold_tested(fit, chosen, data, given, held))
     return replace(fit, evidence=evidence_of(fit, flat(data), loop))
 
 

@@ -14,7 +14,7 @@ from flightid.record.record import Record
 from flightid.record.repeats import Staircase, found_staircase
 from flightid.record.several import as_records
 
-DECLARED, RECORDED, ASSUMED = "declared", "record", "assumed"
+DECLARED, RECORDED, FITTED, ASSUMED = "declared", "record", "fit", "assumed"
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class ChosenHold:
     Attributes
     ----------
     hold : {"zero", "first", "band_limited"}
-    source : {"declared", "record", "assumed"}
+    source : {"declared", "record", "fit", "assumed"}
     findings : tuple of Finding
         What to know of it; empty where it was declared or the records know it.
 
@@ -55,6 +55,7 @@ def chosen_hold(
     known: tuple[InputHold, ...] = ("first", "zero"),
     assumed: InputHold = "first",
     inputs: Iterable[str] | None = None,
+    fitted: InputHold | None = None,
 ) -> ChosenHold:
     """The hold for a verb on records.
 
@@ -69,6 +70,8 @@ def chosen_hold(
         What it takes where nobody knows, or where it cannot compute with what the records know.
     inputs : iterable of str, optional
         The inputs in question; default: those of each record.
+    fitted : str, optional
+        What the model's fit was told, for records that do not know.
 
     Returns
     -------
@@ -93,6 +96,8 @@ def chosen_hold(
     found = hold_of_shapes([(each.name, each.input_shape) for each in listed], known, assumed)
     if found.source != ASSUMED or any(each.hold for each in listed):
         return found
+    if fitted is not None:
+        return ChosenHold(require_hold(fitted, known), FITTED)
     wanted = None if inputs is None else tuple(inputs)
     for record in listed:
         for name in record.inputs if wanted is None else wanted:

@@ -40,11 +40,11 @@ class _Wanted:
 
 def read_records(
     path: str | Path,
-    inputs: Names | None = None,
-    outputs: Names | None = None,
+    inputs: Names | str | None = None,
+    outputs: Names | str | None = None,
     *,
-    excitations: Names | None = None,
-    others: Names | None = None,
+    excitations: Names | str | None = None,
+    others: Names | str | None = None,
     time_column: str = "time",
     units: Mapping[str, str] | None = None,
     sample_time_s: float | None = None,
@@ -68,8 +68,8 @@ def read_records(
     path : str or Path
         The file.
     inputs, outputs, excitations, others : names or mapping of str to str, optional
-        Columns by role; a mapping gives new names, channel to column. With none of the four,
-        every numeric column becomes a channel of role "other".
+        Columns by role, or one name; a mapping gives new names, channel to column. With none of
+        the four, every numeric column becomes a channel of role "other".
     time_column : str
         Column of the time stamps; in s unless the file or `units` says otherwise.
     units : mapping of str to str, optional
@@ -115,16 +115,19 @@ def read_records(
     >>> text = "time,tau,p [deg/s]\n0,0.1,1\n0.5,0.2,2\n1.0,0.1,3\n"
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = write_atomically(Path(folder) / "roll.csv", text)
-    ...     read_records(path, inputs=["tau"], outputs=["p"])
+    ...     read_records(path, inputs="tau", outputs="p")
     [Record('roll', 3 samples, 2 Hz, 1.5 s, inputs [tau], outputs [p])]
     """
     source = Path(path)
     kind = file_format(source)
-    roles = {
+    groups = {
         Role.INPUT: inputs,
         Role.OUTPUT: outputs,
         Role.EXCITATION: excitations,
         Role.OTHER: others,
+    }
+    roles: dict[Role, Names | None] = {
+        role: (names,) if isinstance(names, str) else names for role, names in groups.items()
     }
     text = _labels(source, kind)
     if text is not None:
@@ -194,10 +197,6 @@ def _table(path: Path, kind: FileFormat) -> ColumnTable:
 def _pairs(names: Names | None) -> list[tuple[str, str]]:
     if names is None:
         return []
-    if isinstance(names, str):
-        raise OptionError(
-            "names of channels are a list or a mapping", found=repr(names), needed=f"[{names!r}]"
-        )
     if isinstance(names, Mapping):
         return list(names.items())
     return [(name, name) for name in names]

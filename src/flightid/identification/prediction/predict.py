@@ -13,10 +13,10 @@ from flightid.identification.prediction.request import FREE_RUN, InitialState, R
 from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.sampled import predict_sampled
 from flightid.models import InnovationsModel, LinearSystem, NarxModel, PolynomialModel
-from flightid.models.linear.hold_equivalent import Hold
 from flightid.models.model import LinearModel, Model, model_of
 from flightid.record import Record
 from flightid.record.chosen_hold import chosen_hold
+from flightid.record.hold import HOLDS, InputHold
 from flightid.record.several import as_records
 from flightid.units import canonical, clash, match
 
@@ -41,7 +41,7 @@ def predict(
     settle_s: float | None = ...,
     state_bias: bool = ...,
     output_bias: bool = ...,
-    hold: Hold | None = ...,
+    hold: InputHold | None = ...,
 ) -> Prediction: ...
 
 
@@ -56,7 +56,7 @@ def predict(
     settle_s: float | None = ...,
     state_bias: bool = ...,
     output_bias: bool = ...,
-    hold: Hold | None = ...,
+    hold: InputHold | None = ...,
 ) -> tuple[Prediction, ...]: ...
 
 
@@ -70,7 +70,7 @@ def predict(
     settle_s: float | None = None,
     state_bias: bool = False,
     output_bias: bool = False,
-    hold: Hold | None = None,
+    hold: InputHold | None = None,
 ) -> Prediction | tuple[Prediction, ...]:
     """Predict the outputs of records from their inputs, with any fit or model.
 
@@ -103,7 +103,7 @@ def predict(
     state_bias, output_bias : bool
         Solve for a constant on each state derivative (of a nonlinear model: on each input), and on
         each output.
-    hold : {"first", "zero"}, optional
+    hold : {"first", "zero", "band_limited"}, optional
         What the inputs of a model in continuous time do between samples; default: what each record
         knows, else "first".
 
@@ -163,7 +163,7 @@ def predict(
             chosen,
             Request(
                 horizon, initial_state or _start_of(source, way), settle_s, state_bias, output_bias,
-                chosen_hold(record, hold).in_time,
+                chosen_hold(record, hold, known=HOLDS, fitted=remembered(source).hold).hold,
             ),
         )
         for record in flown

@@ -1,4 +1,4 @@
-"""What a fit was told of initial states and biases: its model is predicted the same way."""
+"""What a fit was told of states, biases and inputs: its model is predicted the same way."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from flightid.identification.records.record_parameters import with_record_values
 from flightid.models import StateSpaceModel
 from flightid.models.model import model_of
 from flightid.record import Record
+from flightid.record.chosen_hold import DECLARED, RECORDED
+from flightid.record.hold import HOLDS, InputHold
 
 WORDS = ("estimate", "measured", "trim")
 
@@ -26,12 +28,15 @@ class Remembered:
         Whether any was free.
     record_parameters : tuple of str
         Parameters that each record has for itself.
+    hold : {"zero", "first", "band_limited"} or None
+        What inputs did between samples, where the fit was told or its records knew.
     """
 
     initial_state: str | None = None
     output_bias: bool | None = None
     input_bias: bool | None = None
     record_parameters: tuple[str, ...] = ()
+    hold: InputHold | None = None
 
 
 def remembered(source: object) -> Remembered:
@@ -39,17 +44,21 @@ def remembered(source: object) -> Remembered:
 
     Example
     -------
-    >>> remembered(object())
-    Remembered(initial_state=None, output_bias=None, input_bias=None, record_parameters=())
+    >>> remembered(object())  # doctest: +NORMALIZE_WHITESPACE
+    Remembered(initial_state=None, output_bias=None, input_bias=None, record_parameters=(),
+    hold=None)
     """
-    told = _told(source)
+    told, inputs = _told(source, "told"), _told(source, "inputs")
     start = told.get("initial_state")
     biases = {
         name: None if told.get(name) is None else bool(told[name])
         for name in ("output_bias", "input_bias")
     }
     own = tuple(told.get("record_parameters", ()))
-    return Remembered(start if start in WORDS else None, **biases, record_parameters=own)
+    known = inputs.get("hold_from") in (DECLARED, RECORDED)
+    hold = inputs.get("hold") if known and inputs.get("hold") in HOLDS else None
+    start = start if start in WORDS else None
+    return Remembered(start, **biases, record_parameters=own, hold=hold)
 
 
 def of_record(source: object, model: object, record: Record) -> object:
@@ -66,11 +75,11 @@ def of_record(source: object, model: object, record: Record) -> object:
     return with_record_values(model, record, names)
 
 
-def _told(source: object) -> Mapping[str, Any]:
+def _told(source: object, key: str) -> Mapping[str, Any]:
     estimated = getattr(model_of(source), "estimated", None)
     for holder in (source, estimated):
         known = getattr(holder, "provenance", None)
-        told = known.get("told") if isinstance(known, Mapping) else None
+        told = known.get(key) if isinstance(known, Mapping) else None
         if isinstance(told, Mapping):
             return told
     return {}

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flightid.errors import OptionError
-from flightid.models.linear.hold_equivalent import Hold
 from flightid.options import Options, option
+from flightid.record.hold import HOLDS, InputHold
 
 FREE_RUN = "free_run"
 STARTS = ("trim", "zero", "measured", "estimate")
@@ -50,7 +50,7 @@ class Request(PredictionOptions):
         leaves it to the kind of model.
     state_bias, output_bias : bool
         Constants on the state derivatives and on the outputs are solved for.
-    hold : {"first", "zero"}
+    hold : {"zero", "first", "band_limited"}
         What the inputs of a continuous model do between samples.
 
     Example
@@ -61,7 +61,7 @@ class Request(PredictionOptions):
 
     state_bias: bool = option(False, doc="Constants on the state derivatives are solved for.")
     output_bias: bool = option(False, doc="Constants on the outputs are solved for.")
-    hold: Hold = option("first", choices=("first", "zero"), doc="What inputs do between samples.")
+    hold: InputHold = option("first", choices=HOLDS, doc="What inputs do between samples.")
 
     @property
     def words(self) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flightid.identification.prediction.request import PredictionOptions
-from flightid.models.linear.hold_equivalent import Hold
 from flightid.options import option
+from flightid.record.hold import HOLDS, InputHold
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,10 @@ class VerifyOptions(PredictionOptions):
     output_bias: bool | None = option(
         None, doc="Solve for constants on the outputs; default: by the kind of model."
     )
-    hold: Hold | None = option(
+    hold: InputHold | None = option(
         None,
-        choices=("first", "zero"),
-        doc="What inputs do between samples: lines or steps; default: what the records know.",
+        choices=HOLDS,
+        doc="What inputs do between samples: default: what records or the fit know.",
     )
 
     @property

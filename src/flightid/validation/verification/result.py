@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from flightid.findings import Finding
 from flightid.identification.prediction.result import Prediction
 from flightid.record import Record
+from flightid.record.hold import BETWEEN, InputHold
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.validation.verification.muad import Mismatch
@@ -38,7 +39,7 @@ class Verification(Result, schema="flightid.verification/1"):
         Where the runs started, in words.
     state_bias, output_bias : bool
         Which constants were solved for.
-    hold : {"first", "zero"}
+    hold : {"zero", "first", "band_limited"}
         What inputs do between samples.
     mismatch : Mismatch or None
         The model's frequency response against a measured one, where one was given.
@@ -70,7 +71,7 @@ class Verification(Result, schema="flightid.verification/1"):
     initial_state: str
     state_bias: bool
     output_bias: bool
-    hold: str
+    hold: InputHold
     mismatch: Mismatch | None = None
     findings: tuple[Finding, ...] = ()
 
@@ -103,7 +104,7 @@ class Verification(Result, schema="flightid.verification/1"):
         over = (
             "after the first stretch, which no score counts," if left else "over the whole record"
         )
-        between = {"first": "straight lines", "zero": "steps"}[self.hold]
+        between = BETWEEN[self.hold]
         return (
             f"Free run {over} on measured inputs alone ({between} between samples), from "
             f"{self.initial_state}{shifts}."

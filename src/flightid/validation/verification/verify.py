@@ -22,9 +22,9 @@ from flightid.identification.prediction.predict import (
 from flightid.identification.prediction.remembered import of_record, remembered
 from flightid.identification.prediction.request import FREE_RUN, InitialState, Request
 from flightid.identification.prediction.result import Prediction
-from flightid.models.linear.hold_equivalent import Hold
 from flightid.record import Record
 from flightid.record.chosen_hold import chosen_hold
+from flightid.record.hold import HOLDS, InputHold
 from flightid.record.several import as_records
 from flightid.responses import FrequencyResponse
 from flightid.validation.verification.baseline import baseline_findings
@@ -46,7 +46,7 @@ def verify(  # type: ignore[overload-overlap]  # a list is an object too
     state_bias: bool | None = ...,
     output_bias: bool | None = ...,
     outputs: Sequence[str] | None = ...,
-    hold: Hold | None = ...,
+    hold: InputHold | None = ...,
     responses: FrequencyResponse | None = ...,
 ) -> Comparison: ...
 
@@ -63,7 +63,7 @@ def verify(
     state_bias: bool | None = ...,
     output_bias: bool | None = ...,
     outputs: Sequence[str] | None = ...,
-    hold: Hold | None = ...,
+    hold: InputHold | None = ...,
     responses: FrequencyResponse | None = ...,
 ) -> Verification: ...
 
@@ -79,7 +79,7 @@ def verify(
     state_bias: bool | None = None,
     output_bias: bool | None = None,
     outputs: Sequence[str] | None = None,
-    hold: Hold | None = None,
+    hold: InputHold | None = None,
     responses: FrequencyResponse | None = None,
 ) -> Verification | Comparison:
     """Predict records with a model, or with several of any kinds side by side, and judge it.
@@ -121,9 +121,9 @@ def verify(
         `input_bias` and `output_bias`, else for models in continuous time (b: linear ones).
     outputs : sequence of str, optional
         Outputs to compare; default: those of the models that every record holds.
-    hold : {"first", "zero"}, optional
-        What inputs do between samples; default: what the records know, else "first", and a finding
-        says so.
+    hold : {"first", "zero", "band_limited"}, optional
+        What inputs do between samples; default: what the records know, else what the fit was told,
+        else "first", and a finding says so.
     responses : FrequencyResponse, optional
         Measured responses: the models are judged against them too, inside the envelopes of
         maximum unnoticed added dynamics (see `flightid.validation.mismatch`).
@@ -170,14 +170,14 @@ def verify(
     models = [predictor_of(each) for each in several]
     chosen = _compared([model for model, _ in models], flown, outputs)
     _require_change(flown, chosen)
-    held = chosen_hold(flown, hold)
-    asked = Request(
-        horizon, initial_state, settle_s, bool(state_bias), bool(output_bias), held.in_time
-    )
+    holds = [
+        chosen_hold(flown, hold, known=HOLDS, fitted=remembered(each).hold) for each in several
+    ]
+    asked = Request(horizon, initial_state, settle_s, bool(state_bias), bool(output_bias))
     told = (state_bias is not None, output_bias is not None)
     requests = [
-        _request(each, model, way, asked, told)
-        for each, (model, way) in zip(several, models, strict=True)
+        _request(each, model, way, replace(asked, hold=held.hold), told)
+        for each, (model, way), held in zip(several, models, holds, strict=True)
     ]
     runs = []
     for each, (model, way), request in zip(several, models, requests, strict=True):
@@ -187,8 +187,8 @@ def verify(
             [way(of_record(each, model, record), record, chosen, request) for record in flown]
         )
     results = []
-    for each, (model, way), request, made in zip(
-        several, models, requests, _scored_alike(runs), strict=True
+    for each, (model, way), request, made, held in zip(
+        several, models, requests, _scored_alike(runs), holds, strict=True
     ):
         seen = None if responses is None else mismatch(model, responses)
         judged = judge(tuple(made), chosen, request, seen)
