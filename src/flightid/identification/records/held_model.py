@@ -33,7 +33,7 @@ class LinearPoint:
     Example
     -------
     >>> import flightid as fid
-    >>> model = fid.StateSpaceModel(states={"p": "rad/s"}, input_units={"u": "1"},
+    >>> model = fid.StateSpaceModel(states={"p": "rad/s"}, input_units={"u": "rad/s^2"},
     ...     measurements={"p": fid.Output("p", "rad/s")}, equations={"p'": "Lp*p + u"},
     ...     parameters=fid.Parameters([fid.Parameter("Lp", -2.0, "1/s")]))
     >>> LinearPoint.of(model, model.parameters.independent_values()).a.ravel().tolist()
