@@ -11,6 +11,7 @@ import pytest
 import flightid as fid
 from flightid.cli.program import run as command
 from flightid.study import document, model_section, uses
+from flightid.study.settings import Settings, read_settings
 
 MODEL = """
 kind = "state-space"
@@ -116,3 +117,52 @@ def test_outputs_free_a_model_from_the_other_columns(folder: Path) -> None:
     (folder / "study.toml").write_text(told, "utf-8")
     made = fid.run_study(folder / "study.toml")
     assert made.identified[0].fit.model.outputs == ("p",)
+
+
+def test_all_errors_of_a_study_file_are_told_at_once(folder: Path) -> None:
+    wrong = STUDY.replace('path = "a.csv"', 'pth = "a.csv"').replace("reference", "refrence", 1)
+    (folder / "study.toml").write_text(wrong.replace("gains =", "gain ="), "utf-8")
+    with pytest.raises(fid.errors.StudyError, match="the study file has 3 errors") as raised:
+        fid.run_study(folder / "study.toml")
+    for said in ("[[record]] number 1: path is missing", "'refrence'", "gains is missing"):
+        assert said in str(raised.value)
+    # A model is not judged by a table that could not be read.
+    (folder / "study.toml").write_text(STUDY.replace('"output_error"', '"magic"'), "utf-8")
+    with pytest.raises(fid.errors.StudyError, match="magic") as raised:
+        fid.run_study(folder / "study.toml")
+    assert "band_rad_s" not in str(raised.value)
+    missing = STUDY.replace("roll.toml", "rol.toml").replace("a.csv", "b.csv")
+    (folder / "study.toml").write_text(missing, "utf-8")
+    with pytest.raises(fid.errors.StudyError, match="has 2 errors") as raised:
+        fid.run_study(folder / "study.toml")
+    assert "the file of record 'a' is not there" in str(raised.value)
+
+
+def test_what_holds_for_all_records_is_said_once(folder: Path) -> None:
+    told = STUDY.replace("[[record]]", '[defaults.record]\nunits = { p = "rad/s" }\n[[record]]')
+    settings = study_settings(folder, told.replace('hold = "zero"\n', ""))
+    assert settings.record_files[0].units == {"p": "rad/s"}
+    both = told.replace('hold = "zero"', 'hold = "first"\nunits = { lat = "rad" }')
+    settings = study_settings(
+        folder, both.replace("[defaults.record]", '[defaults.record]\nhold = "zero"')
+    )
+    assert settings.record_files[0].units == {"p": "rad/s", "lat": "rad"}
+    assert settings.record_files[0].shape.hold == "first"
+    with pytest.raises(fid.errors.StudyError, match="there is no key 'colour'"):
+        study_settings(folder, told.replace("units =", "colour = 1\nunits ="))
+
+
+def study_settings(folder: Path, text: str) -> Settings:
+    (folder / "study.toml").write_text(text, "utf-8")
+    return read_settings(folder / "study.toml")
+
+
+def test_one_record_may_stand_for_several_files(folder: Path) -> None:
+    (folder / "a2.csv").write_bytes((folder / "a.csv").read_bytes())
+    (folder / "study.toml").write_text(STUDY.replace('"a.csv"', '"a*.csv"'), "utf-8")
+    made = fid.run_study(folder / "study.toml")
+    assert list(made.records) == ["a: a", "a: a2"]
+    assert len(made.identified[0].fit.records) == 2
+    assert {"a.csv", "a2.csv"} <= set(made.files)
+    with pytest.raises(fid.errors.StudyError, match="path matches no file"):
+        study_settings(folder, STUDY.replace('"a.csv"', '"z*.csv"'))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from flightid.conventions import Role
 from flightid.errors import StudyError
 from flightid.record import InputShape, Record, read_records
 from flightid.record.hold import HOLDS, LOOPS
+from flightid.study.collected import Collected
 from flightid.study.reading import TableReader
 
 UNKNOWN = InputShape()
@@ -26,8 +27,9 @@ class RecordFile:
     ----------
     name : str
         Name by which models refer to it.
-    path : Path
-        CSV, Parquet, MATLAB or netCDF.
+    paths : tuple of Path
+        CSV, Parquet, MATLAB or netCDF; the name stands for the pieces of all, where they are
+        several.
     manoeuvre : str or None
         Name of the manoeuvre, where the file holds several; ``"*"`` takes all of them, and the
         name then stands for the whole group.
@@ -48,7 +50,7 @@ class RecordFile:
     """
 
     name: str
-    path: Path
+    paths: tuple[Path, ...]
     manoeuvre: str | None = None
     span_s: tuple[float, float] | None = None
     time: str = "time"
@@ -69,7 +71,7 @@ def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
     """
     made = RecordFile(
         reader.text("name"),
-        folder / reader.text("path"),
+        _paths(reader, folder),
         reader.maybe(reader.text, "manoeuvre"),
         reader.maybe(reader.interval, "span_s"),
         reader.text("time_column", "time"),
@@ -81,6 +83,43 @@ def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
     )
     reader.finish()
     return made
+
+
+def _paths(reader: TableReader, folder: Path) -> tuple[Path, ...]:
+    """Files by name, or by a pattern with ``*``, in the order of their names."""
+    found: list[Path] = []
+    for text in reader.names("path"):
+        place = folder / text
+        matches = sorted(place.parent.glob(place.name)) if "*" in place.name else [place]
+        if not matches:
+            raise reader.error("path", "matches no file", found=text, needed=f"files in {folder}")
+        found += matches
+    return tuple(dict.fromkeys(found))
+
+
+def require_files(files: Iterable[RecordFile]) -> None:
+    """See before any work that every file is there.
+
+    Raises
+    ------
+    StudyError
+        Some are not; the message names all of them.
+    """
+    collected = Collected()
+    for file in files:
+        for path in file.paths:
+            collected.read(_require_file, None, file.name, path)
+    collected.finish()
+
+
+def _require_file(name: str, path: Path) -> None:
+    if not path.is_file():
+        raise StudyError(
+            f"the file of record {name!r} is not there",
+            found=str(path),
+            needed="a file",
+            action="correct path of its [[record]]",
+        )
 
 
 def read_shape(reader: TableReader) -> InputShape:
@@ -105,7 +144,7 @@ def _texts(reader: TableReader, values: Mapping[str, object]) -> dict[str, str]:
 
 
 def load_records(file: RecordFile, roles: Mapping[str, Role]) -> list[Record]:
-    """Read the channels that models need, of one manoeuvre or of all that the file holds.
+    """Read the channels that models need, of one manoeuvre or of all that the files hold.
 
     Parameters
     ----------
@@ -120,24 +159,29 @@ def load_records(file: RecordFile, roles: Mapping[str, Role]) -> list[Record]:
     Raises
     ------
     StudyError
-        The file is not there, or holds several manoeuvres and none is named.
+        A file holds several manoeuvres and none is named.
     FlightidError
         The file cannot be read as a record; the message says why.
     """
-    if not file.path.is_file():
-        raise StudyError(
-            f"the file of record {file.name!r} is not there",
-            found=str(file.path),
-            needed="a file",
-            action="correct path of its [[record]]",
-        )
+    pieces = [_load(file, path, roles) for path in file.paths]
+    if len(pieces) == 1:
+        return pieces[0]
+    return [
+        record.replace(name=f"{file.name}: {path.stem}" if len(piece) == 1 else record.name)
+        for path, piece in zip(file.paths, pieces, strict=True)
+        for record in piece
+    ]
+
+
+def _load(file: RecordFile, path: Path, roles: Mapping[str, Role]) -> list[Record]:
+    """Records of one file."""
 
     def named(role: Role) -> dict[str, str] | None:
         chosen = {key: file.columns.get(key, key) for key, value in roles.items() if value is role}
         return chosen or None
 
     found = read_records(
-        file.path,
+        path,
         inputs=named(Role.INPUT),
         outputs=named(Role.OUTPUT),
         excitations=named(Role.EXCITATION),

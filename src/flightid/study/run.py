@@ -11,10 +11,12 @@ from flightid.files import sha256_of_file
 from flightid.progress import progress
 from flightid.report.html import to_html
 from flightid.report.text import to_text
+from flightid.study.collected import Collected
 from flightid.study.faults import Faults
 from flightid.study.output import RESULTS, require_replaceable, whole_folder
 from flightid.study.pipeline import identify_models
 from flightid.study.qualities import rate_models, require_pairs
+from flightid.study.record_files import require_files
 from flightid.study.settings import read_settings
 from flightid.study.stage_runner import StageRunner
 from flightid.study.study import Study
@@ -84,7 +86,10 @@ def run_study(
     final = Path(output) if output is not None else source.with_name(f"{source.stem}-output")
     require_replaceable(final)
     names = tuple(model.name for model in settings.models)
-    tasks = [load_task(model, names) for model in settings.models]
+    collected = Collected()
+    collected.read(require_files, None, settings.record_files if log is None else ())
+    tasks = list(collected.each(settings.models, load_task, names))
+    collected.finish()
     rated = settings.qualities
     if rated is not None:
         require_pairs(tasks, rated)

@@ -7,12 +7,15 @@ are relative to the file.
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from flightid.errors import StudyError
 from flightid.record import InputShape
+from flightid.study.collected import Collected
 from flightid.study.conditioning import Conditioning, read_conditioning, require_records
 from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
 from flightid.study.flight import FlightPlan, read_flight
@@ -27,6 +30,7 @@ from flightid.study.tuning import TuneSettings, read_tune
 from flightid.study.uses_settings import UsesSettings, read_uses
 
 MAXIMUM_BYTES = 1 << 20
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -140,61 +144,56 @@ def read_settings(path: Path) -> Settings:
     ------
     StudyError
         The file is no TOML, a key is unknown or missing, a value does not fit, or a model refers
-        to a segment that is not there; the message names the place.
+        to a segment that is not there; the message names the place, and all places where there
+        are several.
     """
-    root = TableReader(_parsed(path), TOP)
-    title = root.table("study")
-    words = (title.text("title"), title.text("aircraft", ""), title.text("notes", ""))
-    title.finish()
-    log, flight = _source(root, path.parent)
-    channels = root.table("channels")
-    mapped = channels.maybe(channels.text, "map")
-    if mapped is not None and mapped.endswith(".toml"):
-        mapped = str(path.parent / mapped)
-    gaps = channels.choice("gaps", ("error", "interpolate"), "error")
-    max_gap_s = channels.maybe(channels.positive, "max_gap_s")
-    rate = channels.maybe(channels.positive, "sample_rate_hz")
-    channels.finish()
-    segments = tuple(_segment(reader) for reader in root.tables("segment"))
-    files = tuple(read_record_file(reader, path.parent) for reader in root.tables("record"))
-    conditioning = tuple(read_conditioning(reader) for reader in root.tables("conditioning"))
-    response = read_response(root.table("response"))
-    fit = read_fit(root.table("fit"))
-    check = read_verify(root.table("verify"))
-    reducing = root.maybe(lambda key: read_reduce(root.table(key)), "reduce")
-    tuning = root.maybe(lambda key: read_tune(root.table(key)), "tune")
-    qualities = root.maybe(
-        lambda key: read_qualities(root.table(key), path.parent), "handling_qualities"
-    )
-    models = tuple(
-        read_model(
-            reader,
-            path.parent,
-            response=response,
-            fit=fit,
-            check=check,
-            reduced=reducing is not None,
-        )
-        for reader in root.tables("model")
-    )
-    uses = read_uses(root, [model.name for model in models])
-    root.finish()
+    root, folder = TableReader(_parsed(path), TOP), path.parent
+    collected = Collected()
+    tables = partial(collected.read, root.tables, [])
+    words = collected.read(_words, ("", "", ""), root)
+    log, flight = collected.read(_source, (None, None), root, folder)
+    mapped, gaps, gap_s, rate = collected.read(_channels, (None, "error", None, None), root, folder)
+    segments = collected.each(tables("segment"), _segment)
+    records = collected.read(_record_tables, [], root)
+    files = collected.each(records, read_record_file, folder)
+    conditioning = collected.each(tables("conditioning"), read_conditioning)
+    nothing = TableReader({}, TOP)
+    table = partial(collected.read, _maybe, None, root)
+    before = len(collected.errors)
+    response = table("response", read_response) or read_response(nothing)
+    fit = table("fit", read_fit) or read_fit(nothing)
+    check = table("verify", read_verify) or read_verify(nothing)
+    reducing = table("reduce", read_reduce)
+    tuning = table("tune", read_tune)
+    qualities = table("handling_qualities", read_qualities, folder)
+    model = partial(read_model, response=response, fit=fit, check=check, reduced="reduce" in root)
+    # What a model lacks hangs on the tables of all: without those, nothing can be said of it.
+    readers = tables("model") if len(collected.errors) == before else []
+    models = collected.each(readers, model, folder)
+    named = [str(values.get("name")) for _, values in collected.read(root.rows, [], "model")]
+    uses = collected.read(read_uses, UsesSettings(), root, named)
+    collected.read(root.finish, None)
     if files and segments:
-        raise StudyError(
-            "study file: [[segment]] cuts a log, and there is none",
-            needed="span_s in a [[record]]",
+        collected.errors.append(
+            StudyError(
+                "study file: [[segment]] cuts a log, and there is none",
+                needed="span_s in a [[record]]",
+            )
         )
-    kind = "record" if files else "segment"
-    require_references(files or segments, models, kind=kind)
-    require_conditions(models)
-    require_records(conditioning, [each.name for each in files or segments])
+    # What refers to a part that could not be read is no error of its own.
+    if not collected.errors:
+        kind, known = "record" if files else "segment", [each.name for each in files or segments]
+        collected.read(partial(require_references, kind=kind), None, files or segments, models)
+        collected.read(require_conditions, None, models)
+        collected.read(require_records, None, conditioning, known)
+    collected.finish()
     return Settings(
         *words,
         log,
         flight,
         mapped,
         gaps,
-        max_gap_s,
+        gap_s,
         rate,
         segments,
         files,
@@ -208,6 +207,61 @@ def read_settings(path: Path) -> Settings:
         qualities,
         uses,
     )
+
+
+def _maybe(
+    root: TableReader,
+    key: str,
+    read: Callable[..., Value],
+    *inputs: Any,  # noqa: ANN401 - whatever the table's reader takes
+) -> Value | None:
+    """A table that may be absent."""
+    return root.maybe(lambda given: read(root.table(given), *inputs), key)
+
+
+def _words(root: TableReader) -> tuple[str, str, str]:
+    title = root.table("study")
+    words = (title.text("title"), title.text("aircraft", ""), title.text("notes", ""))
+    title.finish()
+    return words
+
+
+def _channels(
+    root: TableReader, folder: Path
+) -> tuple[str | None, str, float | None, float | None]:
+    """Map of channels, what to do about gaps, their longest, and the rate."""
+    channels = root.table("channels")
+    mapped = channels.maybe(channels.text, "map")
+    if mapped is not None and mapped.endswith(".toml"):
+        mapped = str(folder / mapped)
+    gaps = channels.choice("gaps", ("error", "interpolate"), "error")
+    max_gap_s = channels.maybe(channels.positive, "max_gap_s")
+    rate = channels.maybe(channels.positive, "sample_rate_hz")
+    channels.finish()
+    return mapped, gaps, max_gap_s, rate
+
+
+def _record_tables(root: TableReader) -> list[TableReader]:
+    """Tables of the records, each over what [defaults.record] says of all."""
+    defaults = root.table("defaults")
+    common = defaults.values("record")
+    defaults.finish()
+    rows = root.rows("record")
+    if common and not rows:
+        raise StudyError(
+            "study file: [defaults.record] is meant for records, and there is none",
+            needed="a [[record]]",
+        )
+    return [TableReader(_over(common, values), where) for where, values in rows]
+
+
+def _over(common: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values over common ones; tables of both are joined."""
+    joined = {**common, **values}
+    for key, value in common.items():
+        if isinstance(value, dict) and isinstance(values.get(key), dict):
+            joined[key] = {**value, **values[key]}
+    return joined
 
 
 def _parsed(path: Path) -> dict[str, Any]:

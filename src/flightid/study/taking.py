@@ -68,7 +68,7 @@ def take(
             raise StudyError(
                 "the study reads records, not a log", found=str(given), action="leave out --log"
             )
-        paths = dict.fromkeys(file.path for file in settings.record_files)
+        paths = dict.fromkeys(path for file in settings.record_files for path in file.paths)
         files = {
             file.name: runner.stage(f"record: {file.name}", load_records, file, needed[file.name])
             for file in settings.record_files
