@@ -26,6 +26,7 @@ from flightid.report.verification import verification_blocks
 from flightid.study.choice_section import choice_blocks
 from flightid.study.estimate_tables import estimates_table
 from flightid.study.faults import blocks_until, section_of
+from flightid.study.published import published_table
 from flightid.study.response_figures import response_figures
 from flightid.study.structures import goal_findings
 
@@ -73,6 +74,8 @@ def _first(item: Identified, truth: Truth | None) -> Iterator[Block]:
     yield from result_blocks(fit, title=title)
     if fit.details is not None:
         yield from map(TableBlock, fit.details.tables())
+    if item.settings.published is not None:
+        yield TableBlock(published_table(item.settings.published, fit))
     yield from evidence_blocks(fit.evidence)
     if len(item.fits) > 1:
         yield TableBlock(estimates_table(item, truth))

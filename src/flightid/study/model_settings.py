@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
+from flightid.study.published import PublishedFigures, read_published
 from flightid.study.reading import TableReader
 from flightid.study.response_settings import ResponseSettings, read_response
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings, read_structure
@@ -62,6 +63,8 @@ class ModelSettings:
         Whether the reduction that the study asks for is meant for this model.
     reference : str or None
         Model whose parameters and modes stand beside the estimates: library name or model file.
+    published : PublishedFigures or None
+        What others found of its parameters, beside ours.
     structure : StructureSettings or None
         A structure without equations, whose order is looked for.
     """
@@ -86,6 +89,7 @@ class ModelSettings:
     reference: str | None = None
     values_from: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     reduce: bool = True
+    published: PublishedFigures | None = None
     structure: StructureSettings | None = None
 
     @property
@@ -137,6 +141,7 @@ def read_model(
             "joint", "is missing", found="none", needed="records beside those of the responses"
         )
     reference = reader.maybe(reader.text, "reference")
+    published = reader.maybe(reader.text, "published")
     made = ModelSettings(
         reader.text("name"),
         _placed(folder, template),
@@ -155,6 +160,7 @@ def read_model(
         *((reader.names("keep", ()), reader.names("drop", ())) if reduced else ((), ())),
         condition=reader.maybe(reader.text, "condition"),
         reference=None if reference is None else _placed(folder, reference),
+        published=None if published is None else read_published(folder / published),
         values_from=_values_from(reader),
         reduce=reader.flag("reduce", True) if reduced else False,
     )

@@ -1,0 +1,145 @@
+"""What others published of the same model: values, bounds and insensitivities beside ours."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from flightid.errors import StudyError
+from flightid.identification import Fit
+from flightid.study.reading import TableReader
+from flightid.table import Cell, Column, Table
+from flightid.uncertainty.estimate import Estimate
+
+
+@dataclass(frozen=True)
+class PublishedFigures:
+    """Figures of a paper or report, by parameter.
+
+    Attributes
+    ----------
+    source : str
+        Where they stand.
+    value : mapping of str to float
+        In the units of the model's parameters.
+    cramer_rao_percent, insensitivity_percent : mapping of str to float
+        Percent of the value.
+    average_cost : float or None
+        Of all responses.
+
+    Example
+    -------
+    >>> PublishedFigures("a paper", {"Lp": -4.0}, {"Lp": 3.1}, {}).cramer_rao_percent["Lp"]
+    3.1
+    """
+
+    source: str
+    value: Mapping[str, float]
+    cramer_rao_percent: Mapping[str, float]
+    insensitivity_percent: Mapping[str, float]
+    average_cost: float | None = None
+
+
+def read_published(path: Path) -> PublishedFigures:
+    """Figures from a TOML file.
+
+    Parameters
+    ----------
+    path : Path
+        Keys ``source`` and ``average_cost``; tables ``[value]``, ``[cramer_rao_percent]`` and
+        ``[insensitivity_percent]`` of numbers by parameter; each may be left out but the first.
+
+    Returns
+    -------
+    PublishedFigures
+
+    Raises
+    ------
+    StudyError
+        The file cannot be read, a key is unknown, or a figure is no number.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise StudyError(
+            "a file of published figures cannot be read",
+            found=f"{path.name}: {error}",
+            needed="a TOML file beside the study",
+        ) from error
+    reader = TableReader(content, f"published figures {path.name}")
+    made = PublishedFigures(
+        reader.text("source"),
+        _numbers(reader, "value"),
+        _numbers(reader, "cramer_rao_percent"),
+        _numbers(reader, "insensitivity_percent"),
+        reader.maybe(reader.positive, "average_cost"),
+    )
+    reader.finish()
+    return made
+
+
+def _numbers(reader: TableReader, kind: str) -> dict[str, float]:
+    inner = reader.table(kind)
+    return {name: inner.number(name) for name in reader.values(kind)}
+
+
+def published_table(published: PublishedFigures, fit: Fit) -> Table:
+    """Each published figure beside ours, with the ratio of ours to it.
+
+    Parameters
+    ----------
+    published : PublishedFigures
+    fit : Fit
+
+    Returns
+    -------
+    Table
+        One row for each parameter of which something was published. Bounds and insensitivities
+        rest on the flights behind them: those of other flights agree in order of magnitude.
+    """
+    kinds = {
+        "value": (published.value, "", _value),
+        "CR": (published.cramer_rao_percent, "%", _bound),
+        "I": (published.insensitivity_percent, "%", _insensitivity),
+    }
+    named = dict.fromkeys(name for theirs, _, _ in kinds.values() for name in theirs)
+    columns = [Column("parameter"), Column("unit")]
+    for kind, (_, unit, _) in kinds.items():
+        columns += [Column(kind, unit, 4), Column(f"published {kind}", unit, 4)]
+        columns.append(Column(f"{kind} ratio", digits=3))
+    rows: list[tuple[Cell, ...]] = []
+    for name in named:
+        parameter = fit.parameters.get(name)
+        if parameter is None:
+            continue
+        cells: list[Cell] = [name, parameter.unit]
+        for theirs, _, read in kinds.values():
+            cells += _pair(read(parameter) if name in theirs else None, theirs.get(name))
+        rows.append(tuple(cells))
+    absent = [name for name in named if name not in fit.parameters]
+    notes = [f"Published: {published.source}."]
+    if published.average_cost is not None and fit.responses:
+        notes.append(f"Average cost {fit.average_cost:.3g}; published {published.average_cost:g}.")
+    if absent:
+        notes.append(f"Published, and not in this model: {', '.join(absent)}.")
+    made = Table("Published figures beside ours", tuple(columns), tuple(rows), tuple(notes))
+    return made.without_empty_columns()
+
+
+def _value(parameter: Estimate) -> float | None:
+    return parameter.value
+
+
+def _bound(parameter: Estimate) -> float | None:
+    return parameter.cramer_rao_percent
+
+
+def _insensitivity(parameter: Estimate) -> float | None:
+    return parameter.insensitivity_percent
+
+
+def _pair(ours: float | None, theirs: float | None) -> tuple[Cell, Cell, Cell]:
+    ratio = ours / theirs if ours is not None and theirs else None
+    return ours, theirs, ratio
