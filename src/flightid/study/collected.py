@@ -18,7 +18,7 @@ class Collected:
 
     Attributes
     ----------
-    errors : list of FlightidError
+    errors : list of FlightidError or OSError
 
     Example
     -------
@@ -35,7 +35,7 @@ class Collected:
     - path is missing
     """
 
-    errors: list[FlightidError] = field(default_factory=list)
+    errors: list[FlightidError | OSError] = field(default_factory=list)
 
     def read(
         self,
@@ -46,7 +46,7 @@ class Collected:
         """What a part reads, or what stands in its place while the others are read."""
         try:
             return work(*inputs)
-        except FlightidError as error:
+        except (FlightidError, OSError) as error:
             self.errors.append(error)
             return instead  # type: ignore[no-any-return]
 
@@ -65,7 +65,7 @@ class Collected:
 
         Raises
         ------
-        FlightidError
+        FlightidError, OSError
             Of the part, where there is one.
         StudyError
             With all of them.
