@@ -23,7 +23,7 @@ from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words
 from flightid.uncertainty.uncertain import Uncertain
 
 
@@ -160,13 +160,27 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
         """What is known of the estimates, as a model's file keeps it."""
         return Estimated(
             self.names,
-            self.covariance,
+            self.carried,
             self.method,
             self.intervals_from,
             {each.name: each.band_rad_s for each in self.responses},
             self.evidence.to_dict(),
             self.provenance,
         )
+
+    @property
+    def carried(self) -> NDArray[np.float64] | None:
+        """Covariance as it goes on to other numbers, whose intervals are normal: shape (n, n).
+
+        Where few records tell how far vehicles lie apart, it is larger than `covariance` by what
+        Student's distribution adds to a 95 % interval.
+        """
+        apart = self.agreement is not None and self.agreement.freedom is not None
+        if self.covariance is None or not apart:
+            return self.covariance
+        widths = [half_width(LEVEL, self.parameters[name].freedom) for name in self.names]
+        share = np.array(widths) / half_width(LEVEL)
+        return np.asarray(self.covariance * np.outer(share, share))
 
     def uncertain(self) -> Uncertain[Model]:
         """The fitted model with the covariance of its parameters, for what is computed from it.
@@ -185,7 +199,7 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
         >>> fid.identify(truth, data).uncertain()
         Uncertain(3 numbers, covariance known)
         """
-        return uncertain_model(self.model, self.names, self.covariance)
+        return uncertain_model(self.model, self.names, self.carried)
 
     def summary(self, *, level: float = LEVEL) -> Table:
         """Table of the parameters, with costs and findings below.
@@ -205,6 +219,7 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
             Column("value", digits=6),
             Column("unit"),
             Column("standard error", digits=3),
+            Column("by noise alone", digits=3),
             Column(f"{words} low", digits=5),
             Column(f"{words} high", digits=5),
             Column("Cramér–Rao", "%", 3),
@@ -212,9 +227,18 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
             Column("status"),
             Column("note"),
         )
-        rows = [_row(p, level) for p in (self.details or Details()).quantities(self.parameters)]
+        alone = self._by_noise_alone()
+        shown = (self.details or Details()).quantities(self.parameters)
+        rows = [_row(p, level, alone.get(p.name)) for p in shown]
         table = Table(f"Fit of {self.model.name}", columns, tuple(rows), self._notes())
         return table.without_empty_columns()
+
+    def _by_noise_alone(self) -> dict[str, float]:
+        """Standard errors without the scatter between parts, where there is any."""
+        found = self.agreement
+        if found is None or found.by_scatter is None or len(found.by_noise) != len(self.names):
+            return {}
+        return dict(zip(self.names, map(float, found.by_noise), strict=True))
 
     def _notes(self) -> tuple[str, ...]:
         costs = ", ".join(f"{name} {cost:.3g}" for name, cost in self.costs.items())
@@ -248,10 +272,10 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
         }
 
 
-def _row(p: Estimate, level: float) -> tuple[Cell, ...]:
+def _row(p: Estimate, level: float, alone: float | None) -> tuple[Cell, ...]:
     low, high = p.interval(level) or (None, None)
     guides = (p.cramer_rao_percent, p.insensitivity_percent)
-    return (p.name, p.value, p.unit, p.stderr, low, high, *guides, p.status, p.reason)
+    return (p.name, p.value, p.unit, p.stderr, alone, low, high, *guides, p.status, p.reason)
 
 
 def uncertain_model(

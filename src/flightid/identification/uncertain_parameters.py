@@ -49,6 +49,7 @@ def uncertain_parameters(source: object) -> Uncertain[dict[str, float]]:
     known = source if isinstance(source, Fit) else model.estimated
     names = () if known is None else known.names
     covariance = None if known is None else known.covariance
+    covariance = source.carried if isinstance(source, Fit) else covariance
 
     def make(numbers: NDArray[np.float64]) -> dict[str, float]:
         given: Mapping[str, float] = dict(zip(names, map(float, numbers), strict=True))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,10 +21,12 @@ from flightid.uncertainty import (
     insensitivity,
     null_combination,
 )
+from flightid.uncertainty.agreement import Agreed, Agreement
 from flightid.uncertainty.cramer_rao import inverse_hessian
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
+Compare = Callable[[Array, NDArray[np.bool_]], Agreed]
 _DECIBEL = 20.0 / np.log(10.0)
 _DEGREE = 180.0 / np.pi
 _AT_BOUND = 1e-9
@@ -48,6 +50,8 @@ class Statistics:
         Whether errors of different outputs were taken as independent for want of knowledge.
     withheld : str
         Why there are no intervals though errors are known; empty where there are.
+    agreement : Agreement or None
+        Of records and of their halves.
     """
 
     parameters: Mapping[str, Estimate]
@@ -57,6 +61,7 @@ class Statistics:
     source: str
     outputs_apart: bool
     withheld: str = ""
+    agreement: Agreement | None = None
 
 
 def statistics(
@@ -67,10 +72,12 @@ def statistics(
     *,
     sensitivity: Array | None,
     withheld: str = "",
+    compare: Compare | None = None,
 ) -> Statistics:
     """Standard errors, bounds and correlations at the end of a search.
 
-    `withheld` says why there shall be no intervals, though errors of the data are known.
+    `withheld` says why there shall be no intervals, though errors of the data are known; `compare`
+    looks at parts of them.
 
     Raises
     ------
@@ -82,15 +89,28 @@ def statistics(
     names = tuple(p.name for p, keep in zip(free, inner, strict=True) if keep)
     jacobian = end.jacobian[:, inner]
     require_identifiable(names, jacobian)
-    covariance = None
+    covariance, freedom, agreement = None, None, None
     if sensitivity is not None and names and not withheld:
-        covariance = errors.propagated(estimator_gain(jacobian, sensitivity))
+        gain = estimator_gain(jacobian, sensitivity)
+        if compare is None:
+            covariance = errors.propagated(gain)
+        else:
+            agreed = compare(gain, inner)
+            covariance, agreement = agreed.covariance, agreed.agreement
+            freedom = agreed.freedom if agreement.freedom is not None else None
     weighted = coherence_jacobian(fitted, selected)[:, inner]
     correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
-    parameters = fitted_parameters(fitted, names, covariance, weighted, withheld=withheld)
+    parameters = fitted_parameters(fitted, names, covariance, weighted, freedom, withheld=withheld)
     source = UNKNOWN if withheld else errors.source
     return Statistics(
-        parameters, names, covariance, correlation, source, errors.outputs_apart, withheld
+        parameters,
+        names,
+        covariance,
+        correlation,
+        source,
+        errors.outputs_apart,
+        withheld,
+        agreement,
     )
 
 

@@ -122,6 +122,36 @@ class Correction:
         weights = self._weights(frequencies)
         return np.stack([weights(one) for one in zip(*changes, strict=True)])
 
+    def halves(self, model: GreyBoxModel, frequencies: Places) -> tuple[Complex, Complex]:
+        """Estimates of what the model leaves, and makes, of each half of each record.
+
+        Raises as `apply`.
+
+        Returns
+        -------
+        tuple of ndarray, shape (n_records, 2, n_out, n_in, n_f)
+        """
+        weights = self._weights(frequencies)
+        left = self._records.of(model)
+        measured = self._linear.output_records
+        made = [one - rest for one, rest in zip(measured, left, strict=True)]
+        nothing = [np.zeros_like(one) for one in measured]
+
+        def halved(place: int, rows: Array) -> list[Complex]:
+            half = rows.shape[1] // 2
+            found = []
+            for span in (slice(0, half), slice(half, None)):
+                alone = list(nothing)
+                alone[place] = np.zeros_like(rows)
+                alone[place][:, span] = rows[:, span]
+                found.append(weights(alone))
+            return found
+
+        return (
+            np.array([halved(place, rows) for place, rows in enumerate(left)]),
+            np.array([halved(place, rows) for place, rows in enumerate(made)]),
+        )
+
     def errors(self, model: GreyBoxModel) -> CovarianceSource | None:
         """Errors of a corrected response: their noise is what the model leaves.
 

@@ -34,6 +34,7 @@ from flightid.identification.frequency_domain.error_model import (
 from flightid.identification.frequency_domain.estimates import Statistics, statistics
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
+from flightid.identification.frequency_domain.response_parts import ResponseParts
 from flightid.identification.frequency_domain.search import minimise
 from flightid.identification.frequency_domain.selection import (
     SelectedResponse,
@@ -81,7 +82,7 @@ def _fit_selected(
     errors = error_model(data, selected)
     groups = cluster(_minimise(model, selected, errors, options))
     correction: dict[str, object] = {"applied": False, "reason": "correct_bias=False"}
-    fitted, curves, withheld = _at(model, groups[0][0]), None, ""
+    fitted, curves, withheld, compare = _at(model, groups[0][0]), None, "", None
     if options.correct_bias:
         without = Correction(data, options.hold)
         objective = Objective(model, without, selected, errors, options.cost)
@@ -93,9 +94,17 @@ def _fit_selected(
             groups = [*cluster(done.ends), *groups[1:]]
             selected, errors, fitted = list(done.selected), done.errors, done.model
             curves = done.estimates
+            if errors.known is not None:
+                compare = ResponseParts(without, fitted, selected, errors).compare
     sensitivity = _sensitivity(fitted, selected, errors, options, curves)
     found = statistics(
-        fitted, selected, errors, groups[0][0], sensitivity=sensitivity, withheld=withheld
+        fitted,
+        selected,
+        errors,
+        groups[0][0],
+        sensitivity=sensitivity,
+        withheld=withheld,
+        compare=compare,
     )
     responses = compare_responses(fitted, selected)
     fit = _assemble(fitted, options, data, groups, responses, found, setup)
@@ -280,6 +289,7 @@ def _assemble(
         intervals_from=found.source,
         findings=findings,
         provenance=_provenance(data, options),
+        agreement=found.agreement,
     )
 
 

@@ -74,7 +74,7 @@ class WindowedWeights:
             for place, (basis, turn) in enumerate(zip(bases, turns, strict=True)):
                 moved = np.zeros(shape, dtype=np.complex128)
                 for each, change in zip(weights, changes, strict=True):
-                    if not basis.plan.count(change.shape[1]):
+                    if not (basis.plan.count(change.shape[1]) and np.any(change)):
                         continue
                     real, imaginary = transform(change, basis, windows.detrend)
                     window = (real + 1j * imaginary).transpose(0, 2, 1)
@@ -119,6 +119,8 @@ class LocalWeights:
         def apply(changes: Sequence[Real]) -> Complex:
             found = np.zeros((len(outputs), len(inputs), len(fits)), dtype=np.complex128)
             for index, change in enumerate(changes):
+                if not np.any(change):
+                    continue
                 values = Bins.of(change, self.sample_time_s).values
                 for place, fit in enumerate(fits):
                     bins = values[:, fit.places[index]]

@@ -1,0 +1,136 @@
+"""Parts of the records behind a response: what each adds to a fit of it.
+
+A response is linear in its outputs, so what the model leaves of one half of one record passes
+through the weights of the estimate, and through the fit, by itself. At the optimum these parts add
+up to nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.identification.frequency_domain.error_model import ErrorModel
+from flightid.identification.frequency_domain.estimator_bias import Correction
+from flightid.identification.frequency_domain.selection import SelectedResponse
+from flightid.models import GreyBoxModel
+from flightid.uncertainty.agreement import Agreed, compare_parts
+from flightid.uncertainty.parts import Flight
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class ResponseParts:
+    """What is needed to compare the parts of a fit to a response.
+
+    Attributes
+    ----------
+    correction : Correction
+    fitted : TransferFunctionModel or StateSpaceModel
+    selected : sequence of SelectedResponse
+    errors : ErrorModel
+    """
+
+    correction: Correction
+    fitted: GreyBoxModel
+    selected: Sequence[SelectedResponse]
+    errors: ErrorModel
+
+    def compare(self, gain: Array, inner: NDArray[np.bool_]) -> Agreed:
+        """Covariance of the estimates, halves and records compared.
+
+        Parameters
+        ----------
+        gain : ndarray, shape (n, n_points)
+            How the estimates move with the points, but for the sign.
+        inner : ndarray of bool, shape (n_free,)
+            Free parameters that are not at a bound.
+
+        Returns
+        -------
+        Agreed
+
+        Assumes
+        -------
+        Noise as strong in all parts; at each frequency a part counts by its share of the power,
+        and so does its noise.
+        """
+        left, modelled = self.correction.halves(self.fitted, self._places)
+        whole = self._points(modelled.sum(axis=(0, 1)))
+        slopes = self._slopes()[:, inner]
+        n, count = len(gain), left.shape[0]
+        scores, information, weighed = [], [], []
+        for kept, made in zip(
+            left.reshape(-1, *left.shape[2:]), modelled.reshape(-1, *left.shape[2:]), strict=True
+        ):
+            share = _share(self._points(made), whole)
+            scores.append(-gain @ _stacked(self._points(kept)))
+            information.append(-gain @ (share[:, None] * slopes))
+            weighed.append(gain * np.sqrt(share))
+        total = np.sum(information, axis=0)
+        known = self.errors.propagated(np.vstack([gain, *weighed]))
+        known = known.reshape(2 * count + 1, n, 2 * count + 1, n)
+        flights = []
+        for k in range(count):
+            noise = np.zeros((2, n, 2, n))
+            for half in range(2):
+                place = 2 * k + half + 1
+                noise[half, :, half] = known[place, :, place]
+            both = slice(2 * k, 2 * k + 2)
+            part = np.array(information[both]) @ np.linalg.inv(total)
+            flights.append(Flight(np.array(scores[both]), part, noise))
+        return compare_parts(flights, np.eye(n), known[0, :, 0], np.full(n, np.inf))
+
+    @property
+    def _places(self) -> NDArray[np.intp]:
+        return np.unique(np.concatenate([each.places for each in self.selected]))
+
+    def _points(self, response: Complex) -> list[Complex]:
+        """Fitted points of each run, from a response of all outputs and inputs at `_places`."""
+        data = self.correction.data
+        found = []
+        for run in self.errors.runs:
+            group = self.selected[run.first : run.first + run.count]
+            rows = [
+                response[
+                    data.outputs.index(each.measured.output), data.inputs.index(each.measured.input)
+                ][np.searchsorted(self._places, each.places)]
+                for each in group
+            ]
+            found.append(np.concatenate(rows))
+        return found
+
+    def _slopes(self) -> Array:
+        """Derivatives of the model's points by the free parameters, (n_points, n_free)."""
+        values = self.fitted.parameters.independent_values()
+        free = self.fitted.parameters.free_indices
+        parts = []
+        for run in self.errors.runs:
+            rows = []
+            for place in range(run.first, run.first + run.count):
+                omega = np.ascontiguousarray(self.selected[place].omega_rad_s)
+                curve = np.asarray(self.fitted.native.response(values, omega)[place])
+                slope = self.fitted.native.log_gradient(values, free, omega)[place]
+                rows.append(curve[:, None] * slope)
+            parts.append(np.concatenate(rows))
+        return np.vstack([side for part in parts for side in (part.real, part.imag)])
+
+
+def _stacked(runs: Sequence[Complex]) -> Array:
+    """All real parts of a run, then all imaginary ones, run after run."""
+    return np.concatenate([side for run in runs for side in (run.real, run.imag)])
+
+
+def _share(made: Sequence[Complex], whole: Sequence[Complex]) -> Array:
+    """Share of each point that one part of the records makes, from 0 to 1."""
+    found = []
+    for one, every in zip(made, whole, strict=True):
+        size = np.maximum(np.abs(every), np.finfo(float).tiny)
+        share = np.clip((one * every.conj()).real / size**2, 0.0, 1.0)
+        found += [share, share]
+    return np.concatenate(found)
