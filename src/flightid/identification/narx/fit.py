@@ -29,12 +29,14 @@ from flightid.identification.narx.candidates import (
 )
 from flightid.identification.narx.details import ChosenTerm, NarxDetails
 from flightid.identification.narx.findings import collinear_finding, free_run_findings
+from flightid.identification.narx.parts import compare_weights
 from flightid.identification.narx.regressors import Regressors, regressors_of, scaling_of
 from flightid.models.narx.model import NarxModel
 from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.structure import NarxStructure
 from flightid.record import Record
 from flightid.record.several import as_records
+from flightid.uncertainty.agreement import Agreed
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
@@ -86,6 +88,7 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
     if structure.held_back:
         selection = _estimated(structure, selection.chosen, estimated_on)
     chosen = selection.chosen
+    agreed = compare_weights(structure, chosen, estimated_on, selection.covariance)
     model = _model(structure, scaling, chosen)
     baseline = _baseline(structure, scaling, records)
     flown = tuple(record for record in records if record.n_samples > structure.longest_lag)
@@ -110,9 +113,10 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
         model,
         BlackBoxRuns(flown, tuple(run.predicted[None] for run in free), errors),
         BlackBoxEstimates(
-            _parameters(structure, chosen),
+            _parameters(structure, chosen, agreed),
             tuple(weights),
-            selection.covariance if structure.held_back else None,
+            _covariance(selection, agreed) if structure.held_back else None,
+            agreement=None if agreed is None else agreed.agreement,
         ),
         (LocalMinimum(chosen[-1].sum_of_squares, 1, weights, structure.stop),),
         iterations=len(chosen),
@@ -134,8 +138,23 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
     )
 
 
-def _parameters(structure: NarxStructure, chosen: Sequence[ChosenTerm]) -> dict[str, Estimate]:
+def _covariance(selection: Selection, agreed: Agreed | None) -> Array:
+    return selection.covariance if agreed is None else agreed.covariance
+
+
+def _parameters(
+    structure: NarxStructure, chosen: Sequence[ChosenTerm], agreed: Agreed | None
+) -> dict[str, Estimate]:
     """Weights by term; errors hold in spite of the choice only where samples were held back."""
+    if structure.held_back and agreed is not None and agreed.agreement.by_scatter is not None:
+        errors = np.sqrt(np.diag(agreed.covariance))
+        known = zip(chosen, errors.tolist(), agreed.freedom.tolist(), strict=True)
+        return {
+            item.term.name: Estimate(
+                item.term.name, item.weight, "1", error, freedom=freedom, status="free"
+            )
+            for item, error, freedom in known
+        }
     if structure.held_back:
         return {
             item.term.name: Estimate(item.term.name, item.weight, "1", item.stderr, status="free")

@@ -18,10 +18,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Regressors:
-    """Regressor vectors (n_samples, n_lags) and targets (n_samples,), in deviations."""
+    """Regressor vectors (n_samples, n_lags) and targets (n_samples,), in deviations.
+
+    `lengths` are the samples of each record.
+    """
 
     vectors: Array
     target: Array
+    lengths: tuple[int, ...]
 
 
 def scaling_of(model: NarxStructure, records: Sequence[Record]) -> Scaling:
@@ -84,4 +88,5 @@ def _joined(parts: Sequence[tuple[Array, Array]], model: NarxStructure, start: i
             action="give longer records or fewer lags",
         )
     vectors = np.ascontiguousarray(np.concatenate([rows for rows, _ in parts]))
-    return Regressors(vectors, np.concatenate([target for _, target in parts]))
+    lengths = tuple(target.size for _, target in parts)
+    return Regressors(vectors, np.concatenate([target for _, target in parts]), lengths)

@@ -40,7 +40,7 @@ from flightid.identification.regression.sampled_equations import (
     Reconstruction,
 )
 from flightid.identification.regression.weights import (
-    fourier_covariance,
+    compared_covariance,
     level_weights,
     spectral_weights,
 )
@@ -113,9 +113,13 @@ def fit_fourier_regression(
     )
     action = f"{APART}; constants have no harmonic: method='equation_error', output_bias=False"
     require_seen(inner, jacobian, action)
-    covariance, freedom = fourier_covariance(kept, settled.weights, omegas)
+    agreed = compared_covariance(kept, settled.weights, omegas)
     known = Knowledge(
-        jacobian, covariance, np.full(len(inner.names), freedom), "spectra of residuals"
+        jacobian,
+        agreed.covariance,
+        agreed.freedom,
+        "spectra of residuals",
+        agreement=agreed.agreement,
     )
     return _finish("Fourier regression", problem, data, options, settled, limits, inner, known)
 

@@ -28,7 +28,7 @@ from flightid.identification.regression.fourier_output_error import (
 )
 from flightid.identification.regression.options import FourierOutputErrorOptions
 from flightid.identification.regression.rounds import Rows, SettledRounds, settle, stack
-from flightid.identification.regression.weights import fourier_covariance, spectral_weights
+from flightid.identification.regression.weights import compared_covariance, spectral_weights
 from flightid.models import StateSpaceModel
 from flightid.record import Record, Step
 
@@ -62,9 +62,13 @@ def fit_fourier_output_error(
         [each.slopes * w[:, :, None] for each, w in zip(kept, best.weights, strict=True)]
     )
     require_seen(inner, jacobian)
-    covariance, freedom = fourier_covariance(kept, best.weights, omegas)
+    agreed = compared_covariance(kept, best.weights, omegas)
     known = Knowledge(
-        jacobian, covariance, np.full(len(inner.names), freedom), "spectra of residuals"
+        jacobian,
+        agreed.covariance,
+        agreed.freedom,
+        "spectra of residuals",
+        agreement=agreed.agreement,
     )
     return assemble(
         "Fourier output error",

@@ -8,6 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.identification.regression.rounds import Rows
+from flightid.uncertainty.agreement import Agreed
+from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.residual_covariance import white_covariance
 from flightid.uncertainty.spectral import averaged, spectral_covariance
 
 Array = NDArray[np.float64]
@@ -65,6 +68,29 @@ def fourier_covariance(
     slopes = [_complex(np.moveaxis(r.slopes, 2, 1) * w[:, None]) for r, w in pairs]
     jacobian = np.moveaxis(np.concatenate(slopes, axis=2), 1, 2)
     return spectral_covariance(jacobian[:, order], residuals[:, order])
+
+
+def compared_covariance(
+    rows: Sequence[Rows], weights: Sequence[Array], omegas: Sequence[Array]
+) -> Agreed:
+    """`fourier_covariance`, records and halves of each compared.
+
+    Halves are those of the weighted harmonics taken back in time, where white residuals are white.
+    """
+    covariance, freedom = fourier_covariance(rows, weights, omegas)
+    blocks = []
+    for each, weight in zip(rows, weights, strict=True):
+        residual = _in_time(_complex(each.residuals * weight))
+        slopes = _in_time(_complex(np.moveaxis(each.slopes, 2, 1) * weight[:, None]))
+        sensitivity = -np.moveaxis(slopes, 1, 2)
+        blocks.append(Block.of(sensitivity, np.zeros((residual.size, 0)), residual))
+    return white_covariance(blocks, covariance, freedom)
+
+
+def _in_time(harmonics: Complex) -> Array:
+    """Real sequence of neighbouring harmonics, which keeps the place in time of what they hold."""
+    quiet = np.zeros((*harmonics.shape[:-1], 1))
+    return np.fft.irfft(np.concatenate([quiet, harmonics, quiet], axis=-1), axis=-1)
 
 
 def _complex(rows: Array) -> Complex:

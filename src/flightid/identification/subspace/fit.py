@@ -105,7 +105,7 @@ def _assemble(
     return black_box_fit(
         model,
         BlackBoxRuns(records, _about(structure, data, runs), errors),
-        BlackBoxEstimates(parameters, tuple(names), covariance),
+        BlackBoxEstimates(parameters, tuple(names), covariance, agreement=found.agreement),
         (LocalMinimum(measures.loss, 1, values, found.termination),),
         iterations=found.iterations,
         noise_covariance=np.asarray(model.noise_covariance),

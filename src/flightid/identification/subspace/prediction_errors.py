@@ -13,6 +13,9 @@ from flightid.identification.subspace.matrices import STABLE, adjoint_run
 from flightid.models.innovations.prediction import RANK
 from flightid.models.sampled.recursion import run_recursion, spectral_radius
 from flightid.progress import progress
+from flightid.uncertainty.agreement import Agreement
+from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.residual_covariance import white_covariance
 
 Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array, Array, Array]
@@ -37,6 +40,8 @@ class Refined:
         Degrees of freedom of the errors.
     iterations : int
     termination : str
+    agreement : Agreement or None
+        Of records and of their halves, along independent directions of the entries.
     """
 
     matrices: Matrices
@@ -45,6 +50,7 @@ class Refined:
     degrees: int
     iterations: int
     termination: str
+    agreement: Agreement | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,8 +205,10 @@ def refine(
     samples = sum(e.shape[1] for e in errors)
     own = n * len(errors) if initial_state == "estimate" else 0
     degrees = max(samples * data.n_outputs - _count(free, n) - own, 1)
-    covariance = _covariance(predictor, matrices, errors, degrees)
-    return Refined(matrices, errors, covariance, degrees, iterations, termination)
+    covariance, agreement = _covariance(predictor, matrices, errors, degrees)
+    if agreement is not None and agreement.freedom is not None:
+        degrees = max(1, int(np.min(agreement.freedom)))
+    return Refined(matrices, errors, covariance, degrees, iterations, termination, agreement)
 
 
 def _count(shapes: tuple[tuple[int, ...], ...], n: int) -> int:
@@ -269,14 +277,21 @@ def _search(
 
 def _covariance(
     predictor: Predictor, matrices: Matrices, errors: tuple[Array, ...], degrees: int
-) -> Array | None:
+) -> tuple[Array | None, Agreement | None]:
     if not np.isfinite(_level(errors)):
-        return None
+        return None, None
     basis = _tangent(predictor, matrices)
-    jacobian = predictor.jacobian(matrices, _whitener(errors, degrees), basis)
+    whiten = _whitener(errors, degrees)
+    jacobian = predictor.jacobian(matrices, whiten, basis)
     triangle = np.linalg.qr(jacobian, mode="r")
     lengths = np.linalg.norm(triangle, axis=0)
     if np.any(np.abs(np.diag(triangle)) <= 1e-11 * np.maximum(lengths, 1e-300)):
-        return None
-    root = basis @ np.linalg.inv(triangle)
-    return np.asarray(root @ root.T)
+        return None, None
+    root = np.linalg.inv(triangle)
+    ends = np.cumsum([each.size for each in errors])[:-1]
+    blocks = [
+        Block.of(part, np.zeros((len(part), 0)), (whiten @ each))
+        for part, each in zip(np.split(-jacobian, ends), errors, strict=True)
+    ]
+    agreed = white_covariance(blocks, root @ root.T, degrees)
+    return np.asarray(basis @ agreed.covariance @ basis.T), agreed.agreement
