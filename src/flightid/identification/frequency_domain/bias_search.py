@@ -20,6 +20,9 @@ ROUNDING = 1e-9
 """Relative step of every parameter below which nothing moves."""
 CURVED = 0.5
 """Share of a step's effect that its derivatives missed, from which on they are worked out anew."""
+NEARBY = 1.0
+"""Size of all steps since the estimator's slopes were worked out, up to which they serve for the
+errors of the estimates."""
 ACROSS = 0.01
 """Share of a sample by which the other side of a jump is tried."""
 STRETCH, NEAR = 4.0, 0.3
@@ -102,20 +105,24 @@ def search(objective: Objective, start: Array) -> Settled:
     free = objective.model.parameters.free
     limits = np.array([p.minimum for p in free]), np.array([p.maximum for p in free])
     bounds, begun = limits, here.cost
-    extra, fresh, damping, step = _extra(objective, here.x), True, 0.0, np.inf
+    # Until a step shows what the estimator adds to the slopes, they are the model's own.
+    extra: Curves = [np.zeros((len(start), len(each)), complex) for each in here.estimates]
+    damping, step, away = 0.0, np.inf, np.inf
     jacobian = np.zeros((0, len(start)))
     for count in range(MOST_STEPS):
         jacobian = _jacobian(objective, here, extra)
         whole = _step(jacobian, here, bounds, 0.0)
-        step = _size(jacobian @ whole, here)
+        step = _size(jacobian, whole, here)
         small = np.all(np.abs(whole) <= ROUNDING * np.maximum(np.abs(here.x), 1e-300))
-        if step <= ENOUGH or (small and fresh):
+        if step <= ENOUGH or small:
+            if away > NEARBY:
+                extra, away = _extra(objective, here.x), 0.0
+                continue
             step = step if step <= ENOUGH else 0.0
             beyond = None if bounds is limits else _beyond(objective, here, bounds, limits)
             if beyond is None:
                 return Settled(_end(here, jacobian, count, "step"), here.estimates, step, begun)
-            here, bounds = beyond, limits
-            extra, fresh = _extra(objective, here.x), True
+            here, bounds, away = beyond, limits, np.inf
             continue
         tried = _step(jacobian, here, bounds, damping) if damping else whole
         there = _Place.of(objective, np.clip(here.x + tried, *bounds))
@@ -123,21 +130,21 @@ def search(objective: Objective, start: Array) -> Settled:
             cell = objective.correction.cell(objective.at(here.x)) if bounds is limits else None
             if cell is not None:
                 bounds = np.maximum(cell[0], limits[0]), np.minimum(cell[1], limits[1])
-            elif not fresh:
-                extra, fresh = _extra(objective, here.x), True
+            elif away > 0.0:
+                extra, away = _extra(objective, here.x), 0.0
             else:
                 damping = max(10.0 * damping, 1e-3)
                 if damping > LARGEST_DAMPING:
                     break
             continue
-        expected = here.residuals + jacobian @ (there.x - here.x)
-        moved = float(np.linalg.norm(expected - here.residuals))
-        missed = float(np.linalg.norm(there.residuals - expected)) / max(moved, 1e-300)
+        effect = jacobian @ (there.x - here.x)
+        missed = np.linalg.norm(there.residuals - here.residuals - effect)
         extra = _learned(objective, extra, here, there, np.linalg.norm(jacobian, axis=0))
-        here, fresh = _along(objective, here, there, jacobian, bounds), False
+        away += _size(jacobian, there.x - here.x, there)
+        here = _along(objective, here, there, jacobian, bounds)
         damping = 0.0 if damping <= 1e-3 else 0.1 * damping
-        if missed > CURVED:
-            extra, fresh = _extra(objective, here.x), True
+        if missed > CURVED * np.linalg.norm(effect):
+            extra, away = _extra(objective, here.x), 0.0
     reason = f"the search stopped {step:.2g} of the residuals' scatter away from a minimum"
     return Settled(_end(here, jacobian, MOST_STEPS, "stalled"), here.estimates, step, begun, reason)
 
@@ -215,9 +222,10 @@ def _jacobian(objective: Objective, here: _Place, extra: Curves) -> Array:
     return objective.jacobian(here.estimates, slopes)
 
 
-def _size(effect: Array, here: _Place) -> float:
-    """A step's effect on the residuals over their scatter."""
-    return float(np.linalg.norm(effect) / max(np.sqrt(here.cost / len(effect)), 1e-300))
+def _size(jacobian: Array, step: Array, place: _Place) -> float:
+    """Effect of a step on the residuals, a parameter, over their scatter."""
+    scatter = np.sqrt(place.cost / len(place.residuals) * len(step))
+    return float(np.linalg.norm(jacobian @ step) / max(scatter, 1e-300))
 
 
 def _step(jacobian: Array, here: _Place, bounds: tuple[Array, Array], damping: float) -> Array:

@@ -34,7 +34,7 @@ TINY = float(np.finfo(float).tiny)
 
 NOISE = 1.1
 """Ratio of the cost with the estimator inside to that without, up to which it may be noise."""
-MISFIT = 2.0
+MISFIT = 10.0
 """Mean square of misfits over their errors from which on another start is tried."""
 
 
@@ -152,7 +152,12 @@ def _searches(objective: Objective, plain: DenseEnd) -> list[_Judged]:
         return [first]
     own = np.array([parameter.value or 0.0 for parameter in objective.model.parameters.free])
     try:
-        other = _Judged.of(objective, search(objective, own))
+        other = search(objective, own)
     except (FitError, *OUTSIDE):
         return [first]
-    return sorted([first, other], key=lambda it: (it.found.step > TOLERABLE, it.found.end.cost))
+    if (other.step > TOLERABLE, other.end.cost) < (
+        first.found.step > TOLERABLE,
+        first.found.end.cost,
+    ):
+        return [_Judged.of(objective, other), first]
+    return [first, replace(first, found=other)]
