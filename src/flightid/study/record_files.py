@@ -11,7 +11,7 @@ from flightid.conventions import Role
 from flightid.errors import StudyError
 from flightid.record import InputShape, Record, read_records
 from flightid.record.hold import HOLDS, LOOPS
-from flightid.study.collected import Collected
+from flightid.study.error_list import ErrorList
 from flightid.study.reading import TableReader
 
 UNKNOWN = InputShape()
@@ -105,7 +105,7 @@ def require_files(files: Iterable[RecordFile]) -> None:
     StudyError
         Some are not; the message names all of them.
     """
-    collected = Collected()
+    collected = ErrorList()
     for file in files:
         for path in file.paths:
             collected.read(_require_file, None, file.name, path)

@@ -11,7 +11,7 @@ from flightid.files import sha256_of_file
 from flightid.progress import progress
 from flightid.report.html import to_html
 from flightid.report.text import to_text
-from flightid.study.collected import Collected
+from flightid.study.error_list import ErrorList
 from flightid.study.faults import Faults
 from flightid.study.output import RESULTS, require_replaceable, whole_folder
 from flightid.study.pipeline import identify_models
@@ -86,7 +86,7 @@ def run_study(
     final = Path(output) if output is not None else source.with_name(f"{source.stem}-output")
     require_replaceable(final)
     names = tuple(model.name for model in settings.models)
-    collected = Collected()
+    collected = ErrorList()
     collected.read(require_files, None, settings.record_files if log is None else ())
     tasks = list(collected.each(settings.models, load_task, names))
     collected.finish()

@@ -15,8 +15,8 @@ from typing import Any, TypeVar
 
 from flightid.errors import StudyError
 from flightid.record import InputShape
-from flightid.study.collected import Collected
 from flightid.study.conditioning import Conditioning, read_conditioning, require_records
+from flightid.study.error_list import ErrorList
 from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
 from flightid.study.flight import FlightPlan, read_flight
 from flightid.study.model_settings import ModelSettings, read_model
@@ -148,7 +148,7 @@ def read_settings(path: Path) -> Settings:
         are several.
     """
     root, folder = TableReader(_parsed(path), TOP), path.parent
-    collected = Collected()
+    collected = ErrorList()
     tables = partial(collected.read, root.tables, [])
     words = collected.read(_words, ("", "", ""), root)
     log, flight = collected.read(_source, (None, None), root, folder)

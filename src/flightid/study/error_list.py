@@ -13,7 +13,7 @@ Value = TypeVar("Value")
 
 
 @dataclass
-class Collected:
+class ErrorList:
     """Errors of parts that are read one after the other, told together.
 
     Attributes
@@ -24,7 +24,7 @@ class Collected:
     -------
     >>> def refuse(key):
     ...     raise StudyError(f"{key} is missing")
-    >>> collected = Collected()
+    >>> collected = ErrorList()
     >>> collected.read(refuse, None, "name"), collected.read(len, 0, "four")
     (None, 4)
     >>> collected.read(refuse, None, "path")
