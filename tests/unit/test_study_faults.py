@@ -12,6 +12,9 @@ import flightid as fid
 from flightid.cli.program import run as command
 from flightid.study import document, model_section, uses
 from flightid.study.settings import Settings, read_settings
+from flightid.study.stage_runner import StageRunner
+from flightid.study.taking import take
+from flightid.study.task import load_task
 
 MODEL = """
 kind = "state-space"
@@ -166,3 +169,21 @@ def test_one_record_may_stand_for_several_files(folder: Path) -> None:
     assert {"a.csv", "a2.csv"} <= set(made.files)
     with pytest.raises(fid.errors.StudyError, match="path matches no file"):
         study_settings(folder, STUDY.replace('"a.csv"', '"z*.csv"'))
+
+
+def test_data_compatibility_is_checked_and_applied(folder: Path) -> None:
+    time_s = 0.02 * np.arange(1000)
+    bias = 0.02
+    rows = [f"{t:.2f},0,{np.cos(t) + bias},0,0,{np.sin(t)},0" for t in time_s]
+    heading = "time,lat [rad],p [rad/s],q [rad/s],r [rad/s],phi [rad],theta [rad]"
+    (folder / "b.csv").write_text("\n".join([heading, *rows]), "utf-8")
+    step = '[[conditioning]]\nconsistency = { estimate = ["bias_p"], apply = true }\n[[model]]'
+    text = STUDY.replace("[[model]]", step).replace("a.csv", "b.csv")
+    settings = study_settings(folder, text)
+    task = load_task(settings.models[0])
+    taken = take(settings, [task], None, folder, StageRunner())
+    found = taken.checks["a"].parameters["bias_p"].value
+    assert abs(found - bias) < 1e-3
+    (record,) = taken.records["a"].value
+    assert abs(np.mean(record["p"] - np.cos(time_s))) < 1e-3
+    assert command(["--quiet", "consistency", str(folder / "b.csv"), "--estimate", "bias_p"]) == 0

@@ -160,6 +160,7 @@ def check_consistency(
         found,
         known.covariance,
         correlation,
+        measured,
         dict(zip(measured, prediction.values, strict=True)),
         rms,
         fit,

@@ -20,7 +20,11 @@ from flightid.uncertainty.quantiles import LEVEL, interval_words
 class KinematicConsistency(
     Result,
     schema="flightid.kinematic_consistency/1",
-    untold={"reconstructed": "time histories", "corrected": "a record"},
+    untold={
+        "measured": "time histories",
+        "reconstructed": "time histories",
+        "corrected": "a record",
+    },
 ):
     """How well rates, attitude, accelerations and velocities belong to one motion.
 
@@ -32,6 +36,8 @@ class KinematicConsistency(
         Covariance in the order of `parameters`, corrected for coloured residuals.
     correlation : ndarray, shape (n_parameters, n_parameters)
         Correlation of the estimates by the information matrix.
+    measured : mapping of str to ndarray, shape (n,)
+        Outputs as measured, angles without jumps, unit of the output.
     reconstructed : mapping of str to ndarray, shape (n,)
         Outputs rebuilt from the inputs with the estimated instrument errors, unit of the output.
     residual_rms : mapping of str to float
@@ -58,6 +64,7 @@ class KinematicConsistency(
     parameters: Mapping[str, Estimate]
     covariance: NDArray[np.float64]
     correlation: NDArray[np.float64]
+    measured: Mapping[str, NDArray[np.float64]]
     reconstructed: Mapping[str, NDArray[np.float64]]
     residual_rms: Mapping[str, float]
     fit_percent: Mapping[str, float | None]

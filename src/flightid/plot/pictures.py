@@ -14,6 +14,7 @@ from flightid.errors import DataError
 from flightid.identification import Advice, Fit
 from flightid.plot import look
 from flightid.plot.autopilots import controller, replay
+from flightid.plot.consistency import consistency
 from flightid.plot.excitation import excitation_history, plan_spectrum
 from flightid.plot.fit import fit_figure
 from flightid.plot.fitted_record import record_figure
@@ -147,6 +148,7 @@ PICTURES: Mapping[str, Callable[..., Any]] = {
     "ClosedLoop": _closed_loop,
     "Comparison": comparison,
     "DiskMargin": disk_figure,
+    "KinematicConsistency": consistency,
     "DisturbanceRejection": disturbance_figure,
     "Excitation": excitation_history,
     "Fit": fit_picture,

@@ -10,6 +10,7 @@ from flightid.conditioning import (
     accelerations_at_cg,
     air_data_at_cg,
     align,
+    check_consistency,
     convert_axes,
     detrend,
     filter_record,
@@ -19,6 +20,7 @@ from flightid.conditioning import (
     velocities_at_cg,
 )
 from flightid.conditioning.axes import AxisConversion
+from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.conditioning.detrend import Trend
 from flightid.conditioning.filter import FilterDesign
 from flightid.conditioning.sensor_position import RATES
@@ -36,6 +38,25 @@ SENSORS: dict[str, tuple[Move, tuple[str, str, str]]] = {
 }
 """Keys of sensor positions: the verb that moves them to the centre of gravity, and its channels."""
 BANDS = ("lowpass", "highpass", "bandpass", "bandstop")
+
+
+@dataclass(frozen=True)
+class ConsistencyStep:
+    """A check of data compatibility; see `flightid.conditioning.check_consistency`.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Attitudes, accelerations and velocities to look at, beside the rates.
+    estimate : tuple of str, or None
+        Instrument errors; None: the usual ones.
+    apply : bool
+        Whether records go on without the errors that were found.
+    """
+
+    channels: tuple[str, ...] = ("phi", "theta")
+    estimate: tuple[str, ...] | None = None
+    apply: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,6 +81,8 @@ class Conditioning:
         Bandwidth of the known actuator behind an input, rad/s.
     positions : mapping of str to tuple of float
         Position of sensors from the centre of gravity, m, by key of `SENSORS`.
+    consistency : ConsistencyStep or None
+        Check of rates against attitudes and velocities, and whether its errors are taken out.
     filter : mapping or None
         Options of `flightid.conditioning.filter_record`.
     resample_to_s : float or None
@@ -76,6 +99,7 @@ class Conditioning:
     outliers: Mapping[str, Any] | None = None
     actuators: Mapping[str, float] = field(default_factory=dict)
     positions: Mapping[str, Position] = field(default_factory=dict)
+    consistency: ConsistencyStep | None = None
     filter: Mapping[str, Any] | None = None
     resample_to_s: float | None = None
     detrend: str | None = None
@@ -87,6 +111,8 @@ class Conditioning:
         needed = [*moved, *RATES] if moved else []
         if self.axes is not None:
             needed += [*RATES, *SENSORS["accelerometers_m"][1]]
+        if self.consistency is not None:
+            needed += [*RATES, *self.consistency.channels]
         return tuple(dict.fromkeys(needed))
 
 
@@ -109,6 +135,7 @@ def read_conditioning(reader: TableReader) -> Conditioning:
         reader.maybe(lambda key: _outliers(reader.table(key)), "outliers"),
         _numbers(reader, "actuators"),
         _positions(reader),
+        reader.maybe(lambda key: _consistency(reader.table(key)), "consistency"),
         reader.maybe(lambda key: _filter(reader.table(key)), "filter"),
         reader.maybe(reader.positive, "resample_to_s"),
         reader.maybe(lambda key: reader.choice(key, [str(each) for each in Trend]), "detrend"),
@@ -135,15 +162,18 @@ def require_records(steps: Sequence[Conditioning], names: Sequence[str]) -> None
                 )
 
 
-def condition(record: Record, steps: Sequence[Conditioning], name: str) -> Record:
+def condition(
+    record: Record, steps: Sequence[Conditioning], name: str
+) -> tuple[Record, tuple[KinematicConsistency, ...]]:
     """Carry out the steps that are meant for the record or group of this name, in order."""
+    checks: list[KinematicConsistency] = []
     for step in steps:
         if not step.records or name in step.records:
-            record = _apply(record, step)
-    return record
+            record = _apply(record, step, checks)
+    return record, tuple(checks)
 
 
-def _apply(record: Record, step: Conditioning) -> Record:
+def _apply(record: Record, step: Conditioning, checks: list[KinematicConsistency]) -> Record:
     units = {name: unit for name, unit in step.units.items() if name in record}
     if units:
         record = record.to_units(**units)
@@ -165,6 +195,14 @@ def _apply(record: Record, step: Conditioning) -> Record:
         verb, channels = SENSORS[key]
         if all(name in record for name in channels):
             record = verb(record, position)
+    if step.consistency is not None:
+        # Other channels of the record, in units of their own, are not looked at.
+        looked = record.select([*RATES, *step.consistency.channels])
+        found = check_consistency(looked, estimate=step.consistency.estimate)
+        checks.append(found)
+        if step.consistency.apply:
+            corrected = {name: found.corrected[name] for name in looked.channels}
+            record = record.replace(corrected, step=found.corrected.history[-1])
     if step.filter is not None:
         record = filter_record(record, **step.filter)
     if step.resample_to_s is not None:
@@ -189,6 +227,17 @@ def _positions(reader: TableReader) -> dict[str, Position]:
         if given is not None:
             found[key] = (given[0], given[1], given[2])
     return found
+
+
+def _consistency(reader: TableReader) -> ConsistencyStep:
+    usual = ConsistencyStep()
+    made = ConsistencyStep(
+        reader.names("channels", usual.channels),
+        reader.maybe(reader.names, "estimate"),
+        reader.flag("apply", usual.apply),
+    )
+    reader.finish()
+    return made
 
 
 def _outliers(reader: TableReader) -> dict[str, Any]:

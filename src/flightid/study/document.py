@@ -11,6 +11,7 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.findings import Finding, worst
 from flightid.options import Options
+from flightid.plot.consistency import consistency
 from flightid.plot.fit import EstimateBar, parameter_intervals
 from flightid.report.blocks import provenance, result_blocks
 from flightid.report.closed_loop import closed_loop_section
@@ -27,6 +28,7 @@ from flightid.table import Cell, Column, Table
 from flightid.version import VERSION
 
 if TYPE_CHECKING:
+    from flightid.conditioning.consistency_result import KinematicConsistency
     from flightid.study.identified import Identified
     from flightid.uncertainty.estimate import Estimate
 
@@ -50,6 +52,10 @@ def study_document(study: StudyResults) -> Document:
         settings.aircraft,
         (
             section_of("Result", _result, study),
+            *(
+                section_of(f"Data compatibility of “{name}”", _consistency, found)
+                for name, found in study.consistency.items()
+            ),
             *models,
             *_qualities(study),
             *_uses(study),
@@ -60,6 +66,13 @@ def study_document(study: StudyResults) -> Document:
         ),
         f"Made by flightid {VERSION} from {', '.join(study.files)}.",
     )
+
+
+def _consistency(found: KinematicConsistency) -> Iterator[Block]:
+    yield from result_blocks(found, title="Instrument errors")
+    yield TableBlock(found.fits())
+    shown = "Outputs as measured, and rebuilt from rates and accelerations with these errors."
+    yield figure_block(consistency(found), shown)
 
 
 def _uses(study: StudyResults) -> Iterator[Section]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.control.tuning.result import Tuning
 from flightid.dynamics.handling_qualities.handling_qualities import HandlingQualities
 from flightid.findings import Finding
@@ -59,6 +60,8 @@ class StudyResults(
         Model files, and what else was made with the models.
     faults : tuple of Finding
         What was asked for after the fits and could not be made.
+    consistency : mapping of str to KinematicConsistency
+        Data compatibility of records, where the conditioning asks for it.
     carried_out, from_cache : tuple of str
         Stages that this run carried out, and those whose results the cache held.
     """
@@ -74,6 +77,7 @@ class StudyResults(
     qualities: Mapping[str, HandlingQualities] = field(default_factory=dict)
     uses: Uses = field(default_factory=Uses)
     faults: tuple[Finding, ...] = ()
+    consistency: Mapping[str, KinematicConsistency] = field(default_factory=dict)
     carried_out: tuple[str, ...] = ()
     from_cache: tuple[str, ...] = ()
 

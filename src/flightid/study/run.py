@@ -122,6 +122,7 @@ def run_study(
             qualities,
             uses,
             tuple(faults.findings),
+            taken.checks,
             tuple(runner.carried_out),
             tuple(runner.from_cache),
         )

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.conventions import Role
 from flightid.errors import StudyError
 from flightid.inspection import Inspection, inspect_log
@@ -39,6 +40,8 @@ class Taken:
     inspection : Inspection or None
     truth : Truth or None
     log : Staged Log or None
+    checks : mapping of str to KinematicConsistency
+        Data compatibility, by record, where the conditioning asks for it.
     """
 
     records: Mapping[str, Staged[list[Record]]]
@@ -46,6 +49,7 @@ class Taken:
     inspection: Inspection | None = None
     truth: Truth | None = None
     log: Staged[Log] | None = None
+    checks: Mapping[str, KinematicConsistency] = field(default_factory=dict)
 
 
 def take(
@@ -63,6 +67,7 @@ def take(
         A log is given to a study of records, or a file is not there.
     """
     needed = channels_needed(settings, tasks)
+    checks: dict[str, KinematicConsistency] = {}
     if settings.record_files:
         if given is not None:
             raise StudyError(
@@ -74,7 +79,8 @@ def take(
             for file in settings.record_files
             if file.name in needed
         }
-        return Taken(_conditioned(files, settings, runner), tuple(paths))
+        made = _conditioned(files, settings, runner, checks)
+        return Taken(made, tuple(paths), checks=checks)
     flown, truth = _obtain_log(settings, given, folder, runner)
     opened = runner.stage("log", read_log, flown)
     mapped = settings.channel_map
@@ -92,13 +98,17 @@ def take(
         if segment.name in needed
     }
     inspection = runner.stage("inspection", inspect_log, opened).value
-    return Taken(_conditioned(cut, settings, runner), (flown,), inspection, truth, opened)
+    made = _conditioned(cut, settings, runner, checks)
+    return Taken(made, (flown,), inspection, truth, opened, checks)
 
 
 def _conditioned(
-    records: Mapping[str, Staged[list[Record]]], settings: Settings, runner: StageRunner
+    records: Mapping[str, Staged[list[Record]]],
+    settings: Settings,
+    runner: StageRunner,
+    checks: dict[str, KinematicConsistency],
 ) -> dict[str, Staged[list[Record]]]:
-    """Records after the steps that are meant for them."""
+    """Records after the steps that are meant for them; what their checks found is added."""
     made = dict(records)
     for name, record in records.items():
         steps = tuple(
@@ -107,11 +117,15 @@ def _conditioned(
             if not step.records or name in step.records
         )
         if steps:
-            made[name] = runner.stage(f"conditioning: {name}", _prepare, record, steps)
+            done = runner.stage(f"conditioning: {name}", _prepare, record, steps)
+            made[name] = Staged([each for each, _ in done.value], done.key)
+            checks |= {str(each.name): found for each, all_ in done.value for found in all_}
     return made
 
 
-def _prepare(records: list[Record], steps: tuple[Conditioning, ...]) -> list[Record]:
+def _prepare(
+    records: list[Record], steps: tuple[Conditioning, ...]
+) -> list[tuple[Record, tuple[KinematicConsistency, ...]]]:
     return [condition(record, steps, str(record.name)) for record in records]
 
 
