@@ -46,6 +46,7 @@ OF_COMMANDS = {
     "interface": "of an FMU",
     "json": "print one JSON document",
     "kind": "of a model without equations",
+    "estimate": "instrument errors of a check of data compatibility",
     "level": "probability of intervals",
     "listen": "port to listen at",
     "log": "a flight log",
@@ -186,7 +187,8 @@ def test_commands_with_options_of_fields_read_them_all() -> None:
     """No option of a verb is written by hand: the commands of verbs with fields read the fields."""
     reading = {name for name, found in _commands() if isinstance(found, OptionsCommand)}
     assert reading == {
-        "design", "identify", "polynomial", "response", "simulate model", "tune", "verify",
+        "consistency", "design", "identify", "polynomial", "response", "simulate model", "tune",
+        "verify",
     }  # fmt: skip
     for name, found in _commands():
         if isinstance(found, OptionsCommand):

@@ -28,7 +28,6 @@ WITHOUT_PICTURE = {
     "FlownSession": "its record draws itself",
     "Inspection": "tables and lights",
     "Interpretation": "sentences; `pole_zero` draws the roots",
-    "KinematicConsistency": "tables; its corrected record draws itself",
     "Log": "raw messages; its records draw themselves",
     "LogContents": "what a log holds",
     "LogTable": "raw messages",

@@ -202,6 +202,9 @@ def _apply(record: Record, step: Conditioning, checks: list[KinematicConsistency
         checks.append(found)
         if step.consistency.apply:
             corrected = {name: found.corrected[name] for name in looked.channels}
+            # Delays that are taken out cost samples at the ends.
+            first, last = found.corrected.time_s[[0, -1]]
+            record = record.segment(first, last + 0.5 * record.sample_time_s)
             record = record.replace(corrected, step=found.corrected.history[-1])
     if step.filter is not None:
         record = filter_record(record, **step.filter)
