@@ -94,9 +94,11 @@ def _fit_selected(
             groups = [*cluster(done.ends), *groups[1:]]
             selected, errors, fitted = list(done.selected), done.errors, done.model
             curves = done.estimates
-            if errors.known is not None:
-                compare = ResponseParts(without, fitted, selected, errors).compare
     sensitivity = _sensitivity(fitted, selected, errors, options, curves)
+    if curves is not None and errors.known is not None and sensitivity is not None:
+        # Residuals answer to points and to the model's estimates with opposite signs.
+        slopes = np.asarray(-np.linalg.lstsq(sensitivity, groups[0][0].jacobian)[0], np.float64)
+        compare = ResponseParts(without, fitted, selected, errors, slopes).compare
     found = statistics(
         fitted,
         selected,

@@ -34,12 +34,15 @@ class ResponseParts:
     fitted : TransferFunctionModel or StateSpaceModel
     selected : sequence of SelectedResponse
     errors : ErrorModel
+    slopes : ndarray, shape (n_points, n_free)
+        Derivatives of what the estimator makes of the model, run after run.
     """
 
     correction: Correction
     fitted: GreyBoxModel
     selected: Sequence[SelectedResponse]
     errors: ErrorModel
+    slopes: Array
 
     def compare(self, gain: Array, inner: NDArray[np.bool_]) -> Agreed:
         """Covariance of the estimates, halves and records compared.
@@ -62,7 +65,7 @@ class ResponseParts:
         """
         left, modelled = self.correction.halves(self.fitted, self._places)
         whole = self._points(modelled.sum(axis=(0, 1)))
-        slopes = self._slopes()[:, inner]
+        slopes = self.slopes[:, inner]
         n, count = len(gain), left.shape[0]
         scores, information, weighed = [], [], []
         for kept, made in zip(
@@ -104,21 +107,6 @@ class ResponseParts:
             ]
             found.append(np.concatenate(rows))
         return found
-
-    def _slopes(self) -> Array:
-        """Derivatives of the model's points by the free parameters, (n_points, n_free)."""
-        values = self.fitted.parameters.independent_values()
-        free = self.fitted.parameters.free_indices
-        parts = []
-        for run in self.errors.runs:
-            rows = []
-            for place in range(run.first, run.first + run.count):
-                omega = np.ascontiguousarray(self.selected[place].omega_rad_s)
-                curve = np.asarray(self.fitted.native.response(values, omega)[place])
-                slope = self.fitted.native.log_gradient(values, free, omega)[place]
-                rows.append(curve[:, None] * slope)
-            parts.append(np.concatenate(rows))
-        return np.vstack([side for part in parts for side in (part.real, part.imag)])
 
 
 def _stacked(runs: Sequence[Complex]) -> Array:
