@@ -18,7 +18,7 @@ from flightid.study.task import load_task
 
 MODEL = """
 kind = "state-space"
-name = "Roll"
+name = "Template"
 [states]
 p = "rad/s"
 [inputs]
@@ -78,6 +78,8 @@ def test_a_reference_of_zero_ends_no_study(folder: Path) -> None:
     assert not made.faults
     assert "Where that is zero, in percent of the estimate" in str(made.document.sections[0])
     assert (made.output / "report.html").is_file()
+    written = fid.load_model(made.output / "models" / "roll.toml")
+    assert written.name == "Roll"
 
 
 def broken(*_: object, **__: object) -> object:

@@ -17,7 +17,7 @@ from flightid.errors import StudyError
 from flightid.export import Exported
 from flightid.export.to_file import export
 from flightid.identification import Fit
-from flightid.models import write_model
+from flightid.models import GreyBoxModel, write_model
 from flightid.models.saved_files import MODELS
 from flightid.study.faults import Faults
 from flightid.study.identified import Identified
@@ -146,6 +146,9 @@ def _written(fits: Mapping[str, Fit], folder: Path) -> dict[str, str]:
         stem = re.sub(r"\W+", "_", name.lower()).strip("_") or "model"
         if f"{MODELS}/{stem}.toml" in written.values():
             stem = f"{stem}_{len(written) + 1}"
+        if isinstance(fit.model, GreyBoxModel):
+            # Two fits of one template are told apart by their names in the study.
+            fit = replace(fit, model=replace(fit.model, name=name))  # noqa: PLW2901
         write_model(fit, folder / MODELS / f"{stem}.toml")
         written[name] = f"{MODELS}/{stem}.toml"
     return written
