@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc
 
 from flightid.conventions import Light
 from flightid.findings import Finding
@@ -23,38 +25,97 @@ EXCELLENT_COST = 50.0
 SINGLE_COST_GUIDE = 150.0
 SINGLE_COST_LIMIT = 200.0
 """Tischler & Remple, 2nd ed., §12.2.5, §12.3.4 and §13.7."""
+MISFIT_GUIDE = 25.0
+"""Half of what is nearly indistinguishable, where noise explains none of it."""
+MISFIT_RATIO = 2.0
+"""Times what noise explains: its own size is an estimate."""
+CHANCE = 0.01
+"""Share of flights of a model that is right whose noise costs more than noise explains."""
 
 _NEAR_COST = 1.1
 _DETERMINED = 0.2
 """Half-width of a 95 % interval, as a share of the value, below which the data do determine it."""
 
 
-def judge_cost(costs: Mapping[str, float], average: float) -> list[Finding]:
-    """Verdicts on the costs: the average, and each response that stands out."""
-    if average <= EXCELLENT_COST:
-        found = [
-            Finding("cost", Light.GREEN, f"average cost {average:.3g}, nearly indistinguishable")
-        ]
-    elif average <= AVERAGE_COST_GUIDE:
-        found = [
-            Finding("cost", Light.GREEN, f"average cost {average:.3g}, within the guide of 100")
-        ]
-    else:
-        found = [
-            Finding(
-                "cost",
-                Light.RED,
-                f"average cost {average:.0f} is above the guide of 100",
-                "do not use its numbers, whose intervals assume that the structure holds: add "
-                "missing dynamics, narrow the band, or look for a wrong sign or unit",
-            )
-        ]
+@dataclass(frozen=True)
+class NoiseCost:
+    """Mean and deviation of the cost that random errors alone give a model that is right.
+
+    Example
+    -------
+    >>> NoiseCost(100.0, 20.0).explains(120.0), NoiseCost(10.0, 2.0).explains(42.0)
+    (True, False)
+    """
+
+    mean: float
+    deviation: float
+
+    def explains(self, cost: float) -> bool:
+        """Whether chance gives as large a cost in more than one of a hundred flights."""
+        if not (self.mean > 0.0 and self.deviation > 0.0):
+            return False
+        # A sum of squares of few independent parts: chi-square of the same mean and variance.
+        scale = self.deviation**2 / (2.0 * self.mean)
+        return float(chdtrc(self.mean / scale, cost / scale)) > CHANCE
+
+
+def judge_cost(
+    costs: Mapping[str, float], average: float, noise: Mapping[str, NoiseCost] | None = None
+) -> list[Finding]:
+    """Verdicts on the costs beside what noise explains: their average, and each that stands out.
+
+    Parameters
+    ----------
+    costs : mapping of str to float
+        By response.
+    average : float
+    noise : mapping of str to NoiseCost, optional
+        By response, where errors are known.
+    """
+    known = noise or {}
+    found = [_judge_average(average, _averaged(known))]
     for name, cost in costs.items():
-        if len(costs) > 1 and cost > SINGLE_COST_GUIDE:
+        explained = name in known and known[name].explains(cost)
+        if len(costs) > 1 and cost > SINGLE_COST_GUIDE and not explained:
             light = Light.RED if cost > SINGLE_COST_LIMIT else Light.AMBER
             action = "narrow its band to where it is coherent, or leave it out"
             found.append(Finding("cost-response", light, f"{name}: cost {cost:.0f}", action))
     return found
+
+
+def _averaged(noise: Mapping[str, NoiseCost]) -> NoiseCost | None:
+    """Of the average cost; errors of different responses may be one and the same."""
+    if not noise:
+        return None
+    means, deviations = zip(*((each.mean, each.deviation) for each in noise.values()), strict=True)
+    return NoiseCost(float(np.mean(means)), float(np.mean(deviations)))
+
+
+def _judge_average(average: float, noise: NoiseCost | None) -> Finding:
+    if noise is not None and noise.explains(average):
+        what = f"average cost {average:.3g}, as much as random errors alone give"
+        return Finding("cost", Light.GREEN, f"{what} ({noise.mean:.3g})")
+    if average > AVERAGE_COST_GUIDE:
+        return Finding(
+            "cost",
+            Light.RED,
+            f"average cost {average:.0f} is above the guide of 100",
+            "do not use its numbers, whose intervals assume that the structure holds: add "
+            "missing dynamics, narrow the band, or look for a wrong sign or unit",
+        )
+    if noise is not None and average > MISFIT_RATIO * noise.mean + MISFIT_GUIDE:
+        return Finding(
+            "cost",
+            Light.AMBER,
+            f"average cost {average:.3g}, of which random errors explain {noise.mean:.3g}: the "
+            "model misses what the data show",
+            "look for the responses that stand out, more starts, or missing dynamics",
+        )
+    if average <= EXCELLENT_COST:
+        words = f"average cost {average:.3g}, nearly indistinguishable"
+    else:
+        words = f"average cost {average:.3g}, within the guide of 100"
+    return Finding("cost", Light.GREEN, words)
 
 
 def judge_parameters(parameters: Mapping[str, Estimate]) -> list[Finding]:

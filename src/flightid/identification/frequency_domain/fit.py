@@ -7,7 +7,7 @@ Or, with ``cost="likelihood"``, the whitened complex error.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from flightid.errors import DataError, FitError
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
+    NoiseCost,
     judge_correlation,
     judge_cost,
     judge_intervals,
@@ -33,6 +34,7 @@ from flightid.identification.frequency_domain.error_model import (
 )
 from flightid.identification.frequency_domain.estimates import Statistics, statistics
 from flightid.identification.frequency_domain.estimator_bias import Correction
+from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.response_parts import ResponseParts
 from flightid.identification.frequency_domain.search import minimise
@@ -80,6 +82,7 @@ def _fit_selected(
     options: FrequencyDomainOptions,
 ) -> Fit:
     errors = error_model(data, selected)
+    by_noise = errors
     groups = cluster(_minimise(model, selected, errors, options))
     correction: dict[str, object] = {"applied": False, "reason": "correct_bias=False"}
     fitted, curves, withheld, compare = _at(model, groups[0][0]), None, "", None
@@ -109,7 +112,9 @@ def _fit_selected(
         compare=compare,
     )
     responses = compare_responses(fitted, selected)
-    fit = _assemble(fitted, options, data, groups, responses, found, setup)
+    curves = [response_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
+    noise = noise_costs(selected, curves, by_noise)
+    fit = _assemble(fitted, options, data, groups, responses, found, setup, noise)
     return replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
 
 
@@ -256,6 +261,7 @@ def _assemble(
     responses: tuple[FittedResponse, ...],
     found: Statistics,
     setup: list[Finding],
+    noise: Mapping[str, NoiseCost],
 ) -> Fit:
     best = groups[0][0]
     costs = {each.name: each.cost for each in responses}
@@ -264,7 +270,7 @@ def _assemble(
     findings = (
         *setup,
         *judge_search(groups),
-        *judge_cost(costs, total / len(costs)),
+        *judge_cost(costs, total / len(costs), noise),
         *judge_parameters(found.parameters),
         *judge_correlation(found.names, found.correlation),
         *(

@@ -1,0 +1,74 @@
+"""What the random error of a response alone adds to the cost of a model that is right."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.identification.fit_findings import NoiseCost
+from flightid.identification.frequency_domain.error_model import ErrorModel, coherence_sensitivity
+from flightid.identification.frequency_domain.selection import SelectedResponse
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+LARGEST_ERROR = 0.5
+"""Relative random error beyond which a logarithm no longer follows it."""
+
+
+def noise_costs(
+    selected: Sequence[SelectedResponse], curves: Sequence[Complex], errors: ErrorModel
+) -> dict[str, NoiseCost]:
+    """Mean and deviation of each response's cost by its random error.
+
+    Parameters
+    ----------
+    selected : sequence of SelectedResponse
+    curves : sequence of ndarray of complex
+        The model at the points of each.
+    errors : ErrorModel
+        Of the response as measured: what a model leaves must not count as noise.
+
+    Returns
+    -------
+    dict of str to NoiseCost
+        Empty where errors are not known.
+
+    Assumes
+    -------
+    Small errors of logarithms: larger ones than `LARGEST_ERROR` count as that, so that points
+    without coherence explain nothing. Too large by what the fit takes of the noise, which is little
+    beside many points.
+
+    Reference
+    ---------
+    Pintelon & Schoukens, *System Identification*, 2nd ed., §11.4 (the cost of a model that is
+    right); moments of quadratic forms: Mathai & Provost (1992), eq. 3.2b.8.
+    """
+    if not errors.runs:
+        return {}
+    sensitivity = coherence_sensitivity(selected, curves, errors)
+    found, first = {}, 0
+    for run, covariance in zip(errors.runs, errors.covariances, strict=True):
+        size = len(covariance)
+        span = slice(first, first + size)
+        group = range(run.first, run.first + run.count)
+        turned = sensitivity[span, span] * _believed(covariance, [curves[k] for k in group])
+        spread = turned @ covariance @ turned.T
+        start = 0
+        for place in group:
+            rows = slice(start, start + 2 * len(selected[place].places))
+            start = rows.stop
+            part = spread[rows, rows]
+            deviation = float(np.sqrt(2.0 * np.sum(part * part)))
+            found[selected[place].name] = NoiseCost(float(np.trace(part)), deviation)
+        first = span.stop
+    return found
+
+
+def _believed(covariance: Array, curves: Sequence[Complex]) -> Array:
+    """Shares of the errors of a run's real and imaginary parts that its logarithms can hold."""
+    real, imaginary = np.split(np.diag(covariance), 2)
+    error = np.sqrt(0.5 * (real + imaginary)) / np.abs(np.concatenate(list(curves)))
+    return np.tile(LARGEST_ERROR / np.maximum(error, LARGEST_ERROR), 2)

@@ -1,0 +1,56 @@
+"""Costs beside what random errors alone explain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import flightid as fid
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.identification.fit_findings import NoiseCost, judge_cost
+
+
+def _found(average: float, noise: NoiseCost | None) -> Finding:
+    return judge_cost({"p/a": average}, average, None if noise is None else {"p/a": noise})[0]
+
+
+def test_a_cost_that_noise_explains_is_green_and_one_that_it_does_not_is_not() -> None:
+    assert _found(140.0, NoiseCost(120.0, 20.0)).light is Light.GREEN
+    assert _found(140.0, NoiseCost(20.0, 5.0)).light is Light.RED
+    assert _found(42.0, NoiseCost(5.0, 2.0)).light is Light.AMBER
+    assert "random errors explain 5" in _found(42.0, NoiseCost(5.0, 2.0)).message
+    assert _found(10.0, NoiseCost(0.1, 0.01)).light is Light.GREEN
+    assert _found(42.0, None).light is Light.GREEN
+
+
+def test_a_single_response_is_judged_beside_its_own_noise() -> None:
+    noise = {"p/a": NoiseCost(170.0, 40.0), "q/a": NoiseCost(10.0, 2.0)}
+    codes = [each.code for each in judge_cost({"p/a": 180.0, "q/a": 10.0}, 95.0, noise)]
+    assert codes == ["cost"]
+    said = judge_cost({"p/a": 10.0, "q/a": 180.0}, 95.0, noise)
+    assert [each.message for each in said if each.code == "cost-response"] == ["q/a: cost 180"]
+
+
+def test_costs_of_independent_errors_have_the_mean_that_is_foretold() -> None:
+    random = np.random.default_rng(0)
+    truth = fid.load_model("rate_first_order").with_values({"Lp": -5.0, "Ltphi": 150.0})
+    omega = np.geomspace(0.5, 20.0, 40)
+    exact = truth.frequency_response(omega)
+    costs = []
+    for _ in range(40):
+        errors = 0.05 * random.standard_normal((2, *exact.shape))
+        data = fid.FrequencyResponse.from_values(
+            omega,
+            exact * (1.0 + errors[0] + 1j * errors[1]),
+            inputs=truth.inputs,
+            outputs=truth.outputs,
+            units=truth.units,
+            random_error=np.full((1, 1, 40), 0.05),
+        )
+        fit = fid.identify(truth, data, correct_bias=False)
+        costs.append(fit.average_cost)
+        assert fit.findings[0].code != "cost" or "random errors" in fit.findings[0].message
+    # Twenty points of equal weight: (20 / ln 10 · 0.05)² dB² and (0.05 rad)² with W_p = 0.01745.
+    weight = (1.58 * (1.0 - np.exp(-1.0))) ** 2
+    expected = 20.0 * weight * ((20.0 / np.log(10.0) * 0.05) ** 2 + 0.01745 * np.rad2deg(0.05) ** 2)
+    assert 0.85 * expected < np.mean(costs) < 1.05 * expected
