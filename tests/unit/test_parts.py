@@ -11,7 +11,7 @@ from flightid.evidence.part_checks import agreement_check
 from flightid.uncertainty.agreement import Agreement, compare_parts
 from flightid.uncertainty.parts import Flight, chance_alike, larger, scatter
 from tests.closeness import assert_close
-from tests.strangers.parts import by_arx, by_output_error, changed_midway, steps_flown
+from tests.strangers.parts import arx_flown, by_arx, by_output_error, changed_midway, steps_flown
 
 Array = NDArray[np.float64]
 
@@ -102,8 +102,8 @@ def test_a_vehicle_that_changes_midway_is_red_and_its_bars_reach_both() -> None:
 
 def test_vehicles_apart_widen_bars_of_grey_and_black_boxes() -> None:
     random = np.random.default_rng(2)
-    records = [steps_flown(random, 0.05) for _ in range(3)]
-    for fit in (by_output_error(records), by_arx(records)):
+    for flown, fitted in ((steps_flown, by_output_error), (arx_flown, by_arx)):
+        fit = fitted([flown(random, 0.05) for _ in range(3)])
         assert fit.agreement is not None
         assert fit.agreement.by_scatter is not None
         assert all((p.freedom or 99.0) < 3.0 for p in fit.parameters.values())

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import flightid as fid
 from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
 from flightid.plot.residuals import correlations
-from flightid.validation.residuals.correlation import (
+from flightid.uncertainty.residual_correlation import (
     cross_correlation,
     independence_portmanteau,
     lag_covariance,

@@ -55,6 +55,8 @@ BELONGS = {
     "residuals-coloured": RESIDUALS,
     "output-unexplained": RESIDUALS,
     "process-noise": RESIDUALS,
+    "errors-not-white": RESIDUALS,
+    "inputs-in-errors": RESIDUALS,
 }
 
 

@@ -112,6 +112,9 @@ def _spread(parameter: Parameter, share: Array) -> Array:
 def collect(outcomes: Sequence[E | str]) -> list[E]:
     """Ends of the starts that ended, best first; a text is why a start did not.
 
+    Of minima that cost the same, as twins do whose poles are exchanged, the one that the earliest
+    start found goes first: rounding shall not choose, and the user's own start is the first.
+
     Raises
     ------
     FitError
@@ -126,7 +129,23 @@ def collect(outcomes: Sequence[E | str]) -> list[E]:
             needed="a model with a finite response at its start values",
             action="check start values and bounds, or the structure of the model",
         )
-    return sorted(ends, key=lambda end: end.cost)
+    return best_first(ends)
+
+
+def best_first(ends: Sequence[E]) -> list[E]:
+    """Ends by their cost; of those that cost the same as the best, the earliest goes first.
+
+    Example
+    -------
+    >>> ends = [End(np.ones(1), cost, 1, "step") for cost in (3.0, 1.0 + 1e-9, 1.0)]
+    >>> [ends.index(end) for end in best_first(ends)]
+    [1, 2, 0]
+    """
+    ranked = sorted(ends, key=lambda end: end.cost)
+    limit = ranked[0].cost + _SAME_COST * (1.0 + abs(ranked[0].cost))
+    alike = [end for end in ends if end.cost <= limit and end.is_converged]
+    first = alike[0] if alike else ranked[0]
+    return [first, *(end for end in ranked if end is not first)]
 
 
 def cluster(ends: Sequence[E]) -> list[list[E]]:
@@ -145,7 +164,7 @@ def cluster(ends: Sequence[E]) -> list[list[E]]:
 def _same(first: End, second: End) -> bool:
     scale = np.maximum(np.abs(first.x), np.abs(second.x))
     near = np.all(np.abs(first.x - second.x) <= _SAME_VALUE * np.maximum(scale, 1e-12))
-    return bool(near) and second.cost - first.cost <= _SAME_COST * (1.0 + abs(first.cost))
+    return bool(near) and abs(second.cost - first.cost) <= _SAME_COST * (1.0 + abs(first.cost))
 
 
 def local_minima(groups: Sequence[Sequence[End]], names: Sequence[str]) -> tuple[LocalMinimum, ...]:

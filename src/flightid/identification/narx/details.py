@@ -62,6 +62,9 @@ class NarxDetails(Details):
         Samples that the weights rest on, those that initialise lags excluded.
     unit : str
         Of the output.
+    why_biased : str
+        What the prediction errors say against the weights and their standard errors, which are
+        then not shown; else empty.
 
     Example
     -------
@@ -87,6 +90,7 @@ class NarxDetails(Details):
     baseline_free_run_rms: float
     n_samples: int
     unit: str
+    why_biased: str = ""
 
     @property
     def words(self) -> str:
@@ -98,7 +102,7 @@ class NarxDetails(Details):
         return (
             repr(structure),
             "weights and errors are of channels scaled to zero mean and unit deviation; "
-            + _meaning_of_errors(structure),
+            + (self.why_biased or _meaning_of_errors(structure)),
             f"rms error on training records [{self.unit}]: one step {self.one_step_rms:.4g}, free "
             f"run {self.free_run_rms:.4g}, free run of the linear model of the same lags "
             f"{self.baseline_free_run_rms:.4g}",
@@ -123,7 +127,7 @@ class NarxDetails(Details):
                 item.term.kind,
                 item.term.degree,
                 item.weight,
-                item.stderr,
+                None if self.why_biased else item.stderr,
                 100.0 * item.error_reduction,
                 item.sum_of_squares,
                 item.leave_one_out,
@@ -142,6 +146,7 @@ class NarxDetails(Details):
         return {
             "baseline": self.baseline.to_dict(),
             "chosen": [item.to_dict() for item in self.chosen],
+            "why_biased": self.why_biased,
             "one_step_rms": self.one_step_rms,
             "free_run_rms": self.free_run_rms,
             "baseline_free_run_rms": self.baseline_free_run_rms,

@@ -21,6 +21,7 @@ from flightid.identification.black_box import (
     provenance_of,
 )
 from flightid.identification.fit import Fit
+from flightid.identification.innovation_tests import innovation_tests
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.narx.candidates import (
     CandidateTerms,
@@ -108,14 +109,27 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
     errors = tuple(np.subtract(*run.scored)[None] for run in one_step)
     squares = sum(float(np.sum(row**2)) for row in errors)
     weights = {item.term.name: item.weight for item in chosen}
+    tests = innovation_tests(
+        errors,
+        [
+            record.matrix(structure.inputs)[:, -row.shape[1] :]
+            for record, row in zip(flown, errors, strict=True)
+        ],
+        [run.measured[None] for run in one_step],
+        (structure.output_lags, structure.input_lags),
+    ).beside(None if agreed is None else agreed.agreement)
+    details = replace(details, why_biased=tests.why_biased)
+    covariance = None
+    if structure.held_back and not tests.why_biased:
+        covariance = _covariance(selection, agreed)
     arrays = [record.matrix([structure.output, *structure.inputs]) for record in records]
     return black_box_fit(
         model,
         BlackBoxRuns(flown, tuple(run.predicted[None] for run in free), errors),
         BlackBoxEstimates(
-            _parameters(structure, chosen, agreed),
+            _parameters(structure, chosen, agreed, tests.why_biased),
             tuple(weights),
-            _covariance(selection, agreed) if structure.held_back else None,
+            covariance,
             agreement=None if agreed is None else agreed.agreement,
         ),
         (LocalMinimum(chosen[-1].sum_of_squares, 1, weights, structure.stop),),
@@ -126,6 +140,7 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
             *free_run_findings(
                 details.free_run_rms, details.baseline_free_run_rms, _held(flown, free)
             ),
+            *tests.findings(biased=True),
         ),
         provenance=provenance_of(
             "orthogonal least squares",
@@ -143,10 +158,14 @@ def _covariance(selection: Selection, agreed: Agreed | None) -> Array:
 
 
 def _parameters(
-    structure: NarxStructure, chosen: Sequence[ChosenTerm], agreed: Agreed | None
+    structure: NarxStructure,
+    chosen: Sequence[ChosenTerm],
+    agreed: Agreed | None,
+    why_biased: str,
 ) -> dict[str, Estimate]:
     """Weights by term; errors hold in spite of the choice only where samples were held back."""
-    if structure.held_back and agreed is not None and agreed.agreement.by_scatter is not None:
+    held = structure.held_back > 0.0 and not why_biased
+    if held and agreed is not None and agreed.agreement.by_scatter is not None:
         errors = np.sqrt(np.diag(agreed.covariance))
         known = zip(chosen, errors.tolist(), agreed.freedom.tolist(), strict=True)
         return {
@@ -155,12 +174,12 @@ def _parameters(
             )
             for item, error, freedom in known
         }
-    if structure.held_back:
+    if held:
         return {
             item.term.name: Estimate(item.term.name, item.weight, "1", item.stderr, status="free")
             for item in chosen
         }
-    reason = "standard errors ignore the choice of terms: see held_back"
+    reason = why_biased or "standard errors ignore the choice of terms: see held_back"
     return {
         item.term.name: Estimate(item.term.name, item.weight, "1", None, reason, status="free")
         for item in chosen

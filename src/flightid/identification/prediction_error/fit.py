@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +21,14 @@ from flightid.identification.black_box import (
 from flightid.identification.fit import Fit
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.backcast import backcast
-from flightid.identification.prediction_error.coloured_errors import (
-    has_noise_model,
-    output_error_covariance,
+from flightid.identification.prediction_error.coefficient_covariance import (
+    SearchResult,
+    compared,
+    is_white,
+    printed,
+    shares_poles,
+    spent,
+    tests_of,
 )
 from flightid.identification.prediction_error.details import FitScore, PolynomialDetails
 from flightid.identification.prediction_error.findings import judge_polynomial
@@ -32,7 +36,7 @@ from flightid.identification.prediction_error.information_criteria import criter
 from flightid.identification.prediction_error.instrumental_variables import four_stage
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
 from flightid.identification.prediction_error.linear_regression import regress, require_independent
-from flightid.identification.prediction_error.part_blocks import BEFORE, errors_at, part_blocks
+from flightid.identification.prediction_error.part_blocks import BEFORE, errors_at
 from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
 from flightid.identification.prediction_error.starts import polynomial_starts
 from flightid.models.polynomial.model import PolynomialModel
@@ -41,31 +45,14 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels, hold_diverged
 from flightid.record import Record
 from flightid.record.several import as_records
-from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.residual_covariance import colour_findings, white_covariance
+from flightid.uncertainty.residual_covariance import colour_findings
 
 Array = NDArray[np.float64]
 BACKCASTS = 6
 SETTLED = 1e-6
 SAME_MINIMUM = 1e-6
 SPARE_SAMPLES = 3
-
-
-@dataclass(frozen=True, eq=False)
-class _SearchResult:
-    """Coefficients with what the search left; `skip` first errors of each record do not count."""
-
-    theta: Array
-    covariance: Array | None
-    degrees: int
-    minima: tuple[LocalMinimum, ...]
-    iterations: int
-    memory: list[list[float]]
-    skip: int
-    freedom: Array | None = None
-    colour: tuple[float, float] = (1.0, 1.0)
-    agreement: Agreement | None = None
 
 
 def fit_polynomial(structure: PolynomialStructure, data: Record | Sequence[Record]) -> Fit:
@@ -95,7 +82,7 @@ def _require_samples(structure: PolynomialStructure, data: SampledChannels) -> N
         )
 
 
-def _search(structure: PolynomialStructure, data: SampledChannels) -> _SearchResult:
+def _search(structure: PolynomialStructure, data: SampledChannels) -> SearchResult:
     if structure.is_regression and not structure.backcast:
         found = _regression(structure, data)
         unstable = np.max(np.abs(np.roots([1.0, *found.theta[: structure.na]])), initial=0.0) >= 1.0
@@ -106,7 +93,7 @@ def _search(structure: PolynomialStructure, data: SampledChannels) -> _SearchRes
     return _iterate(structure, data, polynomial_starts(structure, data), [])
 
 
-def _regression(structure: PolynomialStructure, data: SampledChannels) -> _SearchResult:
+def _regression(structure: PolynomialStructure, data: SampledChannels) -> SearchResult:
     """ARX: linear in the coefficients, so no iteration."""
     skip = 0 if structure.initial_state == "zero" else structure.longest_lag
     made = regress(
@@ -132,10 +119,10 @@ def _linear(
     degrees: int,
     ending: str,
     skip: int,
-) -> _SearchResult:
+) -> SearchResult:
     values = dict(zip(structure.names, theta.tolist(), strict=True))
     minimum = LocalMinimum(0.0, 1, values, ending)
-    return _SearchResult(theta, covariance, degrees, (minimum,), 0, [], skip)
+    return SearchResult(theta, covariance, degrees, (minimum,), 0, [], skip)
 
 
 def _inverse_square(factor: Array) -> Array:
@@ -149,7 +136,7 @@ def _iterate(
     data: SampledChannels,
     starts: Array,
     memory: list[list[float]],
-) -> _SearchResult:
+) -> SearchResult:
     """Gauss-Newton with the damping of Levenberg and Marquardt from every start."""
     skip = structure.longest_lag if structure.is_regression and not memory else 0
     outcomes = _native.polynomial_fit(
@@ -184,7 +171,7 @@ def _iterate(
     covariance = None
     if _is_determined(factor):
         covariance = squares / degrees * _inverse_square(factor)
-    return _SearchResult(
+    return SearchResult(
         theta, covariance, degrees, _minima(structure, ends), iterations, memory, skip
     )
 
@@ -207,7 +194,7 @@ def _minima(
     return tuple(groups)
 
 
-def _backcast_rounds(structure: PolynomialStructure, data: SampledChannels) -> _SearchResult:
+def _backcast_rounds(structure: PolynomialStructure, data: SampledChannels) -> SearchResult:
     """The past follows from the model and the model from the past, until both rest."""
     of_inputs, of_noise = _native.polynomial_memory(structure.native)
     memory = [[0.0] * (sum(of_inputs) + of_noise) for _ in data.lengths]
@@ -229,11 +216,13 @@ def _assemble(
     structure: PolynomialStructure,
     records: tuple[Record, ...],
     data: SampledChannels,
-    found: _SearchResult,
+    found: SearchResult,
 ) -> Fit:
     errors = errors_at(structure, data, found.memory, found.theta)
-    found = _compared(structure, data, found, errors)
     counted = tuple(errors[span][found.skip :] for span in data.spans)
+    tests = tests_of(structure, data, counted, found.skip)
+    found = compared(structure, data, found, errors, tests)
+    tests = tests.beside(found.agreement)
     squares = float(sum(row @ row for row in counted))
     n_counted = sum(row.size for row in counted)
     model = PolynomialModel.from_theta(
@@ -268,9 +257,9 @@ def _assemble(
         ),
         BlackBoxEstimates(
             parameters,
-            structure.names,
-            found.covariance,
-            WHITE if has_noise_model(structure) and structure.method != "iv4" else COLOURED,
+            tuple(name for name, each in parameters.items() if each.stderr is not None),
+            printed(found.covariance, parameters),
+            WHITE if is_white(structure, tests) else COLOURED,
             found.agreement,
         ),
         minima,
@@ -279,6 +268,7 @@ def _assemble(
         findings=(
             *judge_polynomial(structure, model, parameters, roots, minima, n_counted),
             *colour_findings(*found.colour),
+            *tests.findings(biased=shares_poles(structure)),
         ),
         provenance=_provenance(structure, records, data),
         details=PolynomialDetails(
@@ -287,47 +277,18 @@ def _assemble(
             criteria(squares, n_counted, structure.n_parameters),
             {structure.output: _scores(structure, runs, data, counted)},
             model.difference_equation(),
-            spent=(
-                structure.na + structure.nc + structure.nd,
-                max((b + f for b, f in zip(structure.nb, structure.nf, strict=True)), default=0),
-            ),
+            spent=spent(structure),
         ),
     )
 
 
-def _compared(
-    structure: PolynomialStructure, data: SampledChannels, found: _SearchResult, errors: Array
-) -> _SearchResult:
-    """Covariance of the coefficients after parts of the data were compared.
-
-    By the colour of residuals where no noise model answers for it.
-    """
-    if found.covariance is None or found.agreement is not None:
-        return found
-    if has_noise_model(structure) or structure.kernel is not None:
-        at = partial(errors_at, structure, data, found.memory)
-        blocks = part_blocks(at, data, found.theta, found.skip)
-        agreed = white_covariance(blocks, found.covariance, found.degrees)
-        freedom = agreed.freedom if agreed.agreement.by_scatter is not None else None
-        return replace(
-            found, covariance=agreed.covariance, freedom=freedom, agreement=agreed.agreement
-        )
-    known = output_error_covariance(structure, data, found.theta, errors, found.skip)
-    return replace(
-        found,
-        covariance=known.covariance,
-        freedom=known.freedom,
-        colour=known.colour,
-        agreement=known.agreement,
-    )
-
-
-def _parameters(model: PolynomialModel, found: _SearchResult) -> dict[str, Estimate]:
+def _parameters(model: PolynomialModel, found: SearchResult) -> dict[str, Estimate]:
     made = {}
     for place, (name, coefficient) in enumerate(model.parameters.items()):
         unit, value = coefficient.unit, float(found.theta[place])
-        if found.covariance is None:
-            reason = "the data do not tell the coefficients apart"
+        reason = found.reason if found.covariance is None else ""
+        reason = found.noise_reason if not reason and name[0] in "cd" else reason
+        if found.covariance is None or reason:
             made[name] = Estimate(name, value, unit, None, reason, status="free")
             continue
         stderr = float(np.sqrt(found.covariance[place, place]))

@@ -14,6 +14,7 @@ from flightid.identification.black_box import (
     provenance_of,
 )
 from flightid.identification.fit import Fit
+from flightid.identification.innovation_tests import innovation_tests
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.details import FitScore
 from flightid.identification.prediction_error.roots import Errors
@@ -94,7 +95,9 @@ def _assemble(
         operating_point=data.channels.operating_point,
         name=f"innovations model of {', '.join(structure.outputs)}",
     )
-    covariance = _in_units(structure, found, size)
+    spent = (2 * model.order, model.order)
+    tests = innovation_tests(found.errors, data.inputs, data.outputs, spent)
+    covariance = None if tests.why_biased else _in_units(structure, found, size)
     spread = Errors(model.sample_time_s, covariance, found.degrees)
     roots = innovations_roots(model, spread, direct=structure.direct)
     measures = determinant_criteria(joint, size[:, None], structure.n_parameters(model.order))
@@ -109,7 +112,10 @@ def _assemble(
         (LocalMinimum(measures.loss, 1, values, found.termination),),
         iterations=found.iterations,
         noise_covariance=np.asarray(model.noise_covariance),
-        findings=judge_innovations(structure, model, choice, roots, found.termination),
+        findings=(
+            *judge_innovations(structure, model, choice, roots, found.termination),
+            *tests.findings(biased=True),
+        ),
         provenance=_provenance(structure, records, data),
         details=SubspaceDetails(
             roots,
@@ -118,7 +124,7 @@ def _assemble(
             _scores(structure, data, runs, errors),
             repr(choice),
             # Poles and gains of the predictor shape each correlation; input matrices the other.
-            spent=(2 * model.order, model.order),
+            spent=spent,
             order=choice,
         ),
     )

@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.validation.residuals.correlation import LEVEL
+from flightid.uncertainty.residual_correlation import LEVEL
 
 
 class Kind(StrEnum):

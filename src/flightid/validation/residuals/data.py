@@ -12,7 +12,7 @@ from flightid.errors import DataError, OptionError, ShapeError
 from flightid.identification import Fit
 from flightid.models import Model
 from flightid.record import Record
-from flightid.validation.residuals.correlation import Series
+from flightid.uncertainty.residual_correlation import Series
 from flightid.validation.residuals.correlation_result import Horizon
 from flightid.validation.verification.result import Verification
 

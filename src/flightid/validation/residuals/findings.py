@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.validation.residuals.correlation import LEVEL
+from flightid.uncertainty.residual_correlation import LEVEL
 from flightid.validation.residuals.correlation_result import CorrelationTest, Kind, Verdict
 
 _CODES = {

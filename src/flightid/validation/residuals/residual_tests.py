@@ -15,7 +15,7 @@ from flightid.record import Record
 from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
 from flightid.uncertainty.feedback import FeedbackTest, declared_loop, find_feedback
-from flightid.validation.residuals.correlation import (
+from flightid.uncertainty.residual_correlation import (
     Series,
     centred,
     cross_correlation,

@@ -19,7 +19,7 @@ from flightid.responses.windows.windows import (
     overlap_factor,
     shifts_of,
 )
-from flightid.validation.residuals.correlation import LEVEL
+from flightid.uncertainty.residual_correlation import LEVEL
 from flightid.validation.spectra.result import Peak, ResidualSpectra, SpectrumComparison
 from flightid.validation.verification.result import Verification
 

@@ -1,0 +1,166 @@
+"""Whether prediction errors are what intervals of a black box assume: white, and new to the inputs.
+
+Where the errors of a model whose noise shares its poles are not white, its estimates are biased,
+and no covariance mends that. Where inputs still foretell the errors, dynamics are missing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.uncertainty.agreement import Agreement
+from flightid.uncertainty.residual_correlation import (
+    Series,
+    cross_correlation,
+    independence_portmanteau,
+    lag_covariance,
+    white_portmanteau,
+)
+
+Array = NDArray[np.float64]
+FALSE_ALARMS = 0.01
+"""Share of good models that each of both tests calls wrong."""
+LAGS = 25
+FEWEST_LAGS = 5
+"""Beyond the parameters that were fitted: below it there is no test."""
+ROUNDING = 1e-8
+"""Errors over outputs below which there is rounding alone."""
+
+
+@dataclass(frozen=True)
+class InnovationTests:
+    """Smallest p-values over outputs and inputs, by the number of tests; None: not testable.
+
+    Attributes
+    ----------
+    white : float or None
+        That the errors do not foretell themselves.
+    independent : float or None
+        That past inputs do not foretell the errors.
+    """
+
+    white: float | None
+    independent: float | None
+
+    @property
+    def is_white(self) -> bool:
+        """Whether nothing speaks against white errors."""
+        return self.white is None or self.white >= FALSE_ALARMS
+
+    @property
+    def is_independent(self) -> bool:
+        """Whether nothing speaks against errors that are new to the inputs."""
+        return self.independent is None or self.independent >= FALSE_ALARMS
+
+    @property
+    def why_biased(self) -> str:
+        """Why estimates whose noise and vehicle share poles are biased; empty where they are not.
+
+        Example
+        -------
+        >>> InnovationTests(1e-9, 0.5).why_biased
+        'prediction errors are not white (p = 1e-09), which biases the estimates'
+        """
+        if not self.is_independent:
+            return (
+                f"inputs still foretell the prediction errors (p = {self.independent:.2g}): "
+                "dynamics are missing, and the estimates are biased"
+            )
+        if not self.is_white:
+            chance = f"(p = {self.white:.2g})"
+            return f"prediction errors are not white {chance}, which biases the estimates"
+        return ""
+
+    def beside(self, agreement: Agreement | None) -> InnovationTests:
+        """The tests of a mean vehicle: where records differ, inputs tell how; scatter counts."""
+        if agreement is None or agreement.freedom is None:
+            return self
+        return replace(self, independent=None)
+
+    def findings(self, *, biased: bool) -> list[Finding]:
+        """Verdicts; `biased` says whether coloured errors bias estimates of this structure."""
+        if not self.is_independent:
+            action = "raise the orders of the input's part, check its delay, or look for feedback"
+            return [Finding("inputs-in-errors", Light.RED, self.why_biased, action)]
+        if self.is_white or not biased:
+            return []
+        return [
+            Finding(
+                "errors-not-white",
+                Light.AMBER,
+                f"{self.why_biased}; they have no intervals",
+                "fit a noise model that is large enough, or one that shares no poles with the "
+                "vehicle (output error, Box-Jenkins; method='iv4' for ARX)",
+            )
+        ]
+
+
+def innovation_tests(
+    errors: Sequence[Array],
+    inputs: Sequence[Array],
+    outputs: Sequence[Array],
+    spent: tuple[int, int],
+) -> InnovationTests:
+    """Test prediction errors against their own past and that of the inputs.
+
+    Parameters
+    ----------
+    errors, outputs : sequence of ndarray, shape (n_outputs, n_samples)
+        One array for each record.
+    inputs : sequence of ndarray, shape (n_inputs, n_samples)
+    spent : tuple of int
+        Parameters that shape the errors' correlation with themselves, and with an input.
+
+    Returns
+    -------
+    InnovationTests
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., section 16.6; Ljung & Box (1978), Biometrika 65(2).
+
+    Example
+    -------
+    >>> e, u = np.random.default_rng(1).standard_normal((2, 1, 500))
+    >>> innovation_tests([e], [u], [e + u], (0, 0)).why_biased
+    ''
+    """
+    shortest = min(row.shape[1] for row in errors)
+    n, first = sum(row.shape[1] for row in errors), max(spent) + FEWEST_LAGS
+    lags = min(LAGS + max(spent), shortest // 4)
+    if lags < first:
+        return InnovationTests(None, None)
+    own, driven = [], []
+    for place in range(len(errors[0])):
+        e = tuple(row[place] for row in errors)
+        if _size(e) <= ROUNDING * _size(tuple(row[place] for row in outputs)):
+            continue
+        past = cross_correlation(e, e, lags)[lags + 1 :]
+        own.append(white_portmanteau(past, n, spent[0])[2])
+        for channel in range(len(inputs[0])):
+            u = tuple(row[channel] for row in inputs)
+            if _size(u) > 0.0:
+                driven.append(_independence(u, e, n, lags, spent[1]))
+    return InnovationTests(_smallest(own), _smallest([p for p in driven if p is not None]))
+
+
+def _independence(u: Series, e: Series, n: int, lags: int, spent: int) -> float | None:
+    values = cross_correlation(u, e, lags)[lags:]
+    _, degrees, p_value = independence_portmanteau(values, lag_covariance(u, e, lags + 1), n, spent)
+    return p_value if degrees >= 1 else None
+
+
+def _size(series: Series) -> float:
+    whole = np.concatenate([row - row.mean() for row in series])
+    return float(np.sqrt(np.mean(whole**2)))
+
+
+def _smallest(found: Sequence[float]) -> float | None:
+    """Bonferroni's p-value of several tests."""
+    return min(1.0, len(found) * min(found)) if found else None

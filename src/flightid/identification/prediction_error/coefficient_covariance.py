@@ -1,0 +1,158 @@
+"""Covariance of a polynomial model's coefficients, as far as its prediction errors allow one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.identification.innovation_tests import InnovationTests, innovation_tests
+from flightid.identification.local_minimum import LocalMinimum
+from flightid.identification.prediction_error.coloured_errors import (
+    has_noise_model,
+    output_error_covariance,
+)
+from flightid.identification.prediction_error.part_blocks import errors_at, part_blocks
+from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.sampled.channels import SampledChannels
+from flightid.uncertainty.agreement import Agreement
+from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.residual_covariance import residual_covariance, white_covariance
+
+Array = NDArray[np.float64]
+UNDETERMINED = "the data do not tell the coefficients apart"
+NOISE_MODEL = "prediction errors are not white, so the noise model's coefficients are not its truth"
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """Coefficients with what the search left; `skip` first errors of each record do not count."""
+
+    theta: Array
+    covariance: Array | None
+    degrees: int
+    minima: tuple[LocalMinimum, ...]
+    iterations: int
+    memory: list[list[float]]
+    skip: int
+    freedom: Array | None = None
+    colour: tuple[float, float] = (1.0, 1.0)
+    agreement: Agreement | None = None
+    reason: str = UNDETERMINED
+    noise_reason: str = ""
+
+
+def shares_poles(structure: PolynomialStructure) -> bool:
+    """Whether errors that are not white bias the vehicle's coefficients, or a prior's bars."""
+    regressed = structure.na > 0 and structure.method != "iv4"
+    return regressed or structure.kernel is not None
+
+
+def is_white(structure: PolynomialStructure, tests: InnovationTests) -> bool:
+    """Whether the covariance is that of white errors."""
+    return has_noise_model(structure) and structure.method != "iv4" and tests.is_white
+
+
+def tests_of(
+    structure: PolynomialStructure, data: SampledChannels, counted: Sequence[Array], skip: int
+) -> InnovationTests:
+    """Whiteness of the errors that count, and their independence of the inputs."""
+    return innovation_tests(
+        [row[None] for row in counted],
+        [data.inputs[:, span][:, skip:] for span in data.spans],
+        [data.output[None, span] for span in data.spans],
+        spent(structure),
+    )
+
+
+def spent(structure: PolynomialStructure) -> tuple[int, int]:
+    """Coefficients that shape the errors' correlation with themselves, and with an input."""
+    return (
+        structure.na + structure.nc + structure.nd,
+        max((b + f for b, f in zip(structure.nb, structure.nf, strict=True)), default=0),
+    )
+
+
+def compared(
+    structure: PolynomialStructure,
+    data: SampledChannels,
+    found: SearchResult,
+    errors: Array,
+    tests: InnovationTests,
+) -> SearchResult:
+    """Covariance of the coefficients after parts of the data were compared.
+
+    By the colour of residuals where no noise model answers for it; none where estimates are biased.
+    """
+    plain = found.covariance
+    if plain is None:
+        return found
+    if found.agreement is None and not has_noise_model(structure) and structure.kernel is None:
+        known = output_error_covariance(structure, data, found.theta, errors, found.skip)
+        found = replace(
+            found,
+            covariance=known.covariance,
+            freedom=known.freedom,
+            colour=known.colour,
+            agreement=known.agreement,
+        )
+    elif found.agreement is None:
+        at = partial(errors_at, structure, data, found.memory)
+        blocks = part_blocks(at, data, found.theta, found.skip)
+        agreed = white_covariance(blocks, plain, found.degrees)
+        freedom = agreed.freedom if agreed.agreement.by_scatter is not None else None
+        found = replace(
+            found, covariance=agreed.covariance, freedom=freedom, agreement=agreed.agreement
+        )
+        if not tests.is_white and not shares_poles(structure):
+            found = _by_colour(structure, found, agreed.covariance, blocks)
+    tests = tests.beside(found.agreement)
+    if not tests.is_independent or (not tests.is_white and shares_poles(structure)):
+        return replace(found, covariance=None, reason=tests.why_biased)
+    return found
+
+
+def _by_colour(
+    structure: PolynomialStructure, found: SearchResult, white: Array, blocks: Sequence[Block]
+) -> SearchResult:
+    """The vehicle's coefficients by the colour of the errors, where noise has its own poles.
+
+    In an open loop errors of the noise model do not reach the vehicle's, so the two stand apart.
+
+    Reference: Ljung, *System Identification*, 2nd ed., theorem 8.4 and eq. 9.42.
+    """
+    places = np.array([name[0] in "bf" for name in structure.names])
+    known = residual_covariance(
+        [
+            Block.of(
+                block.projected.reshape(*block.residual.shape, -1)[:, :, places],
+                np.zeros((*block.residual.shape, 0)),
+                block.residual,
+            )
+            for block in blocks
+        ]
+    )
+    covariance = np.where(np.outer(~places, ~places), white, 0.0)
+    covariance[np.ix_(places, places)] = known.covariance
+    freedom = np.full(places.size, float(found.degrees))
+    freedom[places] = known.freedom
+    return replace(
+        found,
+        covariance=covariance,
+        freedom=freedom,
+        colour=known.colour,
+        agreement=known.agreement,
+        noise_reason=NOISE_MODEL,
+    )
+
+
+def printed(covariance: Array | None, parameters: Mapping[str, Estimate]) -> Array | None:
+    """Covariance of the coefficients that have intervals."""
+    if covariance is None:
+        return None
+    shown = [each.stderr is not None for each in parameters.values()]
+    return covariance[np.ix_(shown, shown)]

@@ -1,0 +1,73 @@
+"""Prediction errors that are not white, or that inputs foretell, take the intervals away."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.identification.innovation_tests import InnovationTests, innovation_tests
+from flightid.identification.multistart import End, best_first
+from tests.strangers import black_boxes as flights
+
+CODES = {"errors-not-white", "inputs-in-errors"}
+
+
+def _codes(fit: fid.Fit) -> set[str]:
+    return CODES & {finding.code for finding in fit.findings}
+
+
+def test_tests_tell_white_coloured_and_driven_errors_apart() -> None:
+    e, u = np.random.default_rng(2).standard_normal((2, 1, 800))
+    coloured, driven = e + np.roll(e, 1), e + np.roll(u, 3)
+    good, colour, missing = (innovation_tests([x], [u], [e], (1, 1)) for x in (e, coloured, driven))
+    assert good.is_white
+    assert good.is_independent
+    assert not good.why_biased
+    assert not colour.is_white
+    assert colour.is_independent
+    assert not missing.is_independent
+    assert "inputs still foretell" in missing.why_biased
+    assert innovation_tests([0.0 * e], [u], [e], (1, 1)) == InnovationTests(None, None)
+    assert innovation_tests([e[:, :20]], [u[:, :20]], [e[:, :20]], (1, 1)).white is None
+
+
+@pytest.mark.parametrize("structure", [flights.ARX, flights.SUBSPACE], ids=["arx", "subspace"])
+def test_one_step_models_have_intervals_in_their_own_noise_alone(structure: object) -> None:
+    random = np.random.default_rng
+    good = fid.identify(structure, flights.in_equation(random(1), flights.WHITE))
+    bad = fid.identify(structure, flights.in_output(random(1), flights.RESONANT))
+    assert not _codes(good)
+    assert good.covariance is not None
+    assert _codes(bad)
+    assert bad.covariance is None
+    assert bad.evidence.light != "green"
+    assert all(p.interval95 is None for p in bad.parameters.values())
+    assert all(gain.interval95 is None for gain in bad.details.gains.values())
+
+
+def test_box_jenkins_keeps_the_vehicle_and_not_its_noise_model() -> None:
+    record = flights.in_output(np.random.default_rng(3), flights.RESONANT)
+    fit = fid.identify(flights.BJ, record)
+    assert fit.intervals_from == "coloured residuals"
+    assert fit.names == ("b1", "b2", "f1", "f2")
+    assert fit.parameters["d1"].interval95 is None
+    assert "noise model" in fit.parameters["d1"].reason
+    assert fit.covariance is not None
+    assert fit.covariance.shape == (4, 4)
+
+
+def test_narx_in_noise_of_the_sensor_is_not_green() -> None:
+    fly = partial(flights.fly_narx, noise=flights.RED, at_sensor=True)
+    trial = fly(0)
+    assert trial.light != "green"
+    assert all(r.interval95 is None for r in trial.readings)
+
+
+def test_rounding_does_not_choose_between_twins() -> None:
+    pairs = ((1, 2.0), (9, 2 - 1e-8), (5, 3.0))
+    own, twin, worse = (End(np.array([x]), cost, 1, "step") for x, cost in pairs)
+    assert best_first([own, worse, twin])[0] is own
+    assert best_first([worse, own, twin])[:2] == [own, twin]
