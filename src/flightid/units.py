@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 DIMENSIONLESS = "1"
 GRAM, GRAVITY = "gram", "standard_gravity"
 SPELLINGS = {
-    "G": "g",
     "gn": "g0",
     "KTS": "kt",
     "KIAS": "kt",

@@ -76,6 +76,6 @@ def test_commands_that_a_text_names_exist(page: Path) -> None:
         if isinstance(command, click.Group) and rest and not rest[0].startswith("-"):
             command = command.get_command(context, rest.pop(0))
             assert command is not None, line
-        known = {option for each in command.params for option in each.opts}
+        known = {option for each in command.get_params(context) for option in each.opts}
         unknown = {word for word in rest if word.startswith("--")} - known - {"--help"}
         assert not unknown, f"{line}: {unknown}"

@@ -357,7 +357,11 @@ AIR = Record.from_arrays(
             DataError,
             "the record is shorter than the filter",
         ),
-        (lambda: c.estimate_skew(BASE, "p", "deg"), UnitError, "channel 'deg' has another unit"),
+        (
+            lambda: c.estimate_skew(BASE, "p", "deg"),
+            UnitError,
+            "channel 'deg' has another unit",
+        ),
         (
             lambda: c.estimate_skew(BASE, "p", "q", window_s=20.0),
             OptionError,
@@ -388,7 +392,7 @@ AIR = Record.from_arrays(
         (
             lambda: c.accelerations_at_cg(BASE, (1.0, 0.0, 0.0), accelerations=("p", "q", "r")),
             UnitError,
-            "channel 'p' has another unit",
+            "channel 'p' of record 'record' has another unit",
         ),
         (
             lambda: c.velocities_at_cg(BASE, (1.0, 0.0)),

@@ -239,7 +239,7 @@ def test_refusals() -> None:
         check_consistency(record.select(["p", "r", "phi"]))
     with pytest.raises(DataError, match="needs an attitude"):
         check_consistency(record.select(["p", "q", "r"]))
-    with pytest.raises(UnitError, match="channel 'phi' has another unit"):
+    with pytest.raises(UnitError, match="channel 'phi' of record 'record' has another unit"):
         check_consistency(record.to_units(phi="deg"))
     with pytest.raises(DataError, match="too short for the parameters"):
         check_consistency(record.segment(0.0, 1.0))

@@ -134,7 +134,7 @@ def test_what_noise_cannot_be() -> None:
         fid.Noise(sensor={"p": -1.0})
     with pytest.raises(OptionError, match="no correlation time"):
         fid.Noise(gusts={"p": (1.0, 0.0)})
-    with pytest.raises(OptionError, match="a seed is negative"):
+    with pytest.raises(OptionError, match="seed is too small"):
         fid.Noise(seed=-1)
     for noise in (fid.Noise(process={"z": 1.0}), fid.Noise(gusts={"z": (1.0, 1.0)})):
         with pytest.raises(UnknownNameError, match="unknown state"):

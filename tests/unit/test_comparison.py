@@ -140,7 +140,7 @@ def test_the_command_compares(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert run([*options, "--html", str(page)]) == 0
     assert "Comparison(3 models, 1 output, 1 record" in capsys.readouterr().out
     assert "Roll rate, integrator" in page.read_text()
-    assert run([*options, "--json", "--residuals"]) in (0, 1)
+    assert run([*options, "--json", "--residual-tests"]) in (0, 1)
     plain = json.loads(capsys.readouterr().out)
     assert plain["schema"] == "flightid.comparison/1"
     assert "residual_tests" in plain

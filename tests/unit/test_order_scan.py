@@ -115,7 +115,7 @@ def test_edges_simpler_models_and_growth_are_told():
 
 def test_scans_that_cannot_be_made():
     record, unseen = flown(ARMAX, 8), flown(ARMAX, 9)
-    with pytest.raises(OptionError, match="unknown kind of model"):
+    with pytest.raises(OptionError, match="kind is not known"):
         fid.scan_orders(record, unseen, kind="arma")
     with pytest.raises(OptionError, match="nothing to try"):
         fid.scan_orders(record, unseen, na=[])

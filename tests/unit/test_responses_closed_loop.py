@@ -177,7 +177,7 @@ def test_command(tmp_path: Path) -> None:
         str(path),
         "--input",
         "u",
-        "--output",
+        "--outputs",
         "y",
         "--band",
         "3",

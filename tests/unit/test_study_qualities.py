@@ -88,13 +88,13 @@ def test_axes_are_a_models_own_or_refused_before_any_work(study: Path) -> None:
     assert "no-bandwidth" in [each.code for each in found.findings]
 
 
-def test_models_without_equations_are_not_rated(tmp_path: Path) -> None:
+def test_models_without_equations_are_not_rated(study: Path) -> None:
     text = STUDY.replace('template = "attitude_first_order"\naxis = "roll"\n', "")
     text = text.replace('name = "Roll"\n', 'name = "Roll"\nstructure = "arx"\n', 1)
     black = 'inputs = ["tau_phi"]\noutputs = "phi"\nband_rad_s = [1.0, 9.0]\nna=1\nnb=1\nnk=1\n'
     text = text.replace("[handling_qualities]", black + "[handling_qualities]")
     with pytest.raises(StudyError, match="are read off models with equations"):
-        fid.run_study(written(tmp_path, text))
+        fid.run_study(written(study.parent, text))
 
 
 @pytest.mark.parametrize(

@@ -208,9 +208,10 @@ def _free(modes: Modes, n_samples: int, sample_time_s: float) -> Array:
     ahead = -sample_time_s if modes.backwards else sample_time_s
     power = expm(ahead * system)
     rows, needed = np.hstack([c, d]), n_samples * len(c)
-    while len(rows) < needed:
-        more = rows[: needed - len(rows)] @ power
-        rows, power = np.concatenate([rows, more]), power @ power
+    with np.errstate(over="ignore", invalid="ignore"):  # who asks tells a run that explodes
+        while len(rows) < needed:
+            more = rows[: needed - len(rows)] @ power
+            rows, power = np.concatenate([rows, more]), power @ power
     found = rows.reshape(n_samples, len(c), n + m).transpose(2, 1, 0)
     return found[:, :, ::-1] if modes.backwards else found
 

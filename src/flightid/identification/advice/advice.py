@@ -51,7 +51,7 @@ class Advice(Result, schema="flightid.advice/1"):
 
     Example
     -------
-    >>> Advice("y", ("u",), 500, 1, {"u": 2}, None, FeedbackTest("open", "declared"))
+    >>> Advice(("u",), "y", 500, 1, {"u": 2}, None, FeedbackTest("open", "declared"))
     Advice('y' from u, 500 samples in 1 record, excitation order 2)
     """
 
