@@ -43,7 +43,7 @@ from flightid.identification.frequency_domain.selection import (
     select_points,
 )
 from flightid.identification.frequency_domain.setup_checks import check_setup
-from flightid.identification.frequency_domain.without_bias import take_out
+from flightid.identification.frequency_domain.without_bias import far_from_best, take_out
 from flightid.identification.multistart import DenseEnd, cluster, local_minima
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
@@ -89,12 +89,13 @@ def _fit_selected(
     if options.correct_bias:
         without = Correction(data, options.hold)
         objective = Objective(model, without, selected, errors, options.cost)
-        done = take_out(objective, groups[0][0], lambda found: select_by(model, found, options))
+        done = take_out(objective, groups, lambda found: select_by(model, found, options))
         outcome, withheld = done.outcome, done.outcome.withheld
         setup += outcome.findings()
         correction = outcome.provenance(options.hold)
         if outcome.applied:
-            groups = [*cluster(done.ends), *groups[1:]]
+            # Minima far above the best keep the cost of the search without correction.
+            groups = [*done.groups, *far_from_best(groups)]
             selected, errors, fitted = list(done.selected), done.errors, done.model
             curves = done.estimates
     sensitivity = _sensitivity(fitted, selected, errors, options, curves)

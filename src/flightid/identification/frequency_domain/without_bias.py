@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,10 @@ BENT, FEW = 4.0, 20_000
 which another start is then tried in any case."""
 TINY = float(np.finfo(float).tiny)
 
+RIVAL, MOST_RIVALS = 4.0, 4
+"""Cost over the best one's up to which other minima are searched again, and how many at most."""
+SAME_COST, SAME_VALUE = 1e-3, 1e-3
+"""Relative differences of cost and values that searches leave by ending where steps are small."""
 NOISE = 1.1
 """Ratio of the cost with the estimator inside to that without, up to which it may be noise."""
 MISFIT = 10.0
@@ -51,8 +56,8 @@ class WithoutBias:
     errors : ErrorModel
     estimates : list of ndarray
         What the estimator makes of the model, by response.
-    ends : list of DenseEnd
-        Best first.
+    groups : list of list of DenseEnd
+        Minima, best first, each with as many ends as starts that led there.
     """
 
     outcome: BiasOutcome
@@ -60,12 +65,12 @@ class WithoutBias:
     selected: Sequence[SelectedResponse]
     errors: ErrorModel
     estimates: Curves
-    ends: list[DenseEnd]
+    groups: list[list[DenseEnd]]
 
 
 def take_out(
     objective: Objective,
-    plain: DenseEnd,
+    minima: Sequence[list[DenseEnd]],
     select: Select,
 ) -> WithoutBias:
     """Search with the estimator inside, from the fit without and, where it matters, the model.
@@ -74,25 +79,26 @@ def take_out(
     ----------
     objective : Objective
         With the model at its own start values.
-    plain : DenseEnd
-        Of the fit to the response as measured.
+    minima : sequence of sequence of DenseEnd
+        Of the fit to the response as measured, best first; rivals of the best are searched too.
     select : callable
         Chooses the fitted points of a response.
     """
+    plain = minima[0][0]
     fitted = objective.at(plain.x)
 
     def not_done(reason: str, *, possible: bool = True) -> WithoutBias:
         outcome = BiasOutcome(reason, possible)
-        return WithoutBias(outcome, fitted, objective.selected, objective.errors, [], [plain])
+        return WithoutBias(outcome, fitted, objective.selected, objective.errors, [], [[plain]])
 
     reason = why_unknown(objective.correction.data)
     if reason:
         return not_done(reason, possible=False)
     try:
-        ends = _searches(objective, plain)
+        ends = _ranked([*_searches(objective, minima[0]), *_rivals(objective, minima)])
     except (FitError, *OUTSIDE) as error:
         return not_done(str(error))
-    best = ends[0]
+    best = _Judged.of(objective, ends[0].found)
     if best.found.end.cost > NOISE * plain.cost:
         return not_done(
             f"it would raise the cost from {plain.cost:.3g} to {best.found.end.cost:.3g}: the "
@@ -108,8 +114,17 @@ def take_out(
     selected = select(objective.correction.apply(model))
     changes = sizes(objective.selected, selected, best.errors)
     outcome = BiasOutcome("", steps=found.end.iterations, last=found.step, sizes=changes)
-    rest = [other.found.end for other in ends[1:] if not other.found.reason]
-    return WithoutBias(outcome, model, selected, best.errors, found.estimates, [found.end, *rest])
+    groups = [[found.end] * ends[0].count]
+    groups += [[other.found.end] * other.count for other in ends[1:] if not other.found.reason]
+    return WithoutBias(outcome, model, selected, best.errors, found.estimates, groups)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A minimum with the estimator inside, and how many starts led there."""
+
+    found: Settled
+    count: int = 1
 
 
 @dataclass(frozen=True)
@@ -139,25 +154,68 @@ class _Judged:
         return cls(found, errors, misfit)
 
 
-def _searches(objective: Objective, plain: DenseEnd) -> list[_Judged]:
+def _searches(objective: Objective, minimum: Sequence[DenseEnd]) -> list[_Found]:
     """From the fit without correction and from the model's values, one alone if that is enough.
 
     Leakage can bend the first beyond the reach of the right minimum, which two starts tell.
     """
-    first = _Judged.of(objective, search(objective, plain.x))
-    lower = first.found.end.cost <= NOISE * plain.cost
-    settled = lower and first.found.step <= TOLERABLE and first.misfit <= MISFIT
-    bent = first.found.begun > BENT * first.found.end.cost
+    plain, count = minimum[0], len(minimum)
+    first = search(objective, plain.x)
+    lower = first.end.cost <= NOISE * plain.cost
+    settled = lower and first.step <= TOLERABLE and _Judged.of(objective, first).misfit <= MISFIT
+    bent = first.begun > BENT * first.end.cost
     if settled and not (bent and objective.size <= FEW):
-        return [first]
+        return [_Found(first, count)]
     own = np.array([parameter.value or 0.0 for parameter in objective.model.parameters.free])
     try:
-        other = search(objective, own)
+        return [_Found(first, count), _Found(search(objective, own))]
     except (FitError, *OUTSIDE):
-        return [first]
-    if (other.step > TOLERABLE, other.end.cost) < (
-        first.found.step > TOLERABLE,
-        first.found.end.cost,
-    ):
-        return [_Judged.of(objective, other), first]
-    return [first, replace(first, found=other)]
+        return [_Found(first, count)]
+
+
+def far_from_best(minima: Sequence[list[DenseEnd]]) -> list[list[DenseEnd]]:
+    """Minima that are not searched again: far above the best, or behind too many others."""
+    limit = RIVAL * minima[0][0].cost
+    near = sum(group[0].cost <= limit for group in minima[1:])
+    return list(minima[1 + min(near, MOST_RIVALS) :])
+
+
+def _rivals(objective: Objective, minima: Sequence[list[DenseEnd]]) -> list[_Found]:
+    """Other minima of the fit without correction that are near its best, by the same cost."""
+    rivals = minima[1 : len(minima) - len(far_from_best(minima))]
+    found = []
+    for group in rivals:
+        with suppress(FitError, *OUTSIDE):
+            found.append(_Found(search(objective, group[0].x), len(group)))
+    return found
+
+
+def _ranked(ends: Sequence[_Found]) -> list[_Found]:
+    """Distinct minima, best first; of those that cost the same the earliest goes first."""
+    distinct: list[_Found] = []
+    for each in ends:
+        for place, known in enumerate(distinct):
+            if _same(known.found, each.found):
+                better = min((known, each), key=_worth)
+                distinct[place] = replace(better, count=max(known.count, each.count))
+                break
+        else:
+            distinct.append(each)
+    ranked = sorted(distinct, key=_worth)
+    stalled, cost = _worth(ranked[0])
+    alike = (each for each in distinct if _worth(each) <= (stalled, cost * (1.0 + SAME_COST)))
+    first = next(each for each in alike if _worth(each)[0] == stalled)
+    return [first, *(each for each in ranked if each is not first)]
+
+
+def _worth(end: _Found) -> tuple[bool, float]:
+    return end.found.step > TOLERABLE, end.found.end.cost
+
+
+def _same(one: Settled, other: Settled) -> bool:
+    """Whether the way between two ends is within what a search that settled leaves undone."""
+    way = other.end.x - one.end.x
+    if np.all(np.abs(way) <= SAME_VALUE * np.abs(one.end.x)):
+        return True
+    effect = float(np.linalg.norm(one.end.jacobian @ way))
+    return effect <= TOLERABLE * float(np.sqrt(one.end.cost / one.end.residuals.size))
