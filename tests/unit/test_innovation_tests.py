@@ -71,3 +71,11 @@ def test_rounding_does_not_choose_between_twins() -> None:
     own, twin, worse = (End(np.array([x]), cost, 1, "step") for x, cost in pairs)
     assert best_first([own, worse, twin])[0] is own
     assert best_first([worse, own, twin])[:2] == [own, twin]
+
+
+def test_pulse_responses_are_fitted_until_they_end_or_have_no_bars() -> None:
+    outlasting = partial(flights.fly_impulse, decay=0.98, noise=flights.WHITE)
+    assert outlasting(0, samples=3000).light == "green"
+    short = outlasting(0, samples=600)
+    assert short.light == "amber"
+    assert all(reading.interval95 is None for reading in short.readings)

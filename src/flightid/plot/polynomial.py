@@ -169,14 +169,15 @@ def impulse_response(item: ImpulseResponse, name: str | None = None) -> go.Figur
     steps, errors = item.step()
     causal = item.lags >= 0
     curves = (
-        (item.time_s, item.values[place], item.stderr[place]),
-        (item.time_s[causal], steps[place], errors[place]),
+        (item.time_s, item.values[place], item.stderr),
+        (item.time_s[causal], steps[place], errors),
     )
     for row, (time, values, wide) in enumerate(curves, start=1):
-        # The band lies about zero for pulses: outside it, chance does not explain a lag.
-        middle, half = 0.0 * values if row == 1 else values, half_width() * wide
-        for edge in look.band("95 %", time, middle - half, middle + half, colour=look.TRUTH):
-            made.add_trace(edge, row=row, col=1)
+        if wide is not None:
+            # The band lies about zero for pulses: outside it, chance does not explain a lag.
+            middle, half = 0.0 * values if row == 1 else values, half_width() * wide[place]
+            for edge in look.band("95 %", time, middle - half, middle + half, colour=look.TRUTH):
+                made.add_trace(edge, row=row, col=1)
         if row == 1:
             bars = go.Bar(x=time, y=values, name="pulse", marker={"color": look.MODEL})
             made.add_trace(bars, row=row, col=1)

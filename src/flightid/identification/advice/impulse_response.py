@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
+from scipy.stats import chi2
 
 from flightid.errors import DataError, OptionError
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
@@ -24,6 +25,12 @@ Array = NDArray[np.float64]
 LEVEL = 0.95
 WHITENER = 20
 SAMPLES_PER_COEFFICIENT = 3
+LAST = 4
+"""One over the share of the lags, at their end, that has to be zero."""
+OUTLASTS = (
+    "the response outlasts {} lags, the most that the records allow, which bends all of them: no "
+    "intervals; give longer records, or fit a model with poles (output error)"
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,7 +45,8 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
         Samples after the pulse; negative ones are the response before it, which only feedback has.
     values : ndarray, shape (n_inputs, n_lags)
         In the output's unit per the input's.
-    covariance : ndarray, shape (n_inputs, n_lags, n_lags)
+    covariance : ndarray, shape (n_inputs, n_lags, n_lags), or None
+        None where the response outlasts all lags that the records allow; see `reason`.
     sample_time_s : float
     kernel : str or None
         Regularisation.
@@ -47,6 +55,10 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
     delays : mapping of str to int or None
         First lag from 0 on that chance does not explain, by input; None where no lag stands out.
     units : mapping of str to str
+    fitted_lags : int
+        Lags that were fitted: more than those asked for, where the response outlasts them.
+    reason : str
+        Why there is no covariance; else empty.
 
     Example
     -------
@@ -58,12 +70,14 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
     output: str
     lags: NDArray[np.int64]
     values: Array
-    covariance: Array
+    covariance: Array | None
     sample_time_s: float
     kernel: str | None
     n_samples: int
     delays: Mapping[str, int | None]
     units: Mapping[str, str] = field(default_factory=dict)
+    fitted_lags: int = 0
+    reason: str = ""
 
     @property
     def time_s(self) -> Array:
@@ -71,15 +85,19 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
         return np.asarray(self.lags * self.sample_time_s)
 
     @property
-    def stderr(self) -> Array:
+    def stderr(self) -> Array | None:
         """Standard errors of `values`, shape (n_inputs, n_lags)."""
+        if self.covariance is None:
+            return None
         return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
 
-    def step(self) -> tuple[Array, Array]:
+    def step(self) -> tuple[Array, Array | None]:
         """Step response from lag 0 on and its standard errors, shapes (n_inputs, n_lags ≥ 0)."""
         causal = self.lags >= 0
         total = np.tril(np.ones((int(np.sum(causal)),) * 2))
         values = self.values[:, causal] @ total.T
+        if self.covariance is None:
+            return values, None
         parts = self.covariance[:, causal][:, :, causal]
         variance = np.diagonal(total @ parts @ total.T, axis1=1, axis2=2)
         return values, np.sqrt(np.maximum(variance, 0.0))
@@ -108,12 +126,11 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
                     float(self.values[i, peak]),
                     float(self.time_s[peak]),
                     float(steps[i, -1]),
-                    float(half_width() * errors[i, -1]),
+                    None if errors is None else float(half_width() * errors[i, -1]),
                 )
             )
-        return Table(
-            repr(self), columns, tuple(rows), ("delay: first lag that chance does not explain",)
-        )
+        notes = ("delay: first lag that chance does not explain", self.reason)
+        return Table(repr(self), columns, tuple(rows), tuple(filter(None, notes)))
 
     def _computed(self) -> dict[str, object]:
         return {"stderr": self.stderr}
@@ -147,7 +164,7 @@ def impulse_response(
     outputs : str, optional
         Default: the only output.
     n_lags : int
-        Lags from 0 on; the response should have died out by then.
+        Lags from 0 on. Where the last of them are not zero, more are fitted than are returned.
     negative_lags : int
         Lags before 0, which take what feedback brings.
     kernel : {"tc", "dc"}, optional
@@ -167,8 +184,8 @@ def impulse_response(
 
     Assumes
     -------
-    A linear vehicle whose response ends within the lags. Biased when it does not, and under
-    feedback.
+    A linear vehicle, in an open loop. Where its response outlasts the longest lags that the
+    records allow there are no standard errors, with the reason.
 
     Reference
     ---------
@@ -206,9 +223,9 @@ def impulse_response(
             needed=f"at least {needed}",
             action="give longer records or fewer lags",
         )
-    theta, covariance, rows = _estimate(data, n, kernel)
+    fitted, (theta, covariance, rows), ended = _until_ended(data, n, len(names), kernel)
     lags = np.arange(-negative_lags, n_lags)
-    parts = [slice(i * n, (i + 1) * n) for i in range(len(names))]
+    parts = [slice(i * fitted, i * fitted + n) for i in range(len(names))]
     values = np.array([theta[part] for part in parts])
     blocks = np.array([covariance[part, part] for part in parts])
     return ImpulseResponse(
@@ -216,13 +233,44 @@ def impulse_response(
         name,
         lags,
         values,
-        blocks,
+        blocks if ended else None,
         data.sample_time_s,
         kernel,
         rows,
         {name: _delay(lags, v, c) for name, v, c in zip(names, values, blocks, strict=True)},
         data.units,
+        fitted,
+        "" if ended else OUTLASTS.format(fitted),
     )
+
+
+def _until_ended(
+    data: SampledChannels, n: int, count: int, kernel: str | None
+) -> tuple[int, tuple[Array, Array, int], bool]:
+    """Lags that were fitted, the estimate, and whether the response ends within them.
+
+    What a response does after the last lag goes into the lags before, as far as inputs are
+    coloured; so lags are doubled until the last of them are zero or the records are used up.
+    """
+    while True:
+        found = _estimate(data, n, kernel)
+        parts = [slice(i * n, (i + 1) * n) for i in range(count)]
+        if all(_ends(found[0][part], found[1][part, part], count) for part in parts):
+            return n, found, True
+        longer = 2 * n
+        room = sum(max(0, length - longer - WHITENER) for length in data.lengths)
+        short = room < SAMPLES_PER_COEFFICIENT * longer * count
+        if short or min(data.lengths) <= longer + WHITENER:
+            return n, found, False
+        n = longer
+
+
+def _ends(values: Array, covariance: Array, count: int) -> bool:
+    """Whether chance explains the last quarter of the lags."""
+    last = max(values.size // LAST, 1)
+    tail = values[-last:]
+    statistic = float(tail @ np.linalg.pinv(covariance[-last:, -last:], hermitian=True) @ tail)
+    return float(chi2.sf(statistic, last)) >= (1.0 - LEVEL) / count
 
 
 def _require(names: tuple[str, ...], n_lags: int, negative_lags: int, kernel: str | None) -> None:
