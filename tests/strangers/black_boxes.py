@@ -169,7 +169,9 @@ BOXES: dict[str, tuple[object, Flight, str | None]] = {
     "bj, resonant, loop closed": (BJ, partial(under_control, noise=RESONANT), "closed"),
     "subspace, white noise of the sensor": (SUBSPACE, partial(in_output, noise=WHITE), None),
     "subspace, resonant": (SUBSPACE, partial(in_output, noise=RESONANT), None),
-    "subspace, order 4 of 2": (HIGH, partial(in_output, noise=WHITE), None),
+    "subspace, its own noise": (SUBSPACE, partial(in_equation, noise=WHITE), None),
+    "subspace, order 4 of 2": (HIGH, partial(in_equation, noise=WHITE), None),
+    "subspace, order 4 of 2, noise of the sensor": (HIGH, partial(in_output, noise=WHITE), None),
 }
 
 CASES = (

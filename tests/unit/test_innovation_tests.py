@@ -79,3 +79,11 @@ def test_pulse_responses_are_fitted_until_they_end_or_have_no_bars() -> None:
     short = outlasting(0, samples=600)
     assert short.light == "amber"
     assert all(reading.interval95 is None for reading in short.readings)
+
+
+def test_a_state_that_is_not_there_takes_the_intervals_away() -> None:
+    record = flights.in_equation(np.random.default_rng(1), flights.WHITE)
+    fit = fid.identify(flights.HIGH, record)
+    assert "order-too-high" in {finding.code for finding in fit.findings}
+    assert fit.covariance is None
+    assert fit.evidence.light != "green"

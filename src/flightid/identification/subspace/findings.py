@@ -21,11 +21,13 @@ def judge_innovations(
     order: OrderChoice,
     roots: Sequence[FittedRoot],
     termination: str,
+    spare: str,
 ) -> tuple[Finding, ...]:
     """All verdicts that the fit itself allows; residual tests say more."""
     return (
         *_ending(structure, termination),
         *_order(order),
+        *_spare(spare),
         *_stability(model),
         *_uncertain(roots),
     )
@@ -54,10 +56,7 @@ def _ending(structure: SubspaceStructure, termination: str) -> list[Finding]:
 
 
 def _order(order: OrderChoice) -> list[Finding]:
-    said = {"singular-value gap": order.gap, "SVC": order.smallest_svc}
-    if order.smallest_bic is not None:
-        said["BIC of prediction errors"] = order.smallest_bic
-    others = {name: n for name, n in said.items() if n != order.chosen}
+    others = order.rivals
     if not others:
         return []
     words = ", ".join(f"{name} says {n}" for name, n in others.items())
@@ -69,6 +68,13 @@ def _order(order: OrderChoice) -> list[Finding]:
             "compare the orders in free run on records not used here",
         )
     ]
+
+
+def _spare(reason: str) -> list[Finding]:
+    if not reason:
+        return []
+    action = "lower the order: a mode that is not there takes away from what is known of others"
+    return [Finding("order-too-high", Light.AMBER, f"{reason}; there are no intervals", action)]
 
 
 def _stability(model: InnovationsModel) -> list[Finding]:

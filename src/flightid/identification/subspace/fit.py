@@ -20,10 +20,10 @@ from flightid.identification.prediction_error.details import FitScore
 from flightid.identification.prediction_error.roots import Errors
 from flightid.identification.subspace.data import SubspaceData, gather
 from flightid.identification.subspace.details import SubspaceDetails
-from flightid.identification.subspace.estimate import Matrices, decompose
+from flightid.identification.subspace.estimate import Matrices, decompose, realise
 from flightid.identification.subspace.findings import judge_innovations
 from flightid.identification.subspace.order import OrderChoice, choose_order, determinant_criteria
-from flightid.identification.subspace.prediction_errors import Refined, refine
+from flightid.identification.subspace.prediction_errors import Refined, refine, spare_states
 from flightid.identification.subspace.roots import innovations_gains, innovations_roots
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.prediction import free_run, one_step_errors
@@ -43,19 +43,33 @@ def fit_subspace(structure: SubspaceStructure, data: Record | Sequence[Record]) 
     """
     records = as_records(data)
     gathered = gather(structure, records)
-    choice, start = choose_order(structure, gathered, decompose(structure, gathered))
+    decomposed = decompose(structure, gathered)
+    choice, start = choose_order(structure, gathered, decomposed)
     size = gathered.scales
+    spare = ""
     if structure.refine:
-        found = refine(
-            gathered,
-            _scaled(start, 1.0 / size),
-            direct=structure.direct,
-            initial_state=structure.initial_state,
-            maximum_iterations=structure.maximum_iterations,
-        )
+        found = _refined(structure, gathered, start)
+        fewer = [order for order in choice.rivals.values() if order < choice.chosen]
+        if found.covariance is not None and fewer:
+            # Where a state is not there, its pole is anywhere and the information near singular.
+            numbers = 2 * len(structure.outputs) + len(structure.inputs)
+            for order in sorted({min(fewer), choice.chosen - 1}):
+                less = realise(structure, gathered, decomposed, order)
+                lower = _refined(structure, gathered, less)
+                spare = spare or spare_states(lower, found, numbers)
     else:
         found = _unrefined(structure, gathered, _scaled(start, 1.0 / size))
-    return _assemble(structure, records, gathered, choice, found)
+    return _assemble(structure, records, gathered, choice, found, spare)
+
+
+def _refined(structure: SubspaceStructure, data: SubspaceData, start: Matrices) -> Refined:
+    return refine(
+        data,
+        _scaled(start, 1.0 / data.scales),
+        direct=structure.direct,
+        initial_state=structure.initial_state,
+        maximum_iterations=structure.maximum_iterations,
+    )
 
 
 def _scaled(matrices: Matrices, size: Array) -> Matrices:
@@ -81,6 +95,7 @@ def _assemble(
     data: SubspaceData,
     choice: OrderChoice,
     found: Refined,
+    spare: str,
 ) -> Fit:
     size = data.scales
     errors = tuple(size[:, None] * e for e in found.errors)
@@ -97,7 +112,7 @@ def _assemble(
     )
     spent = (2 * model.order, model.order)
     tests = innovation_tests(found.errors, data.inputs, data.outputs, spent)
-    covariance = None if tests.why_biased else _in_units(structure, found, size)
+    covariance = None if spare or tests.why_biased else _in_units(structure, found, size)
     spread = Errors(model.sample_time_s, covariance, found.degrees)
     roots = innovations_roots(model, spread, direct=structure.direct)
     measures = determinant_criteria(joint, size[:, None], structure.n_parameters(model.order))
@@ -113,7 +128,7 @@ def _assemble(
         iterations=found.iterations,
         noise_covariance=np.asarray(model.noise_covariance),
         findings=(
-            *judge_innovations(structure, model, choice, roots, found.termination),
+            *judge_innovations(structure, model, choice, roots, found.termination, spare),
             *tests.findings(biased=True),
         ),
         provenance=_provenance(structure, records, data),

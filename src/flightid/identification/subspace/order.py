@@ -68,6 +68,14 @@ class OrderChoice(Result, schema="flightid.order_choice/1"):
         values = [math.inf if each.bic is None else each.bic for each in self.criteria]
         return None if not values or math.isinf(min(values)) else int(np.argmin(values)) + 1
 
+    @property
+    def rivals(self) -> dict[str, int]:
+        """Criteria that ask for another order, and which."""
+        said = {"singular-value gap": self.gap, "SVC": self.smallest_svc}
+        if self.smallest_bic is not None:
+            said["BIC of prediction errors"] = self.smallest_bic
+        return {name: n for name, n in said.items() if n != self.chosen}
+
     def summary(self) -> Table:
         """Table of the candidates."""
         columns = (

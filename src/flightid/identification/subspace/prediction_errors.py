@@ -222,6 +222,28 @@ def _level(errors: tuple[Array, ...]) -> float:
     return float(value) if sign > 0 and value > -60.0 * len(joint) else -np.inf
 
 
+def spare_states(lower: Refined, found: Refined, numbers: int) -> str:
+    """Why fewer states do as well, by the Bayesian information criterion; else empty.
+
+    Parameters
+    ----------
+    lower, found : Refined
+        With fewer states, and as asked.
+    numbers : int
+        Parameters that a state brings.
+
+    Reference
+    ---------
+    Schwarz (1978), Estimating the dimension of a model, *Annals of Statistics* 6.
+    """
+    samples = sum(each.shape[1] for each in found.errors)
+    order, fewer = (each.matrices[0].shape[0] for each in (found, lower))
+    gained = samples * (_level(lower.errors) - _level(found.errors))
+    if not np.isfinite(gained) or gained >= (order - fewer) * numbers * np.log(samples):
+        return ""
+    return f"{fewer} states foretell the outputs as well as {order}"
+
+
 def _balanced(predictor: Predictor, matrices: Matrices) -> Matrices:
     """States of unit covariance over the records, so that steps have one size."""
     a, b, c, d, k = matrices
