@@ -15,7 +15,9 @@ import scipy.io
 import xarray as xr
 
 from flightid.errors import DataError, FileFormatError, OptionError, UnitError, UnknownNameError
+from flightid.evidence.gather import FitFacts, gather_evidence
 from flightid.record import read_records
+from flightid.record.time_question import time_question
 from flightid.units import canonical
 from tests.closeness import assert_close
 
@@ -72,8 +74,14 @@ def test_a_gap_in_time_or_a_record_column_makes_several_records(tmp_path: Path) 
     text = "time,p,record\n" + "\n".join(f"{k % 10},{k},{'ab'[k // 10]}" for k in range(20))
     found = read_records(_csv(tmp_path, text), outputs=["p"])
     assert [(r.name, r.n_samples) for r in found] == [("a", 10), ("b", 10)]
+    found = read_records(_csv(tmp_path, text), outputs=["p"], record_column=None)
+    assert [(r.name, r.n_samples) for r in found] == [("roll[0]", 10), ("roll[1]", 10)]
+    numbers = text.replace("a\n", "1\n").replace("b", "2").replace("record", "exp")
+    found = read_records(_csv(tmp_path, numbers), outputs=["p"], record_column="exp")
+    assert [r.name for r in found] == ["1", "2"]
+    backward = text.replace("\n3,3", "\n1.5,3")
     with pytest.raises(DataError, match="not uniform"):
-        read_records(_csv(tmp_path, text), outputs=["p"], record_column=None)
+        read_records(_csv(tmp_path, backward), outputs=["p"], record_column=None)
 
 
 def test_jittered_stamps_need_a_stated_grid(tmp_path: Path) -> None:
@@ -85,6 +93,68 @@ def test_jittered_stamps_need_a_stated_grid(tmp_path: Path) -> None:
     (record,) = read_records(path, outputs=["p"], resample_to_s=0.02)
     assert_close(record["p"][5:-5], np.sin(record.time_s)[5:-5], atol=1e-5, why="spline")
     assert record.history[-1].operation == "conditioning.to_uniform"
+
+
+def _staircase(folder: Path) -> Path:
+    """A PRBS of steps each half second with its ramp, logged at stamps that jitter, in ms."""
+    random = np.random.default_rng(3)
+    stamps = np.arange(200) * 100.0
+    stamps[1:] += random.integers(-4, 5, 199)
+    steps = np.repeat(random.choice([-1.0, 1.0], 40), 5)
+    rows = [f"{t:.0f};{u};{t / 1000}" for t, u in zip(stamps, steps, strict=True)]
+    return _csv(folder, "t;u;y\n" + "\n".join(rows).replace(".", ","))
+
+
+def test_held_inputs_with_jittered_stamps_stay_steps_at_their_own_rate(tmp_path: Path) -> None:
+    path = _staircase(tmp_path)
+    asked = {"inputs": ["u"], "outputs": ["y"], "time_column": "t", "units": {"t": "ms"}}
+    (held,) = read_records(path, **asked, resample_to_s=0.1, hold="zero")
+    assert (held.hold, set(held["u"])) == ("zero", {-1.0, 1.0})
+    assert set(np.flatnonzero(np.diff(held["u"])) % 5) <= {3, 4}
+    assert_close(held["y"], held.time_s, atol=1e-6, why="a line comes through")
+    for words in ({}, {"hold": "zero", "interpolation": {"u": "band-limited"}}):
+        (smooth,) = read_records(path, **asked, resample_to_s=0.1, **words)
+        assert "low-pass" not in str(smooth.history)
+        assert len(set(smooth["u"])) > 50
+    (coarse,) = read_records(path, **asked, resample_to_s=0.2, hold="zero")
+    assert coarse.hold == "band_limited"
+    assert "low-pass" in str(coarse.history)
+    (kept,) = read_records(
+        path, **asked, resample_to_s=0.2, hold="zero", interpolation={"u": "previous"}
+    )
+    assert (kept.hold, set(kept["u"])) == ("zero", {-1.0, 1.0})
+
+
+def test_outliers_go_before_the_base_is_made(tmp_path: Path) -> None:
+    text = _staircase(tmp_path).read_text().splitlines()
+    text[51] = ";".join([*text[51].split(";")[:2], "900"])
+    path = _csv(tmp_path, "\n".join(text))
+    asked = {"outputs": ["y"], "time_column": "t", "units": {"t": "ms"}, "resample_to_s": 0.1}
+    (spoiled,) = read_records(path, **asked)
+    (clean,) = read_records(path, **asked, outliers={"half_width": 4})
+    assert_close(clean["y"], clean.time_s, atol=0.02, why="a line bridges the outlier")
+    assert np.max(np.abs(spoiled["y"] - spoiled.time_s)) > 800.0
+    assert clean.history[1].options["y"] == 1
+
+
+def test_milliseconds_are_asked_about_and_never_taken_for_seconds(tmp_path: Path) -> None:
+    path = _staircase(tmp_path)
+    asked = {"inputs": ["u"], "outputs": ["y"], "time_column": "t"}
+    with pytest.raises(OptionError, match=r"rows are 100 s apart \(0\.01 Hz\).*t = 'ms'"):
+        read_records(path, **asked, resample_to_s=0.1)
+    with pytest.raises(UnitError, match="is none of time: found V"):
+        read_records(path, **asked, units={"t": "V"})
+    (doubtful,) = read_records(path, **asked, resample_to_s=100.0)
+    question = time_question(doubtful)
+    assert question is not None
+    assert "is it ms?" in question.message
+    for unit, step_s in (("s", 100.0), ("ms", 0.1)):
+        (sure,) = read_records(path, **asked, units={"t": unit}, resample_to_s=step_s)
+        assert time_question(sure) is None
+    checks = gather_evidence(
+        FitFacts([doubtful], ("u",), ("y",), (), (), "", {}, loop="open")
+    ).checks
+    assert [check.light.value for check in checks if check.name == "time base"] == ["amber"]
 
 
 @pytest.mark.parametrize(

@@ -74,12 +74,15 @@ def test_operations_keep_what_they_leave_true_and_drop_the_rest() -> None:
     dropped = {
         "filter inputs": cond.filter_record(record, 5.0, channels=["u"]),
         "align inputs": cond.align(record, {"u": 0.003}),
-        "finer": cond.resample(record, 0.01),
-        "other method": cond.resample(record, 0.04, interpolation="linear"),
+        "between steps": cond.resample(record, 0.013),
+        "other method": cond.resample(record, 0.04, interpolation="previous"),
     }
     assert {name: each.hold for name, each in dropped.items()} == dict.fromkeys(dropped)
     assert {each.period_s for each in dropped.values()} == {2.0}
     assert cond.resample(record, 0.04).hold == "band_limited"
+    finer = cond.resample(record, 0.01)
+    assert finer.hold == "zero"
+    assert set(finer["u"]) <= set(record["u"])
 
 
 def test_simulate_uses_what_the_record_knows_and_says_what_it_used() -> None:

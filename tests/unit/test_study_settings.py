@@ -109,7 +109,7 @@ def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> 
         ('identify = "sweep"', 'identify = "sweeps"', "no such segment: found 'sweeps'"),
         ('verify = ["doublet"]', 'verify = ["sweep"]', "verified on data it has seen"),
         ("band_rad_s = [0.5, 60]", "band_rad_s = [0, 60]", "needed positive frequencies"),
-        ("free = false", 'free = "no"', "[model number 1.parameters.tau_s]: free does not fit"),
+        ("free = false", 'free = "no"', "[[model]] number 1, parameters, tau_s: free does not fit"),
         ("value = 0.03", "val = 0.03", "Next: write 'value'"),
         ("value = 0.03", 'value = "x"', "needed a number"),
         ("[log]\n", "[flight]\nsimulate = 'quadrotor'\n[log]\n", "found [log] and [flight]"),

@@ -4,19 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import numpy as np
-from numpy.typing import NDArray
-from scipy.ndimage import median_filter
-
 from flightid.conditioning.detrend import chosen_channels
-from flightid.errors import DataError, OptionError
 from flightid.record import Record, Step
+from flightid.record.outlying import bridge_outliers
 from flightid.table import Cell
-
-NORMAL_MAD = 1.4826
-"""Standard deviation of normal noise over its median absolute deviation."""
-MOST = 0.1
-"""Share of a channel that may be bridged: more is no outlier but the signal."""
 
 
 def remove_outliers(
@@ -67,6 +58,7 @@ def remove_outliers(
 
     Example
     -------
+    >>> import numpy as np
     >>> time_s = np.arange(200) * 0.01
     >>> y = np.sin(time_s)
     >>> y[50] += 8.0
@@ -75,46 +67,13 @@ def remove_outliers(
     >>> bool(abs(cleaned["y"][50] - np.sin(0.5)) < 1e-4)
     True
     """
-    if not deviations > 0.0:
-        raise OptionError("deviations is not positive", found=deviations, needed="above 0")
-    if half_width < 1 or 2 * half_width + 1 > record.n_samples:
-        raise OptionError(
-            "half_width does not suit the record",
-            found=half_width,
-            needed=f"1 to {(record.n_samples - 1) // 2}",
-        )
     names = record.outputs if channels is None else chosen_channels(record, channels)
     replaced, counts = {}, {}
     for name in names:
-        bad = _outliers(record[name], deviations, half_width)
-        count = int(np.count_nonzero(bad))
-        if count > MOST * record.n_samples:
-            raise DataError(
-                f"too many samples of channel {name!r} would count as outliers",
-                found=f"{count} of {record.n_samples}",
-                needed=f"at most {MOST:.0%}",
-                action="raise deviations, or leave the channel out",
-            )
+        samples, count = bridge_outliers(
+            name, record.time_s, record[name], deviations=deviations, half_width=half_width
+        )
         if count:
-            place = np.arange(record.n_samples)
-            replaced[name] = np.where(
-                bad, np.interp(place, place[~bad], record[name][~bad]), record[name]
-            )
-            counts[name] = count
+            replaced[name], counts[name] = samples, count
     options: dict[str, Cell] = {"deviations": deviations, "half_width": half_width, **counts}
     return record.replace(replaced, step=Step("conditioning.remove_outliers", options))
-
-
-def _outliers(
-    samples: NDArray[np.float64], deviations: float, half_width: int
-) -> NDArray[np.bool_]:
-    away = np.abs(samples - median_filter(samples, 2 * half_width + 1, mode="nearest"))
-    typical = float(np.median(away))
-    if typical == 0.0:
-        # More than half of the samples are their neighbours' median: a held or quiet channel.
-        moved = away[away > 0.0]
-        typical = float(np.median(moved)) if moved.size else 0.0
-    spread = NORMAL_MAD * typical
-    # A clean curve lies near its running median everywhere: what rounding adds is no outlier.
-    rounding = 1e-9 * float(np.ptp(samples))
-    return np.asarray(away > deviations * spread + rounding)

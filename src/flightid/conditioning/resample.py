@@ -6,13 +6,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from flightid.record import InputShape, Interpolation, Record, Step, to_uniform
+from flightid.record.interpolation import is_coarser, usual_method
+
+STILL = (("zero", {"previous"}), ("first", {"linear"}))
+"""Ways to a finer base that keep what inputs do between samples."""
 
 
 def resample(
     record: Record,
     sample_time_s: float,
     *,
-    interpolation: Interpolation | str | Mapping[str, Interpolation | str] = "band-limited",
+    interpolation: Interpolation | str | Mapping[str, Interpolation | str] | None = None,
 ) -> Record:
     """Bring a record to another sample time, anti-aliased where it becomes coarser.
 
@@ -22,8 +26,9 @@ def resample(
         Data.
     sample_time_s : float
         New sample time, s.
-    interpolation : Interpolation or mapping of str to Interpolation
-        How samples arise between stamps, for all channels or by name (others: band-limited).
+    interpolation : Interpolation or mapping of str to Interpolation, optional
+        How samples arise between stamps, for all channels or by name. Default: of inputs that are
+        held the previous value, of inputs on straight lines those, of all else band-limited.
 
     Returns
     -------
@@ -51,10 +56,11 @@ def resample(
     >>> resample(Record.from_arrays(time_s, outputs={"p": np.sin(time_s)}), 0.01)
     Record('record', 100 samples, 100 Hz, 1 s, inputs [], outputs [p])
     """
+    methods = _methods(record, sample_time_s, interpolation)
     base = to_uniform(
         {name: (record.time_s, record[name]) for name in record.channels},
         sample_time_s=sample_time_s,
-        interpolation=interpolation,
+        interpolation=methods,
     )
     step = Step("conditioning.resample", base.options)
     time_s = base.only.time_s
@@ -62,23 +68,41 @@ def resample(
         base.only.samples,
         time_s=time_s,
         step=step,
-        input_shape=_shape_after(record, sample_time_s, interpolation),
+        input_shape=_shape_after(record, sample_time_s, methods),
     )
 
 
-def _shape_after(
+def _methods(
     record: Record,
     sample_time_s: float,
-    interpolation: Interpolation | str | Mapping[str, Interpolation | str],
-) -> InputShape:
-    """Inputs that were low-passed to a coarser base are smooth on it, whatever they were."""
-    methods = {
-        interpolation.get(name, Interpolation.BAND_LIMITED)
-        if isinstance(interpolation, Mapping)
-        else interpolation
-        for name in record.inputs
+    asked: Interpolation | str | Mapping[str, Interpolation | str] | None,
+) -> dict[str, Interpolation | str]:
+    """Interpolation by channel: what was asked for, else what the inputs' hold calls for."""
+    if isinstance(asked, str):
+        return dict.fromkeys(record.channels, asked)
+    usual: dict[str, Interpolation | str] = {
+        name: usual_method(
+            record.hold if name in record.inputs else None, record.sample_time_s, sample_time_s
+        )
+        for name in record.channels
     }
-    known = record.input_shape.on_another_base(record.sample_time_s, sample_time_s)
-    if known.hold is None and methods == {"band-limited"} and sample_time_s > record.sample_time_s:
-        return replace(known, hold="band_limited")
-    return known if methods <= {"band-limited"} else known.without_hold()
+    return {**usual, **(asked or {})}
+
+
+def _shape_after(
+    record: Record, sample_time_s: float, methods: Mapping[str, Interpolation | str]
+) -> InputShape:
+    """Inputs that were low-passed to a coarser base are smooth on it, whatever they were.
+
+    Steps stay steps where a finer base has a sample at every step.
+    """
+    used = {str(methods[name]) for name in record.inputs}
+    known = record.input_shape
+    if is_coarser(sample_time_s, record.sample_time_s) and "previous" not in used:
+        return replace(known, hold="band_limited") if used else known
+    ratio = record.sample_time_s / sample_time_s
+    nested = abs(ratio - round(ratio)) < 1e-9 * ratio and round(ratio) >= 1
+    if nested and (known.hold, used) in STILL:
+        return known
+    moved = known.on_another_base(record.sample_time_s, sample_time_s)
+    return moved if used <= {"band-limited"} else moved.without_hold()

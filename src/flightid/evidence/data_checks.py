@@ -9,10 +9,11 @@ import numpy as np
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
-from flightid.evidence.evidence import BAND, COHERENCE, LOOP, Check
+from flightid.evidence.evidence import BAND, COHERENCE, LOOP, TIME, Check
 from flightid.evidence.feedback import feedback_test
 from flightid.evidence.spans import judge_coherence, judge_span, spans_of
 from flightid.record import Record
+from flightid.record.time_question import time_question
 from flightid.responses import FrequencyResponse, estimate_response
 from flightid.responses.windows.windows import CYCLES_AT_LOWEST, HIGHEST_FRACTION
 from flightid.uncertainty.feedback import FeedbackTest
@@ -41,6 +42,12 @@ def loop_check(test: FeedbackTest) -> Check:
     if test.loop == "unknown" and test.source != "instrument":
         return Check(LOOP, Light.UNKNOWN, str(test), "declare loop='open' or 'closed'")
     return Check(LOOP, Light.GREEN, str(test))
+
+
+def time_checks(records: Sequence[Record]) -> list[Check]:
+    """The question that a record's stamps raise, if they raise one."""
+    asked = next(filter(None, map(time_question, records)), None)
+    return [] if asked is None else [Check(TIME, asked.light, asked.message, asked.action)]
 
 
 def loop_of_responses(responses: Sequence[FrequencyResponse]) -> Check | None:

@@ -13,6 +13,7 @@ from flightid.result import Result
 from flightid.table import Column, Table
 
 INSPECTION = "inspection"
+TIME = "time base"
 BAND = "excitation band"
 COHERENCE = "coherence"
 LOOP = "loop"
@@ -22,12 +23,16 @@ AGREEMENT = "agreement of parts"
 SIGNS = "declared signs"
 RESIDUALS = "residuals"
 GUIDELINES = "guidelines"
-NAMES = (INSPECTION, BAND, COHERENCE, LOOP, HOLD, SETTLED, AGREEMENT, SIGNS, RESIDUALS, GUIDELINES)
+NAMES = (
+    INSPECTION, TIME, BAND, COHERENCE, LOOP, HOLD, SETTLED, AGREEMENT, SIGNS, RESIDUALS,
+    GUIDELINES,
+)  # fmt: skip
 ALWAYS = (BAND, COHERENCE, LOOP, SETTLED, AGREEMENT)
 """What every result needs before it may be green."""
 
 _ABSENT: Mapping[str, tuple[str, str]] = {
     INSPECTION: ("the log was not inspected", "run inspect_log, or `flightid inspect`"),
+    TIME: ("the time base was not examined", ""),
     BAND: ("the band that the inputs excite was not examined", "fit records or their responses"),
     COHERENCE: ("coherence was not examined", "fit records or a response estimated from them"),
     LOOP: ("whether a loop was closed was not examined", "declare loop='open' or 'closed'"),
@@ -143,10 +148,22 @@ class Evidence(Result, schema="flightid.evidence/1"):
 
     @property
     def reason(self) -> Finding | None:
-        """The finding that gives the light; one that was examined goes before one that was not."""
+        """The finding that gives the light; one that was examined goes before one that was not.
+
+        Where a loop was closed, that comes before the residual tests which it spoils.
+        """
         absent = {"evidence-" + name.replace(" ", "-") for name in self.missing}
         ranked = sorted(self.findings, key=lambda f: (_ORDER.index(f.light), f.code in absent))
-        return ranked[0] if ranked else None
+        if not ranked:
+            return None
+        loop, tests = self.check(LOOP), self.check(RESIDUALS)
+        if loop is None or tests is None or ranked[0] != tests.finding:
+            return ranked[0]
+        if loop.light is not Light.AMBER:
+            return ranked[0]
+        # Feedback leaves inputs in residuals whatever the order: it is what to mend first.
+        what = f"{loop.what}; {tests.what}"
+        return Finding(loop.finding.code, tests.light, what, loop.action)
 
     @property
     def lines(self) -> tuple[str, ...]:

@@ -11,6 +11,7 @@ from flightid.evidence.data_checks import (
     loop_of_records,
     loop_of_responses,
     power_of_records,
+    time_checks,
 )
 from flightid.evidence.evidence import (
     ALWAYS,
@@ -108,7 +109,7 @@ def gather_evidence(made: FitFacts) -> Evidence:
     """
     responses = [each for each in made.data if isinstance(each, FrequencyResponse)]
     records = [each for each in made.data if isinstance(each, Record)]
-    checks: list[Check] = []
+    checks: list[Check] = time_checks(records)
     if made.spans:
         checks += [judge_span(made.spans), judge_coherence(made.spans)]
     elif records:

@@ -20,6 +20,11 @@ TRANSITION = 0.1
 HALF_LENGTH = (ATTENUATION_DB - 7.95) / (2 * 14.36 * TRANSITION)
 """Half length of the kernel in samples of the lower rate (Kaiser's formula)."""
 BLOCK = 1 << 21
+SAME_RATE = 0.05
+"""Relative difference of a grid from a source's mean spacing that counts as the same rate: the
+mean of jittered stamps lies on either side of their nominal spacing."""
+CLOCK_JITTER = 0.15
+"""Largest jitter, as a fraction of a sample, of stamps that belong to a clock."""
 
 
 class Interpolation(StrEnum):
@@ -27,8 +32,9 @@ class Interpolation(StrEnum):
 
     `BAND_LIMITED`: windowed sinc (jittered stamps first pass through a cubic spline on the true
     stamps). `CUBIC`: spline. `LINEAR`: straight lines, which lose amplitude near the source's
-    Nyquist frequency. `PREVIOUS`: the last value holds; for modes and other discrete values, and
-    the only choice that is never low-passed.
+    Nyquist frequency. `PREVIOUS`: the last value holds, stamps that jitter counting for the grid
+    point they belong to; for modes and other discrete values, and the only choice that is never
+    low-passed.
 
     Example
     -------
@@ -45,7 +51,7 @@ class Interpolation(StrEnum):
 def sample_at(
     source: Stamped, time_s: NDArray[np.float64], sample_time_s: float, method: Interpolation
 ) -> tuple[NDArray[np.float64], str]:
-    """Values of a channel on a uniform grid, low-passed first where the grid is coarser.
+    """Values of a channel on a uniform grid, low-passed first where the grid is coarser by 5 %.
 
     Parameters
     ----------
@@ -77,25 +83,69 @@ def sample_at(
     (array([ 5., 10., 15.]), 'linear')
     """
     if method is Interpolation.PREVIOUS:
-        # A stamp that equals the grid to within rounding belongs to that grid point.
-        index = np.searchsorted(source.time_s, time_s + 1e-6 * sample_time_s, side="right") - 1
+        index = (
+            np.searchsorted(source.time_s, time_s + _slack_s(source, sample_time_s), "right") - 1
+        )
         return source.values[np.maximum(index, 0)], "previous value"
     if _is_same_grid(source, time_s):
         first = int(np.argmin(np.abs(source.time_s - time_s[0])))
         return source.values[first : first + time_s.size].copy(), "copied"
     step = source.sample_time_s
-    coarser = sample_time_s > step * (1 + 1e-6)
+    coarser = is_coarser(sample_time_s, step)
     if not coarser and method is Interpolation.LINEAR:
         return np.interp(time_s, source.time_s, source.values), "linear"
     if not coarser and method is Interpolation.CUBIC:
         return spline(source, time_s), "cubic spline"
     start, step, values = uniform_samples(source)
-    rate = min(1 / step, 1 / sample_time_s)
+    rate = 1 / sample_time_s if coarser else 1 / step
     # Decimation stops at the new Nyquist frequency; interpolation turns exactly at the old one,
     # where the sinc passes through every given sample.
     cutoff_hz = rate * ((1 - TRANSITION) / 2 if coarser else 0.5)
     done = f"low-pass {cutoff_hz:.6g} Hz, zero phase" if coarser else "band-limited"
     return windowed_sinc(values, (time_s - start) / step, cutoff_hz * step, rate * step), done
+
+
+def usual_method(hold: str | None, source_s: float, sample_time_s: float) -> Interpolation:
+    """How an input with this hold is brought to a grid where nobody says how.
+
+    Steps stay steps and straight lines stay lines, unless the grid is coarser than the samples:
+    then inputs are low-passed as outputs are.
+
+    Parameters
+    ----------
+    hold : str or None
+        What the input does between samples, as a record knows it.
+    source_s, sample_time_s : float
+        Mean spacing of its samples, and spacing of the grid, s.
+
+    Example
+    -------
+    >>> usual_method("zero", 0.0998, 0.1).value, usual_method("zero", 0.02, 0.1).value
+    ('previous', 'band-limited')
+    """
+    if hold == "zero" and not is_coarser(sample_time_s, source_s):
+        return Interpolation.PREVIOUS
+    return Interpolation.LINEAR if hold == "first" else Interpolation.BAND_LIMITED
+
+
+def is_coarser(sample_time_s: float, source_s: float) -> bool:
+    """Tell whether a grid is so much coarser than its source that it takes a low-pass.
+
+    Example
+    -------
+    >>> is_coarser(0.1, 0.0998), is_coarser(0.1, 0.09)
+    (False, True)
+    """
+    return sample_time_s > source_s * (1 + SAME_RATE)
+
+
+def _slack_s(source: Stamped, sample_time_s: float) -> float:
+    """How much later than a grid point a stamp may be and still belong to it, s."""
+    jitter = source.jitter
+    # Rare events are no jittered clock: their stamps mean what they say.
+    if jitter > CLOCK_JITTER or abs(sample_time_s / source.sample_time_s - 1) > SAME_RATE:
+        jitter = 0.0
+    return max(1e-6 * sample_time_s, 3 * jitter * source.sample_time_s)
 
 
 def spline(source: Stamped, time_s: NDArray[np.float64]) -> NDArray[np.float64]:

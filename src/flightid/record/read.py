@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Role
-from flightid.errors import DataError, FileFormatError, OptionError, UnitError, UnknownNameError
+from flightid.errors import DataError, OptionError, UnitError, UnknownNameError
 from flightid.files import sha256_of_file
 from flightid.record.channel import DECLARED, Channel
 from flightid.record.formats import ColumnTable, FileFormat, csv, file_format, matlab, netcdf
@@ -19,12 +19,16 @@ from flightid.record.formats import parquet as parquet_format
 from flightid.record.formats.columns import is_unit
 from flightid.record.history import Step
 from flightid.record.hold import InputHold, InputShape, Loop
+from flightid.record.interpolation import Interpolation, is_coarser, usual_method
+from flightid.record.outlying import bridge_outliers
 from flightid.record.record import Record
+from flightid.record.rows import column_unit, manoeuvres, require_sensible_base, row_stamps
 from flightid.record.stamps import GAP_FACTOR
 from flightid.record.store import RECORD_COLUMN, stored_records
 from flightid.record.timebase import to_uniform
+from flightid.record.validation import unknown_channel
 from flightid.table import Cell
-from flightid.units import canonical, convert
+from flightid.units import canonical
 from flightid.version import VERSION
 
 Names = Iterable[str] | Mapping[str, str]
@@ -49,6 +53,8 @@ def read_records(
     units: Mapping[str, str] | None = None,
     sample_time_s: float | None = None,
     resample_to_s: float | None = None,
+    interpolation: Interpolation | str | Mapping[str, Interpolation | str] | None = None,
+    outliers: Mapping[str, Any] | None = None,
     record_column: str | None = RECORD_COLUMN,
     hold: InputHold | None = None,
     period_s: float | None = None,
@@ -59,7 +65,8 @@ def read_records(
     A file that `write_records` made comes back as it was; naming channels then selects and
     assigns roles. In any other file the time is the column `time_column`, or `sample_time_s` is
     stated; neither is guessed. Rows fall into several records where the column `record_column`
-    changes or where the time has a gap (a spacing above 2.5 median spacings). Units come from
+    changes, where time starts again, or where it has a gap (a spacing above 2.5 median spacings).
+    Text with semicolons or tabs may have decimal commas. Units come from
     headings such as ``p [rad/s]``, from a second row of units in CSV, or from the file's metadata;
     `units` declares them and must not contradict the file. Values are not converted.
 
@@ -78,7 +85,16 @@ def read_records(
     sample_time_s : float, optional
         Sample time of a file without time column, s; the first sample is at 0 s.
     resample_to_s : float, optional
-        Sample time, s, of a new uniform grid; for stamps that are not uniform.
+        Sample time, s, of a new uniform grid; for stamps that are not uniform. Channels are
+        low-passed where it is coarser than the rows by more than 5 %.
+    interpolation : Interpolation or mapping of str to Interpolation, optional
+        How samples of the new grid arise, for all channels or by name. Default: of inputs with
+        `hold` "zero" the previous value, with "first" straight lines, of all else band-limited;
+        inputs that were low-passed are band-limited afterwards, whatever they were.
+    outliers : mapping of str to object, optional
+        Options ``deviations``, ``half_width`` and ``channels`` of
+        `flightid.conditioning.remove_outliers`, carried out on the rows of each manoeuvre before
+        anything is resampled: a filter would spread an outlier.
     record_column : str, optional
         Column that tells manoeuvres apart, used if it is there; None: there is none.
     hold : {"zero", "first", "band_limited"}, optional
@@ -135,7 +151,7 @@ def read_records(
         chosen = [_selected(item, roles, units or {}) for item in stored]
         return [_declared(item, InputShape(hold, period_s, loop)) for item in chosen]
     table = _table(source, kind)
-    stamps = _stamps(table, time_column, units or {}, sample_time_s)
+    stamps = row_stamps(table, time_column, units or {}, sample_time_s)
     wanted = _wanted(table, roles, units or {}, time_column, record_column, stamps.size)
     columns = {item.channel.name: table.column(item.column) for item in wanted}
     for item in wanted:
@@ -145,21 +161,66 @@ def read_records(
                 found=f"{columns[item.channel.name].size} samples",
                 needed=f"{stamps.size}",
             )
+    base = _Base(resample_to_s, interpolation, outliers, hold, time_column)
     options: dict[str, Cell] = {
         "file": source.name,
         "sha256": sha256_of_file(source),
         "time": time_column if sample_time_s is None else None,
         "sample_time_s": sample_time_s,
     }
-    history = (Step("read_records", options, VERSION),)
     records: list[Record] = []
-    for part, label in _manoeuvres(table, record_column, stamps, split_gaps=resample_to_s is None):
-        pieces = _piece(stamps[part], {k: v[part] for k, v in columns.items()}, resample_to_s)
-        for grid, samples, more in pieces:
+    for part, label in manoeuvres(table, record_column, stamps, split_gaps=resample_to_s is None):
+        if sample_time_s is None:
+            options["time_unit"] = (units or {}).get(time_column) or table.units.get(time_column)
+            options["row_spacing_s"] = _spacing_s(stamps[part])
+        history = (Step("read_records", dict(options), VERSION),)
+        rows = {name: values[part] for name, values in columns.items()}
+        for grid, samples, more in _pieces(stamps[part], rows, wanted, base):
             records.append(_record(grid, samples, wanted, label or source.stem, (*history, *more)))
     if len(records) > 1 and len({item.name for item in records}) == 1:
         records = [item.replace(name=f"{item.name}[{index}]") for index, item in enumerate(records)]
-    return [_declared(item, InputShape(hold, period_s, loop)) for item in records]
+    kept = base.hold_after(_spacing_s(stamps), wanted)
+    return [_declared(item, InputShape(kept, period_s, loop)) for item in records]
+
+
+@dataclass(frozen=True)
+class _Base:
+    """What is done to the rows of a manoeuvre before they are a record."""
+
+    resample_to_s: float | None
+    interpolation: Interpolation | str | Mapping[str, Interpolation | str] | None
+    outliers: Mapping[str, Any] | None
+    hold: InputHold | None
+    time_column: str
+
+    def methods(self, wanted: Iterable[_Wanted], source_s: float) -> dict[str, Interpolation | str]:
+        """Interpolation by channel: what was asked for, else what the inputs' hold calls for."""
+        assert self.resample_to_s is not None
+        given = self.interpolation
+        if isinstance(given, str):
+            return {item.channel.name: given for item in wanted}
+        found: dict[str, Interpolation | str] = {}
+        for item in wanted:
+            hold = self.hold if item.channel.role is Role.INPUT else None
+            found[item.channel.name] = usual_method(hold, source_s, self.resample_to_s)
+        return {**found, **(given or {})}
+
+    def hold_after(self, source_s: float, wanted: Iterable[_Wanted]) -> InputHold | None:
+        """What is still true of the inputs: what was low-passed is smooth."""
+        if self.resample_to_s is None or not is_coarser(self.resample_to_s, source_s):
+            return self.hold
+        ways = self.methods(wanted, source_s)
+        driving = [ways[item.channel.name] for item in wanted if item.channel.role is Role.INPUT]
+        filtered = self.hold is not None and any(way != "previous" for way in driving)
+        return "band_limited" if filtered else self.hold
+
+
+def _spacing_s(stamps: NDArray[np.float64]) -> float:
+    """Mean spacing of rows outside gaps, s."""
+    spacing = np.diff(stamps)
+    if not spacing.size:
+        return 0.0
+    return float(np.mean(spacing[spacing <= GAP_FACTOR * np.median(spacing)]))
 
 
 def _declared(record: Record, given: InputShape) -> Record:
@@ -200,48 +261,6 @@ def _pairs(names: Names | None) -> list[tuple[str, str]]:
     if isinstance(names, Mapping):
         return list(names.items())
     return [(name, name) for name in names]
-
-
-def _stamps(
-    table: ColumnTable, time: str, units: Mapping[str, str], sample_time_s: float | None
-) -> NDArray[np.float64]:
-    if time in table.lengths:
-        if sample_time_s is not None:
-            raise OptionError(
-                "the time is stated twice",
-                found=f"column {time!r} and sample_time_s={sample_time_s}",
-                needed="one of them",
-                action="leave out sample_time_s, or name another time column",
-            )
-        unit = _unit(table, time, time, units, default="s")
-        values = table.column(time)
-        return values if unit == "s" else convert(values, unit, "s")
-    if sample_time_s is None:
-        raise OptionError(
-            f"{table.path.name} has no time column {time!r}",
-            found="columns " + ", ".join(table.lengths),
-            needed="time=<name of the column> or sample_time_s=<seconds>",
-            action="no sample time is invented: state it",
-        )
-    if not (np.isfinite(sample_time_s) and sample_time_s > 0):
-        raise OptionError("sample time is not positive", found=sample_time_s, needed="above 0 s")
-    longest = max(table.lengths.values(), default=0)
-    return np.asarray(sample_time_s * np.arange(longest), dtype=np.float64)
-
-
-def _unit(
-    table: ColumnTable, column: str, name: str, units: Mapping[str, str], default: str
-) -> str:
-    stated, declared = table.units.get(column), units.get(name)
-    if declared is None:
-        if stated is not None and not is_unit(stated):
-            raise UnitError(
-                f"the unit of column {column!r} is not known",
-                found=repr(stated),
-                needed=f"units={{{name!r}: ...}}, the unit declared",
-            )
-        return canonical(stated) if stated is not None else default
-    return canonical(declared)
 
 
 def _note(table: ColumnTable, column: str, name: str, units: Mapping[str, str]) -> str:
@@ -285,7 +304,7 @@ def _wanted(
         _Wanted(
             Channel(
                 name,
-                _unit(table, column, name, units, default="1"),
+                column_unit(table, column, name, units, default="1"),
                 role,
                 _note(table, column, name, units),
             ),
@@ -295,52 +314,47 @@ def _wanted(
     ]
 
 
-def _manoeuvres(
-    table: ColumnTable, record: str | None, stamps: NDArray[np.float64], *, split_gaps: bool
-) -> list[tuple[slice, str | None]]:
-    """Row ranges of the manoeuvres and their names, where the file has them."""
-    edges = {0, stamps.size}
-    labels = None
-    if record is not None and record in table.lengths:
-        labels = table.raw(record)
-        if labels.size != stamps.size:
-            raise FileFormatError(
-                f"column {record!r} is not as long as the time",
-                found=f"{labels.size} samples",
-                needed=f"{stamps.size}",
-            )
-        edges |= {int(i) + 1 for i in np.flatnonzero(labels[1:] != labels[:-1])}
-    parts = []
-    for first, last in _ranges(edges):
-        spacing = np.diff(stamps[first:last])
-        gaps = {first, last}
-        if split_gaps and spacing.size and np.all(spacing > 0):
-            is_gap = spacing > GAP_FACTOR * np.median(spacing)
-            gaps |= {first + int(i) + 1 for i in np.flatnonzero(is_gap)}
-        name = None if labels is None or labels.dtype.kind in "fiub" else str(labels[first])
-        parts += [(slice(a, b), name) for a, b in _ranges(gaps)]
-    return parts
-
-
-def _ranges(edges: Iterable[int]) -> list[tuple[int, int]]:
-    ordered = sorted(edges)
-    return list(pairwise(ordered))
-
-
-def _piece(
+def _pieces(
     stamps: NDArray[np.float64],
-    samples: Mapping[str, NDArray[np.float64]],
-    resample_to_s: float | None,
+    rows: dict[str, NDArray[np.float64]],
+    wanted: Sequence[_Wanted],
+    base: _Base,
 ) -> list[tuple[NDArray[np.float64], Mapping[str, NDArray[np.float64]], tuple[Step, ...]]]:
-    if resample_to_s is None:
-        return [(stamps, samples, ())]
-    base = to_uniform(
-        {key: (stamps, values) for key, values in samples.items()},
-        sample_time_s=resample_to_s,
+    """The rows of a manoeuvre without outliers, on the grid that was asked for."""
+    steps: tuple[Step, ...] = ()
+    if base.outliers is not None:
+        rows, step = _without_outliers(stamps, rows, wanted, base.outliers)
+        steps = (step,)
+    if base.resample_to_s is None:
+        return [(stamps, rows, steps)]
+    require_sensible_base(stamps, base.resample_to_s, base.time_column)
+    made = to_uniform(
+        {key: (stamps, values) for key, values in rows.items()},
+        sample_time_s=base.resample_to_s,
         gaps="split",
+        interpolation=base.methods(wanted, _spacing_s(stamps)),
     )
-    step = Step("conditioning.to_uniform", base.options, VERSION)
-    return [(span.time_s, span.samples, (step,)) for span in base.spans]
+    steps = (*steps, Step("conditioning.to_uniform", made.options, VERSION))
+    return [(span.time_s, span.samples, steps) for span in made.spans]
+
+
+def _without_outliers(
+    stamps: NDArray[np.float64],
+    rows: dict[str, NDArray[np.float64]],
+    wanted: Iterable[_Wanted],
+    asked: Mapping[str, Any],
+) -> tuple[dict[str, NDArray[np.float64]], Step]:
+    limits = {"deviations": 6.0, "half_width": 3, **asked}
+    outputs = [item.channel.name for item in wanted if item.channel.role is Role.OUTPUT]
+    names = outputs if limits.pop("channels", None) is None else list(asked["channels"])
+    counts: dict[str, Cell] = {}
+    for name in names:
+        if name not in rows:
+            raise unknown_channel(name, rows)
+        samples, count = bridge_outliers(name, stamps, rows[name], **limits)
+        if count:
+            rows, counts = {**rows, name: samples}, {**counts, name: count}
+    return rows, Step("conditioning.remove_outliers", {**limits, **counts}, VERSION)
 
 
 def _record(

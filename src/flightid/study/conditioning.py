@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -28,6 +28,7 @@ from flightid.errors import StudyError
 from flightid.record import Record
 from flightid.simulation import actuator_positions
 from flightid.study.reading import TableReader
+from flightid.study.record_files import RecordFile
 
 Position = tuple[float, float, float]
 Move = Callable[[Record, Position], Record]
@@ -160,6 +161,34 @@ def require_records(steps: Sequence[Conditioning], names: Sequence[str]) -> None
                     found=name,
                     needed=", ".join(names),
                 )
+
+
+def outliers_first(
+    steps: Sequence[Conditioning], file: RecordFile, channels: Iterable[str]
+) -> Mapping[str, Any] | None:
+    """Options of the outliers of a file that is resampled as it is read: they go before.
+
+    Raises
+    ------
+    StudyError
+        Two steps take outliers off one such record.
+    """
+    if file.resample_to_s is None:
+        return None
+    meant = [
+        step.outliers
+        for step in steps
+        if step.outliers is not None and (not step.records or file.name in step.records)
+    ]
+    if len(meant) > 1:
+        raise StudyError(
+            f"study file, [[conditioning]]: outliers of record {file.name!r} are taken off twice",
+            needed="one step with outliers for a record that is resampled as it is read",
+        )
+    if not meant or "channels" not in meant[0]:
+        return meant[0] if meant else None
+    held = set(channels)
+    return {**meant[0], "channels": [name for name in meant[0]["channels"] if name in held]}
 
 
 def condition(

@@ -14,6 +14,7 @@ from flightid.options import Options, options_of, read_options
 
 Value = TypeVar("Value")
 TOP = "top level"
+NUMBER = " number "
 REQUIRED: Any = object()
 """Default of a key that must be given."""
 
@@ -171,7 +172,7 @@ class TableReader:
 
     def table(self, key: str) -> TableReader:
         """A table below; empty where it is absent."""
-        return TableReader(self.values(key), f"[{self._below(key)}]")
+        return TableReader(self.values(key), self._heading(key))
 
     def rows(self, key: str) -> list[tuple[str, dict[str, Any]]]:
         """A list of tables below, each with its place in words; empty where it is absent."""
@@ -181,7 +182,7 @@ class TableReader:
 
         found = self._take(key, [], fits, f"tables headed [[{key}]]")
         path = self._below(key)
-        return [(f"[[{path}]] number {number}", item) for number, item in enumerate(found, start=1)]
+        return [(f"[[{path}]]{NUMBER}{number}", item) for number, item in enumerate(found, start=1)]
 
     def tables(self, key: str) -> list[TableReader]:
         """Readers of a list of tables below; empty where it is absent."""
@@ -190,6 +191,12 @@ class TableReader:
     def know(self, key: str) -> None:
         """Count a key as one that has a meaning here, though it is absent."""
         self._known.append(key)
+
+    def _heading(self, key: str) -> str:
+        """How a table below is named: under one of several by its place."""
+        if NUMBER in self._where:
+            return f"{self._where}, {key}"
+        return f"[{self._below(key)}]"
 
     def _below(self, key: str) -> str:
         return key if self._where == TOP else f"{re.sub(r'[][]', '', self._where)}.{key}"
@@ -268,7 +275,7 @@ def read_each(
 
 def unknown_key(where: str, key: str, known: Iterable[str]) -> StudyError:
     """Error for a key that has no meaning here; names the nearest one that has."""
-    options = list(known)
+    options = list(dict.fromkeys(known))
     near = get_close_matches(key, options, n=1, cutoff=0.5)
     return StudyError(
         f"study file, {where}: there is no key {key!r}",

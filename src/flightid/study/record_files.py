@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from flightid.conventions import Role
 from flightid.errors import StudyError
-from flightid.record import InputShape, Record, read_records
+from flightid.record import InputShape, Interpolation, Record, read_records
 from flightid.record.hold import HOLDS, LOOPS
+from flightid.record.store import RECORD_COLUMN
 from flightid.study.error_list import ErrorList
 from flightid.study.reading import TableReader
 
@@ -41,10 +42,16 @@ class RecordFile:
         Sample time of a file without time column, s.
     resample_to_s : float or None
         Sample time of a new uniform grid, s.
+    time_unit : str or None
+        Unit of the time stamps, where the file does not say.
+    experiment : str
+        Column that tells manoeuvres of one file apart.
+    interpolation : str, mapping of str to str, or None
+        How samples of the new grid arise, for all channels or by name.
     columns : mapping of str to str
         Column of a channel, where it has another name.
     units : mapping of str to str
-        Unit of a channel, where the file does not say.
+        Unit of a channel or of the time column, where the file does not say.
     shape : InputShape
         What is known of the inputs beyond their samples.
     """
@@ -56,6 +63,9 @@ class RecordFile:
     time: str = "time"
     sample_time_s: float | None = None
     resample_to_s: float | None = None
+    time_unit: str | None = None
+    experiment: str = RECORD_COLUMN
+    interpolation: str | Mapping[str, str] | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
     shape: InputShape = UNKNOWN
@@ -77,6 +87,9 @@ def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
         reader.text("time_column", "time"),
         reader.maybe(reader.positive, "sample_time_s"),
         reader.maybe(reader.positive, "resample_to_s"),
+        reader.maybe(reader.text, "time_unit"),
+        reader.text("experiment", RECORD_COLUMN),
+        reader.maybe(lambda key: _interpolation(reader, key), "interpolation"),
         _texts(reader.table("columns"), reader.values("columns")),
         _texts(reader.table("units"), reader.values("units")),
         read_shape(reader),
@@ -122,6 +135,16 @@ def _require_file(name: str, path: Path) -> None:
         )
 
 
+def _interpolation(reader: TableReader, key: str) -> str | dict[str, str]:
+    """One word for all channels, or one for each that is named."""
+    words = tuple(map(str, Interpolation))
+    given = reader.peek(key)
+    if not isinstance(given, Mapping):
+        return reader.choice(key, words)
+    inner = reader.table(key)
+    return {str(name): inner.choice(str(name), words) for name in given}
+
+
 def read_shape(reader: TableReader) -> InputShape:
     """Take what a table says of the inputs between samples, their repetition and the loop."""
     given: dict[str, Any] = {
@@ -143,7 +166,11 @@ def _texts(reader: TableReader, values: Mapping[str, object]) -> dict[str, str]:
     return {key: reader.text(key) for key in values}
 
 
-def load_records(file: RecordFile, roles: Mapping[str, Role]) -> list[Record]:
+def load_records(
+    file: RecordFile,
+    roles: Mapping[str, Role],
+    outliers: Mapping[str, Any] | None = None,
+) -> list[Record]:
     """Read the channels that models need, of one manoeuvre or of all that the files hold.
 
     Parameters
@@ -151,6 +178,8 @@ def load_records(file: RecordFile, roles: Mapping[str, Role]) -> list[Record]:
     file : RecordFile
     roles : mapping of str to Role
         Channels to take.
+    outliers : mapping of str to object, optional
+        Options of the outliers that are bridged before anything is resampled.
 
     Returns
     -------
@@ -163,7 +192,7 @@ def load_records(file: RecordFile, roles: Mapping[str, Role]) -> list[Record]:
     FlightidError
         The file cannot be read as a record; the message says why.
     """
-    pieces = [_load(file, path, roles) for path in file.paths]
+    pieces = [_load(file, path, roles, outliers) for path in file.paths]
     if len(pieces) == 1:
         return pieces[0]
     return [
@@ -173,7 +202,9 @@ def load_records(file: RecordFile, roles: Mapping[str, Role]) -> list[Record]:
     ]
 
 
-def _load(file: RecordFile, path: Path, roles: Mapping[str, Role]) -> list[Record]:
+def _load(
+    file: RecordFile, path: Path, roles: Mapping[str, Role], outliers: Mapping[str, Any] | None
+) -> list[Record]:
     """Records of one file."""
 
     def named(role: Role) -> dict[str, str] | None:
@@ -187,26 +218,65 @@ def _load(file: RecordFile, path: Path, roles: Mapping[str, Role]) -> list[Recor
         excitations=named(Role.EXCITATION),
         others=named(Role.OTHER),
         time_column=file.time,
-        units={key: unit for key, unit in file.units.items() if key in roles},
+        units=_declared_units(file, roles),
         sample_time_s=file.sample_time_s,
         resample_to_s=file.resample_to_s,
+        interpolation=_named_in(file.interpolation, roles),
+        outliers=outliers,
+        record_column=file.experiment,
+        hold=file.shape.hold,
     )
     if file.manoeuvre == ALL:
         return [_named(file, record, f"{file.name}: {record.name}") for record in found]
     if file.manoeuvre is not None:
-        found = [record for record in found if record.name == file.manoeuvre]
-    if len(found) != 1:
+        chosen = [record for record in found if record.name == file.manoeuvre]
+    else:
+        chosen = found
+    if len(chosen) != 1:
         raise StudyError(
             f"it is not clear which manoeuvre record {file.name!r} is",
-            found=f"{len(found)} of that name" if file.manoeuvre else f"{len(found)} in the file",
+            found=f"{len(chosen)} of that name" if file.manoeuvre else f"{len(found)} in the file",
             needed="one",
-            action='name it with manoeuvre, take all with "*", or mend gaps with resample_to_s',
+            action=f'name it with manoeuvre ({_names(found)}), take all with "*", or mend gaps '
+            "with resample_to_s",
         )
-    return [_named(file, found[0], file.name)]
+    return [_named(file, chosen[0], file.name)]
+
+
+def _names(records: list[Record]) -> str:
+    shown = [record.name for record in records[:6]]
+    return ", ".join([*shown, *(["…"] if len(records) > len(shown) else [])])
+
+
+def _declared_units(file: RecordFile, roles: Mapping[str, Role]) -> dict[str, str]:
+    """Units of the channels that are taken and of the time column.
+
+    Raises
+    ------
+    StudyError
+        The unit of the time is declared twice, and differently.
+    """
+    units = {key: unit for key, unit in file.units.items() if key in roles or key == file.time}
+    if file.time_unit is not None and units.setdefault(file.time, file.time_unit) != file.time_unit:
+        raise StudyError(
+            f"study file, record {file.name!r}: the unit of the time is declared twice",
+            found=f"time_unit = {file.time_unit!r}, units {file.time} = {units[file.time]!r}",
+            needed="one of them",
+        )
+    return units
+
+
+def _named_in(
+    interpolation: str | Mapping[str, str] | None, roles: Mapping[str, Role]
+) -> str | dict[str, str] | None:
+    """Interpolation of the channels that are taken: one study may use a file in several ways."""
+    if isinstance(interpolation, Mapping):
+        return {key: word for key, word in interpolation.items() if key in roles}
+    return interpolation
 
 
 def _named(file: RecordFile, record: Record, name: str) -> Record:
-    known = declared(record, file.shape)
+    known = declared(record, replace(file.shape, hold=None))
     return (
         known.replace(name=name) if file.span_s is None else known.segment(*file.span_s, name=name)
     )

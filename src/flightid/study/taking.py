@@ -14,7 +14,7 @@ from flightid.inspection import Inspection, inspect_log
 from flightid.logs import Log, read_log
 from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.record import Record
-from flightid.study.conditioning import Conditioning, condition
+from flightid.study.conditioning import Conditioning, condition, outliers_first
 from flightid.study.flight import FlightPlan
 from flightid.study.record_files import declared, load_records
 from flightid.study.response_settings import EXCITATION
@@ -75,7 +75,13 @@ def take(
             )
         paths = dict.fromkeys(path for file in settings.record_files for path in file.paths)
         files = {
-            file.name: runner.stage(f"record: {file.name}", load_records, file, needed[file.name])
+            file.name: runner.stage(
+                f"record: {file.name}",
+                load_records,
+                file,
+                needed[file.name],
+                outliers_first(settings.conditioning, file, needed[file.name]),
+            )
             for file in settings.record_files
             if file.name in needed
         }
@@ -110,9 +116,10 @@ def _conditioned(
 ) -> dict[str, Staged[list[Record]]]:
     """Records after the steps that are meant for them; what their checks found is added."""
     made = dict(records)
+    read = {file.name for file in settings.record_files if file.resample_to_s is not None}
     for name, record in records.items():
         steps = tuple(
-            replace(step, records=())
+            replace(step, records=(), outliers=None if name in read else step.outliers)
             for step in settings.conditioning
             if not step.records or name in step.records
         )

@@ -23,7 +23,8 @@ def read_columns(path: Path) -> ColumnTable:
     """Columns of a delimited text file.
 
     Lines that begin with ``#`` may stand above the headings. The delimiter is the one that the
-    heading row holds: comma, semicolon or tab. Numbers are read to the last bit.
+    heading row holds: comma, semicolon or tab. Beside the latter two a comma may be the decimal
+    point. Numbers are read to the last bit.
 
     Parameters
     ----------
@@ -47,21 +48,10 @@ def read_columns(path: Path) -> ColumnTable:
         units = {name: text for name, text in zip(names, second, strict=False) if text}
     # A byte makes at most one cell of a column.
     require_readable_size(path, path.stat().st_size)
-    try:
-        # Arrow rounds decimal text correctly, refuses ragged rows, and reads in parallel.
-        table = pa_csv.read_csv(
-            path,
-            read_options=pa_csv.ReadOptions(
-                skip_rows=_rows_to_skip(path, 2 if has_unit_row else 1), column_names=names
-            ),
-            parse_options=pa_csv.ParseOptions(delimiter=delimiter),
-        )
-    except pa.ArrowException as error:
-        raise FileFormatError(
-            f"{path.name} is not a table of numbers under its headings",
-            found=str(error).strip().split("\n")[0],
-            needed="rows with one cell for each heading",
-        ) from error
+    skipped = _rows_to_skip(path, 2 if has_unit_row else 1)
+    table = _read(path, names, skipped, delimiter, ".")
+    if delimiter != "," and _has_decimal_commas(table):
+        table = _read(path, names, skipped, delimiter, ",")
     if not table.num_rows:
         raise FileFormatError(
             f"{path.name} holds headings only", needed="rows of numbers below the headings"
@@ -71,6 +61,39 @@ def read_columns(path: Path) -> ColumnTable:
         dict.fromkeys(names, table.num_rows),
         lambda name: table.column(name).to_numpy(),
         units,
+    )
+
+
+def _read(
+    path: Path, names: list[str], skipped: int, delimiter: str, decimal_point: str
+) -> pa.Table:
+    try:
+        # Arrow rounds decimal text correctly, refuses ragged rows, and reads in parallel.
+        return pa_csv.read_csv(
+            path,
+            read_options=pa_csv.ReadOptions(skip_rows=skipped, column_names=names),
+            parse_options=pa_csv.ParseOptions(delimiter=delimiter),
+            convert_options=pa_csv.ConvertOptions(decimal_point=decimal_point),
+        )
+    except pa.ArrowException as error:
+        raise FileFormatError(
+            f"{path.name} is not a table of numbers under its headings",
+            found=str(error).strip().split("\n")[0],
+            needed="rows with one cell for each heading",
+        ) from error
+
+
+def _has_decimal_commas(table: pa.Table) -> bool:
+    """Whether a column that is no number becomes one when its commas are decimal."""
+    texts = [
+        column.slice(0, 100).to_pylist()
+        for column in table.columns
+        if pa.types.is_string(column.type)
+    ]
+    return any(
+        any("," in str(cell) for cell in cells)
+        and all(_is_number(str(cell).replace(",", ".", 1)) for cell in cells if cell)
+        for cells in texts
     )
 
 

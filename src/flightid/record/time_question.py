@@ -1,0 +1,46 @@
+"""Whether stamps that nobody gave a unit look like milliseconds: a question, never an answer."""
+
+from __future__ import annotations
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.record.record import Record
+
+READ = "read_records"
+SLOWEST_S = 1.0
+"""Samples further apart are rare in dynamics, and usual in files whose time is in ms."""
+IN_MS_S = 1000.0
+"""Whole numbers further apart than this look like microseconds rather than milliseconds."""
+
+
+def time_question(record: Record) -> Finding | None:
+    """A question where stamps without a declared unit are a second and more apart.
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    Finding or None
+        Amber; None where a unit was stated, or where seconds are plausible.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> time_question(Record.from_arrays(np.arange(9) * 100.0, outputs={"y": np.arange(9.0)}))
+    """
+    read = next((step for step in record.history if step.operation == READ), None)
+    if read is None or read.options.get("time_unit", "stated") is not None:
+        return None
+    spacing = float(read.options["row_spacing_s"] or 0.0)
+    if spacing < SLOWEST_S:
+        return None
+    guess = "ms" if spacing < IN_MS_S else "us"
+    return Finding(
+        "time-unit-not-stated",
+        Light.AMBER,
+        f"rows of {read.options['file']} are {spacing:.6g} s apart ({1 / spacing:.3g} Hz), and "
+        f"nobody stated the unit of column {read.options['time']!r}: is it {guess}?",
+        f"declare it: units {read.options['time']} = {guess!r}, or 's' if it is seconds",
+    )
