@@ -100,7 +100,7 @@ def test_intervals_and_what_differs_from_theory() -> None:
     assert found["rotor time constant"].identified.interval95 is None
     assert found["rotor time constant"].identified.reason == "its parameters were not fitted"
     assert "lateral gearing" in " ".join(f.message for f in found.findings)
-    assert {f.code for f in found.findings} == {"differs-from-theory"}
+    assert {f.code for f in found.findings} == {"differs-from-theory", "source-evidence"}
 
 
 def test_renamed_parameters_and_other_structures() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -12,7 +15,7 @@ from flightid.evidence import Check, Evidence, inspection_check, residual_check
 from flightid.evidence.evidence import ALWAYS, NAMES
 from flightid.evidence.parameter_checks import declared_signs
 from flightid.evidence.spans import Span, judge_span
-from flightid.findings import Finding
+from flightid.findings import Finding, worst
 
 
 def _all_green() -> Evidence:
@@ -120,3 +123,44 @@ def test_a_loop_declared_to_the_fit_is_its_evidence() -> None:
         assert (check.what, check.light) == (f"loop {loop}, as declared", light)
     with pytest.raises(OptionError, match="loop is not known"):
         fid.identify(asked, record, loop="half")
+
+
+def test_nothing_that_is_computed_from_a_fit_is_greener_than_it(tmp_path: Path) -> None:
+    omega = np.geomspace(0.5, 20.0, 30)
+    truth = fid.load_model("rate_motor_lag").with_values({"Lp": -5.0})
+    data = fid.FrequencyResponse.from_values(
+        omega, truth.frequency_response(omega), inputs=truth.inputs, outputs=truth.outputs,
+        units=truth.units, random_error=np.full((1, 1, 30), 0.02))  # fmt: skip
+    fit = fid.identify(truth, data)
+    bad = Check("residuals", Light.RED, "the residuals are not white", "raise the order")
+    fit = replace(fit, evidence=fit.evidence.with_checks([bad]))
+    assert fit.evidence.band_rad_s == (0.5, 20.0)
+    stored = fid.load_model(fid.write_model(fit, tmp_path / "fit.toml"))
+    control, rate = truth.inputs[0], truth.outputs[0]
+    for source in (fit, stored):
+        closed = fid.close_loop(source, {control: {rate: 0.05}}, draws=0)
+        made = [
+            closed,
+            closed.margins()[control],
+            fid.margins(source),
+            fid.disk_margin(source),
+            fid.modes(source),
+            fid.handling_qualities(source, axes={}),
+            fid.lower_order(source, kind="roll"),
+        ]
+        for result in made:
+            assert worst(result.findings) is Light.RED, result
+            said = [f.message for f in result.findings if f.code == "source-evidence"]
+            assert len(said) == 1, result
+            assert "not white" in said[0]
+            assert "holds from 0.5 to 20 rad/s" in said[0]
+    beyond = fid.margins(fit, controller=10.0)
+    assert "crossover-outside-band" in {finding.code for finding in beyond.findings}
+
+
+def test_a_closed_loop_is_the_reason_before_the_tests_that_it_spoils() -> None:
+    loop = Check("loop", Light.AMBER, "loop closed", "use an instrument")
+    tests = Check("residuals", Light.RED, "they are not white", "raise the order")
+    verdict = _all_green().with_checks([loop, tests]).verdict
+    assert (verdict.light, verdict.action) == (Light.RED, "use an instrument")
+    assert verdict.message == "loop closed; they are not white"

@@ -21,6 +21,7 @@ from flightid.identification.prediction_error.roots import (
     fitted_roots,
 )
 from flightid.identification.subspace.roots import ALL, innovations_roots
+from flightid.identification.uncertain_of import source_findings
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.sampled.discrete_modes import AT_ORIGIN, NO_COUNTERPART
 from flightid.result import Result
@@ -229,7 +230,8 @@ def interpret(
         roots = innovations_roots(discrete, errors, direct=True)
     step = discrete.sample_time_s
     made = tuple(InterpretedRoot(root, _character(root, step), _decay(root)) for root in roots)
-    return Interpretation(discrete.name, step, _transfers(discrete), made, tuple(_judge(made)))
+    findings = (*_judge(made), *source_findings(source))
+    return Interpretation(discrete.name, step, _transfers(discrete), made, findings)
 
 
 def _transfers(model: PolynomialModel | InnovationsModel) -> dict[str, str]:

@@ -62,6 +62,8 @@ class Check:
         What was found, with numbers and units.
     action : str
         What to do about it; empty where nothing is to be done.
+    band_rad_s : tuple of float or None
+        Frequencies that it is about, rad/s.
 
     Example
     -------
@@ -73,6 +75,7 @@ class Check:
     light: Light
     what: str
     action: str = ""
+    band_rad_s: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.name not in NAMES:
@@ -84,14 +87,27 @@ class Check:
         code = "evidence-" + self.name.replace(" ", "-")
         return Finding(code, self.light, self.what, self.action)
 
-    def to_dict(self) -> dict[str, str]:
+    def to_dict(self) -> dict[str, object]:
         """Plain values."""
         return {
             "name": self.name,
             "light": str(self.light),
             "what": self.what,
             "action": self.action,
+            "band_rad_s": None if self.band_rad_s is None else list(self.band_rad_s),
         }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Check:
+        """A check from its plain values."""
+        band = values.get("band_rad_s")
+        return cls(
+            values["name"],
+            Light(values["light"]),
+            values["what"],
+            values.get("action", ""),
+            None if band is None else (float(band[0]), float(band[1])),
+        )
 
 
 @dataclass(frozen=True, repr=False)
@@ -134,6 +150,12 @@ class Evidence(Result, schema="flightid.evidence/1"):
         """The light of the result: everything that shows one shows this."""
         found = self._worst(self.findings)
         return Light.AMBER if found is Light.UNKNOWN else found
+
+    @property
+    def band_rad_s(self) -> tuple[float, float] | None:
+        """Frequencies that the inputs excited with coherence, rad/s: where a model is known."""
+        check = self.check(BAND)
+        return None if check is None else check.band_rad_s
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -218,12 +240,9 @@ class Evidence(Result, schema="flightid.evidence/1"):
             They are none, as in a file that was changed by hand.
         """
         try:
-            checks = tuple(
-                Check(item["name"], Light(item["light"]), item["what"], item.get("action", ""))
-                for item in values["checks"]
-            )
+            checks = tuple(map(Check.from_dict, values["checks"]))
             return cls(checks, tuple(values["required"]))
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
             raise DataError(
                 "these values are no evidence",
                 found=f"{type(error).__name__}: {error}"[:200],

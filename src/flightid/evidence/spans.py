@@ -87,11 +87,12 @@ def judge_span(spans: Sequence[Span]) -> Check:
     'amber'
     """
     narrow = min(spans, key=lambda span: span.ratio)
+    band = narrow.band_rad_s
     if narrow.ratio >= BAND_GOOD.value:
-        return Check(BAND, Light.GREEN, f"narrowest band: {narrow}")
+        return Check(BAND, Light.GREEN, f"narrowest band: {narrow}", band_rad_s=band)
     if narrow.ratio >= BAND_LEAST.value:
-        return Check(BAND, Light.AMBER, f"{narrow}: less than a decade", MORE)
-    return Check(BAND, Light.AMBER, f"{narrow}: too narrow for more than a gain", MORE)
+        return Check(BAND, Light.AMBER, f"{narrow}: less than a decade", MORE, band)
+    return Check(BAND, Light.AMBER, f"{narrow}: too narrow for more than a gain", MORE, band)
 
 
 def judge_coherence(spans: Sequence[Span]) -> Check:

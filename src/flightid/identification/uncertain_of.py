@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import OptionError
+from flightid.evidence import Evidence
+from flightid.findings import Finding
 from flightid.identification.fit import Fit, uncertain_model
 from flightid.models import Model, PolynomialModel
 from flightid.responses import FrequencyResponse
@@ -64,6 +66,47 @@ def uncertain_of(
     """
     if isinstance(source, Uncertain):
         return source
+    found, examined = _of_numbers(source, output, input), evidence_behind(source)
+    if examined is None:
+        return found
+    return replace(found, findings=source_findings(source), valid_rad_s=examined.band_rad_s)
+
+
+def source_findings(source: object) -> tuple[Finding, ...]:
+    """The light of the fit that something is computed from: no result is greener than its source.
+
+    Parameters
+    ----------
+    source : object
+        Fit, model from a fit's file, or what is `Uncertain` because they are; of anything else
+        nothing is known.
+    """
+    if isinstance(source, Uncertain):
+        return source.findings
+    examined = evidence_behind(source)
+    return () if examined is None else (_rests_on(examined),)
+
+
+def evidence_behind(source: object) -> Evidence | None:
+    """Evidence of a fit, or of the one that a model's file keeps; None where there is none."""
+    examined = getattr(source, "evidence", None)
+    known = getattr(source, "estimated", None)
+    if examined is None and known is not None and known.evidence:
+        examined = Evidence.from_dict(known.evidence)
+    return examined if isinstance(examined, Evidence) else None
+
+
+def _rests_on(examined: Evidence) -> Finding:
+    """The light of the fit that something is computed from, and where it holds."""
+    verdict, band = examined.verdict, examined.band_rad_s
+    where = "nothing tells in which band it holds"
+    if band is not None:
+        where = f"it holds from {band[0]:.3g} to {band[1]:.3g} rad/s"
+    text = f"rests on a fit that is {verdict.light}: {verdict.message}; {where}"
+    return Finding("source-evidence", verdict.light, text, verdict.action)
+
+
+def _of_numbers(source: object, output: str | None, input: str | None) -> Uncertain[Any]:
     if isinstance(source, Fit):
         return source.uncertain()
     known = getattr(source, "estimated", None)

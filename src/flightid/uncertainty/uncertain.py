@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Generic, TypeVar
 
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import OptionError
+from flightid.findings import Finding
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
@@ -46,6 +47,10 @@ class Uncertain(Generic[T]):
         What the numbers may be.
     reason : str
         Why there is no covariance; where there is one, what it leaves out.
+    findings : tuple of Finding
+        What is known of where it comes from; what is computed from it is no better.
+    valid_rad_s : tuple of float or None
+        Frequencies in which it is known, rad/s.
 
     Example
     -------
@@ -60,6 +65,8 @@ class Uncertain(Generic[T]):
     make: Callable[[Array], T]
     bounds: tuple[Array, Array] | None = None
     reason: str = ""
+    findings: tuple[Finding, ...] = ()
+    valid_rad_s: tuple[float, float] | None = None
 
     @classmethod
     def exact(cls, thing: T, reason: str = "") -> Uncertain[T]:
@@ -210,10 +217,12 @@ class Uncertain(Generic[T]):
         Julier & Uhlmann, *Proceedings of the IEEE* 92 (2004), eqs. 11–15, with the slopes alone.
         """
         values = np.atleast_1d(np.asarray(function(self.value), dtype=np.float64))
-        if not self.known:
-            return uncertain_numbers(values, None, self.reason)
-        slopes = self.slopes(function).reshape(-1, len(values))
-        return uncertain_numbers(values, slopes.T @ slopes)
+        covariance, reason = None, self.reason
+        if self.known:
+            slopes = self.slopes(function).reshape(-1, len(values))
+            covariance, reason = slopes.T @ slopes, ""
+        found = uncertain_numbers(values, covariance, reason)
+        return replace(found, findings=self.findings, valid_rad_s=self.valid_rad_s)
 
     def draws(self, count: int, seed: int = 0) -> list[T]:
         """Things drawn from the normal distribution of the estimate, inside the bounds.
@@ -258,6 +267,8 @@ class Uncertain(Generic[T]):
             lambda numbers: function(make(numbers)),
             self.bounds,
             self.reason,
+            self.findings,
+            self.valid_rad_s,
         )
 
 

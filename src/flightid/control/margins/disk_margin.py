@@ -203,7 +203,7 @@ def disk_margin(
         unstable_poles=unstable_poles,
     )
     omega, alphas, count = _over_frequency(loops, skew)
-    findings = _stability(count)
+    findings = [*_stability(count), *loops.uncertain.findings]
     if count > 0:
         none = {key: Estimate(name, None, unit, None, UNSTABLE) for key, name, unit in QUANTITIES}
         return DiskMargin(

@@ -197,6 +197,7 @@ def disturbance_rejection(
     level -= np.log(10.0) / 20.0 * DISTURBANCE_LEVEL_DB
     found = [*stability_findings(loop, metrics)]
     found += _guides(made, bandwidth_guide_rad_s, peak_guide_db)
+    found += loop.uncertain.findings
     if not loop.uncertain.known:
         found.append(
             Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loop.uncertain.reason}")

@@ -115,6 +115,7 @@ def margin_findings(
                     "excite that band better, or fit a model",
                 )
             )
+    found += source_findings(loop, made["crossover"])
     if not loop.uncertain.known:
         found.append(
             Finding("no-intervals", Light.UNKNOWN, f"no intervals: {loop.uncertain.reason}")
@@ -122,6 +123,23 @@ def margin_findings(
     if loop.measured:
         found.append(_verdict_of_band(loop))
     return tuple(found)
+
+
+def source_findings(loop: Loop, crossover: Reading) -> list[Finding]:
+    """What is known of where the loop comes from, and whether it is known where it crosses one."""
+    found, valid = list(loop.uncertain.findings), loop.uncertain.valid_rad_s
+    if valid is None or crossover.value is None or valid[0] <= crossover.value <= valid[1]:
+        return found
+    return [
+        *found,
+        Finding(
+            "crossover-outside-band",
+            Light.AMBER,
+            f"the crossover at {crossover.value:.3g} rad/s lies outside {valid[0]:.3g} to "
+            f"{valid[1]:.3g} rad/s, where the model is known",
+            "excite that band, or move the crossover into it",
+        ),
+    ]
 
 
 def _verdict_of_band(loop: Loop) -> Finding:

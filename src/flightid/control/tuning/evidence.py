@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.dynamics.continuous import to_continuous
 from flightid.errors import DataError, FlightidError
-from flightid.evidence import Evidence as GateEvidence
 from flightid.findings import Finding
-from flightid.identification.uncertain_of import uncertain_of
+from flightid.identification.uncertain_of import evidence_behind, uncertain_of
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.model import linear_system, model_of
@@ -164,11 +163,8 @@ def _listed(given: Verdicts | Iterable[Verdicts] | None) -> Sequence[Verdicts]:
 
 def _judged(source: object) -> tuple[Finding, ...]:
     """The light of a fit's evidence: red is refused, amber goes on with its gains."""
-    known = getattr(source, "estimated", None)
-    examined = getattr(source, "evidence", None)
-    if examined is None and known is not None and known.evidence:
-        examined = GateEvidence.from_dict(known.evidence)
-    if not isinstance(examined, GateEvidence):
+    examined = evidence_behind(source)
+    if examined is None:
         return ()
     verdict = examined.verdict
     if verdict.light is Light.RED:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -20,6 +20,7 @@ from flightid.dynamics.modes.result import Mode, Modes
 from flightid.errors import ModelError, OptionError
 from flightid.findings import Finding
 from flightid.identification import Fit
+from flightid.identification.uncertain_of import source_findings
 from flightid.models import StateSpaceModel, TransferFunctionModel
 from flightid.uncertainty.estimate import Estimate, Reading
 
@@ -110,6 +111,11 @@ def compare_conditions(sources: Mapping[str, object]) -> ConditionComparison:
         *_changes(numbers, significant),
         *_changes([n for mode in matched for n in mode.numbers], significant_modes),
         *_turned(conditions, matched),
+        *(
+            replace(finding, message=f"{name}: {finding.message}")
+            for name, source in sources.items()
+            for finding in source_findings(source)
+        ),
     ]
     return ConditionComparison(
         tuple(sources), numbers, tuple(matched), alone_parameters, alone, tuple(findings)

@@ -13,6 +13,7 @@ from flightid.dynamics.derivatives.nondimensional import FORCES, MOMENTS, Normal
 from flightid.errors import ModelError, UnitError
 from flightid.findings import Finding
 from flightid.identification import Fit
+from flightid.identification.uncertain_of import source_findings
 from flightid.models import StateSpaceModel
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
@@ -254,7 +255,8 @@ def derivatives(source: object, normalisation: Normalisation | None = None) -> D
     names = {each.name for each in found}
     others = tuple(name for name in model.parameters if name not in names)
     convention = "" if normalisation is None else normalisation.source
-    return DerivativeTable(model.name, tuple(found), others, convention)
+    known = source_findings(source)
+    return DerivativeTable(model.name, tuple(found), others, convention, known)
 
 
 def _found(

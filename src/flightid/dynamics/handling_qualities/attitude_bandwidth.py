@@ -10,7 +10,7 @@ from flightid.dynamics.handling_qualities.curve import Curve, Pair, smoother_of
 from flightid.dynamics.handling_qualities.result import AttitudeBandwidth
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
-from flightid.identification.uncertain_of import uncertain_of
+from flightid.identification.uncertain_of import source_findings, uncertain_of
 from flightid.responses import FrequencyResponse, PairResponse
 from flightid.uncertainty.uncertain import Uncertain, uncertain_numbers
 
@@ -126,7 +126,11 @@ def attitude_bandwidth(
         )
     errors = _errors(data, pair, values)
     nonlinear = _is_nonlinear(values)
-    findings = (*_judge(curve, values, nonlinear, response_type), *_coherence(data, pair, values))
+    findings = (
+        *_judge(curve, values, nonlinear, response_type),
+        *_coherence(data, pair, values),
+        *source_findings(data),
+    )
     return AttitudeBandwidth(outputs, inputs, response_type, errors, curve, nonlinear, findings)
 
 

@@ -23,6 +23,7 @@ from flightid.dynamics.modes.modes import modes
 from flightid.dynamics.modes.result import Modes
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.findings import Finding
+from flightid.identification.uncertain_of import source_findings
 from flightid.models.model import linear_system, model_of
 from flightid.responses import FrequencyResponse
 from flightid.result import Result
@@ -269,6 +270,7 @@ def handling_qualities(
     names = () if seen is None else (mode.name for mode in seen)
     findings += gaps(ratings, [*bandwidths, *names])
     findings += [finding for rating in ratings for finding in rating.findings]
+    findings += source_findings(source)
     return HandlingQualities(vehicle, conditions, bandwidths, seen, tuple(ratings), tuple(findings))
 
 
@@ -358,4 +360,9 @@ def _absent(code: str, text: str, action: str) -> Finding:
 
 
 def _prefixed(axis: str, findings: Sequence[Finding]) -> list[Finding]:
-    return [Finding(f.code, f.light, f"{axis}: {f.message}", f.action) for f in findings]
+    """Of one axis; what is known of the source is said once."""
+    return [
+        Finding(f.code, f.light, f"{axis}: {f.message}", f.action)
+        for f in findings
+        if f.code != "source-evidence"
+    ]

@@ -16,7 +16,7 @@ from flightid.dynamics.lower_order.structures import DELAY, GAIN, equivalent_mod
 from flightid.errors import DataError, FitError, OptionError, UnknownNameError
 from flightid.findings import Finding
 from flightid.identification import Fit, identify
-from flightid.identification.uncertain_of import uncertain_of
+from flightid.identification.uncertain_of import source_findings, uncertain_of
 from flightid.models import GreyBoxModel, LinearSystem, StateSpaceModel, TransferFunctionModel
 from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
@@ -131,7 +131,7 @@ def lower_order(
         airspeed_m_s,
         n_alpha,
     )
-    return replace(found, findings=_judge(found))
+    return replace(found, findings=(*_judge(found), *source_findings(source)))
 
 
 @dataclass(frozen=True)

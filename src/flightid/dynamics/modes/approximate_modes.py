@@ -16,6 +16,7 @@ from flightid.dynamics.modes.result import Mode, Modes
 from flightid.dynamics.modes.state_matrix import StateMatrix, read_states
 from flightid.errors import ModelError
 from flightid.findings import Finding
+from flightid.identification.uncertain_of import source_findings
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate, Reading
@@ -250,8 +251,9 @@ def approximate_modes(
         )
     full = modes(source, states=states)
     found = tuple(_approximate(read, rule, full) for rule in rules)
+    findings = (*_judge(found), *source_findings(source))
     fast = tuple(name for name in read.states if ALIASES.get(name, name) not in RIGID)
-    return ApproximateModes(read.name, chosen, found, full, fast, tuple(_judge(found)))
+    return ApproximateModes(read.name, chosen, found, full, fast, findings)
 
 
 def _flight(read: StateMatrix) -> str:

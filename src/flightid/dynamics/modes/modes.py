@@ -15,6 +15,7 @@ from flightid.dynamics.modes.participation import UNINVOLVED, Eigenpair, eigenpa
 from flightid.dynamics.modes.result import Mode, Modes, Participation
 from flightid.dynamics.modes.state_matrix import StateMatrix, read_states
 from flightid.findings import Finding
+from flightid.identification.uncertain_of import source_findings
 from flightid.models.sampled.discrete_modes import AT_ORIGIN, NO_COUNTERPART
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.roots import UNSIGNED, UncertainRoot
@@ -78,7 +79,7 @@ def modes(source: object, *, states: Mapping[str, str] | None = None) -> Modes:
         tuple(made),
         read.system.sample_time_s,
         read.reason,
-        tuple(_judge(made)),
+        (*_judge(made), *source_findings(source)),
     )
 
 

@@ -15,6 +15,7 @@ from flightid.dynamics.rotor.result import FULL, GIVEN, THEORY, RotorFact, Rotor
 from flightid.errors import ModelError, OptionError
 from flightid.findings import Finding
 from flightid.identification import Fit
+from flightid.identification.uncertain_of import source_findings
 from flightid.identification.uncertain_parameters import uncertain_parameters
 from flightid.models import StateSpaceModel
 from flightid.uncertainty.estimate import Estimate, Reading
@@ -123,7 +124,9 @@ def rotor_physics(
             needed=", ".join(fact.identified.name for fact in facts),
         )
     found = tuple(facts)
-    return RotorPhysics(model.name, rotor_speed_rad_s, found, tuple(_judge(found)))
+    return RotorPhysics(
+        model.name, rotor_speed_rad_s, found, (*_judge(found), *source_findings(source))
+    )
 
 
 @dataclass(frozen=True)
