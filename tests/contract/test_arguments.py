@@ -93,7 +93,7 @@ OWN = {
         "gyro_rate_hz integers loop_rate_hz named numerator parameters rate_rad_s rise_time_s "
         "setpoint_rad_s single_precision with_hold",
     ),
-    "control.closed_loop": ("signals of the loop", "actuator logged"),
+    "control.closed_loop": ("signals of the loop", "actuator logged outside"),
     "control.loops": (
         "numbers of one block of a diagram",
         "block blocks centre_rad_s computation_delay_s corner_rad_s delay_s denominator depth fast "
@@ -147,8 +147,8 @@ OWN = {
     ),
     "record": (
         "parts of a record and columns of a file",
-        "gaps history input_shape interpolation max_gap_s outliers record_column reference resample_to_s "
-        "role roles samples stamps start_s step stop_s time_column",
+        "gaps history input_shape interpolation max_gap_s outliers record_column reference "
+        "resample_to_s role roles samples stamps start_s step stop_s time_column",
     ),
     "responses": (
         "arrays of one response, and one pair in the order of its name, output/input",

@@ -181,8 +181,14 @@ def test_refuses_controllers_and_data_without_meaning() -> None:
     plant = vehicle()
     with pytest.raises(UnknownNameError, match="moves no input of the vehicle"):
         fid.close_loop(plant, {"lon": {"p": 1.0}})
+    with pytest.raises(UnknownNameError, match="'lat' reads no channel of the vehicle: found 'q'"):
+        fid.close_loop(plant, {"lat": {"p": 1.0, "q": 1.0}})
     with pytest.raises(UnknownNameError, match="reads nothing of the vehicle"):
-        fid.close_loop(plant, {"lat": {"q": 1.0}})
+        fid.close_loop(plant, {"lat": {"q": 1.0}}, outside=["q"])
+    with pytest.raises(UnknownNameError, match="moves no input of the vehicle: found 'pedal'"):
+        fid.close_loop(plant, {"lat": {"p": 1.0}, "pedal": {"r": 1.0}})
+    tracked = fid.close_loop(plant, {"lat": {"p": 1.0, "p_ref": -1.0}}, outside=["p_ref"])
+    assert "p_ref" in tracked.loops.inputs
     with pytest.raises(OptionError, match="number of draws"):
         fid.close_loop(plant, {"lat": {"p": 1.0}}, draws=-1)
     with pytest.raises(UnknownNameError, match="does not move this input"):

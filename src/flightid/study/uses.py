@@ -116,7 +116,14 @@ def _rotor(fits: Mapping[str, Fit], asked: RotorSettings) -> RotorPhysics:
 
 def _closed(fits: Mapping[str, Fit], loop: LoopSettings) -> ClosedLoop:
     fit = _fit(fits, loop.model)
-    return close_loop(fit, loop.gains, draws=loop.draws, seed=loop.seed, name=loop.name)
+    return close_loop(
+        fit,
+        loop.gains,
+        outside=loop.outside,
+        draws=loop.draws,
+        seed=loop.seed,
+        name=loop.name,
+    )
 
 
 def _exported(fits: Mapping[str, Fit], asked: ExportSettings, folder: Path) -> Exported:

@@ -67,6 +67,8 @@ class LoopSettings:
         Negative feedback by input and output.
     band_rad_s : tuple of float or None
         Where margins are looked for.
+    outside : tuple of str
+        Set-points that the gains read.
     draws, seed : int
         Vehicles drawn from the fit's uncertainty.
     """
@@ -75,6 +77,7 @@ class LoopSettings:
     model: str
     gains: Mapping[str, Mapping[str, float]]
     band_rad_s: tuple[float, float] | None = None
+    outside: tuple[str, ...] = ()
     draws: int = DRAWS
     seed: int = 0
 
@@ -173,6 +176,7 @@ def _loop(reader: TableReader) -> LoopSettings:
         reader.text("model"),
         by_input,
         reader.maybe(reader.interval, "band_rad_s"),
+        reader.names("outside", ()),
         reader.integer("draws", DRAWS, minimum=1),
         reader.integer("seed", 0),
     )

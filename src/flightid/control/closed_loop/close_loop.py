@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from flightid.control.closed_loop.controller_blocks import beside, controller_blocks, moved_by
+from flightid.control.closed_loop.controller_blocks import (
+    beside,
+    controller_blocks,
+    moved_by,
+    require_channels,
+)
 from flightid.control.closed_loop.result import ClosedLoop, ClosedPole
 from flightid.control.loops.block import Block, Equations
 from flightid.control.loops.connect import connect
@@ -30,6 +35,7 @@ def close_loop(
     source: object,
     controller: object,
     *,
+    outside: Sequence[str] = (),
     draws: int = DRAWS,
     seed: int = 0,
     name: str = "closed loop",
@@ -37,8 +43,9 @@ def close_loop(
     """Close a controller around a model, in series with what already moves its inputs.
 
     The controller reads the model's outputs by name; a model's input among its readings is the
-    stick, before the controller adds to it; any other name is a set-point from outside. What it
-    gives under the name of a model's input is added to that input: input ``lon`` becomes
+    stick, before the controller adds to it; any other name that a block reads is a set-point from
+    outside, and one that a mapping reads has to be declared in `outside`. What the controller gives
+    under the name of a model's input is added to that input: input ``lon`` becomes
     ``lon_total = lon + lon_controller``, and the loop is broken at ``lon_total``.
 
     Parameters
@@ -48,6 +55,8 @@ def close_loop(
     controller : mapping, Block, sequence of blocks, model, LinearSystem or Interconnection
         A mapping of gains by input and output, ``{"lon": {"q": 3.0}}``, is negative feedback:
         lon_controller = −3 q. Anything else adds what it gives, with its own signs.
+    outside : sequence of str
+        What a mapping reads that is no channel of the model: set-points.
     draws : int
         Vehicles drawn from the fit's uncertainty to be tried for stability.
     seed : int
@@ -61,7 +70,8 @@ def close_loop(
     Raises
     ------
     UnknownNameError
-        The controller gives nothing that the model takes, or reads nothing of it.
+        The controller gives nothing that the model takes, or reads nothing of it; a mapping names
+        what is neither a channel of the model nor declared in `outside`.
     ModelError, UnitError
         As `connect`.
     OptionError
@@ -94,6 +104,8 @@ def close_loop(
     vehicle = linear_system(model)
     # Telling whether a model is linear takes longer than everything else about it.
     linear = not isinstance(system(model).part, Equations)
+    if isinstance(controller, Mapping):
+        require_channels(controller, vehicle.inputs, vehicle.outputs, outside)
     around = controller_blocks(controller, vehicle.units)
     moved = tuple(moved_by(around, vehicle.inputs, vehicle.outputs))
 
@@ -106,7 +118,7 @@ def close_loop(
     poles, propagated = _poles(loops, estimate)
     tried = loops.draws(draws, seed) if draws and loops.known else []
     unstable = sum(unstable_count(each) > 0 for each in tried)
-    findings = _findings(estimate, len(tried), unstable)
+    findings = (*uncertain.findings, *_findings(estimate, len(tried), unstable))
     return ClosedLoop(
         name, estimate, moved, loops, poles, len(tried), unstable, findings,
         propagated.reason,

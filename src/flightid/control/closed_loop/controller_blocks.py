@@ -36,6 +36,36 @@ def _gains(name: str, row: Mapping[str, float], units: Mapping[str, str]) -> Blo
     return gain(tuple(row), name, [[-float(value) for value in row.values()]], units=known)
 
 
+def require_channels(
+    gains: Mapping[str, Mapping[str, float]],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    outside: Sequence[str],
+) -> None:
+    """Refuse gains of what is no channel: a misspelt name would be a set-point that stays at zero.
+
+    Raises
+    ------
+    UnknownNameError
+        A name that is neither a channel of the vehicle nor declared.
+    """
+    for name, row in gains.items():
+        if name not in inputs:
+            raise UnknownNameError(
+                "a gain moves no input of the vehicle",
+                found=repr(name),
+                needed=", ".join(inputs),
+            )
+        for read in row:
+            if read not in (*outputs, *inputs, *outside):
+                raise UnknownNameError(
+                    f"a gain of {name!r} reads no channel of the vehicle",
+                    found=repr(read),
+                    needed=", ".join((*outputs, *inputs)),
+                    action=f"correct the name; a set-point is declared: outside = [{read!r}]",
+                )
+
+
 def moved_by(blocks: Sequence[Block], inputs: Sequence[str], outputs: Sequence[str]) -> list[str]:
     """Inputs of the vehicle that a controller moves.
 
