@@ -15,11 +15,16 @@ from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.discrete_modes import polynomial_roots
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.quantiles import LEVEL, half_width
 
 CONVERGED = {"gradient", "step", "cost", "zero", "regression", "instruments", "kernel"}
 SAMPLES_PER_COEFFICIENT = 10
 AT_CIRCLE = 1e-4
 SAME_MINIMUM = 1e-4
+QUANTILE = half_width(LEVEL)
+HARDLY_SEEN = 0.5
+"""Largest share by which a pole and its zero may change the response anywhere and still be said to
+cancel; a pair that may change it by more was not shown to."""
 
 
 def judge_polynomial(
@@ -107,7 +112,12 @@ def _stability(structure: PolynomialStructure, model: PolynomialModel) -> list[F
 
 
 def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[Finding]:
-    """Pairs of pole and zero whose difference their joint error explains."""
+    """Pairs whose difference their joint error explains and that hardly change the response.
+
+    On the unit circle a pole p and a zero q multiply the response by (z - q)/(z - p) =
+    1 + (p - q)/(z - p), which is at most |p - q|/|1 - |p|| from one. That share has to be small up
+    to the end of the gap's interval: a zero that may lie anywhere cancels nothing.
+    """
     found = []
     covariance = model.covariance
     for pole in (root for root in roots if root.kind == POLE):
@@ -125,13 +135,15 @@ def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[F
             errors = rows @ covariance @ rows.T
             distance = np.array([gap.real, gap.imag][:n])
             statistic = float(distance @ np.linalg.pinv(errors) @ distance)
-            if statistic < chi2.ppf(0.95, n):
+            spread = QUANTILE * float(np.sqrt(np.max(np.linalg.eigvalsh(errors))))
+            seen = (abs(gap) + spread) / abs(1.0 - abs(pole.z))
+            if statistic < chi2.ppf(0.95, n) and seen < HARDLY_SEEN:
                 found.append(
                     Finding(
                         "pole-zero-cancellation",
                         Light.AMBER,
                         f"{pole.response}: pole {pole.z:.4g} and zero {zero.z:.4g} cancel within "
-                        "their errors",
+                        f"their errors and change the response by {100 * seen:.2g} % at most",
                         f"lower na or nf and nb by {n}: the data do not show this mode",
                     )
                 )
