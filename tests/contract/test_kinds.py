@@ -110,7 +110,7 @@ VERBS: dict[str, tuple[Callable[[Any, Path], object], tuple[str, ...]]] = {
     "write_model": (lambda it, path: fid.load_model(fid.write_model(it, path / "x.toml")), ()),
     "export toml": (lambda it, path: fid.export(it, path / "x.toml"), ()),
     "export mat": (lambda it, path: fid.export(it, path / "x.mat"), NARX),
-    "export c": (lambda it, path: fid.export(it, path / "x.c", sample_time_s=T_S), NARX),
+    "export c": (lambda it, path: fid.export(it, path / "x.c", sample_time_s=T_S), ()),
     "to_control": (lambda it, _: fid.to_control(it, pade_order=2), NARX),
 }
 

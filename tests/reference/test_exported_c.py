@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.errors import OptionError
+from flightid.models.narx.terms import KERNELS
 from tests.closeness import assert_close
 from tests.compiled_model import CompiledModel, needs_compiler
+from tests.narx_records import quadratic
 
 pytestmark = needs_compiler
 STEP_S = 0.0125
@@ -61,6 +64,20 @@ def test_nonlinear_equations_take_the_same_steps(name: str, hold: str, tmp_path:
     model = fid.load_model(name)
     assert not model.is_linear
     compare(model, tmp_path, hold, substeps=3)
+
+
+@pytest.mark.parametrize("kernel", [None, *KERNELS])
+def test_narx_models_are_the_sum_of_their_terms(kernel: str | None, tmp_path: Path) -> None:
+    flown = quadratic(300, noise=0.05)
+    degree = 2 if kernel is None else 1
+    structure = fid.NarxStructure(
+        ("u",), "y", 2, 3, kernel=kernel, width=4.0, degree=degree, maximum_terms=8
+    )
+    model = fid.identify(structure, flown).model
+    loud = flown.replace({"u": 7.0 + 3.0 * (flown["u"] - 7.0)})
+    compare(model, tmp_path, "zero", loud)
+    with pytest.raises(OptionError, match="sample time of its own"):
+        fid.export(model, tmp_path / "other.c", sample_time_s=0.1)
 
 
 EVERY_FORM = {

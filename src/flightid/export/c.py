@@ -8,8 +8,9 @@ from flightid.errors import ExportError, OptionError
 from flightid.export.c_source import CSource, Hold, equation_source, linear_source
 from flightid.export.exported import Exported
 from flightid.export.names import identifier
+from flightid.export.narx_source import narx_source
 from flightid.files import write_atomically
-from flightid.models import StateSpaceModel
+from flightid.models import NarxModel, StateSpaceModel
 from flightid.models.model import linear_system
 
 
@@ -63,8 +64,10 @@ def model_source(
         )
     if substeps is not None:
         raise OptionError(
-            "a linear model has no substeps: its discretisation is exact", found=substeps
+            "a linear or sampled model has no substeps: its steps are exact", found=substeps
         )
+    if isinstance(model, NarxModel):
+        return narx_source(model, name, stem, sample_time_s, hold)
     return linear_source(linear_system(model), name, stem, sample_time_s, hold)
 
 

@@ -110,7 +110,7 @@ def linear_source(
     ModelError
         A delay is too long.
     """
-    step_s = _step_of(system, sample_time_s)
+    step_s = step_of_samples(system.sample_time_s, sample_time_s)
     if hold == "first" and system.is_discrete:
         raise OptionError(
             "a discrete system takes its inputs at its samples alone", found="hold='first'"
@@ -121,7 +121,7 @@ def linear_source(
     _require_depth(depth)
     c = system.state_space()[2]
     states, inputs, outputs = _channels(system)
-    tables = _Tables(states, inputs, outputs, ())
+    tables = Tables(states, inputs, outputs, ())
     words = {
         "transition": transition.tolist(),
         "measure": c.tolist(),
@@ -134,7 +134,7 @@ def linear_source(
         "first_order": hold == "first",
     }
     kind = "as it is" if system.is_discrete else f"discretised exactly, {_HOLDS[hold]}"
-    return _rendered("linear.c.j2", name, stem, tables, step_s, hold, f"linear, {kind}", words)
+    return rendered("linear.c.j2", name, stem, tables, step_s, hold, f"linear, {kind}", words)
 
 
 def equation_source(
@@ -184,7 +184,7 @@ def equation_source(
         "first_order": hold == "first",
     }
     method = f"Runge-Kutta steps of fourth order, {count} in a sample, {_HOLDS[hold]}"
-    tables = _Tables(
+    tables = Tables(
         tuple(
             Entry(x, unit, 0.0 if model.is_linear else float(model.trim.get(x, 0.0)))
             for x, unit in model.states.items()
@@ -199,7 +199,7 @@ def equation_source(
             )
         ),
     )  # fmt: skip
-    return _rendered("equations.c.j2", name, stem, tables, step_s, hold, method, words)
+    return rendered("equations.c.j2", name, stem, tables, step_s, hold, method, words)
 
 
 _HOLDS = {
@@ -209,23 +209,26 @@ _HOLDS = {
 
 
 @dataclass(frozen=True)
-class _Tables:
+class Tables:
+    """Lines of the tables in the C source."""
+
     states: tuple[Entry, ...]
     inputs: tuple[Entry, ...]
     outputs: tuple[Entry, ...]
     parameters: tuple[Entry, ...]
 
 
-def _rendered(
+def rendered(
     template: str,
     name: str,
     stem: str,
-    tables: _Tables,
+    tables: Tables,
     sample_time_s: float,
     hold: Hold,
     method: str,
     words: Mapping[str, object],
 ) -> CSource:
+    """Header and source by a template, with names and tables in their places."""
     prefix = identifier(name)
     kinds = {"x": tables.states, "u": tables.inputs, "y": tables.outputs, "p": tables.parameters}
     texts = {
@@ -277,8 +280,8 @@ def _template(name: str) -> str:
     return (folder / name).read_text(encoding="utf-8")
 
 
-def _step_of(system: LinearSystem, sample_time_s: float | None) -> float:
-    own = system.sample_time_s
+def step_of_samples(own: float | None, sample_time_s: float | None) -> float:
+    """Time of one step, s: a discrete model's own, or what is given for a continuous one."""
     if own is None:
         return _positive(sample_time_s)
     if sample_time_s is not None and abs(sample_time_s / own - 1.0) > 1e-9:

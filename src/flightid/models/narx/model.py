@@ -174,13 +174,18 @@ class NarxModel(Tabled):
         values, _, _ = self._run(np.zeros(inputs.shape[1]), np.array(rows), 0)
         return np.asarray(values * scaling.deviation[self.output] + scaling.mean[self.output])[None]
 
+    @property
+    def guard(self) -> tuple[float, float]:
+        """Range in which a run is held, in deviations of the output about its mean."""
+        low, high = self.scaling.output_range
+        middle, half = 0.5 * (low + high), 0.5 * self.structure.guard * (high - low)
+        return middle - half, middle + half
+
     def _run(self, output: Array, inputs: Array, ahead: int) -> tuple[Array, int, int | None]:
         """Native run of scaled channels: values, samples that start it, where it was held."""
         structure = self.structure
         channels = (structure.output, *structure.inputs)
         places = {lag: place for place, lag in enumerate(structure.lags)}
-        low, high = self.scaling.output_range
-        middle, half = 0.5 * (low + high), 0.5 * structure.guard * (high - low)
         radial = [i for i, term in enumerate(self.terms) if term.centre]
         centres = [self.terms[i].centre for i in radial]
         return _native.run_narx(
@@ -192,7 +197,7 @@ class NarxModel(Tabled):
             np.array([self.weights[i] for i in radial], dtype=np.float64),
             structure.kernel or "gaussian",
             structure.beta,
-            (middle - half, middle + half),
+            self.guard,
             ahead,
         )
 
