@@ -19,7 +19,7 @@ RNG = np.random.default_rng(5)
 
 def _record(**known: object) -> fid.Record:
     time_s = np.arange(400) / 50
-    u = np.repeat(RNG.standard_normal(100), 4)
+    u = np.tile(np.repeat(RNG.standard_normal(25), 4), 4)
     arrays = {"inputs": {"u": u}, "outputs": {"y": np.convolve(u, [0.0, 0.5])[:400]}}
     return fid.Record.from_arrays(time_s, **arrays, **known)  # type: ignore[arg-type]
 
@@ -38,6 +38,16 @@ def test_a_file_without_them_takes_what_is_declared(tmp_path: Path) -> None:
     told = read_records(path, ["u"], ["y"], hold="zero", period_s=2.0)[0]
     assert plain.input_shape == InputShape()
     assert told.input_shape == InputShape("zero", 2.0)
+
+
+def test_a_declared_period_must_be_in_the_inputs() -> None:
+    assert _record(period_s=2.0).period_s == 2.0
+    with pytest.raises(DataError, match=r"do not repeat after the declared period: .* 0.7 s apart"):
+        _record(period_s=0.7)
+    with pytest.raises(DataError, match="do not repeat"):
+        _record().declare(period_s=3.0)
+    noisy = _record().replace({"u": _record()["u"] + 0.4 * RNG.standard_normal(400)})
+    assert noisy.declare(period_s=2.0).period_s == 2.0
 
 
 def test_a_declared_hold_must_not_contradict_the_file(tmp_path: Path) -> None:

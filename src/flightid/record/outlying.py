@@ -53,10 +53,10 @@ def bridge_outliers(
 
     Example
     -------
-    >>> stamps = np.arange(9.0)
+    >>> stamps = np.arange(10.0)
     >>> bridge_outliers("y", stamps, np.where(stamps == 4, 50.0, stamps), deviations=6.0,
     ...                 half_width=2)
-    (array([0., 1., 2., 3., 4., 5., 6., 7., 8.]), 1)
+    (array([0., 1., 2., 3., 4., 5., 6., 7., 8., 9.]), 1)
     """
     if not deviations > 0.0:
         raise OptionError("deviations is not positive", found=deviations, needed="above 0")

@@ -26,7 +26,7 @@ from flightid.record.rows import column_unit, manoeuvres, require_sensible_base,
 from flightid.record.stamps import GAP_FACTOR
 from flightid.record.store import RECORD_COLUMN, stored_records
 from flightid.record.timebase import to_uniform
-from flightid.record.validation import unknown_channel
+from flightid.record.validation import require_period, unknown_channel
 from flightid.table import Cell
 from flightid.units import canonical
 from flightid.version import VERSION
@@ -234,6 +234,8 @@ def _declared(record: Record, given: InputShape) -> Record:
             action="leave it out, or replace what the file says with Record.declare",
         )
     shape = known.with_known(given)
+    inputs = [record[name] for name in record.inputs]
+    require_period(inputs, record.sample_time_s, given.period_s)
     return record if shape == known else record.replace(input_shape=shape)
 
 

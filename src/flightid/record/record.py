@@ -20,6 +20,7 @@ from flightid.record.validation import (
     inside_span,
     labelled_variable,
     labelled_variables,
+    require_period,
     unknown_channel,
 )
 from flightid.result import Result
@@ -119,7 +120,9 @@ class Record(LabelledSamples, Result, schema="flightid.record/1"):
         variables = labelled_variables(groups, stamps, units or {}, notes or {}, trim or {})
         dataset = xr.Dataset(variables, coords={TIME: stamps})
         known = InputShape(hold, period_s, loop)
-        return cls(dataset, name=name, trim=trim, history=history, input_shape=known)
+        made = cls(dataset, name=name, trim=trim, history=history, input_shape=known)
+        require_period([made[name] for name in made.inputs], made.sample_time_s, period_s)
+        return made
 
     def replace(
         self,
@@ -185,6 +188,7 @@ class Record(LabelledSamples, Result, schema="flightid.record/1"):
     ) -> Record:
         """Copy that knows more of its inputs, see `InputShape`; what is left out stays."""
         shape = self._input_shape.with_known(InputShape(hold, period_s, loop))
+        require_period([self[name] for name in self.inputs], self._sample_time_s, period_s)
         return self.replace(step=Step("Record.declare", shape.to_dict()), input_shape=shape)
 
     def with_roles(self, **roles: Role | str) -> Record:

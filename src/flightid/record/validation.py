@@ -15,6 +15,10 @@ from flightid.record.channel import Channel
 from flightid.record.stamps import UNIFORM_TOLERANCE
 from flightid.units import DIMENSIONLESS
 
+REPEATING = 0.5
+"""Least correlation of inputs a declared period apart."""
+FEWEST_COMPARED = 8
+"""Samples beyond the first period below which a record tells nothing of it."""
 TIME = "time_s"
 """Name of the time dimension and coordinate of a record."""
 
@@ -107,6 +111,41 @@ def require_finite(name: str, samples: NDArray[np.float64]) -> None:
             found=f"{bad.size} of {samples.size}, the first at index {bad[0]}",
             needed="finite numbers",
             action="cut the segment, or fill gaps with a stated policy when resampling",
+        )
+
+
+def require_period(
+    inputs: Iterable[NDArray[np.float64]], sample_time_s: float, period_s: float | None
+) -> None:
+    """Refuse a declared period after which no input is like itself.
+
+    A half of the variance may differ: measured inputs carry noise. Records shorter than one and a
+    half periods tell nothing.
+
+    Raises
+    ------
+    DataError
+        The inputs a period apart are hardly correlated.
+
+    Example
+    -------
+    >>> u = np.sin(2 * np.pi * np.arange(300) / 100)
+    >>> require_period([u], 0.01, 1.0)
+    """
+    if period_s is None:
+        return
+    lag, alike = max(1, round(period_s / sample_time_s)), []
+    for samples in inputs:
+        compared, spread = samples.size - lag, float(np.var(samples))
+        if compared >= max(FEWEST_COMPARED, lag / 2) and spread > 0.0:
+            apart = float(np.mean((samples[lag:] - samples[:-lag]) ** 2))
+            alike.append(1.0 - apart / (2.0 * spread))
+    if alike and max(alike) < REPEATING:
+        raise DataError(
+            "the inputs do not repeat after the declared period",
+            found=f"correlation {max(alike):.2g} of inputs {period_s:g} s apart",
+            needed=f"at least {REPEATING:g}",
+            action="declare period_s as it was flown, or leave it out",
         )
 
 
