@@ -104,13 +104,21 @@ def _steps(make: Callable[..., Excitation], peak: float) -> Callable[[Request], 
 
 
 def _prbs(request: Request) -> Excitation:
+    """The longest sequence that fits the duration, on a clock that is fast enough for the band."""
     wanted_hz = request.band_rad_s[1] / (2 * math.pi * HALF_POWER)
-    held = max(1, math.floor(request.sample_rate_hz / wanted_hz))
-    clock_hz = request.sample_rate_hz / held
-    order = math.ceil(math.log2(request.duration_s * clock_hz + 1))
+    slowest = max(1, math.floor(request.sample_rate_hz / wanted_hz))
+    room = request.duration_s * request.sample_rate_hz * (1 + 1e-9)
+    lengths = {order: 2**order - 1 for order in range(LOWEST_ORDER, HIGHEST_ORDER + 1)}
+    fitting = {
+        order: min(slowest, math.floor(room / length))
+        for order, length in lengths.items()
+        if length <= room
+    } or {LOWEST_ORDER: 1}
+    # Of sequences of one duration the one of fewer, longer levels has more power in the band.
+    order = max(fitting, key=lambda each: (fitting[each] * lengths[each], fitting[each]))
     return prbs(
-        order=min(max(order, LOWEST_ORDER), HIGHEST_ORDER),
-        clock_hz=clock_hz,
+        order=order,
+        clock_hz=request.sample_rate_hz / fitting[order],
         amplitude=request.amplitude,
         sample_rate_hz=request.sample_rate_hz,
         names=request.names,
@@ -263,7 +271,9 @@ def _default_length(kind: str, band_rad_s: tuple[float, float], sample_rate_hz: 
             needed=f"at most {LONGEST_RECORD_S:g} s by default",
             action="raise the lowest frequency, or give duration_s",
         )
-    return math.ceil(length_s * sample_rate_hz) / sample_rate_hz
+    # The lengths of sequences double: the longest that fits twice the time is no shorter.
+    whole = math.ceil((2.0 if kind == "prbs" else 1.0) * length_s * sample_rate_hz)
+    return whole / sample_rate_hz
 
 
 def _largest_amplitude(unit_plan: Plan) -> float:
