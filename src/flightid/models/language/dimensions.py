@@ -6,11 +6,13 @@ not: an angle in degrees clashes with one in radians and may not stand inside a 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
+from itertools import combinations, product
 from typing import TYPE_CHECKING
 
 from flightid import _native
-from flightid.errors import ModelError
+from flightid.errors import ModelError, UnitError
 from flightid.units import canonical, exponents
 
 if TYPE_CHECKING:
@@ -61,7 +63,7 @@ def require_unit(
     if found is not None and not _same(found, wanted):
         raise ModelError(
             f"{subject} does not have its unit: {text!r}",
-            found=repr(_shown(found)),
+            found=repr(_in_words_of(found, (unit, *units.values()))),
             needed=repr(canonical(unit)),
             action="correct the units of the parameters, or the formula",
         )
@@ -118,7 +120,7 @@ def require_balance(
     if first is not None and second is not None and not _same(first, second):
         raise ModelError(
             f"{subject} has different units on its sides: {left} = {right}",
-            found=f"{_shown(first)!r} = {_shown(second)!r}",
+            found=" = ".join(repr(_in_words_of(side, units.values())) for side in (first, second)),
             needed="the same unit on both sides",
             action="correct the units of the parameters, or the equation",
         )
@@ -226,6 +228,44 @@ def _product(first: Powers, second: Powers, sign: float) -> Powers:
 
 def _same(first: Powers, second: Powers) -> bool:
     return not _product(first, second, -1.0)
+
+
+def _in_words_of(powers: Powers, units: Iterable[str]) -> str:
+    """A unit as a product of powers of the units that a model speaks of, such as volt.
+
+    Example
+    -------
+    >>> _in_words_of({**{n: 2 * p for n, p in exponents("V").items()}, "second": -8.0}, ["V", "s"])
+    'V^2/s^2'
+    """
+    if len(powers) < 2:
+        return _shown(powers)
+    atoms = _atoms(units)
+    for count in (1, 2):
+        for chosen in combinations(atoms, count):
+            for given in product((1, -1, 2, -2, 3, -3), repeat=count):
+                rest = powers
+                for atom, power in zip(chosen, given, strict=True):
+                    rest = _product(rest, _scaled(atoms[atom], power), -1.0)
+                if set(rest) <= {"second"}:
+                    left = dict(zip(chosen, map(float, given), strict=True))
+                    seconds = rest.get("second", 0.0)
+                    return _shown({**left, **({"second": seconds} if seconds else {})})
+    return _shown(powers)
+
+
+def _atoms(units: Iterable[str]) -> dict[str, Powers]:
+    """Names of units that are more than a base unit, such as volt, with their powers."""
+    found: dict[str, Powers] = {}
+    for unit in units:
+        for name in re.findall(r"[A-Za-z]+", canonical(unit)):
+            try:
+                powers = exponents(name)
+            except UnitError:
+                continue
+            if len(powers) > 1:
+                found[name] = powers
+    return found
 
 
 def _shown(powers: Powers) -> str:
