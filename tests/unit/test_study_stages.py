@@ -10,6 +10,7 @@ import pytest
 
 import flightid as fid
 from flightid.study.stage_runner import digest
+from flightid.study.stages import compare_free_run
 from tests.unit.test_study_records import OWN, rig
 
 STUDY = """
@@ -154,3 +155,23 @@ def test_digests_tell_all_that_differs() -> None:
     assert len({digest(value) for value in values}) == len(values)
     with pytest.raises(TypeError, match="no stage can depend on a object"):
         digest(object())
+
+
+def test_a_rival_that_cannot_answer_stands_aside(folder: Path, cache: dict[str, Any]) -> None:
+    made = run(folder, STUDY.replace('name = "Black"\n', 'name = "Black"\nrivals = "Lag"\n'), cache)
+    found = made.identified[1].verifications
+    assert isinstance(found["unseen"], fid.Comparison)
+    ahead = found["unseen, 1 ahead"]
+    aside = [f for f in ahead.findings if f.code == "rival-without-answer"]
+    assert [f.message.split(":")[0] for f in aside] == ["Lag was not compared"]
+    assert "between samples" not in found["unseen"].first.protocol
+    assert "between samples" in found["unseen"].verifications["Lag"].protocol
+
+
+def test_what_settles_a_verification_is_not_asked_of_the_records_of_the_fit(
+    folder: Path, cache: dict[str, Any]
+) -> None:
+    fit = run(folder, STUDY, cache).identified[1].fit
+    assert fit is not None
+    spectra = compare_free_run(fit, [fit.records[0].measured], {"settle_s": 1e3})
+    assert spectra is not None

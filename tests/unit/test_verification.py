@@ -122,9 +122,13 @@ def test_lights_follow_the_guides() -> None:
     assert by_code["verification-theil"] is Light.RED
     by_code = {each.code: each.light for each in fid.verify(wrong, record).findings}
     assert by_code["verification-theil"] is Light.RED
+    assert "verification-j-rms" not in by_code, "an angle of a rig is none of the guide's business"
+    both = LinearSystem([[-2.0]], [[3.0]], [[1.0], [0.5]], [[0.0], [0.0]], ("u",), ("p", "w"))
+    flown = fid.simulate(both, record.select(["u"]), units={"p": "deg/s", "w": "ft/s"})
+    by_code = {each.code: each.light for each in fid.verify(both, flown).findings}
     assert by_code["verification-j-rms"] is Light.GREEN
-    loud = record.replace({"p": 10 * record["p"]})
-    by_code = {each.code: each.light for each in fid.verify(LAG, loud).findings}
+    loud = flown.replace({"p": 10 * flown["p"]})
+    by_code = {each.code: each.light for each in fid.verify(both, loud).findings}
     assert by_code["verification-j-rms"] is Light.AMBER
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flightid.conventions import Light
-from flightid.errors import DataError
+from flightid.errors import DataError, FlightidError
 from flightid.findings import Finding
 from flightid.identification import Fit, Reduction, identify, reduce
 from flightid.identification.prediction.predict import output_names
@@ -224,21 +224,50 @@ def check(
 ) -> Verification | Comparison:
     """Predict records that the fit has not seen, beside the rivals where there are any."""
     baseline = baseline_of(fitted)
-    beside = {**({} if baseline is None else {BASELINE: baseline}), **rivals}
+    beside: dict[str, object] = {} if baseline is None else {BASELINE: baseline}
+    beside |= rivals
     held = [output for output in outputs if all(output in record for record in records)]
-    if not beside:
-        return verify(fitted, records, outputs=held, horizon=horizon, **options)
-    shared = [
-        output for output in held if all(output in output_names(each) for each in beside.values())
-    ]
-    return verify(
-        [fitted, *beside.values()],
-        records,
-        names=[name, *beside],
-        outputs=shared or held,
-        horizon=horizon,
-        **options,
-    )
+    asked = {**options, "horizon": horizon}
+    try:
+        return _beside(name, fitted, beside, records, held, asked)
+    except FlightidError:
+        able, aside = _able(beside, records, held, asked)
+        if not aside:
+            raise
+    made = _beside(name, fitted, able, records, held, asked)
+    return replace(made, findings=(*made.findings, *aside))
+
+
+def _able(
+    rivals: Mapping[str, object], records: Group, held: Sequence[str], asked: Mapping[str, Any]
+) -> tuple[dict[str, object], list[Finding]]:
+    """Rivals that can answer, and for each other one the reason: it does not end the study."""
+    able, aside = dict(rivals), []
+    for name, rival in rivals.items():
+        try:
+            _beside(name, rival, {}, records, held, asked)
+        except FlightidError as error:
+            del able[name]
+            said = f"{name} was not compared: {error}"
+            aside.append(Finding("rival-without-answer", Light.UNKNOWN, said))
+    return able, aside
+
+
+def _beside(
+    name: str,
+    model: object,
+    rivals: Mapping[str, object],
+    records: Group,
+    held: Sequence[str],
+    asked: Mapping[str, Any],
+) -> Verification | Comparison:
+    """A model on records, beside rivals where there are any, on the outputs that all have."""
+    everyone = [model, *rivals.values()]
+    shared = [each for each in held if all(each in output_names(one) for one in everyone)]
+    if not rivals:
+        return verify(model, records, outputs=shared or held, **asked)
+    names = [name, *rivals]
+    return verify(everyone, records, names=names, outputs=shared or held, **asked)
 
 
 def judge_reduction(
@@ -271,7 +300,11 @@ def examine_residuals(fitted: Fit) -> ResidualTests | None:
 
 
 def compare_free_run(fitted: Fit, records: Group, options: Mapping[str, Any]) -> SpectrumComparison:
-    """The spectrum of a free run through the first record beside the measured one."""
+    """The spectrum of a free run through the first record beside the measured one.
+
+    The stretch that settles a verification belongs to its own records, not to those of the fit.
+    """
+    options = {name: value for name, value in options.items() if name != "settle_s"}
     record = records[0]
     held = [output for output in fitted.model.outputs if output in record]
     seen = narrowed(record, fitted.model.inputs, held)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,6 +25,21 @@ def guide_weights(record: Record, outputs: tuple[str, ...]) -> NDArray[np.float6
             factor = 1.0 / spread if spread > 0 else 1.0
         weights.append(factor**2)
     return np.array(weights)
+
+
+def is_vehicle(units: Sequence[str]) -> bool:
+    """Whether outputs are of the kinds that the guide of J_rms was made from.
+
+    It speaks of aircraft, whose angles and rates stand beside speeds and accelerations. An angle of
+    a rig that moves by a radian is none of its business.
+
+    Example
+    -------
+    >>> is_vehicle(["deg/s", "ft/s^2"]), is_vehicle(["rad"])
+    (True, False)
+    """
+    turning = [unit in ANGULAR for unit in units]
+    return any(turning) and not all(turning)
 
 
 def guide_factor(unit: str) -> float | None:

@@ -8,7 +8,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.prediction.result import Prediction
-from flightid.identification.prediction.weights import guide_factor, guide_weights
+from flightid.identification.prediction.weights import guide_factor, guide_weights, is_vehicle
 from flightid.simulation import metrics
 from flightid.validation.verification.muad import Mismatch
 from flightid.validation.verification.result import Verification
@@ -54,7 +54,8 @@ def judge(
     # One number for all outputs, each counted in the guide's units: the verdict of the reference.
     error, seen, said = np.sqrt(guide_weights(first, compared) @ np.array(power))
     overall = float(error / (seen + said))
-    verdicts = _findings(overall, numbers["theil"], j_rms, predictions)
+    guided = j_rms if is_vehicle([first.unit(name) for name in compared]) else None
+    verdicts = _findings(overall, numbers["theil"], guided, predictions)
     return Verification(
         outputs=compared,
         predictions=predictions,

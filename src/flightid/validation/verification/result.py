@@ -39,8 +39,8 @@ class Verification(Result, schema="flightid.verification/1"):
         Where the runs started, in words.
     state_bias, output_bias : bool
         Which constants were solved for.
-    hold : {"zero", "first", "band_limited"}
-        What inputs do between samples.
+    hold : {"zero", "first", "band_limited"} or None
+        What inputs do between samples; None of models that know samples alone.
     mismatch : Mismatch or None
         The model's frequency response against a measured one, where one was given.
     findings : tuple of Finding
@@ -71,7 +71,7 @@ class Verification(Result, schema="flightid.verification/1"):
     initial_state: str
     state_bias: bool
     output_bias: bool
-    hold: InputHold
+    hold: InputHold | None
     mismatch: Mismatch | None = None
     findings: tuple[Finding, ...] = ()
 
@@ -104,10 +104,9 @@ class Verification(Result, schema="flightid.verification/1"):
         over = (
             "after the first stretch, which no score counts," if left else "over the whole record"
         )
-        between = BETWEEN[self.hold]
+        between = "" if self.hold is None else f" ({BETWEEN[self.hold]} between samples)"
         return (
-            f"Free run {over} on measured inputs alone ({between} between samples), from "
-            f"{self.initial_state}{shifts}."
+            f"Free run {over} on measured inputs alone{between}, from {self.initial_state}{shifts}."
         )
 
     def summary(self) -> Table:

@@ -195,7 +195,8 @@ def verify(
         beside = baseline_findings(each, made, request)
         said = held.findings if way is predict_continuous else ()
         said = (*said, *_at_mean(each, flown))
-        results.append(replace(judged, findings=(*judged.findings, *beside, *said)))
+        between = judged.hold if way is predict_continuous else None
+        results.append(replace(judged, hold=between, findings=(*judged.findings, *beside, *said)))
     if not isinstance(source, list | tuple):
         return results[0]
     return compared(dict(zip(_names(several, names), results, strict=True)))
