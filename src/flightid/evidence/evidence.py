@@ -222,7 +222,7 @@ class Evidence(Result, schema="flightid.evidence/1"):
                 rows.append((name, str(check.light), check.what, check.action or None))
             elif name in self.missing:
                 rows.append((name, "not examined", *_ABSENT[name]))
-        return Table(repr(self), columns, tuple(rows))
+        return Table(f"What was examined: {self.light}", columns, tuple(rows))
 
     def _computed(self) -> dict[str, object]:
         return {

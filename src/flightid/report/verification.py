@@ -61,10 +61,18 @@ def _first(result: Verification | Comparison) -> Verification:
 def _picture(result: Verification | Comparison, record: int) -> Figure:
     name = _first(result).predictions[record].measured.name
     if isinstance(result, Comparison):
-        shown = f"{name}: measured, and predicted by each model from the inputs alone."
+        shown = f"{name}: measured, and predicted by each model{_from(result.first)}."
         return figure_block(comparison(result, record), shown)
-    shown = f"{name}: measured, and predicted from the inputs alone."
+    shown = f"{name}: measured, and predicted{_from(result)}."
     return figure_block(prediction(result.predictions[record]), shown)
+
+
+def _from(verification: Verification) -> str:
+    """What the predictions know."""
+    steps = verification.horizon
+    if not isinstance(steps, int):
+        return " from the inputs alone"
+    return f" {steps} sample{'' if steps == 1 else 's'} ahead from the measured past"
 
 
 def _envelopes(result: Verification | Comparison) -> tuple[Block, ...]:

@@ -62,7 +62,10 @@ def _first(item: Identified, truth: Truth | None) -> Iterator[Block]:
         yield Lights(item.left_out)
         return
     if isinstance(fit.details, PolynomialDetails):
-        yield figure_block(pole_zero(fit), "Poles and zeros with 95 % ellipses.")
+        yield figure_block(
+            pole_zero(fit),
+            "Poles and zeros in the z plane; 95 % ellipses may be smaller than a mark.",
+        )
     elif fit.responses:
         yield from response_figures(item, truth)
     elif item.settings.structure is None:

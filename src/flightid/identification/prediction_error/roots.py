@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.sampled.discrete_modes import discrete_modes, zero_note
+from flightid.responses.pair import quotient_unit
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.roots import UncertainRoot
 
@@ -243,7 +244,7 @@ def fitted_gains(model: PolynomialModel, degrees: float) -> dict[str, Estimate]:
         gradient[places["a", 0]] = -value / a
         gradient[places["f", i]] = -value / f
         units = (model.units.get(model.output, "1"), model.units.get(name, "1"))
-        unit = units[0] if units[1] == "1" else f"{units[0]}/({units[1]})"
+        unit = quotient_unit(*units)
         errors = Errors(model.sample_time_s, model.covariance, degrees)
         found[response] = propagated(f"gain {response}", unit, value, gradient, errors)
     return found

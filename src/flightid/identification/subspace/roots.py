@@ -20,6 +20,7 @@ from flightid.identification.prediction_error.roots import (
 )
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.sampled.discrete_modes import discrete_modes
+from flightid.responses.pair import quotient_unit
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
@@ -71,7 +72,7 @@ def innovations_gains(
             left, right = np.linalg.solve(rest.T, c[i]), np.linalg.solve(rest, b[:, j])
             gradient = _entries(model, i, j, left, right, 1.0, 1.0, direct=direct).real
             units = (model.units.get(output, "1"), model.units.get(name, "1"))
-            unit = units[0] if units[1] == "1" else f"{units[0]}/({units[1]})"
+            unit = quotient_unit(*units)
             key = f"{output}/{name}"
             found[key] = propagated(f"gain {key}", unit, value, gradient, errors)
     return found

@@ -72,6 +72,7 @@ class TransferFunction:
         """Formula on one line."""
         above = " * ".join([self.gain, *(f"({factor})" for factor in self.numerator)])
         below = " ".join(f"({factor})" for factor in self.denominator)
+        below = f"({below})" if len(self.denominator) > 1 else below
         delay = "" if self.delay == "0" else f" * exp(-({self.delay}) s)"
         return f"{self.name} = {above}" + (f" / {below}" if below else "") + delay
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.uncertainty.residual_correlation import LEVEL
@@ -62,12 +64,19 @@ def _failure(test: CorrelationTest, n_tests: int) -> Finding:
     sure = p_value * n_tests < 1.0 - LEVEL
     chance = "" if sure else f"; among {n_tests} tests chance alone may do that"
     message = (
-        f"{test.name} fails: p = {p_value:.2g}, {test.exceedances} lags outside where "
-        f"{test.exceedance_limit} are allowed, largest {test.largest:.3f} against "
-        f"{test.simultaneous_band:.3f}{chance}"
+        f"{', '.join([f'{test.name} fails: p = {p_value:.2g}', *_limits_missed(test)])}{chance}"
     )
     action = _FEEDBACK if _leads(test) else _ACTIONS[test.kind]
     return Finding(_CODES[test.kind], Light.RED if sure else Light.AMBER, message, action)
+
+
+def _limits_missed(test: CorrelationTest) -> Iterator[str]:
+    outside, allowed = test.exceedances, test.exceedance_limit
+    if outside is not None and allowed is not None and outside > allowed:
+        yield f"{outside} lags outside where {allowed} are allowed"
+    largest, band = test.largest, test.simultaneous_band
+    if largest is not None and band is not None and abs(largest) > band:
+        yield f"largest {largest:.3f}, beyond {band:.3f}"
 
 
 def _leads(test: CorrelationTest) -> bool:

@@ -117,7 +117,7 @@ class ResidualTests(Result, schema="flightid.residual_tests/1"):
                 item.output,
                 item.input,
                 str(item.verdict),
-                item.counts,
+                item.counts and item.verdict is not Verdict.NOT_TESTABLE,
                 item.p_value,
                 item.degrees_of_freedom,
                 item.exceedances,
