@@ -93,7 +93,7 @@ def test_options_of_c_are_checked(tmp_path: Path) -> None:
         fid.export(roll, path, sample_time_s=-1.0)
     with pytest.raises(OptionError, match="hold is not known"):
         fid.export(roll, path, sample_time_s=0.1, hold="second")
-    with pytest.raises(OptionError, match="discretisation is exact"):
+    with pytest.raises(OptionError, match="its steps are exact"):
         fid.export(roll, path, sample_time_s=0.1, substeps=2)
     with pytest.raises(ExportError, match="no parameters that code could change"):
         fid.export(roll, path, sample_time_s=0.1, tunable=True)

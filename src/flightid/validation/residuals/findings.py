@@ -63,9 +63,8 @@ def _failure(test: CorrelationTest, n_tests: int) -> Finding:
     p_value = test.p_value or 0.0
     sure = p_value * n_tests < 1.0 - LEVEL
     chance = "" if sure else f"; among {n_tests} tests chance alone may do that"
-    message = (
-        f"{', '.join([f'{test.name} fails: p = {p_value:.2g}', *_limits_missed(test)])}{chance}"
-    )
+    parts = [f"{test.name} fails: p = {p_value:.2g}", *_limits_missed(test)]
+    message = ", ".join(parts) + chance
     action = _FEEDBACK if _leads(test) else _ACTIONS[test.kind]
     return Finding(_CODES[test.kind], Light.RED if sure else Light.AMBER, message, action)
 
