@@ -188,7 +188,7 @@ GROUPS = {
         "export.md",
         (
             "export",
-            "Exported",
+            "ExportFiles",
             "write_system",
             "read_system",
             "to_continuous",

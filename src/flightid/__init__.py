@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from flightid.dynamics.rotor.rotor_physics import rotor_physics
     from flightid.errors import FlightidError
     from flightid.evidence import Check, Evidence, FeedbackTest, feedback_test
-    from flightid.export import Exported
+    from flightid.export import ExportFiles
     from flightid.export.to_file import export
     from flightid.findings import Finding
     from flightid.identification import (
@@ -225,7 +225,7 @@ _HOMES = {
     "Evidence": "flightid.evidence",
     "FeedbackTest": "flightid.evidence",
     "feedback_test": "flightid.evidence",
-    "Exported": "flightid.export",
+    "ExportFiles": "flightid.export",
     "Noise": "flightid.simulation.noise",
     "export": "flightid.export.to_file",
     "library_names": "flightid.models",
@@ -259,7 +259,7 @@ __all__ = [
     "DisturbanceRejection",
     "Estimate",
     "Evidence",
-    "Exported",
+    "ExportFiles",
     "FeedbackTest",
     "Finding",
     "Fit",

@@ -25,12 +25,12 @@ ABSENT = "absent"
 """Key that says why a value of `to_dict` is None, by the way to it."""
 
 
-class Tabled(ABC):
+class TableView(ABC):
     """Anything that shows itself as tables: on a terminal by `summary`, in a notebook as HTML.
 
     Example
     -------
-    >>> class Gain(Tabled):
+    >>> class Gain(TableView):
     ...     def summary(self) -> Table:
     ...         return Table("Gain", (), ())
     >>> Gain()._repr_html_().startswith("<table>")
@@ -49,7 +49,7 @@ class Tabled(ABC):
         return "".join(table._repr_html_() for table in self._tables())
 
 
-class Result(Tabled):
+class Result(TableView):
     """Base of every result; a class says its schema, and which fields it does not tell.
 
     ``class Found(Result, schema="flightid.found/1", untold={"record": "raw samples"})``.

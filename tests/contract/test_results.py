@@ -12,7 +12,7 @@ import pytest
 import flightid as fid
 from flightid.errors import OptionError
 from flightid.plot.pictures import PICTURES
-from flightid.result import Result, Tabled
+from flightid.result import Result, TableView
 from flightid.table import Table
 from tests.contract.source import PACKAGE, python_files, tree
 
@@ -23,7 +23,7 @@ WITHOUT_PICTURE = {
     "ConditionComparison": "ratios in a table; `pole_map` draws several conditions",
     "DerivativeTable": "a table",
     "Evidence": "lights with reasons",
-    "Exported": "files",
+    "ExportFiles": "files",
     "Flight": "a simulated log, drawn from its records",
     "FlownSession": "its record draws itself",
     "Inspection": "tables and lights",
@@ -82,7 +82,7 @@ def test_what_shows_itself_as_a_table_is_a_result_or_a_model() -> None:
     items = [getattr(fid, name) for name in fid.__all__]
     shown = [item for item in items if isinstance(item, type) and hasattr(item, "summary")]
     assert len(shown) > 30
-    assert not [item.__name__ for item in shown if not issubclass(item, Tabled)]
+    assert not [item.__name__ for item in shown if not issubclass(item, TableView)]
 
 
 def test_html_is_made_in_one_place() -> None:

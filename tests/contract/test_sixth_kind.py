@@ -22,7 +22,7 @@ from flightid.identification.black_box import (
 )
 from flightid.identification.details import Details
 from flightid.identification.local_minimum import LocalMinimum
-from flightid.models import Estimated, LinearSystem, Model
+from flightid.models import EstimateProvenance, LinearSystem, Model
 from flightid.models.kinds import KINDS, Kind
 from flightid.models.sampled.coefficients import coefficients
 from flightid.uncertainty.estimate import Estimate
@@ -46,7 +46,7 @@ class LeakModel:
     leak: float
     units: Mapping[str, str] = field(default_factory=dict)
     name: str = "leak"
-    estimated: Estimated | None = None
+    estimated: EstimateProvenance | None = None
 
     @property
     def parameters(self):

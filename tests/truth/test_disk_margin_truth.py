@@ -16,7 +16,7 @@ from flightid.control.margins.disk_margin import alphas_of
 from flightid.control.margins.matrix_loop import read_loops, uncertain_at
 from flightid.control.margins.structured_gain import structured_gain
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
-from flightid.responses.errors.random_error import Known
+from flightid.responses.errors.random_error import StoredCovariance
 from tests.closeness import assert_close
 
 
@@ -258,7 +258,7 @@ def test_two_measured_loops_have_intervals_that_draws_confirm():
     # The same errors, told as a covariance that knows one output at a time.
     spread = np.abs(exact).reshape(2, -1) * error
     matrix = np.array([np.diag(np.tile(each, 2) ** 2) for each in spread])
-    told = replace(seen(exact), errors=Known(matrix, 25))
+    told = replace(seen(exact), errors=StoredCovariance(matrix, 25))
     other = fid.disk_margin(told, controller=law)
     assert_close(np.ptp(other.alpha.interval95) / 2, half, rtol=1e-6, why="one covariance")
     nothing = fid.FrequencyResponse.from_values(

@@ -7,7 +7,7 @@ import pytest
 
 import flightid as fid
 from flightid.identification.frequency_domain.selection import coherence_weight
-from flightid.responses.errors.random_error import Known
+from flightid.responses.errors.random_error import StoredCovariance
 from flightid.uncertainty import (
     correlation,
     cramer_rao,
@@ -27,9 +27,9 @@ TRUTH = {
 OMEGA = np.geomspace(0.5, 60.0, 120)
 
 
-def known_errors(matrix: np.ndarray) -> Known:
+def known_errors(matrix: np.ndarray) -> StoredCovariance:
     """Errors with a given covariance of the stacked real and imaginary parts."""
-    return Known(matrix[None], len(matrix) // 2)
+    return StoredCovariance(matrix[None], len(matrix) // 2)
 
 
 def measured(
@@ -38,7 +38,7 @@ def measured(
     *,
     change: np.ndarray | float = 0.0,
     coherence: float = 1.0,
-    errors: Known | None = None,
+    errors: StoredCovariance | None = None,
     random_error: float = 0.0,
 ) -> fid.FrequencyResponse:
     values = model.frequency_response(omega) + change

@@ -10,7 +10,7 @@ from scipy import signal
 
 import flightid as fid
 from flightid.identification.uncertain_of import uncertain_of
-from flightid.responses.errors.random_error import Known
+from flightid.responses.errors.random_error import StoredCovariance
 from tests.closeness import assert_close
 
 STEP_S = 0.02
@@ -74,7 +74,7 @@ def estimated(record, **options):
     """The response of a flight, its covariance worked out once for all that is asked of it."""
     response = fid.estimate_response(record, omega_rad_s=OMEGA, **options)
     covariance = response.covariance_at(OMEGA)
-    return replace(response, errors=Known(covariance, len(OMEGA)))
+    return replace(response, errors=StoredCovariance(covariance, len(OMEGA)))
 
 
 def covered(found, truth, names, hits):

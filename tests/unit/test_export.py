@@ -30,7 +30,7 @@ def test_formats_that_are_read_again(suffix: str, tmp_path: Path) -> None:
     read = fid.load_model if suffix == "toml" else fid.read_system
     back = read(made.files[0]).linear_system()
     assert np.array_equal(back.a, ARMAX.linear_system().a)
-    assert repr(made) == f"Exported({suffix}: model.{suffix})"
+    assert repr(made) == f"ExportFiles({suffix}: model.{suffix})"
     assert "model." in str(made.summary())
     assert made.to_dict()["schema"] == "flightid.exported/1"
 

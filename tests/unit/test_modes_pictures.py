@@ -11,7 +11,7 @@ from flightid.report.content import Document, Figure, Lights, TableBlock
 from flightid.report.html import to_html
 from flightid.report.modes import modes_blocks, physics_blocks
 from flightid.study.fit_settings import FitSettings, VerifySettings
-from flightid.study.identified import Fitted, Identified
+from flightid.study.identified import ModelFits, ModelResults
 from flightid.study.model_section import model_section
 from flightid.study.model_settings import ModelSettings
 from flightid.study.response_settings import ResponseSettings
@@ -106,8 +106,8 @@ def test_studies_show_modes_of_state_space_fits(
     settings = ModelSettings(
         name, name, None, (), (), None, ResponseSettings(), FitSettings(), VerifySettings()
     )
-    fitted = Fitted({"composite": fid.identify(truth, data)})
-    item = Identified(settings, {"composite": data}, fitted=fitted)
+    fitted = ModelFits({"composite": fid.identify(truth, data)})
+    item = ModelResults(settings, {"composite": data}, fitted=fitted)
     page = to_html(Document("study", "", (model_section(item, None),)))
     assert all(f"{title} {truth.name}" in page for title in there)
     assert not any(title in page for title in missing)

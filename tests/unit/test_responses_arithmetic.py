@@ -13,7 +13,7 @@ from scipy import signal
 from flightid import FrequencyResponse, Record, estimate_response
 from flightid.errors import DataError, FileFormatError, ShapeError
 from flightid.responses import arithmetic
-from flightid.responses.errors.random_error import Known
+from flightid.responses.errors.random_error import StoredCovariance
 from flightid.responses.spectrum_measures import band_rms, cutoff_frequency
 from flightid.responses.store import from_xarray, read_response, to_xarray, write_response
 from tests.closeness import assert_close
@@ -33,7 +33,7 @@ def _measured(seed: int = 0, output: str = "p", source: str = "u") -> FrequencyR
         units={output: "rad/s"},
         coherence=[0.9, 0.8, 0.7],
         random_error=[0.1, 0.2, 0.3],
-        errors=Known(1e-6 * spread @ spread.transpose(0, 2, 1), 3),
+        errors=StoredCovariance(1e-6 * spread @ spread.transpose(0, 2, 1), 3),
     )
 
 

@@ -25,7 +25,7 @@ class Exit(IntEnum):
     INTERRUPTED = 130
 
 
-class Shown(Protocol):
+class CommandResult(Protocol):
     """A result: text for people, plain values for programs."""
 
     def summary(self) -> object:
@@ -53,7 +53,7 @@ def level_option(function: Function) -> Function:
     return decorate(function)
 
 
-def emit(result: Shown, *, as_json: bool, level: float | None = None) -> None:
+def emit(result: CommandResult, *, as_json: bool, level: float | None = None) -> None:
     """Print a result to standard output.
 
     Parameters
@@ -68,7 +68,7 @@ def emit(result: Shown, *, as_json: bool, level: float | None = None) -> None:
     emit_values(result.to_dict()) if as_json else click.echo(str(at_level(result, level)))
 
 
-def at_level(result: Shown, level: float | None) -> object:
+def at_level(result: CommandResult, level: float | None) -> object:
     """The table of a result, its intervals at a level where one was asked for."""
     return result.summary() if level is None else result.summary(level=level)  # type: ignore[call-arg]
 

@@ -24,7 +24,7 @@ from flightid.conditioning.sensor_position import (
     velocities_at_cg,
 )
 from flightid.conditioning.smoothing import (
-    Smoothed,
+    SmoothSignal,
     differentiate,
     fourier_smooth,
     local_derivative,
@@ -39,7 +39,7 @@ __all__ = [
     "Interpolation",
     "KinematicConsistency",
     "Skew",
-    "Smoothed",
+    "SmoothSignal",
     "StampPolicy",
     "Trend",
     "UniformBase",

@@ -20,7 +20,7 @@ CHI_SQUARE_MEDIAN = 0.4549
 
 
 @dataclass(frozen=True)
-class Smoothed:
+class SmoothSignal:
     """A smoothed signal with its derivative.
 
     Attributes
@@ -37,7 +37,7 @@ class Smoothed:
     >>> import numpy as np
     >>> time_s = np.arange(200) / 50
     >>> fourier_smooth(np.sin(time_s), 0.02, cutoff_hz=5.0)
-    Smoothed(200 samples, cut-off 5 Hz)
+    SmoothSignal(200 samples, cut-off 5 Hz)
     """
 
     values: NDArray[np.float64]
@@ -47,7 +47,7 @@ class Smoothed:
 
     def __repr__(self) -> str:
         """Length and cut-off on one line."""
-        return f"Smoothed({self.values.size} samples, cut-off {self.cutoff_hz:.4g} Hz)"
+        return f"SmoothSignal({self.values.size} samples, cut-off {self.cutoff_hz:.4g} Hz)"
 
 
 def local_derivative(
@@ -173,7 +173,7 @@ def _mean_kernel(half_width: int) -> NDArray[np.float64]:
 
 def fourier_smooth(
     values: ArrayLike, sample_time_s: float, *, cutoff_hz: float | None = None
-) -> Smoothed:
+) -> SmoothSignal:
     """Smooth a signal by a sine series under a Wiener filter; differentiate the series exactly.
 
     The line through the end points is removed, what is left is continued oddly and expanded in
@@ -195,7 +195,7 @@ def fourier_smooth(
 
     Returns
     -------
-    Smoothed
+    SmoothSignal
 
     Raises
     ------
@@ -248,7 +248,7 @@ def fourier_smooth(
     smooth = line + np.concatenate(([0.0], inside, [0.0]))
     # Each coefficient of white noise of deviation s has variance 2 s² / (n - 1).
     noise = float(np.sqrt(level * (count - 1) / 2))
-    return Smoothed(smooth, np.asarray(slope), cutoff, noise)
+    return SmoothSignal(smooth, np.asarray(slope), cutoff, noise)
 
 
 def _knee(power: NDArray[np.float64], level: float) -> int:

@@ -1,5 +1,5 @@
 """Export of models to other tools."""
 
-from flightid.export.exported import Exported
+from flightid.export.exported import ExportFiles
 
-__all__ = ["Exported"]
+__all__ = ["ExportFiles"]

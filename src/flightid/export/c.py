@@ -6,7 +6,7 @@ from pathlib import Path
 
 from flightid.errors import ExportError, OptionError
 from flightid.export.c_source import CSource, Hold, equation_source, linear_source
-from flightid.export.exported import Exported
+from flightid.export.exported import ExportFiles
 from flightid.export.names import identifier
 from flightid.export.narx_source import narx_source
 from flightid.files import write_atomically
@@ -80,12 +80,12 @@ def export_c(
     hold: Hold = "zero",
     substeps: int | None = None,
     tunable: bool = False,
-) -> Exported:
+) -> ExportFiles:
     """Write header and source; `model_source` says the options.
 
     Returns
     -------
-    Exported
+    ExportFiles
     """
     stem = identifier(path.stem)
     made = model_source(
@@ -114,4 +114,4 @@ def export_c(
         f"{len(made.outputs)} outputs, {len(made.parameters)} parameters",
         "build": f"cc -std=c99 -O2 -c {source.name}",
     }
-    return Exported("c", (source, header), facts)
+    return ExportFiles("c", (source, header), facts)

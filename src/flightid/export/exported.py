@@ -13,7 +13,7 @@ from flightid.table import Cell, Column, Table
 
 
 @dataclass(frozen=True)
-class Exported(Result, schema="flightid.exported/1"):
+class ExportFiles(Result, schema="flightid.exported/1"):
     """Files written by `export`.
 
     Attributes
@@ -29,8 +29,8 @@ class Exported(Result, schema="flightid.exported/1"):
 
     Example
     -------
-    >>> Exported("c", (Path("roll.c"), Path("roll.h")), {"step": "0.0025 s"})
-    Exported(c: roll.c, roll.h)
+    >>> ExportFiles("c", (Path("roll.c"), Path("roll.h")), {"step": "0.0025 s"})
+    ExportFiles(c: roll.c, roll.h)
     """
 
     format: str
@@ -42,7 +42,7 @@ class Exported(Result, schema="flightid.exported/1"):
         """Format and names of the files on one line, and the number of findings."""
         names = ", ".join(path.name for path in self.files)
         doubts = sum(finding.light is not Light.GREEN for finding in self.findings)
-        return f"Exported({self.format}: {names}{f', {doubts} findings' if doubts else ''})"
+        return f"ExportFiles({self.format}: {names}{f', {doubts} findings' if doubts else ''})"
 
     def summary(self) -> Table:
         """Table of the files and facts, findings below."""

@@ -30,7 +30,7 @@ from flightid.export.c_source import (
     equation_source,
     linear_source,
 )
-from flightid.export.exported import Exported
+from flightid.export.exported import ExportFiles
 from flightid.export.fmu_description import FmuDescription, Interface
 from flightid.export.names import comment, identifier
 from flightid.files import write_atomically
@@ -64,7 +64,7 @@ def export_fmu(
     pade_order: int | None = None,
     substeps: int | None = None,
     compile: bool = True,
-) -> Exported:
+) -> ExportFiles:
     """Write an FMU of FMI 3.0.
 
     Parameters
@@ -88,7 +88,7 @@ def export_fmu(
 
     Returns
     -------
-    Exported
+    ExportFiles
 
     Raises
     ------
@@ -131,7 +131,7 @@ def export_fmu(
         "binary": place if compile else "none",
         "tunable": f"{len(code.parameters)} parameters",
     }
-    return Exported("fmu", (path,), facts, tuple(findings))
+    return ExportFiles("fmu", (path,), facts, tuple(findings))
 
 
 _TOKEN = "@TOKEN@"

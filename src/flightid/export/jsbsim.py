@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import STANDARD_GRAVITY_M_S2, Light
 from flightid.errors import ExportError, OptionError
-from flightid.export.exported import Exported
+from flightid.export.exported import ExportFiles
 from flightid.export.fmu_description import plain
 from flightid.export.names import identifier
 from flightid.files import write_atomically
@@ -50,7 +50,7 @@ def export_jsbsim(
     inertia_kg_m2: Mapping[str, float] | None = None,
     trim: Mapping[str, float] | None = None,
     properties: Mapping[str, str] | None = None,
-) -> Exported:
+) -> ExportFiles:
     """Write the aerodynamics section of a JSBSim aircraft from a linear model's derivatives.
 
     Parameters
@@ -73,7 +73,7 @@ def export_jsbsim(
 
     Returns
     -------
-    Exported
+    ExportFiles
 
     Raises
     ------
@@ -116,7 +116,7 @@ def export_jsbsim(
         "use": f'<aerodynamics file="{path.name}"/>',
         "axes": ", ".join(str(each.get("name")) for each in root.findall("axis")),
     }
-    return Exported("jsbsim", (path,), facts, tuple(findings))
+    return ExportFiles("jsbsim", (path,), facts, tuple(findings))
 
 
 def _trim_of(model: object, given: Mapping[str, float] | None) -> dict[str, float]:

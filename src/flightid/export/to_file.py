@@ -10,7 +10,7 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.export.c import export_c
-from flightid.export.exported import Exported
+from flightid.export.exported import ExportFiles
 from flightid.export.fmu import export_fmu
 from flightid.export.jsbsim import export_jsbsim
 from flightid.files import as_path
@@ -36,7 +36,7 @@ FORMATS = {
     ".xml": "jsbsim",
 }
 
-_WRITERS: Mapping[str, Callable[..., Exported]] = {
+_WRITERS: Mapping[str, Callable[..., ExportFiles]] = {
     "c": export_c,
     "fmu": export_fmu,
     "jsbsim": export_jsbsim,
@@ -50,7 +50,7 @@ def export(
     *,
     name: str | None = None,
     **options: object,
-) -> Exported:
+) -> ExportFiles:
     """Write a model to a file of another tool, whole or not at all.
 
     Parameters
@@ -75,7 +75,7 @@ def export(
 
     Returns
     -------
-    Exported
+    ExportFiles
         The files, how they are used, and what the format could not carry.
 
     Raises
@@ -101,7 +101,7 @@ def export(
     >>> roll = fid.load_model("rate_first_order").with_values({"Lp": -5.0, "Ltphi": 150.0})
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     export(roll, f"{folder}/roll.c", sample_time_s=1 / 400)
-    Exported(c: roll.c, roll.h)
+    ExportFiles(c: roll.c, roll.h)
     """
     place = as_path(path)
     chosen = format or FORMATS.get(place.suffix.lower(), "")
@@ -118,8 +118,8 @@ def export(
 
 
 def _called(
-    function: Callable[..., Exported], *arguments: object, options: Mapping[str, object]
-) -> Exported:
+    function: Callable[..., ExportFiles], *arguments: object, options: Mapping[str, object]
+) -> ExportFiles:
     """The writer of a format with its options, which are checked by name."""
     known = set(function.__kwdefaults__ or {})
     unknown = set(options) - known
@@ -132,14 +132,14 @@ def _called(
     return function(*arguments, **options)
 
 
-def _toml(model: object, path: Path) -> Exported:
+def _toml(model: object, path: Path) -> ExportFiles:
     if path.suffix != ".toml":
         raise OptionError("a TOML file ends in .toml", found=path.name)
     write_model(model, path)
-    return Exported("toml", (path,), {"read": f"flightid.load_model({path.name!r})"})
+    return ExportFiles("toml", (path,), {"read": f"flightid.load_model({path.name!r})"})
 
 
-def _matrices(source: object, model: object, path: Path, format: str) -> Exported:
+def _matrices(source: object, model: object, path: Path, format: str) -> ExportFiles:
     if path.suffix.lower() != f".{format}":
         raise OptionError("the suffix is not that of the format", found=path.name, needed=format)
     system = linear_system(model)
@@ -158,7 +158,7 @@ def _matrices(source: object, model: object, path: Path, format: str) -> Exporte
                 "export the equations as toml, c or fmu",
             )
         )
-    return Exported(format, (path,), facts, tuple(findings))
+    return ExportFiles(format, (path,), facts, tuple(findings))
 
 
 def _parameters(source: object) -> dict[str, object]:

@@ -16,7 +16,7 @@ from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.fitted_response import FittedResponse
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.training import TrainingChannel, training_channels
-from flightid.models import Estimated, Model
+from flightid.models import EstimateProvenance, Model
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.record import Record
 from flightid.result import Result
@@ -156,9 +156,9 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
         )
 
     @property
-    def estimated(self) -> Estimated:
+    def estimated(self) -> EstimateProvenance:
         """What is known of the estimates, as a model's file keeps it."""
-        return Estimated(
+        return EstimateProvenance(
             self.names,
             self.carried,
             self.method,

@@ -15,7 +15,7 @@ from flightid.units import DIMENSIONLESS, convert, same_dimension
 
 
 @dataclass(frozen=True)
-class Extracted:
+class ChannelSamples:
     """Samples of a channel with their own stamps.
 
     Attributes
@@ -60,7 +60,7 @@ def find(log: LogContents, channel: MappedChannel) -> ChannelSource | None:
 
 def extract(
     log: LogContents, channel: MappedChannel, span_s: tuple[float, float] | None = None
-) -> Extracted:
+) -> ChannelSamples:
     """Read a channel.
 
     Parameters
@@ -74,7 +74,7 @@ def extract(
 
     Returns
     -------
-    Extracted
+    ChannelSamples
 
     Raises
     ------
@@ -102,7 +102,7 @@ def extract(
             time_s, values = time_s[kept], values[kept]
         else:
             time_s, values = time_s[:0], values[:0]
-    return Extracted(channel, source, time_s, values)
+    return ChannelSamples(channel, source, time_s, values)
 
 
 def _table(log: LogContents, source: ChannelSource) -> LogTable:

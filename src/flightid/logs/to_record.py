@@ -21,7 +21,7 @@ from flightid.logs.channels.channel_map import (
 )
 from flightid.logs.contents import LogContents
 from flightid.logs.dataflash.sid_runs import SidRun
-from flightid.logs.extraction import Extracted, extract, find
+from flightid.logs.extraction import ChannelSamples, extract, find
 from flightid.logs.self_check import InjectionCheck, check_injection, chirp_clock, paired_rows
 from flightid.record import Channel, InputShape, Record, Step
 from flightid.record.timebase import GapPolicy, to_uniform
@@ -101,7 +101,7 @@ def make_record(
 
 
 def _input_shape(
-    declared: InputShape, chosen: ChannelMap, found: list[Extracted], step_s: float
+    declared: InputShape, chosen: ChannelMap, found: list[ChannelSamples], step_s: float
 ) -> InputShape:
     """What is declared; else what the map knows, for inputs that are not resampled."""
     if declared.hold is not None or chosen.hold is None:
@@ -125,7 +125,7 @@ def _chosen(
 
 def _found(
     log: LogContents, chosen: ChannelMap, span_s: tuple[float, float] | None, *, required: bool
-) -> tuple[list[Extracted], list[str]]:
+) -> tuple[list[ChannelSamples], list[str]]:
     """Channels that the log holds; the others by name with the reason, unless they are required.
 
     A channel that does not decide on the sample time may not cut the span either: it is left out
@@ -165,21 +165,21 @@ def _found(
     return found, left_out
 
 
-def _core_span(found: list[Extracted]) -> tuple[float, float]:
+def _core_span(found: list[ChannelSamples]) -> tuple[float, float]:
     core = [item for item in found if item.channel.sets_rate] or found
     if not core:
         return 0.0, 0.0
     return max(float(i.time_s[0]) for i in core), min(float(i.time_s[-1]) for i in core)
 
 
-def _reference(found: list[Extracted]) -> str:
+def _reference(found: list[ChannelSamples]) -> str:
     """The slowest channel among those that decide on the sample time."""
     core = [item for item in found if item.channel.sets_rate] or found
     return max(core, key=lambda item: item.interval_s).channel.name
 
 
 def _snapped(
-    found: list[Extracted], reference: str | None, span_s: tuple[float, float] | None
+    found: list[ChannelSamples], reference: str | None, span_s: tuple[float, float] | None
 ) -> tuple[float, float] | None:
     """Span that begins on a stamp of the reference, so that it is copied, not interpolated.
 
@@ -199,7 +199,7 @@ def _snapped(
     return (float(after[0]), end) if after.size and after[0] < end else span_s
 
 
-def _excitation(log: LogContents, run: SidRun, check: InjectionCheck) -> Extracted:
+def _excitation(log: LogContents, run: SidRun, check: InjectionCheck) -> ChannelSamples:
     """The injected signal at the instants when it acted, as far as that is proven.
 
     The mode logs the chirp at the end of the loop before the one that uses it. Where the self-check
@@ -219,7 +219,7 @@ def _excitation(log: LogContents, run: SidRun, check: InjectionCheck) -> Extract
     unit = SI.get(run.unit, run.unit)
     channel = MappedChannel(EXCITATION, unit, Role.EXCITATION, False, False, ())
     source = ChannelSource("SIDD", ("Targ",), note=note)
-    return Extracted(channel, source, stamp_s, _in_unit(signal, run.unit, unit))
+    return ChannelSamples(channel, source, stamp_s, _in_unit(signal, run.unit, unit))
 
 
 def _in_unit(signal: NDArray[np.float64], source: str, target: str) -> NDArray[np.float64]:

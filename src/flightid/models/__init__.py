@@ -3,7 +3,7 @@
 State space: `model_tape.rs`, `state_space_response.rs`.
 """
 
-from flightid.models.estimated import Estimated
+from flightid.models.estimated import EstimateProvenance
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.interchange import from_control, from_scipy, to_control, to_scipy
@@ -30,7 +30,7 @@ from flightid.models.transfer.model import TransferFunction, TransferFunctionMod
 __all__ = [
     "Axis",
     "Block",
-    "Estimated",
+    "EstimateProvenance",
     "GreyBoxModel",
     "InnovationsModel",
     "Lag",

@@ -24,7 +24,7 @@ _KEYS = {"names", "covariance", "method", "intervals_from", "bands", "evidence",
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Estimated:
+class EstimateProvenance:
     """Where the numbers of a model come from, and how well they are known.
 
     Attributes
@@ -46,8 +46,8 @@ class Estimated:
 
     Example
     -------
-    >>> Estimated(("Lp",), np.array([[0.01]]), "output_error")
-    Estimated(1 number with covariance, by output_error)
+    >>> EstimateProvenance(("Lp",), np.array([[0.01]]), "output_error")
+    EstimateProvenance(1 number with covariance, by output_error)
     """
 
     names: tuple[str, ...]
@@ -62,7 +62,7 @@ class Estimated:
         """Size and method on one line."""
         n = len(self.names)
         known = "" if self.covariance is None else " with covariance"
-        return f"Estimated({n} number{'' if n == 1 else 's'}{known}, by {self.method})"
+        return f"EstimateProvenance({n} number{'' if n == 1 else 's'}{known}, by {self.method})"
 
     def to_dict(self) -> dict[str, object]:
         """Plain values without what is absent, as TOML has no null."""
@@ -79,7 +79,7 @@ class Estimated:
         return table
 
     @classmethod
-    def from_dict(cls, content: Mapping[str, object], known: Sequence[str]) -> Estimated:
+    def from_dict(cls, content: Mapping[str, object], known: Sequence[str]) -> EstimateProvenance:
         """From plain values such as a TOML file gives.
 
         Parameters

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, cast
 
 from flightid.errors import ModelError
-from flightid.models.estimated import Estimated
+from flightid.models.estimated import EstimateProvenance
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.linear.description import system_from_table
 from flightid.models.linear.linear_system import LinearSystem
@@ -91,7 +91,7 @@ def model_from_description(content: Mapping[str, object]) -> Model:
         return model
     if not isinstance(written, Mapping):
         raise ModelError("estimated must be a table", found=repr(written)[:80])
-    estimated = Estimated.from_dict(written, list(model.parameters))
+    estimated = EstimateProvenance.from_dict(written, list(model.parameters))
     return cast("Model", replace(cast("Any", model), estimated=estimated))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol, Self, runtime_checkable
 
 from flightid.errors import ModelError
-from flightid.models.estimated import Estimated
+from flightid.models.estimated import EstimateProvenance
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.realisation import Matrices
 from flightid.models.parameters import Parameter
@@ -47,7 +47,7 @@ class Model(Protocol):
         ...
 
     @property
-    def estimated(self) -> Estimated | None:
+    def estimated(self) -> EstimateProvenance | None:
         """What a fit knew of the parameters; None for numbers without a fit."""
         ...
 

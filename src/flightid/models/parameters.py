@@ -14,7 +14,7 @@ from flightid import _native
 from flightid.errors import ModelError, UnknownNameError
 from flightid.models.language.dimensions import require_unit
 from flightid.models.language.formula import RESERVED, formula_names
-from flightid.result import Tabled
+from flightid.result import TableView
 from flightid.table import Column, Table
 from flightid.units import canonical
 
@@ -122,7 +122,7 @@ class Parameter:
         }
 
 
-class Parameters(Mapping[str, Parameter], Tabled):
+class Parameters(Mapping[str, Parameter], TableView):
     """Named parameters, checked against each other: ties known, not circular, right in their units.
 
     Parameters

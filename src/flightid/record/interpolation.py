@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.record.stamps import Stamped
+from flightid.record.stamps import StampedSamples
 
 ATTENUATION_DB = 100.0
 KAISER_BETA = 0.1102 * (ATTENUATION_DB - 8.7)
@@ -49,13 +49,13 @@ class Interpolation(StrEnum):
 
 
 def sample_at(
-    source: Stamped, time_s: NDArray[np.float64], sample_time_s: float, method: Interpolation
+    source: StampedSamples, time_s: NDArray[np.float64], sample_time_s: float, method: Interpolation
 ) -> tuple[NDArray[np.float64], str]:
     """Values of a channel on a uniform grid, low-passed first where the grid is coarser by 5 %.
 
     Parameters
     ----------
-    source : Stamped
+    source : StampedSamples
         Channel without gaps.
     time_s : ndarray, shape (n,)
         Uniform grid inside the channel's span, s.
@@ -139,7 +139,7 @@ def is_coarser(sample_time_s: float, source_s: float) -> bool:
     return sample_time_s > source_s * (1 + SAME_RATE)
 
 
-def _slack_s(source: Stamped, sample_time_s: float) -> float:
+def _slack_s(source: StampedSamples, sample_time_s: float) -> float:
     """How much later than a grid point a stamp may be and still belong to it, s."""
     jitter = source.jitter
     # Rare events are no jittered clock: their stamps mean what they say.
@@ -148,7 +148,7 @@ def _slack_s(source: Stamped, sample_time_s: float) -> float:
     return max(1e-6 * sample_time_s, 3 * jitter * source.sample_time_s)
 
 
-def spline(source: Stamped, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
+def spline(source: StampedSamples, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
     """Cubic spline through the samples at their true stamps; a line where there are only two."""
     if source.time_s.size < 3:
         return np.interp(time_s, source.time_s, source.values)
@@ -158,7 +158,7 @@ def spline(source: Stamped, time_s: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(CubicSpline(source.time_s, source.values)(time_s), dtype=np.float64)
 
 
-def uniform_samples(source: Stamped) -> tuple[float, float, NDArray[np.float64]]:
+def uniform_samples(source: StampedSamples) -> tuple[float, float, NDArray[np.float64]]:
     """Start, step and values of a channel on a uniform grid of its own mean rate."""
     count = source.time_s.size
     start = float(source.time_s[0])
@@ -220,7 +220,7 @@ def _weights(distance: NDArray[np.float64], cutoff: float, half: int) -> NDArray
     return np.asarray(kernel / np.sum(kernel, axis=1, keepdims=True))
 
 
-def _is_same_grid(source: Stamped, time_s: NDArray[np.float64]) -> bool:
+def _is_same_grid(source: StampedSamples, time_s: NDArray[np.float64]) -> bool:
     first = int(np.argmin(np.abs(source.time_s - time_s[0])))
     part = source.time_s[first : first + time_s.size]
     if part.size != time_s.size or part.size < 2:

@@ -35,7 +35,7 @@ Names = Iterable[str] | Mapping[str, str]
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _ChannelColumn:
     """A channel of the record and the column it comes from."""
 
     channel: Channel
@@ -193,7 +193,9 @@ class _Base:
     hold: InputHold | None
     time_column: str
 
-    def methods(self, wanted: Iterable[_Wanted], source_s: float) -> dict[str, Interpolation | str]:
+    def methods(
+        self, wanted: Iterable[_ChannelColumn], source_s: float
+    ) -> dict[str, Interpolation | str]:
         """Interpolation by channel: what was asked for, else what the inputs' hold calls for."""
         assert self.resample_to_s is not None
         given = self.interpolation
@@ -205,7 +207,7 @@ class _Base:
             found[item.channel.name] = usual_method(hold, source_s, self.resample_to_s)
         return {**found, **(given or {})}
 
-    def hold_after(self, source_s: float, wanted: Iterable[_Wanted]) -> InputHold | None:
+    def hold_after(self, source_s: float, wanted: Iterable[_ChannelColumn]) -> InputHold | None:
         """What is still true of the inputs: what was low-passed is smooth."""
         if self.resample_to_s is None or not is_coarser(self.resample_to_s, source_s):
             return self.hold
@@ -282,7 +284,7 @@ def _wanted(
     time: str,
     record: str | None,
     n_samples: int,
-) -> list[_Wanted]:
+) -> list[_ChannelColumn]:
     pairs = [(role, *pair) for role, names in roles.items() for pair in _pairs(names)]
     if not pairs:
         pairs = [
@@ -303,7 +305,7 @@ def _wanted(
     for _, _, column in pairs:
         table.require(column)
     return [
-        _Wanted(
+        _ChannelColumn(
             Channel(
                 name,
                 column_unit(table, column, name, units, default="1"),
@@ -319,7 +321,7 @@ def _wanted(
 def _pieces(
     stamps: NDArray[np.float64],
     rows: dict[str, NDArray[np.float64]],
-    wanted: Sequence[_Wanted],
+    wanted: Sequence[_ChannelColumn],
     base: _Base,
 ) -> list[tuple[NDArray[np.float64], Mapping[str, NDArray[np.float64]], tuple[Step, ...]]]:
     """The rows of a manoeuvre without outliers, on the grid that was asked for."""
@@ -343,7 +345,7 @@ def _pieces(
 def _without_outliers(
     stamps: NDArray[np.float64],
     rows: dict[str, NDArray[np.float64]],
-    wanted: Iterable[_Wanted],
+    wanted: Iterable[_ChannelColumn],
     asked: Mapping[str, Any],
 ) -> tuple[dict[str, NDArray[np.float64]], Step]:
     limits = {"deviations": 6.0, "half_width": 3, **asked}
@@ -362,7 +364,7 @@ def _without_outliers(
 def _record(
     time_s: NDArray[np.float64],
     samples: Mapping[str, NDArray[np.float64]],
-    wanted: Iterable[_Wanted],
+    wanted: Iterable[_ChannelColumn],
     name: str,
     history: tuple[Step, ...],
 ) -> Record:

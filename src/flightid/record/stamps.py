@@ -35,7 +35,7 @@ class StampPolicy(StrEnum):
 
 
 @dataclass(frozen=True)
-class Stamped:
+class StampedSamples:
     """Samples of one channel on their own increasing stamps.
 
     Attributes
@@ -89,12 +89,12 @@ class Stamped:
         worst = np.max(np.abs(self.time_s - self.time_s[0] - step * np.arange(count)))
         return bool(worst <= UNIFORM_TOLERANCE * step)
 
-    def within(self, start_s: float, stop_s: float) -> Stamped:
+    def within(self, start_s: float, stop_s: float) -> StampedSamples:
         """Copy of the samples with ``start_s <= time <= stop_s``."""
         inside = (self.time_s >= start_s) & (self.time_s <= stop_s)
-        return Stamped(self.name, self.time_s[inside], self.values[inside])
+        return StampedSamples(self.name, self.time_s[inside], self.values[inside])
 
-    def bridged(self) -> Stamped:
+    def bridged(self) -> StampedSamples:
         """Copy in which gaps hold samples on the straight line, a median spacing apart."""
         step = self.median_spacing_s
         extra = [
@@ -106,10 +106,10 @@ class Stamped:
             return self
         added = np.concatenate(extra)
         stamps = np.union1d(self.time_s, added)
-        return Stamped(self.name, stamps, np.interp(stamps, self.time_s, self.values))
+        return StampedSamples(self.name, stamps, np.interp(stamps, self.time_s, self.values))
 
 
-def stamped(name: str, time_s: ArrayLike, values: ArrayLike, policy: StampPolicy) -> Stamped:
+def stamped(name: str, time_s: ArrayLike, values: ArrayLike, policy: StampPolicy) -> StampedSamples:
     """Check one channel; samples that are not finite become missing (the gap policy judges them).
 
     Parameters
@@ -123,7 +123,7 @@ def stamped(name: str, time_s: ArrayLike, values: ArrayLike, policy: StampPolicy
 
     Returns
     -------
-    Stamped
+    StampedSamples
 
     Raises
     ------
@@ -155,7 +155,7 @@ def stamped(name: str, time_s: ArrayLike, values: ArrayLike, policy: StampPolicy
         raise DataError(
             f"channel {name!r} holds too few samples", found=stamps.size, needed="at least 2"
         )
-    return Stamped(name, stamps, samples, n_disordered, n_missing)
+    return StampedSamples(name, stamps, samples, n_disordered, n_missing)
 
 
 def _in_order(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.record.interpolation import Interpolation, sample_at
-from flightid.record.stamps import GAP_FACTOR, Stamped, StampPolicy, stamped
+from flightid.record.stamps import GAP_FACTOR, StampedSamples, StampPolicy, stamped
 from flightid.record.uniform_base import ChannelResampling, UniformBase, UniformSpan, doubts
 from flightid.table import Cell
 
@@ -184,7 +184,7 @@ def _methods(
 
 
 def _grid_step(
-    channels: Mapping[str, Stamped], sample_time_s: float | None, reference: str | None
+    channels: Mapping[str, StampedSamples], sample_time_s: float | None, reference: str | None
 ) -> float:
     if (sample_time_s is None) == (reference is None):
         raise OptionError(
@@ -207,7 +207,7 @@ def _grid_step(
 
 
 def _common_span(
-    channels: Mapping[str, Stamped], span_s: tuple[float, float] | None
+    channels: Mapping[str, StampedSamples], span_s: tuple[float, float] | None
 ) -> tuple[float, float]:
     begins = {key: float(c.time_s[0]) for key, c in channels.items()}
     ends = {key: float(c.time_s[-1]) for key, c in channels.items()}
@@ -224,7 +224,7 @@ def _common_span(
 
 
 def _pieces(
-    channels: Iterable[Stamped],
+    channels: Iterable[StampedSamples],
     start: float,
     stop: float,
     policy: GapPolicy,
@@ -260,8 +260,8 @@ def _pieces(
 
 
 def _stretch(
-    channel: Stamped, first: float, last: float, policy: GapPolicy, max_gap_s: float | None
-) -> Stamped:
+    channel: StampedSamples, first: float, last: float, policy: GapPolicy, max_gap_s: float | None
+) -> StampedSamples:
     """The channel around a piece, as far as its own gaps: filters need the neighbours."""
     if policy is not GapPolicy.SPLIT:
         return channel.bridged()

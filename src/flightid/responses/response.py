@@ -14,7 +14,7 @@ from flightid.record.history import Step
 from flightid.record.hold import InputShape
 from flightid.responses.bands import choose_frequencies, nearest
 from flightid.responses.errors.linear_estimate import LinearEstimate
-from flightid.responses.errors.random_error import CovarianceSource, Selected
+from flightid.responses.errors.random_error import CovarianceSource, ErrorSelection
 from flightid.responses.pair import PairResponse, quotient_unit
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -306,7 +306,7 @@ class FrequencyResponse(
             for name, letters in AXES.items()
             if getattr(self, name) is not None
         }
-        errors = None if self.errors is None else Selected(self.errors, *axes.values())
+        errors = None if self.errors is None else ErrorSelection(self.errors, *axes.values())
         return replace(
             self,
             **changes,

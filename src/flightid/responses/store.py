@@ -21,7 +21,7 @@ from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.record.history import Step
 from flightid.record.hold import InputShape
-from flightid.responses.errors.random_error import Known
+from flightid.responses.errors.random_error import StoredCovariance
 from flightid.responses.response import AXES, FrequencyResponse
 from flightid.uncertainty.feedback import FeedbackTest
 
@@ -128,7 +128,9 @@ def from_xarray(dataset: xr.Dataset) -> FrequencyResponse:
             history=tuple(
                 Step(one["operation"], one["options"], one["version"]) for one in about["history"]
             ),
-            errors=None if covariance is None else Known(covariance, dataset.sizes["omega_rad_s"]),
+            errors=None
+            if covariance is None
+            else StoredCovariance(covariance, dataset.sizes["omega_rad_s"]),
         )
     except (KeyError, TypeError, AttributeError, json.JSONDecodeError) as error:
         raise FileFormatError(

@@ -13,15 +13,15 @@ from flightid.table import Table
 from flightid.validation import OrderScan
 
 if TYPE_CHECKING:
-    from flightid.study.identified import Identified
+    from flightid.study.identified import ModelResults
 
 
-def choice_blocks(item: Identified) -> tuple[Block, ...]:
+def choice_blocks(item: ModelResults) -> tuple[Block, ...]:
     """What was tried, and which was taken by what rule.
 
     Parameters
     ----------
-    item : Identified
+    item : ModelResults
         With a ``choice``.
 
     Returns

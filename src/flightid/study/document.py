@@ -29,7 +29,7 @@ from flightid.version import VERSION
 
 if TYPE_CHECKING:
     from flightid.conditioning.consistency_result import KinematicConsistency
-    from flightid.study.identified import Identified
+    from flightid.study.identified import ModelResults
     from flightid.uncertainty.estimate import Estimate
 
 
@@ -147,7 +147,7 @@ def _beside(study: StudyResults) -> str:
     return "" if study.truth is None else "truth"
 
 
-def _parameters(study: StudyResults) -> Iterator[tuple[Identified, Estimate, float | None]]:
+def _parameters(study: StudyResults) -> Iterator[tuple[ModelResults, Estimate, float | None]]:
     for item in study.identified:
         if item.fit is None or item.settings.structure is not None:
             continue
@@ -190,7 +190,7 @@ def _result(study: StudyResults) -> Iterator[Block]:
     yield from _interval_figure(study)
 
 
-def _in_short(item: Identified) -> Finding:
+def _in_short(item: ModelResults) -> Finding:
     """One line about a model: the light of its evidence, and the first reason for it."""
     if item.fit is None:
         return Finding("model", worst(item.findings), f"{item.name}: {item.left_out[0].message}")

@@ -14,7 +14,7 @@ from flightid.validation import Comparison, Verdict
 
 if TYPE_CHECKING:
     from flightid.identification import Fit
-    from flightid.study.identified import Identified
+    from flightid.study.identified import ModelResults
     from flightid.study.truth import Truth
     from flightid.uncertainty.estimate import Estimate
     from flightid.validation import Verification
@@ -34,12 +34,12 @@ WORDS = {
 """Estimators and methods in words, as legends and tables name them."""
 
 
-def estimates_table(item: Identified, truth: Truth | None) -> Table:
+def estimates_table(item: ModelResults, truth: Truth | None) -> Table:
     """The same model fitted to each estimate of the response.
 
     Parameters
     ----------
-    item : Identified
+    item : ModelResults
         With several fits.
     truth : Truth or None
         What should have been found, where the flight was simulated.
@@ -71,12 +71,12 @@ def _with_interval(parameter: Estimate) -> str:
     return f"{parameter.value:.4g} ({low:.4g} … {high:.4g})"
 
 
-def model_table(items: Iterable[Identified]) -> Table:
+def model_table(items: Iterable[ModelResults]) -> Table:
     """All models: structure, modes, residual tests and free runs.
 
     Parameters
     ----------
-    items : iterable of Identified
+    items : iterable of ModelResults
         Of one study.
 
     Returns
@@ -106,7 +106,7 @@ def model_table(items: Iterable[Identified]) -> Table:
     return replace(made, notes=notes)
 
 
-def _row(item: Identified) -> tuple[Cell, ...]:
+def _row(item: ModelResults) -> tuple[Cell, ...]:
     if item.fit is None:
         pairs = () if item.coherent is None else item.coherent.pairs
         reasons = "; ".join(pair.reason for pair in pairs)
@@ -129,7 +129,7 @@ def _on_trial(verified: Verification | Comparison) -> Verification:
     return verified.first if isinstance(verified, Comparison) else verified
 
 
-def _passed(item: Identified) -> str | None:
+def _passed(item: ModelResults) -> str | None:
     if item.tests is None:
         return None
     passed = len(item.tests.counted(Verdict.PASS))

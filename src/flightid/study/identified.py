@@ -16,7 +16,7 @@ from flightid.validation import Comparison, ResidualTests, SpectrumComparison, V
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class ModelFits:
     """Result of the fit of one model.
 
     Attributes
@@ -40,7 +40,7 @@ class Fitted:
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
+class ModelResults:
     """What a study made of one model.
 
     Attributes
@@ -51,7 +51,7 @@ class Identified:
         By estimator; the first is the one that counts.
     coherent : CoherentPairs or None
         Which responses were fitted, or which inputs, where coherence chose them.
-    fitted : Fitted
+    fitted : ModelFits
         The fits and how they came about.
     tests : ResidualTests or None
         Of the residuals of a fit to records.
@@ -68,7 +68,7 @@ class Identified:
     settings: ModelSettings
     responses: Mapping[str, FrequencyResponse]
     coherent: CoherentPairs | None = None
-    fitted: Fitted = field(default_factory=Fitted)
+    fitted: ModelFits = field(default_factory=ModelFits)
     tests: ResidualTests | None = None
     verifications: Mapping[str, Verification | Comparison] = field(default_factory=dict)
     spectra: SpectrumComparison | None = None

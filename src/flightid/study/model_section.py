@@ -32,17 +32,17 @@ from flightid.study.structures import goal_findings
 
 if TYPE_CHECKING:
     from flightid.identification import Fit
-    from flightid.study.identified import Identified
+    from flightid.study.identified import ModelResults
     from flightid.study.truth import Truth
     from flightid.validation import ResidualTests, SpectrumComparison
 
 
-def model_section(item: Identified, truth: Truth | None) -> Section:
+def model_section(item: ModelResults, truth: Truth | None) -> Section:
     """Say what was found of one model.
 
     Parameters
     ----------
-    item : Identified
+    item : ModelResults
         Every stage.
     truth : Truth or None
         What should have been found, where the flight was simulated.
@@ -55,7 +55,7 @@ def model_section(item: Identified, truth: Truth | None) -> Section:
     return Section(item.name, first, tuple(_parts(item, truth)))
 
 
-def _first(item: Identified, truth: Truth | None) -> Iterator[Block]:
+def _first(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
     """The fit that counts, with what it was fitted to."""
     fit = item.fit
     if fit is None:
@@ -86,7 +86,7 @@ def _first(item: Identified, truth: Truth | None) -> Iterator[Block]:
         yield Lights(item.response.findings, "Frequency response")
 
 
-def _parts(item: Identified, truth: Truth | None) -> Iterator[Section]:
+def _parts(item: ModelResults, truth: Truth | None) -> Iterator[Section]:
     """The stages before and after the fit."""
     structure, fit = item.settings.structure, item.fit
     if item.coherent is not None:
@@ -106,7 +106,7 @@ def _parts(item: Identified, truth: Truth | None) -> Iterator[Section]:
         yield section_of("Spectra", _spectra, item.spectra)
 
 
-def _coherence(item: Identified, truth: Truth | None) -> Iterator[Block]:
+def _coherence(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
     """Which responses or inputs were taken, and why."""
     assert item.coherent is not None
     if item.left_out:
@@ -117,7 +117,7 @@ def _coherence(item: Identified, truth: Truth | None) -> Iterator[Block]:
         yield from response_figures(item, truth)
 
 
-def _reduction(item: Identified) -> Iterator[Block]:
+def _reduction(item: ModelResults) -> Iterator[Block]:
     """The path, and what unseen records say of it."""
     assert item.reduction is not None
     if item.reduction_judged:
@@ -131,7 +131,7 @@ def _spectra(spectra: SpectrumComparison) -> Iterator[Block]:
     yield from result_blocks(spectra, title="Peaks")
 
 
-def _physics(item: Identified, fit: Fit) -> Iterator[Block]:
+def _physics(item: ModelResults, fit: Fit) -> Iterator[Block]:
     """Modes of any model; approximations and derivatives of those that have them."""
     approximations, table = None, None
     # A rig's or a filter's states fit no textbook formula, and coefficients are no derivatives.
@@ -147,7 +147,7 @@ def _physics(item: Identified, fit: Fit) -> Iterator[Block]:
     yield from _beside(item, fit)
 
 
-def _beside(item: Identified, fit: Fit) -> tuple[Block, ...]:
+def _beside(item: ModelResults, fit: Fit) -> tuple[Block, ...]:
     """Eigenvalues of the reference, in a table and beside those of the fit."""
     if item.reference is None:
         return ()

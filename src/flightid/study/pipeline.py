@@ -11,10 +11,10 @@ from flightid.inspection import Inspection
 from flightid.record import Record
 from flightid.responses import CoherentPairs, FrequencyResponse
 from flightid.study.evidence import examined
-from flightid.study.identified import Fitted, Identified
+from flightid.study.identified import ModelFits, ModelResults
 from flightid.study.model_settings import UNBROKEN
 from flightid.study.reducing import ReduceSettings
-from flightid.study.stage_runner import Staged, StageRunner
+from flightid.study.stage_runner import StageResult, StageRunner
 from flightid.study.stages import (
     check,
     chosen_by,
@@ -29,7 +29,7 @@ from flightid.study.stages import (
 from flightid.study.task import Task
 from flightid.validation import Comparison, Verification
 
-Records = Mapping[str, Staged[list[Record]]]
+Records = Mapping[str, StageResult[list[Record]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,16 +40,16 @@ class Part:
     ----------
     task : Task
         With the responses or inputs that coherence has chosen.
-    responses : mapping of str to Staged FrequencyResponse
+    responses : mapping of str to StageResult FrequencyResponse
         By estimator, the one that counts first.
-    coherent : Staged CoherentPairs or None
-    fitted : Staged Fitted
+    coherent : StageResult CoherentPairs or None
+    fitted : StageResult ModelFits
     """
 
     task: Task
-    responses: Mapping[str, Staged[FrequencyResponse]]
-    coherent: Staged[CoherentPairs] | None
-    fitted: Staged[Fitted]
+    responses: Mapping[str, StageResult[FrequencyResponse]]
+    coherent: StageResult[CoherentPairs] | None
+    fitted: StageResult[ModelFits]
 
 
 def identify_models(
@@ -59,7 +59,7 @@ def identify_models(
     reducing: ReduceSettings | None,
     runner: StageRunner,
     advance: Callable[..., None],
-) -> tuple[tuple[Identified, ...], dict[str, Staged[Fitted]]]:
+) -> tuple[tuple[ModelResults, ...], dict[str, StageResult[ModelFits]]]:
     """Carry every model through its stages.
 
     All fits come first: models may be rivals of each other in the verification.
@@ -67,7 +67,7 @@ def identify_models(
     Parameters
     ----------
     tasks : sequence of Task
-    records : mapping of str to Staged list of Record
+    records : mapping of str to StageResult list of Record
         By name, which may stand for all manoeuvres of a file.
     inspection : Inspection or None
         Of the log that they come from.
@@ -78,7 +78,7 @@ def identify_models(
 
     Returns
     -------
-    tuple of Identified, and dict of str to Staged Fitted
+    tuple of ModelResults, and dict of str to StageResult ModelFits
         What was found, and the fits with their keys by name of the model.
     """
     parts: list[Part] = []
@@ -123,7 +123,7 @@ def start_from(task: Task, earlier: Sequence[Part]) -> Task:
     return replace(task, model=model)
 
 
-def _examined(item: Identified, inspection: Inspection | None) -> Identified:
+def _examined(item: ModelResults, inspection: Inspection | None) -> ModelResults:
     """The fit that counts with all that the study knows of it, so that one light shows."""
     fit = item.fit
     if fit is None:
@@ -144,7 +144,7 @@ def _examined(item: Identified, inspection: Inspection | None) -> Identified:
 
 def _responses(
     task: Task, records: Records, runner: StageRunner
-) -> dict[str, Staged[FrequencyResponse]]:
+) -> dict[str, StageResult[FrequencyResponse]]:
     settings = task.settings
     if settings.band_rad_s is None or (task.model is not None and not settings.fit.on_responses):
         return {}
@@ -168,7 +168,7 @@ def _responses(
 
 def _fit(
     task: Task,
-    responses: Mapping[str, Staged[FrequencyResponse]],
+    responses: Mapping[str, StageResult[FrequencyResponse]],
     records: Records,
     reducing: ReduceSettings | None,
     runner: StageRunner,
@@ -219,18 +219,18 @@ def _fit(
 
 
 def _examine(
-    part: Part, records: Records, fitted: Mapping[str, Staged[Fitted]], runner: StageRunner
-) -> Identified:
+    part: Part, records: Records, fitted: Mapping[str, StageResult[ModelFits]], runner: StageRunner
+) -> ModelResults:
     """Residual tests, spectra and verification of the fit that counts."""
     settings = part.task.settings
     responses = {name: each.value for name, each in part.responses.items()}
     coherent = None if part.coherent is None else part.coherent.value
     beside = part.task.reference
-    found = Identified(settings, responses, coherent, part.fitted.value, reference=beside)
+    found = ModelResults(settings, responses, coherent, part.fitted.value, reference=beside)
     fit = part.fitted.value.fit
     if fit is None:
         return found
-    counts = Staged(fit, part.fitted.key)
+    counts = StageResult(fit, part.fitted.key)
     tests = spectra = None
     if settings.check.tests_residuals:
         tests = runner.stage(f"residual tests: {settings.name}", examine_residuals, counts).value
@@ -243,7 +243,7 @@ def _examine(
     found = replace(found, tests=tests, spectra=spectra, verifications=verified)
     if found.reduction is None or not found.reduction.dropped:
         return found
-    start = Staged(found.reduction.start, f"start of {part.fitted.key}")
+    start = StageResult(found.reduction.start, f"start of {part.fitted.key}")
     outputs = settings.outputs or fit.model.outputs
     judged = tuple(
         runner.stage(
@@ -262,9 +262,9 @@ def _examine(
 
 def _verifications(
     part: Part,
-    counts: Staged[Any],
+    counts: StageResult[Any],
     records: Records,
-    fitted: Mapping[str, Staged[Fitted]],
+    fitted: Mapping[str, StageResult[ModelFits]],
     runner: StageRunner,
 ) -> dict[str, Verification | Comparison]:
     settings = part.task.settings
@@ -272,7 +272,7 @@ def _verifications(
     for name in settings.rivals:
         rival = fitted[name].value.fit if name in fitted else None
         if rival is not None:
-            rivals[name] = Staged(rival, fitted[name].key)
+            rivals[name] = StageResult(rival, fitted[name].key)
     options: dict[str, Any] = settings.check.options
     if settings.check.against_responses and part.responses:
         options["responses"] = next(iter(part.responses.values()))

@@ -19,7 +19,7 @@ from flightid.study.reading import TableReader
 
 if TYPE_CHECKING:
     from flightid.identification import Fit
-    from flightid.study.identified import Identified
+    from flightid.study.identified import ModelResults
     from flightid.study.task import Task
 
 BAND_RAD_S = (0.1, 100.0)
@@ -152,13 +152,13 @@ def require_pairs(tasks: Iterable[Task], settings: QualitiesSettings) -> None:
 
 
 def rate_models(
-    identified: Iterable[Identified], settings: QualitiesSettings, faults: Faults
+    identified: Iterable[ModelResults], settings: QualitiesSettings, faults: Faults
 ) -> dict[str, HandlingQualities]:
     """Handling qualities of every fit, by the name of its model.
 
     Parameters
     ----------
-    identified : iterable of Identified
+    identified : iterable of ModelResults
     settings : QualitiesSettings
     faults : Faults
         Takes what cannot be rated.

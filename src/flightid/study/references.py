@@ -9,7 +9,7 @@ from flightid.errors import StudyError
 from flightid.study.model_settings import ModelSettings
 
 
-class Named(Protocol):
+class NamedEntry(Protocol):
     """What a study file names."""
 
     @property
@@ -17,7 +17,7 @@ class Named(Protocol):
         """Its name."""
 
 
-class Modelled(Named, Protocol):
+class ModelEntry(NamedEntry, Protocol):
     """A model of either kind."""
 
     @property
@@ -33,7 +33,9 @@ class Modelled(Named, Protocol):
         """Every record that it uses."""
 
 
-def require_references(sources: Sequence[Named], models: Sequence[Modelled], *, kind: str) -> None:
+def require_references(
+    sources: Sequence[NamedEntry], models: Sequence[ModelEntry], *, kind: str
+) -> None:
     """Check that names are unique and that models refer to what is there.
 
     Parameters
@@ -89,7 +91,7 @@ def require_conditions(models: Sequence[ModelSettings]) -> None:
         )
 
 
-def _require_unique(kind: str, named: Iterable[Named]) -> None:
+def _require_unique(kind: str, named: Iterable[NamedEntry]) -> None:
     names = [item.name for item in named]
     for name in names:
         if names.count(name) > 1:

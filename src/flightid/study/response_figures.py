@@ -11,16 +11,16 @@ from flightid.report.figures import figure_block
 from flightid.study.estimate_tables import WORDS
 
 if TYPE_CHECKING:
-    from flightid.study.identified import Identified
+    from flightid.study.identified import ModelResults
     from flightid.study.truth import Truth
 
 
-def response_figures(item: Identified, truth: Truth | None) -> list[Figure]:
+def response_figures(item: ModelResults, truth: Truth | None) -> list[Figure]:
     """One picture for each response that was fitted; of a structure, for each that was tested.
 
     Parameters
     ----------
-    item : Identified
+    item : ModelResults
         With responses.
     truth : Truth or None
         What should have been found, where the flight was simulated.
@@ -39,7 +39,7 @@ def response_figures(item: Identified, truth: Truth | None) -> list[Figure]:
     return [_figure(item, name, truth) for name in names]
 
 
-def _figure(item: Identified, name: str, truth: Truth | None) -> Figure:
+def _figure(item: ModelResults, name: str, truth: Truth | None) -> Figure:
     output, source = name.split("/")
     curves = []
     for number, (method, response) in enumerate(item.responses.items()):

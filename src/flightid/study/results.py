@@ -13,7 +13,7 @@ from flightid.findings import Finding
 from flightid.inspection import Inspection
 from flightid.record import Record
 from flightid.result import Result
-from flightid.study.identified import Identified
+from flightid.study.identified import ModelResults
 from flightid.study.output import SCHEMA
 from flightid.study.settings import Settings
 from flightid.study.truth import Truth
@@ -46,7 +46,7 @@ class StudyResults(
         What the log can support; None where records come from files.
     records : mapping of str to Record
         By segment.
-    identified : tuple of Identified
+    identified : tuple of ModelResults
         Every stage of each model.
     truth : Truth or None
         What should have been found, where the flight was simulated.
@@ -70,7 +70,7 @@ class StudyResults(
     output: Path
     inspection: Inspection | None
     records: Mapping[str, Record]
-    identified: tuple[Identified, ...]
+    identified: tuple[ModelResults, ...]
     truth: Truth | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     tuning: Tuning | None = None

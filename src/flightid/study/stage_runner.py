@@ -21,7 +21,7 @@ MODELS = tuple(kind.model for kind in KINDS.values())
 
 
 @dataclass(frozen=True, eq=False)
-class Staged(Generic[Value]):
+class StageResult(Generic[Value]):
     """Result of a stage.
 
     Attributes
@@ -63,7 +63,7 @@ class StageRunner:
         self.carried_out: list[str] = []
         self.from_cache: list[str] = []
 
-    def stage(self, name: str, work: Callable[..., Value], *inputs: Any) -> Staged[Value]:  # noqa: ANN401
+    def stage(self, name: str, work: Callable[..., Value], *inputs: Any) -> StageResult[Value]:  # noqa: ANN401
         """Result of a stage.
 
         Parameters
@@ -73,12 +73,12 @@ class StageRunner:
         work : callable
             Takes `inputs`, results of stages as their values.
         *inputs
-            `Staged` results, and settings that `digest` knows; also inside lists, tuples and
+            `StageResult` results, and settings that `digest` knows; also inside lists, tuples and
             mappings.
 
         Returns
         -------
-        Staged
+        StageResult
         """
         # What it is carried out for is no part of the key: two models may share a response.
         key = digest((VERSION, work.__module__, work.__qualname__, inputs))
@@ -87,12 +87,12 @@ class StageRunner:
         else:
             self._cache[key] = work(*map(_values, inputs))
             self.carried_out.append(name)
-        return Staged(self._cache[key], key)
+        return StageResult(self._cache[key], key)
 
 
 def _values(item: Any) -> Any:  # noqa: ANN401 - whatever the stage takes
     """An input with results of stages as their values."""
-    if isinstance(item, Staged):
+    if isinstance(item, StageResult):
         return item.value
     if isinstance(item, Mapping):
         return {name: _values(value) for name, value in item.items()}
@@ -129,7 +129,7 @@ def digest(item: object) -> str:
 def _parts(item: object) -> Iterable[str]:
     """The content of an item as texts, its type first."""
     yield type(item).__name__
-    if isinstance(item, Staged):
+    if isinstance(item, StageResult):
         yield item.key
     elif isinstance(item, Path):
         yield sha256_of_file(item) if item.is_file() else str(item)

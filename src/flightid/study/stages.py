@@ -19,7 +19,7 @@ from flightid.models import GreyBoxModel, Model
 from flightid.record import Record
 from flightid.responses import CoherentPairs, FrequencyResponse, coherent_pairs, estimate_response
 from flightid.study.fit_settings import FitSettings
-from flightid.study.identified import Fitted
+from flightid.study.identified import ModelFits
 from flightid.study.reducing import ReduceSettings
 from flightid.study.response_settings import ResponseSettings
 from flightid.study.structure_settings import StructureSettings
@@ -129,7 +129,7 @@ def fit_equations(
     minimum_coherence: float,
     coherent: CoherentPairs | None,
     reducing: ReduceSettings | None,
-) -> Fitted:
+) -> ModelFits:
     """Fit a model with equations to the response of each estimator, or to the records.
 
     Where the study asks for it, the structure is reduced by the data that count; all other
@@ -164,7 +164,7 @@ def fit_equations(
         if reducing.rough:
             counted = identify(reduction.fit.model, data, **options)
     rest = {name: identify(model, other, **options) for name, other in others}
-    return Fitted({counts: counted, **rest}, reduction)
+    return ModelFits({counts: counted, **rest}, reduction)
 
 
 def _reduced(
@@ -201,16 +201,16 @@ def fit_without_equations(
     inputs: tuple[str, ...],
     flown: Sequence[Group],
     unseen: Sequence[Group],
-) -> Fitted:
+) -> ModelFits:
     """Fit a structure to records, or the best of several; nothing where no input is coherent."""
     if not inputs:
-        return Fitted()
+        return ModelFits()
     told, ranked = (
         [narrowed(record, inputs, settings.outputs) for record in flat(records)]
         for records in (flown, unseen)
     )
     fit, choice = fit_structure(settings, inputs, told, ranked)
-    return Fitted({fit.method: fit}, choice=choice)
+    return ModelFits({fit.method: fit}, choice=choice)
 
 
 def check(

@@ -19,7 +19,7 @@ from flightid.study.flight import FlightPlan
 from flightid.study.record_files import declared, load_records
 from flightid.study.response_settings import EXCITATION
 from flightid.study.settings import Segment, Settings
-from flightid.study.stage_runner import Staged, StageRunner
+from flightid.study.stage_runner import StageResult, StageRunner
 from flightid.study.task import Task
 from flightid.study.truth import Truth
 from flightid.vehicles import write_ardupilot_log
@@ -28,27 +28,27 @@ FLIGHT_LOG = "flight.bin"
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
+class StudyRecords:
     """Records of a study, and where they come from.
 
     Attributes
     ----------
-    records : mapping of str to Staged list of Record
-        Conditioned, by name, which may stand for all manoeuvres of a file.
+    records : mapping of str to StageResult list of Record
+        ConditionalSpectra, by name, which may stand for all manoeuvres of a file.
     files : tuple of Path
         What was read.
     inspection : Inspection or None
     truth : Truth or None
-    log : Staged Log or None
+    log : StageResult Log or None
     checks : mapping of str to KinematicConsistency
         Data compatibility, by record, where the conditioning asks for it.
     """
 
-    records: Mapping[str, Staged[list[Record]]]
+    records: Mapping[str, StageResult[list[Record]]]
     files: tuple[Path, ...]
     inspection: Inspection | None = None
     truth: Truth | None = None
-    log: Staged[Log] | None = None
+    log: StageResult[Log] | None = None
     checks: Mapping[str, KinematicConsistency] = field(default_factory=dict)
 
 
@@ -58,7 +58,7 @@ def take(
     given: Path | None,
     folder: Path,
     runner: StageRunner,
-) -> Taken:
+) -> StudyRecords:
     """Records from files, from the log given or named, or from one that is flown now.
 
     Raises
@@ -86,7 +86,7 @@ def take(
             if file.name in needed
         }
         made = _conditioned(files, settings, runner, checks)
-        return Taken(made, tuple(paths), checks=checks)
+        return StudyRecords(made, tuple(paths), checks=checks)
     flown, truth = _obtain_log(settings, given, folder, runner)
     opened = runner.stage("log", read_log, flown)
     mapped = settings.channel_map
@@ -105,15 +105,15 @@ def take(
     }
     inspection = runner.stage("inspection", inspect_log, opened).value
     made = _conditioned(cut, settings, runner, checks)
-    return Taken(made, (flown,), inspection, truth, opened, checks)
+    return StudyRecords(made, (flown,), inspection, truth, opened, checks)
 
 
 def _conditioned(
-    records: Mapping[str, Staged[list[Record]]],
+    records: Mapping[str, StageResult[list[Record]]],
     settings: Settings,
     runner: StageRunner,
     checks: dict[str, KinematicConsistency],
-) -> dict[str, Staged[list[Record]]]:
+) -> dict[str, StageResult[list[Record]]]:
     """Records after the steps that are meant for them; what their checks found is added."""
     made = dict(records)
     read = {file.name for file in settings.record_files if file.resample_to_s is not None}
@@ -125,7 +125,7 @@ def _conditioned(
         )
         if steps:
             done = runner.stage(f"conditioning: {name}", _prepare, record, steps)
-            made[name] = Staged([each for each, _ in done.value], done.key)
+            made[name] = StageResult([each for each, _ in done.value], done.key)
             checks |= {str(each.name): found for each, all_ in done.value for found in all_}
     return made
 

@@ -21,7 +21,7 @@ from flightid.validation import Comparison, Verification
 
 if TYPE_CHECKING:
     from flightid.logs import Log
-    from flightid.study.identified import Identified
+    from flightid.study.identified import ModelResults
 
 
 @dataclass(frozen=True)
@@ -99,13 +99,13 @@ def _axes(model: Model) -> list[str]:
 
 
 def tune_models(
-    identified: Iterable[Identified], log: Log | None, settings: TuneSettings
+    identified: Iterable[ModelResults], log: Log | None, settings: TuneSettings
 ) -> Tuning | None:
     """Tune every axis whose rate a model of the study predicts from its command.
 
     Parameters
     ----------
-    identified : iterable of Identified
+    identified : iterable of ModelResults
     log : Log or None
         The flight, which holds the gains that flew.
     settings : TuneSettings

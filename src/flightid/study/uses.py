@@ -14,13 +14,13 @@ from flightid.dynamics.conditions.result import ConditionComparison
 from flightid.dynamics.rotor.result import RotorPhysics
 from flightid.dynamics.rotor.rotor_physics import rotor_physics
 from flightid.errors import StudyError
-from flightid.export import Exported
+from flightid.export import ExportFiles
 from flightid.export.to_file import export
 from flightid.identification import Fit
 from flightid.models import GreyBoxModel, write_model
 from flightid.models.saved_files import MODELS
 from flightid.study.faults import Faults
-from flightid.study.identified import Identified
+from flightid.study.identified import ModelResults
 from flightid.study.uses_settings import (
     ExportSettings,
     LoopSettings,
@@ -44,14 +44,14 @@ class Uses:
         Flight conditions side by side, where two models or more name one.
     rotor : RotorPhysics or None
     loops : tuple of (LoopSettings, ClosedLoop)
-    exported : tuple of Exported
+    exported : tuple of ExportFiles
     """
 
     files: Mapping[str, str] = field(default_factory=dict)
     conditions: ConditionComparison | None = None
     rotor: RotorPhysics | None = None
     loops: tuple[tuple[LoopSettings, ClosedLoop], ...] = ()
-    exported: tuple[Exported, ...] = ()
+    exported: tuple[ExportFiles, ...] = ()
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""
@@ -65,13 +65,13 @@ class Uses:
 
 
 def use_models(
-    identified: Sequence[Identified], settings: UsesSettings, folder: Path, faults: Faults
+    identified: Sequence[ModelResults], settings: UsesSettings, folder: Path, faults: Faults
 ) -> Uses:
     """Write every fitted model, and do with them what the study asks.
 
     Parameters
     ----------
-    identified : sequence of Identified
+    identified : sequence of ModelResults
     settings : UsesSettings
     folder : Path
         Output of the study.
@@ -126,7 +126,7 @@ def _closed(fits: Mapping[str, Fit], loop: LoopSettings) -> ClosedLoop:
     )
 
 
-def _exported(fits: Mapping[str, Fit], asked: ExportSettings, folder: Path) -> Exported:
+def _exported(fits: Mapping[str, Fit], asked: ExportSettings, folder: Path) -> ExportFiles:
     (folder / EXPORTS).mkdir(exist_ok=True)
     made = export(
         _fit(fits, asked.model), folder / EXPORTS / asked.file, asked.format, **asked.options
@@ -161,7 +161,7 @@ def _written(fits: Mapping[str, Fit], folder: Path) -> dict[str, str]:
     return written
 
 
-def _conditions(identified: Sequence[Identified]) -> ConditionComparison | None:
+def _conditions(identified: Sequence[ModelResults]) -> ConditionComparison | None:
     named = [(item.settings.condition, item.fit) for item in identified if item.settings.condition]
     held = {str(word): fit for word, fit in named if fit is not None}
     return compare_conditions(held) if len(held) > 1 else None

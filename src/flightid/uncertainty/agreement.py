@@ -102,7 +102,7 @@ def _differ(chance: float | None) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Agreed:
+class AgreementTest:
     """Covariance and degrees of freedom that stand after parts were compared."""
 
     covariance: Array
@@ -116,7 +116,7 @@ def compare_parts(
     covariance: Array,
     freedom: Array,
     rest: Flight | None = None,
-) -> Agreed:
+) -> AgreementTest:
     """Test halves and records against their noise; carry on the larger covariance.
 
     Parameters
@@ -134,7 +134,7 @@ def compare_parts(
 
     Returns
     -------
-    Agreed
+    AgreementTest
         With several records that differ: covariance by leaving out one after the other, where it
         is larger, and Student's degrees of freedom. With halves that differ: by leaving out halves.
 
@@ -150,14 +150,14 @@ def compare_parts(
     plain = Agreement(len(flights), halves, records, np.sqrt(np.diag(covariance)))
     by_records = len(whole) > 1
     if plain.agree and not (records is not None and records < DOUBT):
-        return Agreed(covariance, freedom, plain)
+        return AgreementTest(covariance, freedom, plain)
     parts = whole if by_records else _halved(flights[0])
     found = scatter([*parts, *([] if rest is None else [rest])], solve, covariance)
     apart = np.sqrt(np.diag(found.covariance))
     student = found.freedom if by_records else None
     stated = freedom if student is None else _of_wider(plain.by_noise, freedom, apart, student)
     agreement = Agreement(len(flights), halves, records, plain.by_noise, apart, student)
-    return Agreed(larger(covariance, found.covariance), stated, agreement)
+    return AgreementTest(larger(covariance, found.covariance), stated, agreement)
 
 
 def _combined(chances: Sequence[float | None]) -> float | None:

@@ -49,7 +49,7 @@ class Block:
 
 
 @dataclass(frozen=True, eq=False)
-class Beside:
+class JointResiduals:
     """Residuals of unit variance, fitted together with the records, and what they answer to.
 
     Attributes
@@ -66,7 +66,7 @@ class Beside:
     total: Array
     measured: bool = True
 
-    def of(self, parameters: NDArray[np.bool_]) -> Beside:
+    def of(self, parameters: NDArray[np.bool_]) -> JointResiduals:
         """Columns of some parameters."""
         return replace(self, slopes=self.slopes[:, parameters], total=self.total[:, parameters])
 
@@ -138,7 +138,7 @@ def _flight(answers: Array, block: Block) -> Flight:
     )
 
 
-def rest_of(flights: Sequence[Flight], beside: Beside | None) -> Flight | None:
+def rest_of(flights: Sequence[Flight], beside: JointResiduals | None) -> Flight | None:
     """Data that were fitted beside the records, as one more part: its score balances theirs."""
     if beside is None or not beside.measured:
         return None

@@ -19,17 +19,22 @@ from scipy.linalg import solve_triangular
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.uncertainty.agreement import Agreed, Agreement, compare_parts
+from flightid.uncertainty.agreement import Agreement, AgreementTest, compare_parts
 from flightid.uncertainty.blocks import (
-    Beside,
     Block,
+    JointResiduals,
     flights_of,
     joined,
     noise_heard,
     rest_of,
 )
 from flightid.uncertainty.input_noise import InputNoise
-from flightid.uncertainty.residual_noise import Autoregression, Taken, noise_models, periodogram
+from flightid.uncertainty.residual_noise import (
+    Autoregression,
+    FittedDirections,
+    noise_models,
+    periodogram,
+)
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-9
@@ -134,7 +139,7 @@ def colour_findings(smallest: float, largest: float) -> list[Finding]:
 
 def residual_covariance(
     blocks: Sequence[Block],
-    beside: Beside | None = None,
+    beside: JointResiduals | None = None,
     noise: tuple[InputNoise, Array] | None = None,
 ) -> ResidualCovariance:
     """Covariance of estimates by the colour of their residuals.
@@ -143,7 +148,7 @@ def residual_covariance(
     ----------
     blocks : sequence of Block
         By record.
-    beside : Beside, optional
+    beside : JointResiduals, optional
         Residuals beside the records.
     noise : tuple of InputNoise and ndarray (n_outputs,), optional
         Noise of the inputs, which reaches the outputs as random walks, and what whitens the
@@ -180,7 +185,7 @@ def residual_covariance(
     taken = []
     for block in blocks:
         parts = (block.basis, block.projected @ root)
-        taken.append(Taken(*(part.reshape(*block.residual.shape, -1) for part in parts)))
+        taken.append(FittedDirections(*(part.reshape(*block.residual.shape, -1) for part in parts)))
     walks = None if noise is None else _walks(taken[0], *noise)
     models = noise_models([block.residual for block in blocks], taken, walks)
     apart = noise_heard(models, blocks)
@@ -225,7 +230,7 @@ def residual_covariance(
     )
 
 
-def white_covariance(blocks: Sequence[Block], covariance: Array, freedom: float) -> Agreed:
+def white_covariance(blocks: Sequence[Block], covariance: Array, freedom: float) -> AgreementTest:
     """Covariance of estimates whose errors their own noise model whitens, parts compared.
 
     Parameters
@@ -239,7 +244,7 @@ def white_covariance(blocks: Sequence[Block], covariance: Array, freedom: float)
 
     Returns
     -------
-    Agreed
+    AgreementTest
 
     Reference
     ---------
@@ -271,7 +276,7 @@ def _inverse_root(triangle: Array) -> Array:
     return np.asarray(solve_triangular(triangle / size, np.eye(len(size))) / size[:, None])
 
 
-def _gain(root: Array, beside: Beside | None, blocks: Sequence[Block]) -> Array:
+def _gain(root: Array, beside: JointResiduals | None, blocks: Sequence[Block]) -> Array:
     """What turns a gradient into a change of the estimates, from the root R⁻¹ of the information.
 
     Where data follow the parameters, the equations that the estimates solve bend less than the
@@ -287,7 +292,7 @@ def _gain(root: Array, beside: Beside | None, blocks: Sequence[Block]) -> Array:
     return np.asarray(root @ np.linalg.solve(np.eye(len(root)) - follows, root.T))
 
 
-def _walks(taken: Taken, noise: InputNoise, whitener: Array) -> Array:
+def _walks(taken: FittedDirections, noise: InputNoise, whitener: Array) -> Array:
     """Mean periodogram of what a fit leaves of each output's random walk.
 
     Draws come from a fixed seed: the same record gives the same intervals.

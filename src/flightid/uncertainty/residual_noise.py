@@ -230,7 +230,7 @@ def _weights(sample: Array, n: int) -> tuple[Array, bool]:
 
 
 @dataclass(frozen=True)
-class Taken:
+class FittedDirections:
     """Orthonormal directions along which a fit takes noise out of one record's residuals.
 
     Attributes
@@ -246,7 +246,7 @@ class Taken:
 
 
 def noise_models(
-    residuals: Sequence[Array], taken: Sequence[Taken], known: Array | None = None
+    residuals: Sequence[Array], taken: Sequence[FittedDirections], known: Array | None = None
 ) -> list[Autoregression]:
     """Models of the outputs' noise, in rounds: what the fit took of it is given back.
 
@@ -254,7 +254,7 @@ def noise_models(
     ----------
     residuals : sequence of ndarray, shape (n_outputs, n)
         By record.
-    taken : sequence of Taken
+    taken : sequence of FittedDirections
         By record, in the residuals' own metric.
     known : ndarray, shape (n_outputs, n_bins), optional
         Mean periodograms of parts to leave out of the models; one record alone.
@@ -267,7 +267,8 @@ def noise_models(
     Example
     -------
     >>> white = np.random.default_rng(0).standard_normal((1, 2000))
-    >>> model, = noise_models([white], [Taken(np.zeros((1, 2000, 0)), np.zeros((1, 2000, 0)))])
+    >>> none = FittedDirections(np.zeros((1, 2000, 0)), np.zeros((1, 2000, 0)))
+    >>> model, = noise_models([white], [none])
     >>> model.autocovariance(2).round(1) + 0.0
     array([1., 0.])
     """

@@ -152,7 +152,7 @@ def defaults(autopilot: str, axis: str) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class Resolved:
+class AxisParameters:
     """Parameters of an axis as found: values and names by role, and what was taken as absent."""
 
     values: dict[str, float]
@@ -160,7 +160,7 @@ class Resolved:
     assumed: tuple[str, ...]
 
 
-def resolve(autopilot: str, axis: str, parameters: Mapping[str, float]) -> Resolved:
+def resolve(autopilot: str, axis: str, parameters: Mapping[str, float]) -> AxisParameters:
     """Take the parameters of an axis out of all parameters of a vehicle.
 
     Raises
@@ -188,4 +188,4 @@ def resolve(autopilot: str, axis: str, parameters: Mapping[str, float]) -> Resol
             action="add them to the parameters; firmware before ArduCopter 3.4, ArduPlane 4.1 and "
             "PX4 1.3 has other controllers and is not supported",
         )
-    return Resolved(values, names, tuple(assumed))
+    return AxisParameters(values, names, tuple(assumed))

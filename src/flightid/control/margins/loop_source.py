@@ -25,7 +25,7 @@ GIVEN = ("broken", "closed", "sensitivity")
 
 
 @runtime_checkable
-class Responding(Protocol):
+class ResponseSource(Protocol):
     """Anything with a frequency response, shape (n_out, n_in, n_f)."""
 
     def frequency_response(self, omega_rad_s: ArrayLike) -> Any:  # noqa: ANN401 — any array
@@ -33,7 +33,7 @@ class Responding(Protocol):
         ...
 
 
-Controller = Known | Responding
+Controller = Known | ResponseSource
 """Known part of a loop: a model, a function of s = jω, values at the frequencies, or a gain."""
 
 
@@ -176,10 +176,10 @@ def _modelled(
     unstable_poles: int | None,
 ) -> Loop:
     uncertain = uncertain_of(source)
-    if isinstance(uncertain.value, Model) and not isinstance(uncertain.value, Responding):
+    if isinstance(uncertain.value, Model) and not isinstance(uncertain.value, ResponseSource):
         uncertain = uncertain.then(linear_system)
     model = uncertain.value
-    if not isinstance(model, Responding):
+    if not isinstance(model, ResponseSource):
         raise ModelError(
             "the loop has no frequency response",
             found=type(source).__name__,
@@ -188,7 +188,7 @@ def _modelled(
     outputs, inputs = (tuple(getattr(model, kind, ("loop",))) for kind in ("outputs", "inputs"))
     row, column = _place("output", output, outputs), _place("input", input, inputs)
 
-    def of(thing: Responding, omega: Array) -> Complex:
+    def of(thing: ResponseSource, omega: Array) -> Complex:
         values = np.asarray(thing.frequency_response(omega), dtype=np.complex128)
         loop = values if values.ndim == 1 else values[row, column]
         return loop if controller is None else loop * known_values(controller, omega)
@@ -239,7 +239,7 @@ def known_values(controller: Controller, omega: Array) -> Complex:
     ShapeError
         A controller of several channels, or values that are not as many as the frequencies.
     """
-    if isinstance(controller, Responding):
+    if isinstance(controller, ResponseSource):
         found = np.asarray(controller.frequency_response(omega), dtype=np.complex128)
         if found.ndim == 3 and found.shape[:2] == (1, 1):
             found = found[0, 0]

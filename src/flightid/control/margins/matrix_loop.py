@@ -11,7 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import block_diag
 
 from flightid.control.margins.loop_grid import Roots, loop_grid, roots_of, whole_grid
-from flightid.control.margins.loop_source import Controller, Responding, closed_count, known_values
+from flightid.control.margins.loop_source import (
+    Controller,
+    ResponseSource,
+    closed_count,
+    known_values,
+)
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.responses import FrequencyResponse
@@ -97,14 +102,14 @@ def read_loops(
         raise OptionError(
             "loops without a controller are broken where they are", found=at, needed="controller=…"
         )
-    if controller is not None and not isinstance(controller, Responding):
+    if controller is not None and not isinstance(controller, ResponseSource):
         controller = KnownLaw(controller)
     if band_rad_s is not None and not 0.0 < band_rad_s[0] < band_rad_s[1] < np.inf:
         raise OptionError("band_rad_s has no meaning", found=band_rad_s, needed="0 < low < high")
     measured = isinstance(source, FrequencyResponse)
     uncertain = _unweighed(source) if measured else uncertain_of(source)
     thing = uncertain.value
-    if not measured and not isinstance(thing, Responding):
+    if not measured and not isinstance(thing, ResponseSource):
         raise ModelError(
             "the loop has no frequency response",
             found=type(source).__name__,
@@ -233,7 +238,7 @@ def _chosen(
 
 def _joined(
     plant: Complex,
-    controller: Responding,
+    controller: ResponseSource,
     omega: Array,
     rows: tuple[str, ...],
     columns: tuple[str, ...],

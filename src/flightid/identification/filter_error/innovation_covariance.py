@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.identification.filter_error.innovations import RecordInnovations
-from flightid.uncertainty.blocks import Beside, Block
+from flightid.uncertainty.blocks import Block, JointResiduals
 from flightid.uncertainty.cramer_rao import inverse_hessian
 from flightid.uncertainty.residual_covariance import ResidualCovariance, residual_covariance
 
@@ -64,7 +64,7 @@ def innovation_covariance(
             )
         )
     still = jacobian[first:]
-    return residual_covariance(blocks, Beside(still, still, measured=False))
+    return residual_covariance(blocks, JointResiduals(still, still, measured=False))
 
 
 def _by_output(rows: Array, n_samples: int, n_outputs: int) -> Array:

@@ -31,7 +31,7 @@ SMALLEST_DAMPING, LARGEST_DAMPING = 1e-9, 1e6
 
 
 @dataclass(frozen=True)
-class Settled:
+class SearchOutcome:
     """Where a search with the estimator inside ended.
 
     Attributes
@@ -78,7 +78,7 @@ class _Place:
         return cls(x, estimates, residuals, float(residuals @ residuals))
 
 
-def search(objective: Objective, start: Array) -> Settled:
+def search(objective: Objective, start: Array) -> SearchOutcome:
     """Minimise from one start.
 
     The slopes that the estimator adds to the model's own change slowly: they are kept while steps
@@ -121,7 +121,9 @@ def search(objective: Objective, start: Array) -> Settled:
             step = step if step <= ENOUGH else 0.0
             beyond = None if bounds is limits else _beyond(objective, here, bounds, limits)
             if beyond is None:
-                return Settled(_end(here, jacobian, count, "step"), here.estimates, step, begun)
+                return SearchOutcome(
+                    _end(here, jacobian, count, "step"), here.estimates, step, begun
+                )
             here, bounds, away = beyond, limits, np.inf
             continue
         tried = _step(jacobian, here, bounds, damping) if damping else whole
@@ -146,7 +148,9 @@ def search(objective: Objective, start: Array) -> Settled:
         if missed > CURVED * np.linalg.norm(effect):
             extra, away = _extra(objective, here.x), 0.0
     reason = f"the search stopped {step:.2g} of the residuals' scatter away from a minimum"
-    return Settled(_end(here, jacobian, MOST_STEPS, "stalled"), here.estimates, step, begun, reason)
+    return SearchOutcome(
+        _end(here, jacobian, MOST_STEPS, "stalled"), here.estimates, step, begun, reason
+    )
 
 
 def _along(

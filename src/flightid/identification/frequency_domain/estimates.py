@@ -21,12 +21,12 @@ from flightid.uncertainty import (
     insensitivity,
     null_combination,
 )
-from flightid.uncertainty.agreement import Agreed, Agreement
+from flightid.uncertainty.agreement import Agreement, AgreementTest
 from flightid.uncertainty.cramer_rao import inverse_hessian
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
-Compare = Callable[[Array, NDArray[np.bool_]], Agreed]
+Compare = Callable[[Array, NDArray[np.bool_]], AgreementTest]
 _DECIBEL = 20.0 / np.log(10.0)
 _DEGREE = 180.0 / np.pi
 _AT_BOUND = 1e-9

@@ -32,7 +32,7 @@ TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
-class _Motion:
+class _SystemRun:
     """One system of a model over records of one length.
 
     Attributes
@@ -70,7 +70,7 @@ class _Fitter:
 
 
 @dataclass(frozen=True)
-class _Unknown:
+class _InitialConditions:
     """Motion by unknown initial states and trims in each fitted output, ready for least squares.
 
     Attributes
@@ -91,7 +91,7 @@ class _Unknown:
     triangles: Array
 
     @classmethod
-    def of(cls, free: Array) -> _Unknown:
+    def of(cls, free: Array) -> _InitialConditions:
         """Of motions, shape (n_unknowns, n_outputs, n)."""
         free = free - free.mean(axis=2, keepdims=True)
         lengths = np.maximum(np.linalg.norm(free, axis=(1, 2)), TINY)
@@ -131,7 +131,7 @@ class _Unknown:
 
 
 @dataclass(frozen=True)
-class _Followed:
+class _FollowedRun:
     """One record with a model beside it.
 
     Attributes
@@ -205,7 +205,7 @@ class ModelResiduals:
         kept = self._kept(model)
         changes = [np.zeros((len(moved), *each.shape)) for each in self.linear.output_records]
         for place, (other, step) in enumerate(moved):
-            motions: dict[int, tuple[list[_Motion], Array]] = {}
+            motions: dict[int, tuple[list[_SystemRun], Array]] = {}
             for change, one, between in zip(changes, followed, self._between, strict=True):
                 n = change.shape[2]
                 free, unknown = known[n][1:]
@@ -229,15 +229,15 @@ class ModelResiduals:
 
     def _followed(
         self, model: GreyBoxModel
-    ) -> tuple[list[_Followed], dict[int, tuple[list[_Motion], Array, _Unknown]]]:
+    ) -> tuple[list[_FollowedRun], dict[int, tuple[list[_SystemRun], Array, _InitialConditions]]]:
         kept = self._kept(model)
-        known: dict[int, tuple[list[_Motion], Array, _Unknown]] = {}
+        known: dict[int, tuple[list[_SystemRun], Array, _InitialConditions]] = {}
         found = []
         for measured, between in zip(self.linear.output_records, self._between, strict=True):
             n = measured.shape[1]
             if n not in known:
                 motions, free = self._motion(model, kept, n)
-                known[n] = motions, free, _Unknown.of(free)
+                known[n] = motions, free, _InitialConditions.of(free)
             motions, _, unknown = known[n]
             driven = self._driven(motions, kept, between, n)
             rest = measured[kept] - driven
@@ -249,10 +249,10 @@ class ModelResiduals:
             left = measured.copy()
             left[kept] = unknown.less(fitter, rest)
             self._check(kept, left, measured)
-            found.append(_Followed(left, driven, fitter, start))
+            found.append(_FollowedRun(left, driven, fitter, start))
         return found, known
 
-    def _driven(self, motions: list[_Motion], kept: Places, between: Array, n: int) -> Array:
+    def _driven(self, motions: list[_SystemRun], kept: Places, between: Array, n: int) -> Array:
         found = np.zeros((len(kept), n))
         for each in motions:
             outputs = driven_outputs(
@@ -266,7 +266,7 @@ class ModelResiduals:
         """Inputs of each record, with what they do between their samples."""
         return [between_samples(each, self.hold) for each in self.linear.input_records]
 
-    def _motion(self, model: GreyBoxModel, kept: Places, n: int) -> tuple[list[_Motion], Array]:
+    def _motion(self, model: GreyBoxModel, kept: Places, n: int) -> tuple[list[_SystemRun], Array]:
         """How each system of a model moves, and what unknown states and trims add."""
         step = self.linear.sample_time_s
         motions, free = [], []
@@ -275,7 +275,7 @@ class ModelResiduals:
             inputs = [self.linear.inputs.index(name) for name in each.inputs]
             rows = [k for k in kept if self.outputs[k] in each.outputs]
             places = [each.outputs.index(self.outputs[k]) for k in rows]
-            motions.append(_Motion(modes, inputs, rows, places))
+            motions.append(_SystemRun(modes, inputs, rows, places))
             moving = free_outputs(modes, n, step)
             wide = np.zeros((len(moving), len(kept), n))
             wide[:, np.searchsorted(kept, rows)] = moving[:, places]

@@ -17,7 +17,7 @@ from flightid.identification.frequency_domain.error_model import ErrorModel
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.models import GreyBoxModel
-from flightid.uncertainty.agreement import Agreed, compare_parts
+from flightid.uncertainty.agreement import AgreementTest, compare_parts
 from flightid.uncertainty.parts import Flight
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ class ResponseParts:
     errors: ErrorModel
     slopes: Array
 
-    def compare(self, gain: Array, inner: NDArray[np.bool_]) -> Agreed:
+    def compare(self, gain: Array, inner: NDArray[np.bool_]) -> AgreementTest:
         """Covariance of the estimates, halves and records compared.
 
         Parameters
@@ -56,7 +56,7 @@ class ResponseParts:
 
         Returns
         -------
-        Agreed
+        AgreementTest
 
         Assumes
         -------

@@ -16,7 +16,7 @@ from flightid.identification.frequency_domain.bias_findings import (
     variances,
 )
 from flightid.identification.frequency_domain.bias_objective import Curves, Objective
-from flightid.identification.frequency_domain.bias_search import Settled, search
+from flightid.identification.frequency_domain.bias_search import SearchOutcome, search
 from flightid.identification.frequency_domain.error_model import ErrorModel, error_model
 from flightid.identification.frequency_domain.estimator_bias import (
     OUTSIDE,
@@ -98,7 +98,7 @@ def take_out(
         ends = _ranked([*_searches(objective, minima[0]), *_rivals(objective, minima)])
     except (FitError, *OUTSIDE) as error:
         return not_done(str(error))
-    best = _Judged.of(objective, ends[0].found)
+    best = _Judgement.of(objective, ends[0].found)
     if best.found.end.cost > NOISE * plain.cost:
         return not_done(
             f"it would raise the cost from {plain.cost:.3g} to {best.found.end.cost:.3g}: the "
@@ -123,20 +123,20 @@ def take_out(
 class _Found:
     """A minimum with the estimator inside, and how many starts led there."""
 
-    found: Settled
+    found: SearchOutcome
     count: int = 1
 
 
 @dataclass(frozen=True)
-class _Judged:
+class _Judgement:
     """An end of the search, the errors of the points there, and the mean square of misfits."""
 
-    found: Settled
+    found: SearchOutcome
     errors: ErrorModel
     misfit: float
 
     @classmethod
-    def of(cls, objective: Objective, found: Settled) -> _Judged:
+    def of(cls, objective: Objective, found: SearchOutcome) -> _Judgement:
         """Errors are those of what the model leaves of the outputs, where that is known."""
         correction, selected = objective.correction, objective.selected
         known = correction.errors(objective.at(found.end.x))
@@ -162,7 +162,7 @@ def _searches(objective: Objective, minimum: Sequence[DenseEnd]) -> list[_Found]
     plain, count = minimum[0], len(minimum)
     first = search(objective, plain.x)
     lower = first.end.cost <= NOISE * plain.cost
-    settled = lower and first.step <= TOLERABLE and _Judged.of(objective, first).misfit <= MISFIT
+    settled = lower and first.step <= TOLERABLE and _Judgement.of(objective, first).misfit <= MISFIT
     bent = first.begun > BENT * first.end.cost
     if settled and not (bent and objective.size <= FEW):
         return [_Found(first, count)]
@@ -212,7 +212,7 @@ def _worth(end: _Found) -> tuple[bool, float]:
     return end.found.step > TOLERABLE, end.found.end.cost
 
 
-def _same(one: Settled, other: Settled) -> bool:
+def _same(one: SearchOutcome, other: SearchOutcome) -> bool:
     """Whether the way between two ends is within what a search that settled leaves undone."""
     way = other.end.x - one.end.x
     if np.all(np.abs(way) <= SAME_VALUE * np.abs(one.end.x)):

@@ -32,7 +32,7 @@ from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.joint.independence import judge_independence
 from flightid.identification.joint.options import JointOptions
 from flightid.identification.output_error.fit import (
-    Searched,
+    SearchEnd,
     WhitenedResponses,
     conclude,
     searched,
@@ -42,7 +42,7 @@ from flightid.identification.records.setup import RecordSet, prepare_records
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
-from flightid.uncertainty.blocks import Beside
+from flightid.uncertainty.blocks import JointResiduals
 
 Array = NDArray[np.float64]
 
@@ -64,20 +64,20 @@ class ChosenPoints:
         ]
         return data, whitening(self.errors)
 
-    def beside(self, fitted: GreyBoxModel, following: Array | None = None) -> Beside:
+    def beside(self, fitted: GreyBoxModel, following: Array | None = None) -> JointResiduals:
         """Derivatives of the whitened errors, of data at rest and of data that follow the model.
 
         `following` are the derivatives of the points by the free parameters, run after run.
         """
         slopes = self._slopes(fitted)
         if following is None:
-            return Beside(slopes, slopes)
+            return JointResiduals(slopes, slopes)
         matrices = [matrix for _, _, matrix in whitening(self.errors)]
         ends = np.cumsum([matrix.shape[1] for matrix in matrices])[:-1]
         moved = [
             matrix @ part for matrix, part in zip(matrices, np.split(following, ends), strict=True)
         ]
-        return Beside(slopes, slopes - np.vstack(moved))
+        return JointResiduals(slopes, slopes - np.vstack(moved))
 
     def _slopes(self, fitted: GreyBoxModel) -> Array:
         values, free = fitted.parameters.independent_values(), fitted.parameters.free_indices
@@ -146,12 +146,12 @@ def _points(
 
 
 def _without_bias(
-    found: Searched,
+    found: SearchEnd,
     prepared: RecordSet,
     response: FrequencyResponse,
     points: ChosenPoints,
     options: JointOptions,
-) -> tuple[Searched, ChosenPoints, Array | None, BiasOutcome]:
+) -> tuple[SearchEnd, ChosenPoints, Array | None, BiasOutcome]:
     """Take the estimator's bias out of the response, and fit again, until nothing moves."""
     once = replace(options, starts=1)
 

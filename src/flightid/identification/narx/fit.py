@@ -37,7 +37,7 @@ from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.structure import NarxStructure
 from flightid.record import Record
 from flightid.record.several import as_records
-from flightid.uncertainty.agreement import Agreed
+from flightid.uncertainty.agreement import AgreementTest
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
@@ -153,14 +153,14 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
     )
 
 
-def _covariance(selection: Selection, agreed: Agreed | None) -> Array:
+def _covariance(selection: Selection, agreed: AgreementTest | None) -> Array:
     return selection.covariance if agreed is None else agreed.covariance
 
 
 def _parameters(
     structure: NarxStructure,
     chosen: Sequence[ChosenTerm],
-    agreed: Agreed | None,
+    agreed: AgreementTest | None,
     why_biased: str,
 ) -> dict[str, Estimate]:
     """Weights by term; errors hold in spite of the choice only where samples were held back."""

@@ -11,7 +11,7 @@ from flightid.identification.narx.candidates import product_columns
 from flightid.identification.narx.details import ChosenTerm
 from flightid.identification.narx.regressors import Regressors
 from flightid.models.narx.structure import NarxStructure
-from flightid.uncertainty.agreement import Agreed
+from flightid.uncertainty.agreement import AgreementTest
 from flightid.uncertainty.blocks import Block
 from flightid.uncertainty.residual_covariance import white_covariance
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 def compare_weights(
     structure: NarxStructure, chosen: Sequence[ChosenTerm], data: Regressors, covariance: Array
-) -> Agreed | None:
+) -> AgreementTest | None:
     """Compare parts of the samples that the weights were estimated on.
 
     Parameters
@@ -33,7 +33,7 @@ def compare_weights(
 
     Returns
     -------
-    Agreed or None
+    AgreementTest or None
         None where radial functions were chosen, or more terms than samples.
 
     Assumes

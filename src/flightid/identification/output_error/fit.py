@@ -46,7 +46,7 @@ from flightid.identification.regression.options import FourierOutputErrorOptions
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.measured_states import state_outputs
 from flightid.record import Channel, Record, Step
-from flightid.uncertainty.blocks import Beside
+from flightid.uncertainty.blocks import JointResiduals
 from flightid.version import VERSION
 
 Array = NDArray[np.float64]
@@ -94,7 +94,7 @@ def fit_output_error(
 
 
 @dataclass(frozen=True)
-class Searched:
+class SearchEnd:
     """Where a search over records ended.
 
     Attributes
@@ -119,20 +119,20 @@ class Searched:
 
 
 def conclude(
-    found: Searched,
+    found: SearchEnd,
     options: RecordOptions,
     setup: Sequence[Finding],
-    beside: Beside | None = None,
+    beside: JointResiduals | None = None,
 ) -> Fit:
     """The result of a search.
 
     Parameters
     ----------
-    found : Searched
+    found : SearchEnd
     options : RecordOptions
     setup : sequence of Finding
         Put before those of the fit.
-    beside : Beside, optional
+    beside : JointResiduals, optional
         Residuals of unit variance that were fitted together with the records.
 
     Returns
@@ -172,7 +172,7 @@ def searched(
     prepared: RecordSet,
     options: RecordOptions,
     responses: WhitenedResponses | None = None,
-) -> Searched:
+) -> SearchEnd:
     """Search, again where the estimates have other growing modes than their start.
 
     Parameters
@@ -185,7 +185,7 @@ def searched(
 
     Returns
     -------
-    Searched
+    SearchEnd
 
     Raises
     ------
@@ -205,7 +205,7 @@ def searched(
         if _growing(after) == _growing(runs_of):
             break
         model, starts = _overgrown(model, fitted, after, placed), replace(options, starts=1)
-    return Searched(model, placed, runs_of, groups)
+    return SearchEnd(model, placed, runs_of, groups)
 
 
 def _overgrown(

@@ -17,7 +17,7 @@ WORDS = ("estimate", "measured", "trim")
 
 
 @dataclass(frozen=True)
-class Remembered:
+class StartChoice:
     """What was told; None where nothing was.
 
     Attributes
@@ -39,13 +39,13 @@ class Remembered:
     hold: InputHold | None = None
 
 
-def remembered(source: object) -> Remembered:
+def remembered(source: object) -> StartChoice:
     """What a fit, or the model in its file, was told; nothing for a model that no fit made.
 
     Example
     -------
     >>> remembered(object())  # doctest: +NORMALIZE_WHITESPACE
-    Remembered(initial_state=None, output_bias=None, input_bias=None, record_parameters=(),
+    StartChoice(initial_state=None, output_bias=None, input_bias=None, record_parameters=(),
     hold=None)
     """
     told, inputs = _told(source, "told"), _told(source, "inputs")
@@ -58,7 +58,7 @@ def remembered(source: object) -> Remembered:
     known = inputs.get("hold_from") in (DECLARED, RECORDED)
     hold = inputs.get("hold") if known and inputs.get("hold") in HOLDS else None
     start = start if start in WORDS else None
-    return Remembered(start, **biases, record_parameters=own, hold=hold)
+    return StartChoice(start, **biases, record_parameters=own, hold=hold)
 
 
 def of_record(source: object, model: object, record: Record) -> object:

@@ -23,7 +23,7 @@ from flightid.identification.records.setup import OwnNumbers, RecordSet
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.uncertainty import correlation as correlation_of
 from flightid.uncertainty.agreement import Agreement
-from flightid.uncertainty.blocks import Beside, Block
+from flightid.uncertainty.blocks import Block, JointResiduals
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.residual_covariance import residual_covariance, triangle_of
 
@@ -85,7 +85,7 @@ def record_statistics(
     runs: Sequence[tuple[Array, Array]],
     noise: Array,
     limit: float,
-    beside: Beside | None = None,
+    beside: JointResiduals | None = None,
     starts: Sequence[HeldStart | None] = (),
 ) -> RecordStatistics:
     """Standard errors, bounds and correlations of a fit to records.

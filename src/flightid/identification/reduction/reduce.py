@@ -134,7 +134,7 @@ def reduce(
         raise OptionError(
             "after_rise is not known", found=repr(after_rise), needed=" or ".join(AFTER_RISE)
         )
-    walk = _Walk(data, fit, _options(fit, options), tuple(keep), dict(at or {}))
+    walk = _ReductionPath(data, fit, _options(fit, options), tuple(keep), dict(at or {}))
     for name in (*walk.keep, *walk.at):
         _ = fit.model.parameters[name]
     with progress(None, "reducing the structure") as advance:
@@ -209,7 +209,7 @@ def _options(fit: Fit, given: Mapping[str, object]) -> dict[str, Any]:
 
 
 @dataclass
-class _Walk:
+class _ReductionPath:
     """A reduction under way: the fit that stands and the steps so far."""
 
     data: Any

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from flightid.conditioning.smoothing import fourier_smooth
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.identification.regression.sampled_equations import MeasuredMotion
+from flightid.identification.regression.sampled_equations import StateMeasurements
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]
@@ -26,7 +26,7 @@ LIMIT = 0.5
 _QUARTER_RATE = 0.25
 
 
-def state_noise(motions: Sequence[MeasuredMotion]) -> list[Array]:
+def state_noise(motions: Sequence[StateMeasurements]) -> list[Array]:
     """Standard deviation of the white noise of each state, by record.
 
     Biased where a sensor's filter has taken the noise from the upper half of the band: too small.
@@ -45,15 +45,15 @@ def state_noise(motions: Sequence[MeasuredMotion]) -> list[Array]:
 
 
 def attenuation(
-    motions: Sequence[MeasuredMotion],
-    refit: Callable[[Sequence[MeasuredMotion]], Array],
+    motions: Sequence[StateMeasurements],
+    refit: Callable[[Sequence[StateMeasurements]], Array],
     estimate: Array,
 ) -> Array:
     """Estimated bias of each free parameter by noise in the states.
 
     Parameters
     ----------
-    motions : sequence of MeasuredMotion
+    motions : sequence of StateMeasurements
     refit : callable
         Estimates from motions with more noise.
     estimate : ndarray, shape (n_free,)

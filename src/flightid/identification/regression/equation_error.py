@@ -36,8 +36,8 @@ from flightid.identification.regression.options import (
 from flightid.identification.regression.right_side import RightSide
 from flightid.identification.regression.rounds import Limits, SettledRounds, settle, solve, stack
 from flightid.identification.regression.sampled_equations import (
-    MeasuredMotion,
     Reconstruction,
+    StateMeasurements,
 )
 from flightid.identification.regression.weights import (
     compared_covariance,
@@ -58,7 +58,7 @@ def fit_equation_error(
 ) -> Fit:
     """Fit by least squares on state derivatives; see `flightid.identify`."""
 
-    def operator(motion: MeasuredMotion) -> Operator:
+    def operator(motion: StateMeasurements) -> Operator:
         return LocalMeans(motion, options.half_width, options.output_bias)
 
     problem, start, limits = _problem(model, data, options, operator)
@@ -99,7 +99,7 @@ def fit_fourier_regression(
 ) -> Fit:
     """Fit by least squares on Fourier integrals of the equations; see `flightid.identify`."""
 
-    def operator(motion: MeasuredMotion) -> Operator:
+    def operator(motion: StateMeasurements) -> Operator:
         return FourierRows(motion, options.band_rad_s)
 
     problem, start, limits = _problem(model, data, options, operator)
@@ -153,7 +153,7 @@ def _problem(
     model: StateSpaceModel,
     data: Record | Sequence[Record],
     options: RegressionOptions,
-    operator: Callable[[MeasuredMotion], Operator],
+    operator: Callable[[StateMeasurements], Operator],
 ) -> tuple[EquationRegression, Array, Limits]:
     records = check_records(model, data)
     reconstruction = Reconstruction.of(model, records[0])
@@ -177,7 +177,7 @@ def _finish(
     end = settled.end
     settled_at = problem.renewed(end.x)
 
-    def refit(motions: Sequence[MeasuredMotion]) -> Array:
+    def refit(motions: Sequence[StateMeasurements]) -> Array:
         operators = [
             each.with_motion(motion)
             for each, motion in zip(problem.operators, motions, strict=True)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flightid.conditioning.smoothing import local_derivative, local_mean
 from flightid.identification.regression.harmonics import FEWEST_SAMPLES, Harmonics
-from flightid.identification.regression.sampled_equations import MeasuredMotion, require_length
+from flightid.identification.regression.sampled_equations import StateMeasurements, require_length
 
 Array = NDArray[np.float64]
 
@@ -39,7 +39,7 @@ class Operator(Protocol):
     def in_time(self, rows: Array) -> Array:
         """Rows as samples of time, (n_equations, n_times)."""
 
-    def with_motion(self, motion: MeasuredMotion) -> Operator:
+    def with_motion(self, motion: StateMeasurements) -> Operator:
         """The same operator on another motion of the same length."""
 
 
@@ -49,14 +49,14 @@ class LocalMeans:
 
     Attributes
     ----------
-    motion : MeasuredMotion
+    motion : StateMeasurements
     half_width : int
         Neighbours on each side.
     output_bias : bool
         Whether each equation has an unknown constant in this record.
     """
 
-    motion: MeasuredMotion
+    motion: StateMeasurements
     half_width: int
     output_bias: bool = True
 
@@ -93,7 +93,7 @@ class LocalMeans:
         """The rows themselves."""
         return rows
 
-    def with_motion(self, motion: MeasuredMotion) -> LocalMeans:
+    def with_motion(self, motion: StateMeasurements) -> LocalMeans:
         """The same operator on another motion."""
         return replace(self, motion=motion)
 
@@ -107,12 +107,12 @@ class FourierRows:
 
     Attributes
     ----------
-    motion : MeasuredMotion
+    motion : StateMeasurements
     band : tuple of float or None
         Lowest and highest frequency, rad/s.
     """
 
-    motion: MeasuredMotion
+    motion: StateMeasurements
     band: tuple[float, float] | None
 
     def __post_init__(self) -> None:
@@ -156,6 +156,6 @@ class FourierRows:
         whole = (real + 1j * imaginary) / self._scale()
         return self.grid.in_time(np.asarray(whole, dtype=np.complex128))
 
-    def with_motion(self, motion: MeasuredMotion) -> FourierRows:
+    def with_motion(self, motion: StateMeasurements) -> FourierRows:
         """The same operator on another motion."""
         return replace(self, motion=motion)

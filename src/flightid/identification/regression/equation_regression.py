@@ -12,7 +12,7 @@ from flightid.errors import FitError
 from flightid.identification.regression.equation_operators import FourierRows, Operator
 from flightid.identification.regression.right_side import Bends, RightSide
 from flightid.identification.regression.rounds import Rows
-from flightid.identification.regression.sampled_equations import MeasuredMotion
+from flightid.identification.regression.sampled_equations import StateMeasurements
 
 Array = NDArray[np.float64]
 ROUNDING = 1e-10
@@ -26,7 +26,7 @@ class EquationRegression:
     Attributes
     ----------
     right : RightSide
-    motions : tuple of MeasuredMotion
+    motions : tuple of StateMeasurements
     operators : tuple of Operator
     bends : tuple of Bends
         What corners of the inputs do to the states between samples, by record.
@@ -35,7 +35,7 @@ class EquationRegression:
     """
 
     right: RightSide
-    motions: tuple[MeasuredMotion, ...]
+    motions: tuple[StateMeasurements, ...]
     operators: tuple[Operator, ...]
     bends: tuple[Bends, ...]
     used: NDArray[np.intp]
@@ -44,7 +44,7 @@ class EquationRegression:
     def of(
         cls,
         right: RightSide,
-        motions: Sequence[MeasuredMotion],
+        motions: Sequence[StateMeasurements],
         operators: Sequence[Operator],
         start: Array,
     ) -> EquationRegression:

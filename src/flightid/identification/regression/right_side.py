@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import ModelError, SingularError
 from flightid.identification.records.delayed_inputs import DelayedInputs, lagrange
-from flightid.identification.regression.sampled_equations import MeasuredMotion, Reconstruction
+from flightid.identification.regression.sampled_equations import Reconstruction, StateMeasurements
 from flightid.models import StateSpaceModel
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ class RightSides:
 
 
 @dataclass(frozen=True)
-class _Computed:
+class _StateValues:
     """State derivatives, then other outputs, at points: (n_points, n_rows) and derivatives."""
 
     values: Array
@@ -75,14 +75,14 @@ class RightSide:
         """Model of the equations."""
         return self.reconstruction.model
 
-    def bends(self, theta: Array, motion: MeasuredMotion) -> Bends:
+    def bends(self, theta: Array, motion: StateMeasurements) -> Bends:
         """What corners of the inputs do to the states between samples, for these parameters."""
         values, late = self._late(theta, motion)
         inputs = late.at(0.0)[0]
         n = len(self.model.states)
         return Bends.of(late, self._computed(values, motion.states, inputs).by_input[:, :n])
 
-    def at(self, theta: Array, motion: MeasuredMotion, bends: Bends) -> RightSides:
+    def at(self, theta: Array, motion: StateMeasurements, bends: Bends) -> RightSides:
         """Values and derivatives at free parameters, shape (n_free,), bends held.
 
         Raises
@@ -121,14 +121,14 @@ class RightSide:
         others, other_slopes = self._others(values, motion, late)
         return RightSides(mean(inside.values[:, :n]).T, slopes.swapaxes(0, 1), others, other_slopes)
 
-    def _late(self, theta: Array, motion: MeasuredMotion) -> tuple[Array, DelayedInputs]:
+    def _late(self, theta: Array, motion: StateMeasurements) -> tuple[Array, DelayedInputs]:
         values = self.model.parameters.independent_values()
         values[self.model.parameters.free_indices] = theta
         step = motion.sample_time_s
         return values, DelayedInputs.of(self.model, values, motion.inputs, step, self.hold)
 
     def _others(
-        self, values: Array, motion: MeasuredMotion, late: DelayedInputs
+        self, values: Array, motion: StateMeasurements, late: DelayedInputs
     ) -> tuple[Array, Array]:
         """Outputs that are no states, at the samples, and their derivatives."""
         n = len(self.model.states)
@@ -140,7 +140,7 @@ class RightSide:
         slopes = here.by_theta[:, n:] - (here.by_input[:, n:] * rates.T[:, None]) @ late.slopes
         return here.values[:, n:].T, slopes.swapaxes(0, 1)
 
-    def _computed(self, values: Array, states: Array, inputs: Array) -> _Computed:
+    def _computed(self, values: Array, states: Array, inputs: Array) -> _StateValues:
         n, m = states.shape[0], inputs.shape[0]
         free = self.model.parameters.free_indices
         still = np.zeros((states.shape[1], n))
@@ -154,7 +154,7 @@ class RightSide:
         others = [n + place for place in self.reconstruction.others]
         outputs = slopes[:, others, n:] + slopes[:, others, :n] @ rates
         whole = np.concatenate([rates, outputs], axis=1)
-        return _Computed(np.hstack([moving, found[:, others]]), whole[:, :, :m], whole[:, :, m:])
+        return _StateValues(np.hstack([moving, found[:, others]]), whole[:, :, :m], whole[:, :, m:])
 
 
 def curve(states: Array, place: float) -> Array:

@@ -17,7 +17,7 @@ _SAME = 1e-9
 
 
 @dataclass(frozen=True)
-class MeasuredMotion:
+class StateMeasurements:
     """What one record says about a model's states.
 
     Attributes
@@ -73,7 +73,7 @@ class Reconstruction:
         others = tuple(k for k in range(len(model.outputs)) if k not in seen.places)
         return cls(model, seen, others)
 
-    def measured(self, record: Record) -> MeasuredMotion:
+    def measured(self, record: Record) -> StateMeasurements:
         """States, inputs and remaining outputs of a record.
 
         Raises
@@ -85,7 +85,7 @@ class Reconstruction:
         states = self.seen.states(outputs)
         inputs = record.matrix(self.model.inputs)
         others = outputs[list(self.others)]
-        return MeasuredMotion(record.name, record.sample_time_s, states, inputs, others)
+        return StateMeasurements(record.name, record.sample_time_s, states, inputs, others)
 
 
 def _require_states(model: StateSpaceModel, matrix: Array) -> None:
@@ -105,7 +105,7 @@ def _require_states(model: StateSpaceModel, matrix: Array) -> None:
     )
 
 
-def require_length(motion: MeasuredMotion, needed: int) -> None:
+def require_length(motion: StateMeasurements, needed: int) -> None:
     """Refuse a record that is too short.
 
     Raises

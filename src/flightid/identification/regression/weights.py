@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.identification.regression.rounds import Rows
-from flightid.uncertainty.agreement import Agreed
+from flightid.uncertainty.agreement import AgreementTest
 from flightid.uncertainty.blocks import Block
 from flightid.uncertainty.residual_covariance import white_covariance
 from flightid.uncertainty.spectral import averaged, spectral_covariance
@@ -72,7 +72,7 @@ def fourier_covariance(
 
 def compared_covariance(
     rows: Sequence[Rows], weights: Sequence[Array], omegas: Sequence[Array]
-) -> Agreed:
+) -> AgreementTest:
     """`fourier_covariance`, records and halves of each compared.
 
     Halves are those of the weighted harmonics taken back in time, where white residuals are white.

@@ -107,7 +107,7 @@ def _hankel(rows: Array, blocks: int) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Compressed:
+class RowSpaceFactor:
     """Lower triangular factor of [U_f; U_p; Y_p; Y_f]: every row space without its length.
 
     Attributes
@@ -172,7 +172,7 @@ class Compressed:
         return np.asarray(np.linalg.lstsq(gamma, weights.T @ past, rcond=None)[0])
 
 
-def compress(data: SubspaceData, horizon: int) -> Compressed:
+def compress(data: SubspaceData, horizon: int) -> RowSpaceFactor:
     """One QR of the Hankel matrices of all records, folded block by block.
 
     Raises
@@ -209,4 +209,4 @@ def compress(data: SubspaceData, horizon: int) -> Compressed:
             needed=f"{2 * horizon * m} for a horizon of {horizon}",
             action="excite more frequencies, or shorten the horizon",
         )
-    return Compressed(triangle.T, horizon, m, p, columns)
+    return RowSpaceFactor(triangle.T, horizon, m, p, columns)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
-from flightid.identification.subspace.data import Compressed, SubspaceData, compress
+from flightid.identification.subspace.data import RowSpaceFactor, SubspaceData, compress
 from flightid.identification.subspace.matrices import (
     feedthrough,
     kalman_gain,
@@ -45,7 +45,7 @@ class Subspace:
     n_columns: int
     observability: Array
     states: Array | None
-    compressed: Compressed | None
+    compressed: RowSpaceFactor | None
 
 
 def decompose(structure: SubspaceStructure, data: SubspaceData) -> Subspace:

@@ -23,7 +23,11 @@ from flightid.identification.subspace.details import SubspaceDetails
 from flightid.identification.subspace.estimate import Matrices, decompose, realise
 from flightid.identification.subspace.findings import judge_innovations
 from flightid.identification.subspace.order import OrderChoice, choose_order, determinant_criteria
-from flightid.identification.subspace.prediction_errors import Refined, refine, spare_states
+from flightid.identification.subspace.prediction_errors import (
+    RefinementResult,
+    refine,
+    spare_states,
+)
 from flightid.identification.subspace.roots import innovations_gains, innovations_roots
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.prediction import free_run, one_step_errors
@@ -62,7 +66,7 @@ def fit_subspace(structure: SubspaceStructure, data: Record | Sequence[Record]) 
     return _assemble(structure, records, gathered, choice, found, spare)
 
 
-def _refined(structure: SubspaceStructure, data: SubspaceData, start: Matrices) -> Refined:
+def _refined(structure: SubspaceStructure, data: SubspaceData, start: Matrices) -> RefinementResult:
     return refine(
         data,
         _scaled(start, 1.0 / data.scales),
@@ -78,7 +82,9 @@ def _scaled(matrices: Matrices, size: Array) -> Matrices:
     return a, b, size[:, None] * c, size[:, None] * d, k / size
 
 
-def _unrefined(structure: SubspaceStructure, data: SubspaceData, start: Matrices) -> Refined:
+def _unrefined(
+    structure: SubspaceStructure, data: SubspaceData, start: Matrices
+) -> RefinementResult:
     model = InnovationsModel(structure.inputs, structure.outputs, 1.0, *start)
     errors = tuple(
         one_step_errors(model, y, u, structure.initial_state)
@@ -86,7 +92,7 @@ def _unrefined(structure: SubspaceStructure, data: SubspaceData, start: Matrices
     )
     samples = sum(e.size for e in errors)
     degrees = max(samples - structure.n_parameters(model.order), 1)
-    return Refined(start, errors, None, degrees, 0, "subspace")
+    return RefinementResult(start, errors, None, degrees, 0, "subspace")
 
 
 def _assemble(
@@ -94,7 +100,7 @@ def _assemble(
     records: tuple[Record, ...],
     data: SubspaceData,
     choice: OrderChoice,
-    found: Refined,
+    found: RefinementResult,
     spare: str,
 ) -> Fit:
     size = data.scales
@@ -154,7 +160,7 @@ def _parameters(model: InnovationsModel) -> dict[str, Estimate]:
     }
 
 
-def _in_units(structure: SubspaceStructure, found: Refined, size: Array) -> Array | None:
+def _in_units(structure: SubspaceStructure, found: RefinementResult, size: Array) -> Array | None:
     if found.covariance is None:
         return None
     a, b, c, d, k = (np.ones_like(matrix) for matrix in found.matrices)

@@ -25,7 +25,7 @@ SETTLED = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Refined:
+class RefinementResult:
     """Outcome of the search.
 
     Attributes
@@ -171,7 +171,7 @@ def refine(
     direct: bool,
     initial_state: str,
     maximum_iterations: int,
-) -> Refined:
+) -> RefinementResult:
     """Smallest log determinant of the innovations' covariance, from a subspace estimate.
 
     Each round weights the errors of different outputs by their covariance and searches along the
@@ -208,7 +208,9 @@ def refine(
     covariance, agreement = _covariance(predictor, matrices, errors, degrees)
     if agreement is not None and agreement.freedom is not None:
         degrees = max(1, int(np.min(agreement.freedom)))
-    return Refined(matrices, errors, covariance, degrees, iterations, termination, agreement)
+    return RefinementResult(
+        matrices, errors, covariance, degrees, iterations, termination, agreement
+    )
 
 
 def _count(shapes: tuple[tuple[int, ...], ...], n: int) -> int:
@@ -222,12 +224,12 @@ def _level(errors: tuple[Array, ...]) -> float:
     return float(value) if sign > 0 and value > -60.0 * len(joint) else -np.inf
 
 
-def spare_states(lower: Refined, found: Refined, numbers: int) -> str:
+def spare_states(lower: RefinementResult, found: RefinementResult, numbers: int) -> str:
     """Why fewer states do as well, by the Bayesian information criterion; else empty.
 
     Parameters
     ----------
-    lower, found : Refined
+    lower, found : RefinementResult
         With fewer states, and as asked.
     numbers : int
         Parameters that a state brings.

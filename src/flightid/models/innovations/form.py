@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import ModelError
-from flightid.models.estimated import Estimated
+from flightid.models.estimated import EstimateProvenance
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.parameters import Parameter
 from flightid.models.sampled.coefficients import coefficients, replaced
@@ -39,7 +39,7 @@ class InnovationsForm:
     units: Mapping[str, str] = field(default_factory=dict)
     name: str = "innovations model"
     operating_point: Mapping[str, float] = field(default_factory=dict)
-    estimated: Estimated | None = field(default=None, compare=False)
+    estimated: EstimateProvenance | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "outputs", tuple(self.outputs))

@@ -14,11 +14,11 @@ from flightid.models.innovations.structure import SubspaceOptions, SubspaceStruc
 from flightid.models.sampled.channels import gather_channels, hold_diverged, require_same
 from flightid.models.sampled.discrete_modes import zero_note
 from flightid.record import Record
-from flightid.result import Tabled
+from flightid.result import TableView
 from flightid.table import Cell, Column, Table
 
 
-class InnovationsModel(InnovationsForm, Tabled):
+class InnovationsModel(InnovationsForm, TableView):
     """x(t+1) = A x(t) + B u(t) + K e(t), y(t) = C x(t) + D u(t) + e(t).
 
     Channels are deviations from an operating point, in the channels' units; the states have no
@@ -40,7 +40,7 @@ class InnovationsModel(InnovationsForm, Tabled):
     operating_point : mapping of str to float
         Value of each channel about which the model holds, in its unit: where the training records
         were. A channel left out counts from zero.
-    estimated : Estimated or None
+    estimated : EstimateProvenance or None
         What a fit knew of the parameters, where the model comes from its file.
 
     Raises

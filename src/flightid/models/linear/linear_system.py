@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
-from flightid.models.estimated import Estimated
+from flightid.models.estimated import EstimateProvenance
 from flightid.models.linear.delay_states import delays_as_states, shift_registers
 from flightid.models.linear.hold_equivalent import Hold, hold_equivalent
 from flightid.models.linear.rational import Rational
 from flightid.models.linear.realisation import Matrices
 from flightid.models.parameters import Parameter
-from flightid.result import Tabled
+from flightid.result import TableView
 from flightid.table import Column, Table
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ DEFAULT_PADE_ORDER = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LinearSystem(Rational, Tabled):
+class LinearSystem(Rational, TableView):
     """A linear system given by its matrices: dx/dt = A x + B u(t − τ), y = C x + D u(t − τ).
 
     With a sample time it is a recursion: x[k+1] in place of dx/dt.
@@ -47,7 +47,7 @@ class LinearSystem(Rational, Tabled):
     units : mapping of str to str
         Unit by channel and state name; what is left out is dimensionless.
     name : str
-    estimated : Estimated or None
+    estimated : EstimateProvenance or None
         What a fit knew of the parameters, where the model comes from its file.
 
     Raises
@@ -79,7 +79,7 @@ class LinearSystem(Rational, Tabled):
     sample_time_s: float | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     name: str = "linear system"
-    estimated: Estimated | None = field(default=None, compare=False)
+    estimated: EstimateProvenance | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         inputs, outputs = tuple(self.inputs), tuple(self.outputs)

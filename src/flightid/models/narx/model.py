@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import ModelError
-from flightid.models.estimated import Estimated
+from flightid.models.estimated import EstimateProvenance
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.structure import NarxStructure
@@ -19,7 +19,7 @@ from flightid.models.narx.terms import Lag, Term
 from flightid.models.parameters import Parameter
 from flightid.models.sampled.coefficients import coefficients, replaced
 from flightid.record import Record
-from flightid.result import Tabled
+from flightid.result import TableView
 from flightid.table import Column, Table
 
 SCHEMA = "flightid.narx_equation/1"
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False)
-class NarxModel(Tabled):
+class NarxModel(TableView):
     """y(t) = Σ weight · term of lagged outputs and inputs, channels scaled.
 
     Attributes
@@ -40,7 +40,7 @@ class NarxModel(Tabled):
     scaling : Scaling
         Of the training records.
     name : str
-    estimated : Estimated or None
+    estimated : EstimateProvenance or None
         What a fit knew of the parameters, where the model comes from its file.
 
     Example
@@ -58,7 +58,7 @@ class NarxModel(Tabled):
     weights: tuple[float, ...]
     scaling: Scaling
     name: str = "NARX model"
-    estimated: Estimated | None = field(default=None, compare=False)
+    estimated: EstimateProvenance | None = field(default=None, compare=False)
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -12,11 +12,11 @@ from flightid.models.polynomial.polynomials import Array, Polynomials
 from flightid.models.polynomial.prediction import forced_run
 from flightid.models.sampled.channels import gather_channels, hold_diverged, require_same
 from flightid.record import Record
-from flightid.result import Tabled
+from flightid.result import TableView
 from flightid.table import Table
 
 
-class PolynomialModel(Polynomials, StructureMakers, Tabled):
+class PolynomialModel(Polynomials, StructureMakers, TableView):
     """A(q) y(t) = Σ Bᵢ(q)/Fᵢ(q) uᵢ(t - nkᵢ) + C(q)/D(q) e(t), polynomials in q⁻¹.
 
     Channels are deviations from an operating point, in the channels' units.
@@ -43,7 +43,7 @@ class PolynomialModel(Polynomials, StructureMakers, Tabled):
     operating_point : mapping of str to float
         Value of each channel about which the model holds, in its unit: where the training records
         were. A channel left out counts from zero.
-    estimated : Estimated or None
+    estimated : EstimateProvenance or None
         What a fit knew of the parameters, where the model comes from its file.
 
     Raises

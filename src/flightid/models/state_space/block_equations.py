@@ -12,13 +12,13 @@ from flightid.models.language.blocks import MAXIMUM_BLOCKS, Block, Realisation, 
 from flightid.models.language.dimensions import unit_of
 from flightid.models.language.formula import formula_names
 from flightid.models.parameters import Parameter, Parameters
-from flightid.models.state_space.linear import Linearised
+from flightid.models.state_space.linear import Linearisation
 from flightid.models.state_space.parts import Output
 
 Value = TypeVar("Value")
 
 
-def written_out(bare: Linearised, blocks: Sequence[Block]) -> dict[str, Any]:
+def written_out(bare: Linearisation, blocks: Sequence[Block]) -> dict[str, Any]:
     """What actuators at a model's inputs, and sensors and filters at its outputs, change in it.
 
     Blocks at one place stand one behind the other, in the order given, in the direction of the
@@ -26,7 +26,7 @@ def written_out(bare: Linearised, blocks: Sequence[Block]) -> dict[str, Any]:
 
     Parameters
     ----------
-    bare : Linearised
+    bare : Linearisation
         Model without blocks.
     blocks : sequence of Block
 
@@ -70,7 +70,7 @@ def written_out(bare: Linearised, blocks: Sequence[Block]) -> dict[str, Any]:
 class _Expansion:
     """The tables of a model while blocks are written into them."""
 
-    bare: Linearised
+    bare: Linearisation
     states: dict[str, str] = field(init=False)
     measurements: dict[str, Output] = field(init=False)
     equations: dict[str, str] = field(init=False)

@@ -10,7 +10,7 @@ from flightid.errors import ModelError
 from flightid.models.language.dimensions import require_balance, require_unit
 from flightid.models.language.formula import RESERVED, formula_names
 from flightid.models.language.tables import check_tables
-from flightid.models.state_space.linear import Linearised
+from flightid.models.state_space.linear import Linearisation
 from flightid.models.state_space.parts import derivative
 
 MAXIMUM_STATES = 200
@@ -19,12 +19,12 @@ MAXIMUM_DEFINITIONS = 1_000
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-def check_model(model: Linearised) -> None:
+def check_model(model: Linearisation) -> None:
     """Refuse a model that contradicts itself.
 
     Parameters
     ----------
-    model : Linearised
+    model : Linearisation
 
     Raises
     ------
@@ -65,7 +65,7 @@ def check_model(model: Linearised) -> None:
     _check_record_values(model)
 
 
-def _check_record_values(model: Linearised) -> None:
+def _check_record_values(model: Linearisation) -> None:
     for kind, known in (("initial", tuple(model.states)), ("biases", tuple(model.units))):
         for name in getattr(model, kind):
             if name not in known:
@@ -76,7 +76,7 @@ def _check_record_values(model: Linearised) -> None:
                 )
 
 
-def _check_sizes(model: Linearised) -> None:
+def _check_sizes(model: Linearisation) -> None:
     limits = {"states": MAXIMUM_STATES, "inputs": MAXIMUM_CHANNELS, "outputs": MAXIMUM_CHANNELS}
     if len(model.definitions) > MAXIMUM_DEFINITIONS:
         raise ModelError(
@@ -95,7 +95,7 @@ def _check_sizes(model: Linearised) -> None:
         )
 
 
-def _check_names(model: Linearised) -> None:
+def _check_names(model: Linearisation) -> None:
     seen: dict[str, str] = {}
     for kind in ("states", "inputs", "parameters", "definitions", "tables"):
         for name in getattr(model, kind):
@@ -123,7 +123,7 @@ def _check_names(model: Linearised) -> None:
 
 
 def _defined(
-    text: str, units: Mapping[str, str], subject: str, model: Linearised | None
+    text: str, units: Mapping[str, str], subject: str, model: Linearisation | None
 ) -> set[str]:
     """Names in a formula, all of them known."""
     try:

@@ -19,7 +19,7 @@ from flightid.models.language.sympy_input import is_sympy, sympy_formula
 from flightid.models.language.tables import TableFunction, read_table_function
 from flightid.models.parameter_table import read_parameter
 from flightid.models.parameters import Parameter, Parameters
-from flightid.models.state_space.linear import Linearised
+from flightid.models.state_space.linear import Linearisation
 from flightid.models.state_space.parts import Output
 
 _KEYS = {"schema", "kind", "name", "source", "note", "states", "inputs", "outputs", "parameters"}
@@ -168,12 +168,12 @@ def _pairs(item: object) -> tuple[str, ...]:
     return tuple(read_text(each, "responses") for each in item)
 
 
-def to_plain(model: Linearised) -> dict[str, object]:
+def to_plain(model: Linearisation) -> dict[str, object]:
     """Plain values that `from_plain` reads.
 
     Parameters
     ----------
-    model : Linearised
+    model : Linearisation
 
     Returns
     -------
@@ -215,12 +215,12 @@ def _plain(parameter: Parameter) -> dict[str, object]:
     return {key: value for key, value in parameter.to_dict().items() if value is not None}
 
 
-def lines(model: Linearised) -> list[str]:
+def lines(model: Linearisation) -> list[str]:
     """Equations, definitions, outputs, delays and blocks as text, one a line.
 
     Parameters
     ----------
-    model : Linearised
+    model : Linearisation
 
     Returns
     -------
@@ -242,12 +242,12 @@ def lines(model: Linearised) -> list[str]:
     return [*equations, *definitions, *outputs, *delays, *blocks]
 
 
-def one_line(model: Linearised) -> str:
+def one_line(model: Linearisation) -> str:
     """Name and size of a model.
 
     Parameters
     ----------
-    model : Linearised
+    model : Linearisation
 
     Returns
     -------

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from html import escape
 
 from flightid.models.language.symbolic import ZERO, Printer, Term, latex_name
-from flightid.models.state_space.linear import Linearised
+from flightid.models.state_space.linear import Linearisation
 from flightid.models.state_space.parts import derivative
 
 _BREAK = r" \\ "
@@ -81,12 +81,12 @@ class MatrixDisplay:
         return "".join(f"<div>$${escape(each, quote=False)}$$</div>" for each in self._lines())
 
 
-def matrices_as_latex(model: Linearised) -> MatrixDisplay:
+def matrices_as_latex(model: Linearisation) -> MatrixDisplay:
     """Derive the matrices of a model symbolically.
 
     Parameters
     ----------
-    model : Linearised
+    model : Linearisation
 
     Returns
     -------

@@ -26,7 +26,7 @@ from flightid.models.state_space.parts import (
 Array = NDArray[np.float64]
 
 
-class Linearised(Adjustable):
+class Linearisation(Adjustable):
     """What follows from the linearisation of a state-space model; its base."""
 
     states: Mapping[str, str]
@@ -41,7 +41,7 @@ class Linearised(Adjustable):
     initial: Mapping[str, RecordValue]
     biases: Mapping[str, RecordValue]
     blocks: tuple[Block, ...]
-    bare: Linearised | None
+    bare: Linearisation | None
     source: str
     note: str
     native: _native.StateSpace

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 from flightid import _native
 from flightid.errors import ModelError, UnknownNameError
-from flightid.models.estimated import Estimated
+from flightid.models.estimated import EstimateProvenance
 from flightid.models.language.blocks import Block
 from flightid.models.language.record_values import RecordValue
 from flightid.models.language.tables import TableFunction
@@ -20,10 +20,10 @@ from flightid.models.state_space import description
 from flightid.models.state_space.block_equations import split_own, written_out
 from flightid.models.state_space.checks import check_model
 from flightid.models.state_space.display import MatrixDisplay, matrices_as_latex
-from flightid.models.state_space.linear import Linearised
+from flightid.models.state_space.linear import Linearisation
 from flightid.models.state_space.parts import Output, ResponsePair
 from flightid.models.state_space.trimming import find_trim
-from flightid.result import Tabled
+from flightid.result import TableView
 from flightid.table import Table
 from flightid.units import canonical
 
@@ -32,7 +32,7 @@ SCHEMA = "flightid.state_space_model/1"
 
 
 @dataclass(frozen=True, repr=False)
-class StateSpaceModel(Linearised, Tabled):
+class StateSpaceModel(Linearisation, TableView):
     """Equations of motion with named, bounded, tied parameters.
 
     Attributes
@@ -65,7 +65,7 @@ class StateSpaceModel(Linearised, Tabled):
         Actuators, sensors and filters that are already written out in states and equations.
     bare : StateSpaceModel or None
         The model without its blocks.
-    estimated : Estimated or None
+    estimated : EstimateProvenance or None
         What a fit knew of the parameters, where the model comes from its file.
 
     Raises
@@ -116,7 +116,7 @@ class StateSpaceModel(Linearised, Tabled):
     biases: Mapping[str, RecordValue] = field(default_factory=dict)
     blocks: tuple[Block, ...] = ()
     bare: StateSpaceModel | None = field(default=None, compare=False)
-    estimated: Estimated | None = field(default=None, compare=False)
+    estimated: EstimateProvenance | None = field(default=None, compare=False)
     native: _native.StateSpace = field(init=False, compare=False)
 
     def __post_init__(self) -> None:

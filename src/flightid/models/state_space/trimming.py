@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import FitError, FlightidError, UnknownNameError
-from flightid.models.state_space.linear import Linearised
+from flightid.models.state_space.linear import Linearisation
 
 MAXIMUM_ITERATIONS = 100
 _HALVINGS = 30
@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def find_trim(
-    model: Linearised,
+    model: Linearisation,
     at: Mapping[str, float],
     solve_for: Sequence[str] | None,
     require: Sequence[str],
@@ -28,7 +28,7 @@ def find_trim(
 
     Parameters
     ----------
-    model : Linearised
+    model : Linearisation
     at : mapping of str to float
         States, inputs and state derivatives that are held, instead of the model's trim.
     solve_for : sequence of str, optional
@@ -85,7 +85,7 @@ class _State:
 
 
 class _Search:
-    def __init__(self, model: Linearised, places: list[int], require: tuple[str, ...]) -> None:
+    def __init__(self, model: Linearisation, places: list[int], require: tuple[str, ...]) -> None:
         self._model, self._places, self._require = model, places, require
         names = [parameter.name for parameter in model.parameters.independent]
         auxiliary = {name: output.expression for name, output in model.definitions.items()}

@@ -15,13 +15,13 @@ from numpy.typing import ArrayLike, NDArray
 from flightid import _native
 from flightid.errors import DataError, ModelError, UnknownNameError
 from flightid.models.adjustable import Adjustable
-from flightid.models.estimated import Estimated
+from flightid.models.estimated import EstimateProvenance
 from flightid.models.language.dimensions import require_unit
 from flightid.models.language.formula import formula_names
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.realisation import Matrices, canonical_form, one_delay_for_each_input
 from flightid.models.parameters import Parameters
-from flightid.result import Tabled
+from flightid.result import TableView
 from flightid.table import Table
 from flightid.units import DIMENSIONLESS, canonical
 
@@ -78,7 +78,7 @@ class TransferFunction:
 
 
 @dataclass(frozen=True, repr=False)
-class TransferFunctionModel(Adjustable, Tabled):
+class TransferFunctionModel(Adjustable, TableView):
     """Transfer functions of the same parameters.
 
     Attributes
@@ -91,7 +91,7 @@ class TransferFunctionModel(Adjustable, Tabled):
         Unit by channel name; a channel left out is dimensionless.
     name, source, note : str
         What it is, where it comes from, what to know.
-    estimated : Estimated or None
+    estimated : EstimateProvenance or None
         What a fit knew of the parameters, where the model comes from its file.
 
     Raises
@@ -119,7 +119,7 @@ class TransferFunctionModel(Adjustable, Tabled):
     name: str = "transfer functions"
     source: str = ""
     note: str = ""
-    estimated: Estimated | None = field(default=None, compare=False)
+    estimated: EstimateProvenance | None = field(default=None, compare=False)
     native: _native.TransferFunctions = field(init=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from flightid.errors import ShapeError
 from flightid.responses.errors.covariance import WindowedErrors
 from flightid.responses.errors.noise import NoiseSpectrum, noise_of_residuals
-from flightid.responses.errors.random_error import CovarianceSource, Selected
+from flightid.responses.errors.random_error import CovarianceSource, ErrorSelection
 from flightid.responses.windows.local_fit import Bins, LocalFit
 from flightid.responses.windows.samples import Samples
 from flightid.responses.windows.transform import transform
@@ -233,4 +233,4 @@ class LinearEstimate:
             None where the estimate's own noise is as good.
         """
         found = self.weights.errors_of(residuals, self.places[0])
-        return None if found is None else Selected(found, *self.places)
+        return None if found is None else ErrorSelection(found, *self.places)

@@ -97,7 +97,7 @@ def combined(
 
 def knows_between_outputs(errors: CovarianceSource) -> bool:
     """Whether a source knows what different outputs share."""
-    if isinstance(errors, Selected):
+    if isinstance(errors, ErrorSelection):
         return knows_between_outputs(errors.errors)
     return isinstance(errors, JointErrors)
 
@@ -110,7 +110,7 @@ def union(wanted: Sequence[Points]) -> tuple[NDArray[np.intp], NDArray[np.intp]]
 
 
 @dataclass(frozen=True)
-class Selected:
+class ErrorSelection:
     """Errors of some outputs, inputs and frequencies of a response."""
 
     errors: CovarianceSource
@@ -151,7 +151,7 @@ class Selected:
 
 
 @dataclass(frozen=True)
-class Known:
+class StoredCovariance:
     """A covariance at all frequencies that was computed before (or read from a file).
 
     Attributes

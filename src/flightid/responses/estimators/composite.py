@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.responses.estimators.conditioned import Conditioned
+from flightid.responses.estimators.conditioned import ConditionalSpectra
 
 COHERENCE_WEIGHT = 5.0
 """Weight of the coherence among the five terms of the cost."""
@@ -60,7 +60,7 @@ class Composite:
         return np.clip(np.abs(self.cross) ** 2 / power, 0.0, 1.0)
 
 
-def combine(parts: Sequence[Conditioned], valid: NDArray[np.bool_]) -> Composite:
+def combine(parts: Sequence[ConditionalSpectra], valid: NDArray[np.bool_]) -> Composite:
     """Solve the composite problem at every frequency of every pair.
 
     The cost is a sum over windows of squares of the unknowns less each window's value, so it
@@ -69,7 +69,7 @@ def combine(parts: Sequence[Conditioned], valid: NDArray[np.bool_]) -> Composite
 
     Parameters
     ----------
-    parts : sequence of Conditioned
+    parts : sequence of ConditionalSpectra
         One for each window length.
     valid : ndarray of bool, shape (n_windows, n_f)
         Where a window length may be used; at least one at each frequency.
@@ -112,7 +112,7 @@ def combine(parts: Sequence[Conditioned], valid: NDArray[np.bool_]) -> Composite
     )
 
 
-def _weights(parts: Sequence[Conditioned], valid: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _weights(parts: Sequence[ConditionalSpectra], valid: NDArray[np.bool_]) -> NDArray[np.float64]:
     """``(ε_i / ε_min)⁻⁴``, zero where a window length is not valid."""
     error = np.array([part.random_error for part in parts])
     error = np.maximum(error, np.finfo(float).eps)
@@ -193,7 +193,7 @@ def _step(
 
 
 def _sensitivity(
-    parts: Sequence[Conditioned],
+    parts: Sequence[ConditionalSpectra],
     shares: NDArray[np.float64],
     x: NDArray[np.float64],
     scale: NDArray[np.float64],

@@ -17,7 +17,7 @@ SMALLEST_COHERENCE = 1e-12
 
 
 @dataclass(frozen=True)
-class Conditioned:
+class ConditionalSpectra:
     """Spectra of each (output, input) pair with the other inputs' share removed.
 
     Attributes
@@ -127,7 +127,7 @@ def random_error(
 
 def condition(
     spectra: Spectra, n_inputs: int, omega: NDArray[np.float64], names: tuple[str, ...]
-) -> Conditioned:
+) -> ConditionalSpectra:
     """Condition the outputs on the inputs: ``H = [G_uu⁻¹ G_uy]ᵀ`` at each frequency.
 
     Parameters
@@ -142,7 +142,7 @@ def condition(
 
     Returns
     -------
-    Conditioned
+    ConditionalSpectra
 
     Raises
     ------
@@ -169,7 +169,7 @@ def assemble(
     explained: NDArray[np.float64],
     residual: NDArray[np.float64],
     spectra: Spectra,
-) -> Conditioned:
+) -> ConditionalSpectra:
     """Conditioned spectra from the responses, the inverse input spectra and what is left.
 
     The Schur complement of an input is the reciprocal of its place on the inverse's diagonal, and
@@ -200,7 +200,7 @@ def assemble(
         )
     coherence = input_auto * np.abs(response) ** 2 / np.maximum(output_auto, np.finfo(float).tiny)
     total = explained.T + left
-    return Conditioned(
+    return ConditionalSpectra(
         response,
         np.array(input_auto),
         output_auto,

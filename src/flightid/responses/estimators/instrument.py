@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
-from flightid.responses.estimators.conditioned import Conditioned, assemble, invert_inputs
+from flightid.responses.estimators.conditioned import ConditionalSpectra, assemble, invert_inputs
 from flightid.responses.spectra import Spectra
 from flightid.responses.windows.samples import Samples
 
@@ -24,7 +24,7 @@ def excitation_projection(spectra: Spectra, samples: Samples) -> NDArray[np.comp
 
 def condition_on_excitation(
     spectra: Spectra, n_inputs: int, n_outputs: int, omega: NDArray[np.float64], samples: Samples
-) -> Conditioned:
+) -> ConditionalSpectra:
     """Responses ``H = [G_ũũ⁻¹ G_ũy]ᵀ`` with ũ the part of the inputs that follows the excitations.
 
     With one excitation and one input this is ``G_ry / G_ru``. Coherence and random error are those

@@ -13,7 +13,7 @@ from flightid.responses.cautions import band_findings, correlation_findings
 from flightid.responses.errors.covariance import WindowedErrors
 from flightid.responses.errors.noise import estimate_noise
 from flightid.responses.estimators.composite import Composite, combine
-from flightid.responses.estimators.conditioned import Conditioned, condition, random_error
+from flightid.responses.estimators.conditioned import ConditionalSpectra, condition, random_error
 from flightid.responses.estimators.instrument import condition_on_excitation, excitation_projection
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.spectra import Spectra, average_spectra
@@ -24,7 +24,7 @@ from flightid.responses.windows.window_weights import WindowShare, WindowWeights
 
 
 @dataclass(frozen=True)
-class Windowed:
+class WindowedEstimate:
     """A windowed estimate in the making.
 
     Attributes
@@ -34,7 +34,7 @@ class Windowed:
         rad/s.
     spectra : list of Spectra
         One for each window length, longest first.
-    parts : list of Conditioned
+    parts : list of ConditionalSpectra
     composite : Composite
     """
 
@@ -42,13 +42,13 @@ class Windowed:
     omega: NDArray[np.float64]
     detrend: str
     spectra: list[Spectra]
-    parts: list[Conditioned]
+    parts: list[ConditionalSpectra]
     composite: Composite
 
 
 def estimate_windowed(
     samples: Samples, omega: NDArray[np.float64], plans: Sequence[WindowPlan], detrend: str
-) -> Windowed:
+) -> WindowedEstimate:
     """Spectra, conditioning and composite; with excitations in `samples`, by instrument."""
     spectra, parts = [], []
     n_in = len(samples.inputs)
@@ -62,10 +62,10 @@ def estimate_windowed(
             part = condition(one, n_in, omega, samples.inputs)
         parts.append(part)
     valid = valid_windows(plans, omega, samples.sample_time_s)
-    return Windowed(samples, omega, detrend, spectra, parts, combine(parts, valid))
+    return WindowedEstimate(samples, omega, detrend, spectra, parts, combine(parts, valid))
 
 
-def windowed_errors(estimate: Windowed) -> WindowedErrors:
+def windowed_errors(estimate: WindowedEstimate) -> WindowedErrors:
     """What the covariance of a windowed estimate is made from.
 
     Raises
@@ -92,7 +92,7 @@ def windowed_errors(estimate: Windowed) -> WindowedErrors:
     return WindowedErrors(windows, samples.sample_time_s, estimate.composite.sensitivity, noise)
 
 
-def windowed_response(estimate: Windowed, estimator: str, step: Step) -> FrequencyResponse:
+def windowed_response(estimate: WindowedEstimate, estimator: str, step: Step) -> FrequencyResponse:
     """The frequency response without its covariance."""
     samples, composite = estimate.samples, estimate.composite
     n_in, n_out = len(samples.inputs), len(samples.outputs)
