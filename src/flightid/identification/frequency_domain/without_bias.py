@@ -120,7 +120,7 @@ def take_out(
 
 
 @dataclass(frozen=True)
-class _Found:
+class _Minimum:
     """A minimum with the estimator inside, and how many starts led there."""
 
     found: SearchOutcome
@@ -154,7 +154,7 @@ class _Judgement:
         return cls(found, errors, misfit)
 
 
-def _searches(objective: Objective, minimum: Sequence[DenseEnd]) -> list[_Found]:
+def _searches(objective: Objective, minimum: Sequence[DenseEnd]) -> list[_Minimum]:
     """From the fit without correction and from the model's values, one alone if that is enough.
 
     Leakage can bend the first beyond the reach of the right minimum, which two starts tell.
@@ -165,12 +165,12 @@ def _searches(objective: Objective, minimum: Sequence[DenseEnd]) -> list[_Found]
     settled = lower and first.step <= TOLERABLE and _Judgement.of(objective, first).misfit <= MISFIT
     bent = first.begun > BENT * first.end.cost
     if settled and not (bent and objective.size <= FEW):
-        return [_Found(first, count)]
+        return [_Minimum(first, count)]
     own = np.array([parameter.value or 0.0 for parameter in objective.model.parameters.free])
     try:
-        return [_Found(first, count), _Found(search(objective, own))]
+        return [_Minimum(first, count), _Minimum(search(objective, own))]
     except (FitError, *OUTSIDE):
-        return [_Found(first, count)]
+        return [_Minimum(first, count)]
 
 
 def far_from_best(minima: Sequence[list[DenseEnd]]) -> list[list[DenseEnd]]:
@@ -180,19 +180,19 @@ def far_from_best(minima: Sequence[list[DenseEnd]]) -> list[list[DenseEnd]]:
     return list(minima[1 + min(near, MOST_RIVALS) :])
 
 
-def _rivals(objective: Objective, minima: Sequence[list[DenseEnd]]) -> list[_Found]:
+def _rivals(objective: Objective, minima: Sequence[list[DenseEnd]]) -> list[_Minimum]:
     """Other minima of the fit without correction that are near its best, by the same cost."""
     rivals = minima[1 : len(minima) - len(far_from_best(minima))]
     found = []
     for group in rivals:
         with suppress(FitError, *OUTSIDE):
-            found.append(_Found(search(objective, group[0].x), len(group)))
+            found.append(_Minimum(search(objective, group[0].x), len(group)))
     return found
 
 
-def _ranked(ends: Sequence[_Found]) -> list[_Found]:
+def _ranked(ends: Sequence[_Minimum]) -> list[_Minimum]:
     """Distinct minima, best first; of those that cost the same the earliest goes first."""
-    distinct: list[_Found] = []
+    distinct: list[_Minimum] = []
     for each in ends:
         for place, known in enumerate(distinct):
             if _same(known.found, each.found):
@@ -208,7 +208,7 @@ def _ranked(ends: Sequence[_Found]) -> list[_Found]:
     return [first, *(each for each in ranked if each is not first)]
 
 
-def _worth(end: _Found) -> tuple[bool, float]:
+def _worth(end: _Minimum) -> tuple[bool, float]:
     return end.found.step > TOLERABLE, end.found.end.cost
 
 
