@@ -30,7 +30,9 @@ def agreement_check(found: Agreement) -> Check:
     [green] halves of the record agree (p = 0.4); one record does not tell how far flights differ
     """
     if not found.tested:
-        what = "parts of the data cannot be compared: no two of them see a parameter"
+        what = (
+            "parts of the data cannot be compared: no two hold the same frequencies and parameters"
+        )
         return Check(AGREEMENT, Light.UNKNOWN, what, "fly longer, or repeat the manoeuvre")
     several = found.n_records > 1
     widened = ""

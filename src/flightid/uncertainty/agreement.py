@@ -116,6 +116,9 @@ def compare_parts(
     covariance: Array,
     freedom: Array,
     rest: Flight | None = None,
+    *,
+    by_halves: bool = True,
+    by_records: bool = True,
 ) -> AgreementTest:
     """Test halves and records against their noise; carry on the larger covariance.
 
@@ -131,6 +134,8 @@ def compare_parts(
         Degrees of freedom of its diagonal.
     rest : Flight, optional
         One more part that is neither compared nor halved: what was fitted beside the records.
+    by_halves, by_records : bool
+        Whether the noise of halves, and of records, is known well enough to compare them.
 
     Returns
     -------
@@ -145,10 +150,11 @@ def compare_parts(
     """
     whole = [flight.whole for flight in flights]
     level = float(np.median(freedom)) if len(freedom) else np.inf
-    halves = _combined([chance_alike([flight], level) for flight in flights])
-    records = chance_alike(whole, level) if len(whole) > 1 else None
+    by_records = by_records and len(whole) > 1
+    compared = flights if by_halves else ()
+    halves = _combined([chance_alike([flight], level) for flight in compared])
+    records = chance_alike(whole, level) if by_records else None
     plain = Agreement(len(flights), halves, records, np.sqrt(np.diag(covariance)))
-    by_records = len(whole) > 1
     if plain.agree and not (records is not None and records < DOUBT):
         return AgreementTest(covariance, freedom, plain)
     parts = whole if by_records else _halved(flights[0])

@@ -21,6 +21,8 @@ from flightid.uncertainty.agreement import AgreementTest, compare_parts
 from flightid.uncertainty.parts import Flight
 
 Array = NDArray[np.float64]
+FAIR = 0.4
+"""Least share of a part in the median point, over that of equal parts."""
 Complex = NDArray[np.complex128]
 
 
@@ -61,17 +63,19 @@ class ResponseParts:
         Assumes
         -------
         Noise as strong in all parts; at each frequency a part counts by its share of the power,
-        and so does its noise.
+        and so does its noise. That fails where parts hold other frequencies, as the halves of one
+        sweep or sweeps of different inputs do: such parts are not compared.
         """
         left, modelled = self.correction.halves(self.fitted, self._places)
         whole = self._points(modelled.sum(axis=(0, 1)))
         slopes = self.slopes[:, inner]
         n, count = len(gain), left.shape[0]
-        scores, information, weighed = [], [], []
+        scores, information, weighed, shares = [], [], [], []
         for kept, made in zip(
             left.reshape(-1, *left.shape[2:]), modelled.reshape(-1, *left.shape[2:]), strict=True
         ):
             share = _share(self._points(made), whole)
+            shares.append(share)
             scores.append(-gain @ _stacked(self._points(kept)))
             information.append(-gain @ (share[:, None] * slopes))
             weighed.append(gain * np.sqrt(share))
@@ -87,7 +91,15 @@ class ResponseParts:
             both = slice(2 * k, 2 * k + 2)
             part = np.array(information[both]) @ np.linalg.inv(total)
             flights.append(Flight(np.array(scores[both]), part, noise))
-        return compare_parts(flights, np.eye(n), known[0, :, 0], np.full(n, np.inf))
+        parts = np.array(shares)
+        return compare_parts(
+            flights,
+            np.eye(n),
+            known[0, :, 0],
+            np.full(n, np.inf),
+            by_halves=_fair(parts),
+            by_records=_fair(parts[0::2] + parts[1::2]),
+        )
 
     @property
     def _places(self) -> NDArray[np.intp]:
@@ -107,6 +119,11 @@ class ResponseParts:
             ]
             found.append(np.concatenate(rows))
         return found
+
+
+def _fair(shares: Array) -> bool:
+    """Whether every part makes a fair share of most points."""
+    return bool(np.median(shares, axis=1).min() >= FAIR / len(shares))
 
 
 def _stacked(runs: Sequence[Complex]) -> Array:
