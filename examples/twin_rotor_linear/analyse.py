@@ -78,7 +78,7 @@ def table_1(study: fid.Study) -> Table:
             continue
         for root in item.fit.details.modes:
             frequency, damping = root.natural_frequency, root.damping
-            if frequency is None or damping is None or frequency.stderr is None:
+            if frequency is None or damping is None:
                 continue
             hertz = 1 / (2 * math.pi)
             rows.append(
@@ -86,7 +86,7 @@ def table_1(study: fid.Study) -> Table:
                     channel,
                     PUBLISHED_HZ[channel],
                     frequency.value * hertz,
-                    1.96 * frequency.stderr * hertz,
+                    None if frequency.stderr is None else 1.96 * frequency.stderr * hertz,
                     damping.value,
                     item.fit.structure.orders_text,
                 )

@@ -121,7 +121,12 @@ def test_the_unstable_helicopter_is_found_by_a_study_file_alone(tmp_path: Path) 
         (tmp_path / name).write_text((EXAMPLES / "ah64" / name).read_text(encoding="utf-8"))
     assert _script(tmp_path / "fly.py", folder=tmp_path).returncode == 0
     run = _run(FLIGHTID, "--quiet", "run", "study.toml", "--output", "out", folder=tmp_path)
-    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
+    # The heave model without inflow, offered first, is a wrong one: red, and so is the study.
+    assert run.returncode == 1, run.stdout[-3000:] + run.stderr[-3000:]
+    assert [line.split(":")[0] for line in run.stdout.split("Result")[1].splitlines()
+            if line.startswith("[red]") and "average cost" in line] == [
+        "[red]      Heave before inflow"
+    ]  # fmt: skip
     results = json.loads((tmp_path / "out" / "results.json").read_text(encoding="utf-8"))
     costs = [next(iter(model["fits"].values()))["average_cost"] for model in results["models"]]
     assert costs[1] < 0.5 * costs[0], "inflow explains what a delay cannot"

@@ -77,8 +77,13 @@ def require_distinct(
         found = _alike(_moved(model), prepared, runs_of)
     except (DataError, SingularError):
         return  # the run diverges there; the search says so with its numbers
-    if found is not None:
-        raise _error(model, prepared, *found)
+    if found is None:
+        return
+    shares, parts, unseen = found
+    names = [
+        p.name for p, is_unseen in zip(model.parameters.free, unseen, strict=True) if is_unseen
+    ]
+    raise _unseen(names) if names else _error(model, prepared, shares, parts)
 
 
 def _moved(model: GreyBoxModel) -> GreyBoxModel:
@@ -93,8 +98,11 @@ def _moved(model: GreyBoxModel) -> GreyBoxModel:
 
 def _alike(
     model: GreyBoxModel, prepared: RecordSet, runs_of: EquationRuns | None
-) -> tuple[Array, list[Array]] | None:
-    """Parts of the parameters and of each record's own numbers in a combination without effect."""
+) -> tuple[Array, list[Array], NDArray[np.bool_]] | None:
+    """A combination without effect, and which parameters have none by themselves.
+
+    Of the combination: shares of the parameters, and of each record's own numbers.
+    """
     n = len(model.parameters.free)
     scale = _scale(prepared)
     shared, own = [], []
@@ -114,7 +122,7 @@ def _alike(
         return None
     null = right[-1]
     parts = [_answers(each, rows @ null) for each, rows in zip(own, shared, strict=True)]
-    return np.abs(null), parts
+    return np.abs(null), parts, np.linalg.norm(triangle, axis=0) <= TOLERANCE
 
 
 def _scale(prepared: RecordSet) -> Array:
@@ -138,6 +146,16 @@ def _answers(own: Array, effect: Array) -> Array:
     return np.asarray(np.abs(found))
 
 
+def _unseen(names: Sequence[str]) -> FitError:
+    held = ", ".join(f"{name}=..." for name in names)
+    return FitError(
+        "the data do not see a parameter" if len(names) == 1 else "the data do not see parameters",
+        found=", ".join(names),
+        needed="an effect on an output",
+        action=f"fix with model.with_fixed({held}), or fly what moves the outputs through them",
+    )
+
+
 def _error(
     model: GreyBoxModel, prepared: RecordSet, shares: Array, parts: Sequence[Array]
 ) -> FitError:
@@ -153,12 +171,7 @@ def _error(
             (biased if kind == "bias" else others).add(name if kind == "bias" else f"{kind} {name}")
     named = [*free, *(f"output bias of {name}" for name in sorted(biased)), *sorted(others)]
     if len(named) == 1:
-        return FitError(
-            "the data do not see a parameter",
-            found=named[0],
-            needed="an effect on an output",
-            action=f"fix it with model.with_fixed({named[0]}=...), or fly what it acts on",
-        )
+        return _unseen(named)
     return FitError(
         "the data cannot tell these parameters apart" if not biased | others
         else "free numbers move the records in one way, so that no search can tell them apart",
