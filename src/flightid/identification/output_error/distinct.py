@@ -112,7 +112,8 @@ def _alike(
         shared.append(rows[:, :n])
         own.append(rows[:, n:])
     size = np.sqrt(np.sum([np.sum(each**2, axis=0) for each in shared], axis=0))
-    size = np.where(size > 0.0, size, 1.0)
+    unseen = size == 0.0
+    size = np.where(unseen, 1.0, size)
     shared = [each / size for each in shared]
     bases = [_basis(each) for each in own]
     left = [each - basis @ (basis.T @ each) for each, basis in zip(shared, bases, strict=True)]
@@ -122,7 +123,7 @@ def _alike(
         return None
     null = right[-1]
     parts = [_answers(each, rows @ null) for each, rows in zip(own, shared, strict=True)]
-    return np.abs(null), parts, np.linalg.norm(triangle, axis=0) <= TOLERANCE
+    return np.abs(null), parts, unseen
 
 
 def _scale(prepared: RecordSet) -> Array:
