@@ -8,8 +8,6 @@ from tests.strangers.cases import CASES
 from tests.strangers.counting import Case, count, limits, table
 
 RUNS = 500
-ALWAYS = 0.95
-"""Share of red lights above which a condition is refused: no interval is claimed there."""
 LOWEST, HIGHEST = 0.93, 0.97
 """What is promised; chance widens it by three standard deviations of a count."""
 
@@ -21,7 +19,7 @@ def test_intervals_hold_and_green_seldom_misses(case: Case) -> None:
     assert tally.bad_bars() == 0
     for quantity in tally.quantities():
         share, n = tally.coverage(quantity)
-        if not n or tally.share("red") > ALWAYS:  # nothing was printed, or nothing was claimed
+        if not n:  # nothing was printed, so nothing was claimed
             continue
         low, _ = limits(n, nominal=LOWEST)
         _, high = limits(n, nominal=HIGHEST)
