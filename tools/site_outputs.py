@@ -24,14 +24,14 @@ def _demo_output() -> tempfile.TemporaryDirectory[str]:
     """Folder with the log of the demo's flight, made once for all pages."""
     from flightid.vehicles import (  # noqa: PLC0415
         PilotDoublet,
-        SidRun,
+        SidActivation,
         fly,
         write_ardupilot_log,
     )
 
     plan = tomllib.loads(STUDY.read_text(encoding="utf-8"))["flight"]
     flight = fly(
-        runs=[SidRun(**row) for row in plan["sweep"]],
+        runs=[SidActivation(**row) for row in plan["sweep"]],
         doublets=[PilotDoublet(**row) for row in plan["doublet"]],
         log_every=plan["log_every"],
         seed=plan["seed"],

@@ -9,10 +9,10 @@ Run: python examples/closed_loop_bias/compare.py
 import numpy as np
 
 import flightid as fid
-from flightid.vehicles import SidRun, Turbulence, fly
+from flightid.vehicles import SidActivation, Turbulence, fly
 
 OMEGA = np.geomspace(1.5, 12.0, 7)
-SWEEP = SidRun(10, 3.0, 0.06, 0.2, 6.0, 2.0, 60.0, 1.0, leave_after_s=70.0)
+SWEEP = SidActivation(10, 3.0, 0.06, 0.2, 6.0, 2.0, 60.0, 1.0, leave_after_s=70.0)
 N_FLIGHTS = 8
 
 

@@ -21,7 +21,7 @@ from flightid.files import write_atomically
 from flightid.report.content import Document, Paragraph, Section, TableBlock
 from flightid.report.html import to_html
 from flightid.report.tuning import tuning_section
-from flightid.vehicles import Autopilot, RateGains, SidRun, fly, write_ardupilot_log
+from flightid.vehicles import Autopilot, RateGains, SidActivation, fly, write_ardupilot_log
 
 AXES = ("roll", "pitch", "yaw")
 CHANNELS = {"roll": ("tau_phi", "p"), "pitch": ("tau_theta", "q"), "yaw": ("tau_psi", "r")}
@@ -48,9 +48,9 @@ class Chain:
     measured: dict[str, dict[str, fid.Margins]]
 
 
-def sweep(axis: str, start_s: float, *, kind: int = 10, magnitude: float = 0.15) -> SidRun:
+def sweep(axis: str, start_s: float, *, kind: int = 10, magnitude: float = 0.15) -> SidActivation:
     """Sweep as advised: 0.1 to 12 Hz in 100 s and twenty quiet seconds."""
-    return SidRun(
+    return SidActivation(
         axis=kind + AXES.index(axis), start_s=start_s, magnitude=magnitude, start_hz=0.1,
         stop_hz=12.0, record_s=100.0, fade_out_s=1.0, leave_after_s=125.0,
     )  # fmt: skip

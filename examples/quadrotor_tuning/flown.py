@@ -8,7 +8,7 @@ import numpy as np
 
 import flightid as fid
 from flightid.record import Record
-from flightid.vehicles import Autopilot, Flight, SidRun, fly
+from flightid.vehicles import Autopilot, Flight, SidActivation, fly
 
 AXES = ("roll", "pitch", "yaw")
 COMMANDS = {"roll": "tau_phi", "pitch": "tau_theta", "yaw": "tau_psi"}
@@ -32,7 +32,7 @@ def loops(autopilot: Autopilot, axis: str, seed: int) -> dict[str, fid.Margins]:
         Of the flight's noise.
     """
     place = AXES.index(axis)
-    mixer = SidRun(
+    mixer = SidActivation(
         axis=10 + place, start_s=10.0, magnitude=0.1, start_hz=0.1, stop_hz=20.0, record_s=150.0,
         fade_out_s=1.0, leave_after_s=175.0,
     )  # fmt: skip
@@ -47,7 +47,7 @@ def loops(autopilot: Autopilot, axis: str, seed: int) -> dict[str, fid.Margins]:
 
 
 def _margins(
-    flight: Flight, run: SidRun, channel: str, given: str, band: tuple[float, float]
+    flight: Flight, run: SidActivation, channel: str, given: str, band: tuple[float, float]
 ) -> fid.Margins:
     start, stop = flight.span(run)
     record = flight.record((start, stop + 20.0))

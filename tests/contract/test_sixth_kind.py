@@ -23,7 +23,7 @@ from flightid.identification.black_box import (
 from flightid.identification.details import Details
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.models import EstimateProvenance, LinearSystem, Model
-from flightid.models.kinds import KINDS, Kind
+from flightid.models.kinds import KINDS, ModelKind
 from flightid.models.sampled.coefficients import coefficients
 from flightid.uncertainty.estimate import Estimate
 
@@ -110,7 +110,7 @@ def fit_leak(structure: LeakStructure, record: fid.Record) -> fid.Fit:
 
 @pytest.fixture
 def registered(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(KINDS, "leak", Kind(LeakModel, LeakModel.from_dict, LeakModel.to_dict))
+    monkeypatch.setitem(KINDS, "leak", ModelKind(LeakModel, LeakModel.from_dict, LeakModel.to_dict))
     line = methods.Method("leak", (LeakStructure,), methods.RECORDS, fit_leak)
     monkeypatch.setattr(methods, "METHODS", [*methods.METHODS, line])
 

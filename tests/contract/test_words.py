@@ -34,6 +34,32 @@ def test_classes_are_nouns_for_what_they_hold() -> None:
     assert not offenders, "\n".join(offenders)
 
 
+def _classes() -> dict[str, list[str]]:
+    homes: dict[str, list[str]] = {}
+    for path in python_files():
+        for node in ast.walk(tree(path)):
+            if isinstance(node, ast.ClassDef):
+                homes.setdefault(node.name, []).append(f"{path.relative_to(PACKAGE)}:{node.lineno}")
+    return homes
+
+
+def _shared(homes: dict[str, list[str]]) -> list[str]:
+    return [f"{name}: {', '.join(places)}" for name, places in homes.items() if len(places) > 1]
+
+
+def test_no_two_classes_share_a_name() -> None:
+    homes = _classes()
+    assert "Fit" in homes
+    offenders = _shared(homes)
+    assert not offenders, "\n".join(offenders)
+
+
+def test_a_shared_name_is_seen() -> None:
+    assert _shared({"Fit": ["fit.py:1", "trim.py:9"], "Log": ["log.py:3"]}) == [
+        "Fit: fit.py:1, trim.py:9"
+    ]
+
+
 def test_a_participle_is_seen() -> None:
     assert [bool(_offences(name)) for name in ("Taken", "_Staged", "LineFlown")] == [True] * 3
     assert _offences("MeasuredMotion") == ["MeasuredMotion: call it ODE model"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flightid.vehicles import Flight, PilotDoublet, SidRun, fly, write_ardupilot_log
+from flightid.vehicles import Flight, PilotDoublet, SidActivation, fly, write_ardupilot_log
 
 STUDY = Path(__file__).parent.parent.parent / "examples" / "quadrotor_rig" / "study.toml"
 
@@ -17,7 +17,7 @@ def demo_flight() -> Flight:
     """The flight of the demo's study."""
     plan = tomllib.loads(STUDY.read_text(encoding="utf-8"))["flight"]
     return fly(
-        runs=[SidRun(**row) for row in plan["sweep"]],
+        runs=[SidActivation(**row) for row in plan["sweep"]],
         doublets=[PilotDoublet(**row) for row in plan["doublet"]],
         log_every=plan["log_every"],
         seed=plan["seed"],

@@ -7,10 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 import flightid as fid
-from flightid.vehicles import Autopilot, RateGains, SidRun, Turbulence, fly
+from flightid.vehicles import Autopilot, RateGains, SidActivation, Turbulence, fly
 
 OMEGA = np.geomspace(1.5, 12.0, 8)
-RUN = SidRun(10, 3.0, 0.06, 0.2, 6.0, 2.0, 60.0, 1.0, leave_after_s=70.0)
+RUN = SidActivation(10, 3.0, 0.06, 0.2, 6.0, 2.0, 60.0, 1.0, leave_after_s=70.0)
 GUSTY = Turbulence(rate_rad_s=0.5)
 TIGHT = Autopilot(rate=(RateGains(p=0.14, i=0.14), RateGains(), RateGains(p=0.25, i=0.02, d=0.0)))
 N_FLIGHTS = 8

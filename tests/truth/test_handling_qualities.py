@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 import flightid as fid
 from flightid.dynamics import attitude_bandwidth
 from flightid.dynamics.handling_qualities.attitude_bandwidth import bandwidth_numbers
-from flightid.dynamics.handling_qualities.curve import Curve, Pair, smoother_of
+from flightid.dynamics.handling_qualities.curve import GainPhaseCurve, Pair, smoother_of
 from flightid.dynamics.handling_qualities.rating_charts_reading import rating_chart
 from flightid.errors import DataError, OptionError, UnknownNameError
 from tests.closeness import assert_close
@@ -320,7 +320,7 @@ def test_intervals_of_a_measured_response_are_those_of_its_errors() -> None:
         one = fid.FrequencyResponse.from_values(
             response.omega_rad_s, values, inputs=["lat"], outputs=["phi"]
         )
-        drawn.append(bandwidth_numbers(Curve.of(one, pair, smoother)))
+        drawn.append(bandwidth_numbers(GainPhaseCurve.of(one, pair, smoother)))
     scatter = np.std(drawn, axis=0)
     assert found.uncertain.stderr is not None
     assert_close(found.uncertain.stderr, scatter, rtol=0.12, why="scatter of 500 noisy responses")

@@ -16,7 +16,7 @@ from scipy.stats import binom
 
 import flightid as fid
 from flightid.dynamics.handling_qualities.attitude_bandwidth import bandwidth_numbers
-from flightid.dynamics.handling_qualities.curve import Curve, Pair, smoother_of
+from flightid.dynamics.handling_qualities.curve import GainPhaseCurve, Pair, smoother_of
 from tests.closeness import assert_close
 
 STEP_S = 0.02
@@ -100,7 +100,7 @@ def without_noise() -> np.ndarray:
     """What windows and smoothing make of a flight without noise: what a reading scatters about."""
     pair = Pair("p", "lat", *BAND, integrate=True)
     smoother = smoother_of(response_of(flight(7000, QUIET)), pair)
-    return bandwidth_numbers(Curve.of(response_of(flight(7000, 0.0)), pair, smoother))
+    return bandwidth_numbers(GainPhaseCurve.of(response_of(flight(7000, 0.0)), pair, smoother))
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from flightid.vehicles import (
     Flight,
     QuadrotorParameters,
     Sensors,
-    SidRun,
+    SidActivation,
     Turbulence,
     fly,
     rate_truth,
@@ -121,7 +121,7 @@ def test_differences_of_the_equations_give_the_analytic_derivatives(
 
 
 def _sweep(axis: str, magnitude: float, **options: object) -> Flight:
-    run = SidRun(10 + AXES.index(axis), 1.0, magnitude, 0.5, 12.0, 2.0, 30.0, 1.0)
+    run = SidActivation(10 + AXES.index(axis), 1.0, magnitude, 0.5, 12.0, 2.0, 30.0, 1.0)
     settings = {"sensors": PERFECT, "turbulence": STILL_AIR, "autopilot": SMOOTH} | options
     return fly(runs=[run], **settings)
 

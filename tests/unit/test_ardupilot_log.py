@@ -11,13 +11,13 @@ from pymavlink import mavutil
 import flightid as fid
 from flightid import _native, errors
 from flightid.logs.log import Log
-from flightid.vehicles import Flight, SidRun, fly, write_ardupilot_log
+from flightid.vehicles import Flight, SidActivation, fly, write_ardupilot_log
 from flightid.vehicles.ardupilot_log import POWER_UP_US
 from tests.closeness import assert_close
 
 FLOAT32 = "the log keeps single precision"
 RUNS = tuple(
-    SidRun(
+    SidActivation(
         axis=axis,
         start_s=2.0 + 14.0 * number,
         magnitude=0.1,
@@ -49,7 +49,7 @@ def _pid_sum(log: Log, message: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize("run", RUNS, ids=lambda run: f"axis {run.axis}")
-def test_output_minus_pid_is_the_target_of_the_loop_before(log: Log, run: SidRun) -> None:
+def test_output_minus_pid_is_the_target_of_the_loop_before(log: Log, run: SidActivation) -> None:
     message, field = COMMANDS[run.axis]
     rate, sid = log.table("RATE"), log.table("SIDD")
     excess = rate[field] - _pid_sum(log, message)

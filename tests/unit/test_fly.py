@@ -18,7 +18,7 @@ from flightid.vehicles import (
     QuadrotorParameters,
     RateGains,
     Sensors,
-    SidRun,
+    SidActivation,
     Turbulence,
     fly,
     fly_scenario,
@@ -28,7 +28,7 @@ from flightid.vehicles.scenario import advised_runs, published_runs
 from tests.closeness import assert_close
 
 TURN = [PilotDoublet("roll", 0.1, 3.0)]
-SHORT = SidRun(10, 1.0, 0.1, 1.0, 10.0, 1.0, 6.0, 0.5, leave_after_s=8.0)
+SHORT = SidActivation(10, 1.0, 0.1, 1.0, 10.0, 1.0, 6.0, 0.5, leave_after_s=8.0)
 
 
 def test_a_seed_is_a_flight() -> None:
@@ -99,7 +99,7 @@ def test_refusals() -> None:
     with pytest.raises(errors.OptionError, match="length of the flight"):
         fly(duration_s=-1.0)
     with pytest.raises(errors.OptionError, match="SID_AXIS cannot be flown"):
-        SidRun(axis=14, start_s=0.0)
+        SidActivation(axis=14, start_s=0.0)
     with pytest.raises(errors.OptionError, match="cannot lift"):
         QuadrotorParameters(mass_kg=5.0)
     with pytest.raises(errors.OptionError, match="motor_lag_s has no meaning"):

@@ -8,7 +8,7 @@ from scipy import signal
 
 import flightid as fid
 from flightid.errors import ModelError
-from flightid.models import Block, StateSpaceModel
+from flightid.models import ModelBlock, StateSpaceModel
 from flightid.models.language.blocks import KINDS
 from tests.closeness import assert_close
 
@@ -212,7 +212,7 @@ def test_blocks_that_are_no_blocks_are_refused() -> None:
     with pytest.raises(ModelError, match="block b lacks 'at'"):
         StateSpaceModel.from_dict(plain | {"blocks": {"b": {"kind": "washout", "T": 1}}})
     with pytest.raises(ModelError, match="name of a block cannot stand in a formula"):
-        Block("sin", "r", "washout", {"T": 1.0})
+        ModelBlock("sin", "r", "washout", {"T": 1.0})
     with pytest.raises(ModelError, match="name 'r' is given twice"):
         _yaw().with_block("r", at="r", kind="washout", T=1.0)
     block = _yaw().with_block("b", at="r", kind="washout", T=1.0)

@@ -12,7 +12,7 @@ from scipy import integrate, interpolate
 
 import flightid as fid
 from flightid.errors import DataError, ModelError
-from flightid.models import Axis, RecordValue, StateSpaceModel, TableFunction
+from flightid.models import RecordValue, StateSpaceModel, TableAxis, TableFunction
 from flightid.models.language.symbolic import Printer
 from tests.closeness import assert_close
 
@@ -26,7 +26,7 @@ def _values(*axes: tuple[float, ...]) -> np.ndarray:
 
 
 def _table(interpolation: str, *axes: tuple[float, ...], outside: str = "hold") -> TableFunction:
-    listed = tuple(Axis(points) for points in axes)
+    listed = tuple(TableAxis(points) for points in axes)
     values = tuple(_values(*axes).ravel())
     return TableFunction(listed, values, "1", interpolation, outside)
 

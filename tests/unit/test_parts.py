@@ -9,14 +9,14 @@ from scipy import stats
 from flightid.conventions import Light
 from flightid.evidence.part_checks import agreement_check
 from flightid.uncertainty.agreement import Agreement, compare_parts
-from flightid.uncertainty.parts import Flight, chance_alike, larger, scatter
+from flightid.uncertainty.parts import RecordParts, chance_alike, larger, scatter
 from tests.closeness import assert_close
 from tests.strangers.parts import arx_flown, by_arx, by_output_error, changed_midway, steps_flown
 
 Array = NDArray[np.float64]
 
 
-def _flights(means: Array, informations: Array) -> list[Flight]:
+def _flights(means: Array, informations: Array) -> list[RecordParts]:
     """Records that each know a mean, scalar or not, with noise of unit variance."""
     total = informations.sum(axis=0)
     common = np.linalg.solve(total, np.einsum("kij,kj->i", informations, means))
@@ -24,7 +24,9 @@ def _flights(means: Array, informations: Array) -> list[Flight]:
     for mean, information in zip(means, informations, strict=True):
         half = 0.5 * information
         noise = np.einsum("kl,ij->kilj", np.eye(2), half)
-        made.append(Flight(np.tile(half @ (mean - common), (2, 1)), np.stack([half, half]), noise))
+        made.append(
+            RecordParts(np.tile(half @ (mean - common), (2, 1)), np.stack([half, half]), noise)
+        )
     return made
 
 

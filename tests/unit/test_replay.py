@@ -20,14 +20,14 @@ from flightid.vehicles import (
     Flight,
     PilotDoublet,
     RateGains,
-    SidRun,
+    SidActivation,
     fly,
     write_ardupilot_log,
 )
 from tests.closeness import assert_close
 from tests.ulog_builder import UlogBuilder
 
-RUN = SidRun(
+RUN = SidActivation(
     axis=10, start_s=2.0, magnitude=0.1, start_hz=0.8, stop_hz=10.0, fade_in_s=1.0,
     record_s=8.0, fade_out_s=0.5, leave_after_s=10.0,
 )  # fmt: skip
@@ -95,7 +95,7 @@ def test_the_slew_limiter_is_replayed(tmp_path: Path) -> None:
 
 def test_limits_of_the_mixer_reach_the_integrator_in_the_same_loop(tmp_path: Path) -> None:
     # Saturating sweep: the flag of PIDR is the one that the loop saw.
-    run = SidRun(**{**vars(RUN), "magnitude": 0.9})
+    run = SidActivation(**{**vars(RUN), "magnitude": 0.9})
     gains = RateGains(i=0.5)
     pilot = Autopilot(rate=(gains, gains, Autopilot().rate[2]))
     flight = fly(runs=[run], autopilot=pilot, seed=1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.residual_covariance import (
     ResidualCovariance,
     colour_findings,
@@ -41,7 +41,7 @@ def _noise(random: np.random.Generator, kind: int, shape: tuple[int, int]) -> Ar
     return white
 
 
-def _fitted(random: np.random.Generator, kind: int, longest: int) -> list[Block]:
+def _fitted(random: np.random.Generator, kind: int, longest: int) -> list[RecordBlock]:
     """What least squares leaves of noise on one or two records, whitened."""
     n_outputs, n_shared = int(random.choice([1, 1, 2, 5])), int(random.integers(1, 4))
     scale = 10.0 ** random.uniform(-3, 3, n_shared)
@@ -73,7 +73,9 @@ def _fitted(random: np.random.Generator, kind: int, longest: int) -> list[Block]
     deviation = np.sqrt(np.mean(np.concatenate(residuals, axis=1) ** 2, axis=1, keepdims=True))
     deviation = np.maximum(deviation, 1e-150)
     return [
-        Block.of(shared / deviation[..., None], own / deviation[..., None], residual / deviation)
+        RecordBlock.of(
+            shared / deviation[..., None], own / deviation[..., None], residual / deviation
+        )
         for (shared, own), residual in zip(parts, residuals, strict=True)
     ]
 
@@ -109,7 +111,7 @@ def test_white_residuals_keep_the_inverse_information() -> None:
     random = np.random.default_rng(1)
     slopes = random.standard_normal((2, 4000, 3))
     found = residual_covariance(
-        [Block.of(slopes, np.zeros((2, 4000, 0)), random.standard_normal((2, 4000)))]
+        [RecordBlock.of(slopes, np.zeros((2, 4000, 0)), random.standard_normal((2, 4000)))]
     )
     assert_close(found.white, np.linalg.inv(np.einsum("onp,onq->pq", slopes, slopes)), rtol=1e-9,
                  atol=1e-12, why="the same matrix")  # fmt: skip
@@ -122,7 +124,7 @@ def test_colour_is_that_of_the_known_answer() -> None:
     a, n = 0.9, 20000
     noise = signal.lfilter([1.0], [1.0, -a], np.random.default_rng(2).standard_normal((1, n)))
     noise = (noise - noise.mean()) / noise.std()
-    found = residual_covariance([Block.of(np.ones((1, n, 1)), np.zeros((1, n, 0)), noise)])
+    found = residual_covariance([RecordBlock.of(np.ones((1, n, 1)), np.zeros((1, n, 0)), noise)])
     assert_close(found.colour[1], np.sqrt((1 + a) / (1 - a)), rtol=0.05, why="20000 samples")
 
 

@@ -28,7 +28,7 @@ from flightid.conditioning.kinematics import (
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.record import Record, Step
 from flightid.table import Cell
-from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.residual_covariance import residual_covariance
 from flightid.units import require_match
@@ -134,7 +134,7 @@ def check_consistency(
     theta, prediction, deviations = OutputError(model, observed).fit(theta)
     residuals = observed - prediction.values
     noise = model.input_noise(theta)
-    block = Block.of(
+    block = RecordBlock.of(
         prediction.slopes / deviations[:, None, None],
         np.zeros((*residuals.shape, 0)),
         residuals / deviations[:, None],

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conditioning.consistency_findings import require_separable
-from flightid.conditioning.kinematics import KinematicModel, Prediction
+from flightid.conditioning.kinematics import KinematicModel, KinematicOutputs
 from flightid.errors import DataError, FitError, OptionError
 
 Array = NDArray[np.float64]
@@ -23,11 +23,11 @@ MOST_DAMPING = 1e9
 
 
 @dataclass(frozen=True)
-class _Place:
+class _FitPoint:
     """A point of the fit with its prediction and the sum of its weighed squares."""
 
     theta: Array
-    prediction: Prediction
+    prediction: KinematicOutputs
     cost: float
 
 
@@ -46,7 +46,7 @@ class OutputError:
     model: KinematicModel
     observed: Array
 
-    def fit(self, theta: Array) -> tuple[Array, Prediction, Array]:
+    def fit(self, theta: Array) -> tuple[Array, KinematicOutputs, Array]:
         """Estimate, its prediction, and the residual deviations by which it weighed the outputs.
 
         Raises
@@ -76,10 +76,10 @@ class OutputError:
         return theta, prediction, deviations
 
     def _settle(
-        self, theta: Array, prediction: Prediction, deviations: Array
-    ) -> tuple[Array, Prediction]:
+        self, theta: Array, prediction: KinematicOutputs, deviations: Array
+    ) -> tuple[Array, KinematicOutputs]:
         """Best parameters for these weights."""
-        place = _Place(theta, prediction, self._cost(prediction, deviations))
+        place = _FitPoint(theta, prediction, self._cost(prediction, deviations))
         damping = 0.0
         for _ in range(LARGEST_STEPS):
             triangle, target, size = self._triangle(place.prediction, deviations)
@@ -102,7 +102,9 @@ class OutputError:
             action="estimate fewer instrument errors, or take a calmer record",
         )
 
-    def _triangle(self, prediction: Prediction, deviations: Array) -> tuple[Array, Array, Array]:
+    def _triangle(
+        self, prediction: KinematicOutputs, deviations: Array
+    ) -> tuple[Array, Array, Array]:
         """Triangle of the weighed slopes at unit columns, its right side, and the columns' size."""
         slopes = (prediction.slopes / deviations[:, None, None]).reshape(
             -1, prediction.slopes.shape[-1]
@@ -116,16 +118,16 @@ class OutputError:
         require_separable(self.model.parameters, size, triangle)
         return triangle, whole[:-1, -1], size
 
-    def _trial(self, place: _Place, step: Array, deviations: Array) -> _Place | None:
+    def _trial(self, place: _FitPoint, step: Array, deviations: Array) -> _FitPoint | None:
         """The place after a step, or None where it is no better or not reachable."""
         try:
             prediction = self.model.predict(place.theta + step)
         except OptionError:
             return None
         cost = self._cost(prediction, deviations)
-        return _Place(place.theta + step, prediction, cost) if cost < place.cost else None
+        return _FitPoint(place.theta + step, prediction, cost) if cost < place.cost else None
 
-    def _cost(self, prediction: Prediction, deviations: Array) -> float:
+    def _cost(self, prediction: KinematicOutputs, deviations: Array) -> float:
         return float(np.sum(((self.observed - prediction.values) / deviations[:, None]) ** 2))
 
 

@@ -36,7 +36,7 @@ VELOCITIES = ("u", "v", "w", "vn", "ve", "vd", "V", "alpha", "beta")
 
 
 @dataclass(frozen=True)
-class Prediction:
+class KinematicOutputs:
     """Predicted outputs (n_outputs, n) and their derivatives (n_outputs, n, n_parameters)."""
 
     values: Array
@@ -80,7 +80,7 @@ class KinematicModel:
                 table[:, column] = CubicSpline(self.time_s, self.inputs[name])(fine)
         return table
 
-    def predict(self, theta: Sequence[float] | Array) -> Prediction:
+    def predict(self, theta: Sequence[float] | Array) -> KinematicOutputs:
         """Outputs and their derivatives at parameter values in the order of `parameters`.
 
         Raises
@@ -93,7 +93,7 @@ class KinematicModel:
         found = [
             self._output(name, states, slopes, value, self.parameters) for name in self.outputs
         ]
-        return Prediction(np.array([y for y, _ in found]), np.array([s for _, s in found]))
+        return KinematicOutputs(np.array([y for y, _ in found]), np.array([s for _, s in found]))
 
     def input_noise(self, theta: Sequence[float] | Array) -> InputNoise:
         """White noise of the inputs and its way to the outputs at these parameters."""

@@ -26,7 +26,7 @@ LONGEST_RECORD_S = 600.0
 
 
 @dataclass(frozen=True)
-class Request:
+class DesignRequest:
     """What every kind of design is made from."""
 
     band_rad_s: tuple[float, float]
@@ -56,7 +56,7 @@ class Request:
         return self.names[0]
 
 
-def _sweep(request: Request) -> Excitation:
+def _sweep(request: DesignRequest) -> Excitation:
     return sweep(
         band_rad_s=request.band_rad_s,
         amplitude=request.amplitude,
@@ -68,7 +68,7 @@ def _sweep(request: Request) -> Excitation:
     )
 
 
-def _chirp(request: Request) -> Excitation:
+def _chirp(request: DesignRequest) -> Excitation:
     start_hz, stop_hz = (edge / (2 * math.pi) for edge in request.band_rad_s)
     return ardupilot_chirp(
         magnitude=request.amplitude,
@@ -83,15 +83,15 @@ def _chirp(request: Request) -> Excitation:
     )
 
 
-def _step_s(request: Request, peak: float) -> float:
+def _step_s(request: DesignRequest, peak: float) -> float:
     """Step that puts the most energy in the middle of the band, on the sample grid."""
     middle = math.sqrt(request.band_rad_s[0] * request.band_rad_s[1])
     samples = max(1, round(peak / middle * request.sample_rate_hz))
     return samples / request.sample_rate_hz
 
 
-def _steps(make: Callable[..., Excitation], peak: float) -> Callable[[Request], Excitation]:
-    def made(request: Request) -> Excitation:
+def _steps(make: Callable[..., Excitation], peak: float) -> Callable[[DesignRequest], Excitation]:
+    def made(request: DesignRequest) -> Excitation:
         return make(
             amplitude=request.amplitude,
             step_s=_step_s(request, peak),
@@ -103,7 +103,7 @@ def _steps(make: Callable[..., Excitation], peak: float) -> Callable[[Request], 
     return made
 
 
-def _prbs(request: Request) -> Excitation:
+def _prbs(request: DesignRequest) -> Excitation:
     """The longest sequence that fits the duration, on a clock that is fast enough for the band."""
     wanted_hz = request.band_rad_s[1] / (2 * math.pi * HALF_POWER)
     slowest = max(1, math.floor(request.sample_rate_hz / wanted_hz))
@@ -126,7 +126,7 @@ def _prbs(request: Request) -> Excitation:
     )
 
 
-def _noise(request: Request) -> Excitation:
+def _noise(request: DesignRequest) -> Excitation:
     return noise(
         band_rad_s=request.band_rad_s,
         amplitude=request.amplitude,
@@ -138,7 +138,7 @@ def _noise(request: Request) -> Excitation:
     )
 
 
-def _multisine(request: Request) -> Excitation:
+def _multisine(request: DesignRequest) -> Excitation:
     return multisine(
         band_rad_s=request.band_rad_s,
         amplitude=request.amplitude,
@@ -150,7 +150,7 @@ def _multisine(request: Request) -> Excitation:
     )
 
 
-KINDS: dict[str, Callable[[Request], Excitation]] = {
+KINDS: dict[str, Callable[[DesignRequest], Excitation]] = {
     "sweep": _sweep,
     "ardupilot_chirp": _chirp,
     "doublet": _steps(doublet, DOUBLET_PEAK),
@@ -250,7 +250,7 @@ def plan(
     length = _default_length(kind, band_rad_s, rate_hz) if duration_s is None else duration_s
 
     def made(size: float) -> Plan:
-        request = Request(band_rad_s, size, length, rate_hz, tuple(inputs), unit, seed, axis)
+        request = DesignRequest(band_rad_s, size, length, rate_hz, tuple(inputs), unit, seed, axis)
         return assess(
             KINDS[kind](request), vehicle, band_rad_s=band_rad_s, limits=limits, n_records=n_records
         )

@@ -11,7 +11,7 @@ from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.rates import StreamRate
 from flightid.inspection.saturation import Saturation
-from flightid.inspection.skew import Skew
+from flightid.inspection.skew import StreamSkew
 from flightid.inspection.usable_band import AxisBand
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -45,7 +45,7 @@ class Inspection(Result, schema="flightid.inspection/1"):
         What excited the vehicle.
     saturations : tuple of Saturation
         What was at a limit in the air, most first.
-    skews : tuple of Skew
+    skews : tuple of StreamSkew
         Streams that show the same motion at different times.
     bands : tuple of AxisBand
         What each axis supports.
@@ -69,7 +69,7 @@ class Inspection(Result, schema="flightid.inspection/1"):
     phases: FlightPhases
     excitations: tuple[FoundExcitation, ...]
     saturations: tuple[Saturation, ...]
-    skews: tuple[Skew, ...]
+    skews: tuple[StreamSkew, ...]
     bands: tuple[AxisBand, ...]
     findings: tuple[Finding, ...] = ()
 

@@ -20,7 +20,7 @@ ENOUGH = 20_000
 
 
 @dataclass(frozen=True)
-class Skew:
+class StreamSkew:
     """How late one stream shows the same motion as another.
 
     Attributes
@@ -45,7 +45,7 @@ class Skew:
     resolution_s: float
 
 
-def stream_skews(log: Log, spans: tuple[Span, ...]) -> tuple[Skew, ...]:
+def stream_skews(log: Log, spans: tuple[Span, ...]) -> tuple[StreamSkew, ...]:
     """Skew between every two streams that hold the same body rate, where they agree on it.
 
     The streams are filtered differently, and a filter's delay is part of the lag.
@@ -59,7 +59,9 @@ def stream_skews(log: Log, spans: tuple[Span, ...]) -> tuple[Skew, ...]:
     return tuple(skew for skew in found if skew is not None)
 
 
-def _skew(quantity: str, first: Signal, second: Signal, spans: tuple[Span, ...]) -> Skew | None:
+def _skew(
+    quantity: str, first: Signal, second: Signal, spans: tuple[Span, ...]
+) -> StreamSkew | None:
     slow, fast = sorted((first, second), key=lambda signal: signal.rate_hz)
     mask = inside(slow.time_s, spans)
     stamps, values = slow.time_s[mask], slow.values[mask]
@@ -86,7 +88,7 @@ def _skew(quantity: str, first: Signal, second: Signal, spans: tuple[Span, ...])
     # The fast stream read `lag` later matches the slow one: the fast one is later by `lag`.
     lag = float(lags[best] + fraction * (lags[1] - lags[0]))
     later = lag if fast is second else -lag
-    return Skew(
+    return StreamSkew(
         quantity,
         first.label,
         second.label,

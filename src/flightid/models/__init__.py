@@ -8,9 +8,9 @@ from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.interchange import from_control, from_scipy, to_control, to_scipy
 from flightid.models.kinds import GreyBoxModel
-from flightid.models.language.blocks import Block
+from flightid.models.language.blocks import ModelBlock
 from flightid.models.language.record_values import RecordValue
-from flightid.models.language.tables import Axis, TableFunction
+from flightid.models.language.tables import TableAxis, TableFunction
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.system_files import read_system, write_system
 from flightid.models.load import library_names, load_model, load_structure
@@ -28,8 +28,6 @@ from flightid.models.state_space.parts import Output, ResponsePair, StateSpaceMa
 from flightid.models.transfer.model import TransferFunction, TransferFunctionModel
 
 __all__ = [
-    "Axis",
-    "Block",
     "EstimateProvenance",
     "GreyBoxModel",
     "InnovationsModel",
@@ -37,6 +35,7 @@ __all__ = [
     "LinearModel",
     "LinearSystem",
     "Model",
+    "ModelBlock",
     "ModelBuilder",
     "NarxModel",
     "NarxStructure",
@@ -50,6 +49,7 @@ __all__ = [
     "StateSpaceMatrices",
     "StateSpaceModel",
     "SubspaceStructure",
+    "TableAxis",
     "TableFunction",
     "Term",
     "TransferFunction",

@@ -24,7 +24,7 @@ GreyBoxModel = TransferFunctionModel | StateSpaceModel
 
 
 @dataclass(frozen=True)
-class Kind:
+class ModelKind:
     """One kind of model.
 
     Attributes
@@ -42,13 +42,17 @@ class Kind:
     write: Callable[..., dict[str, object]]
 
 
-KINDS: dict[str, Kind] = {
-    "transfer": Kind(TransferFunctionModel, transfer_from_table, TransferFunctionModel.to_dict),
-    "state-space": Kind(StateSpaceModel, StateSpaceModel.from_dict, StateSpaceModel.to_dict),
-    "polynomial": Kind(PolynomialModel, PolynomialModel.from_dict, PolynomialModel.to_dict),
-    "innovations": Kind(InnovationsModel, InnovationsModel.from_dict, InnovationsModel.to_dict),
-    "narx": Kind(NarxModel, narx_from_table, NarxModel.to_dict),
-    "linear": Kind(LinearSystem, system_from_table, LinearSystem.to_dict),
+KINDS: dict[str, ModelKind] = {
+    "transfer": ModelKind(
+        TransferFunctionModel, transfer_from_table, TransferFunctionModel.to_dict
+    ),
+    "state-space": ModelKind(StateSpaceModel, StateSpaceModel.from_dict, StateSpaceModel.to_dict),
+    "polynomial": ModelKind(PolynomialModel, PolynomialModel.from_dict, PolynomialModel.to_dict),
+    "innovations": ModelKind(
+        InnovationsModel, InnovationsModel.from_dict, InnovationsModel.to_dict
+    ),
+    "narx": ModelKind(NarxModel, narx_from_table, NarxModel.to_dict),
+    "linear": ModelKind(LinearSystem, system_from_table, LinearSystem.to_dict),
 }
 """By the word under ``kind`` in a file."""
 

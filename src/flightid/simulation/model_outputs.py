@@ -49,7 +49,7 @@ class System:
 
 
 @dataclass(frozen=True)
-class Modes:
+class ModeSubset:
     """Those modes of a system that are followed in one direction of time."""
 
     matrices: tuple[Array, ...]
@@ -85,7 +85,7 @@ def systems_of(model: GreyBoxModel) -> list[System]:
     return systems
 
 
-def split_modes(system: System, duration_s: float) -> list[Modes]:
+def split_modes(system: System, duration_s: float) -> list[ModeSubset]:
     """Part a system into modes that are followed forwards and modes followed backwards.
 
     Parameters
@@ -96,7 +96,7 @@ def split_modes(system: System, duration_s: float) -> list[Modes]:
 
     Returns
     -------
-    list of Modes
+    list of ModeSubset
         Their outputs add up to the system's.
 
     Reference
@@ -107,7 +107,7 @@ def split_modes(system: System, duration_s: float) -> list[Modes]:
     a, b, c, d = system.matrices
     growth = np.linalg.eigvals(a).real * duration_s
     if np.max(growth, initial=-np.inf) <= SLOW:
-        return [Modes(system.matrices, system.delays_s, backwards=False)]
+        return [ModeSubset(system.matrices, system.delays_s, backwards=False)]
     between = np.sort(growth[(growth > SLOW) & (growth < FAST)])
     edges = np.concatenate([[SLOW], between, [FAST]])
     widest = int(np.argmax(np.diff(edges)))
@@ -120,8 +120,8 @@ def split_modes(system: System, duration_s: float) -> list[Modes]:
     slow = (triangle[:n, :n], to_modes[:n] @ b, c @ from_modes[:, :n], d)
     fast = (triangle[n:, n:], to_modes[n:] @ b, c @ from_modes[:, n:], np.zeros_like(d))
     return [
-        Modes(slow, system.delays_s, backwards=False),
-        Modes(fast, system.delays_s, backwards=True),
+        ModeSubset(slow, system.delays_s, backwards=False),
+        ModeSubset(fast, system.delays_s, backwards=True),
     ]
 
 
@@ -156,13 +156,13 @@ def between_samples(values: Array, hold: str) -> Array:
 
 
 def driven_outputs(
-    modes: list[Modes], between: Array, sample_time_s: float, hold: str
+    modes: list[ModeSubset], between: Array, sample_time_s: float, hold: str
 ) -> NDArray[np.float64]:
     """Outputs that the inputs drive, from rest at the end from which each mode is followed.
 
     Parameters
     ----------
-    modes : list of Modes
+    modes : list of ModeSubset
     between : ndarray
         The measured inputs from `between_samples`.
     sample_time_s : float
@@ -179,7 +179,7 @@ def driven_outputs(
     return np.asarray(sum(_driven(each, between, step, "first")[:, ::FINER] for each in modes))
 
 
-def free_outputs(modes: list[Modes], n_samples: int, sample_time_s: float) -> Array:
+def free_outputs(modes: list[ModeSubset], n_samples: int, sample_time_s: float) -> Array:
     """What unknown states and unknown trims of the inputs add.
 
     Returns
@@ -195,7 +195,7 @@ def free_outputs(modes: list[Modes], n_samples: int, sample_time_s: float) -> Ar
     return np.concatenate([*states, steady])
 
 
-def _free(modes: Modes, n_samples: int, sample_time_s: float) -> Array:
+def _free(modes: ModeSubset, n_samples: int, sample_time_s: float) -> Array:
     """Motion from each unit state and under each unit of a steady input, (n + m, p, n_samples).
 
     Outputs at sample k are C Eᵏ, E the transition of states and steady inputs together; each pass
@@ -216,7 +216,7 @@ def _free(modes: Modes, n_samples: int, sample_time_s: float) -> Array:
     return found[:, :, ::-1] if modes.backwards else found
 
 
-def _driven(modes: Modes, values: Array, sample_time_s: float, hold: str) -> Array:
+def _driven(modes: ModeSubset, values: Array, sample_time_s: float, hold: str) -> Array:
     start = np.zeros(len(modes.matrices[0]))
     first = hold == "first"
     if not modes.backwards:
@@ -233,7 +233,7 @@ def _driven(modes: Modes, values: Array, sample_time_s: float, hold: str) -> Arr
 
 
 def _run(
-    modes: Modes,
+    modes: ModeSubset,
     values: Array,
     start: Array,
     delays_s: Array,

@@ -13,7 +13,7 @@ from flightid.vehicles import (
     PilotDoublet,
     QuadrotorParameters,
     Sensors,
-    SidRun,
+    SidActivation,
     Turbulence,
     fly,
 )
@@ -28,7 +28,7 @@ class FlightPlan:
 
     Attributes
     ----------
-    sweeps : tuple of SidRun
+    sweeps : tuple of SidActivation
         System-identification runs.
     doublets : tuple of PilotDoublet
         Stick movements.
@@ -40,7 +40,7 @@ class FlightPlan:
         Seed of all noise.
     """
 
-    sweeps: tuple[SidRun, ...]
+    sweeps: tuple[SidActivation, ...]
     doublets: tuple[PilotDoublet, ...]
     vehicle: QuadrotorParameters
     autopilot: Autopilot
@@ -73,7 +73,7 @@ def read_flight(reader: TableReader) -> FlightPlan:
     """
     reader.choice("simulate", SIMULATORS)
     plan = FlightPlan(
-        tuple(_part(SidRun, item, where) for where, item in reader.rows("sweep")),
+        tuple(_part(SidActivation, item, where) for where, item in reader.rows("sweep")),
         tuple(_part(PilotDoublet, item, where) for where, item in reader.rows("doublet")),
         _part(QuadrotorParameters, reader.values("vehicle"), "[flight.vehicle]"),
         _part(Autopilot, reader.values("autopilot"), "[flight.autopilot]"),

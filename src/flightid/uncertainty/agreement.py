@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.uncertainty.parts import Flight, chance_alike, larger, scatter
+from flightid.uncertainty.parts import RecordParts, chance_alike, larger, scatter
 from flightid.uncertainty.quantiles import LEVEL, half_width
 
 Array = NDArray[np.float64]
@@ -111,11 +111,11 @@ class AgreementTest:
 
 
 def compare_parts(
-    flights: Sequence[Flight],
+    flights: Sequence[RecordParts],
     solve: Array,
     covariance: Array,
     freedom: Array,
-    rest: Flight | None = None,
+    rest: RecordParts | None = None,
     *,
     by_halves: bool = True,
     by_records: bool = True,
@@ -124,7 +124,7 @@ def compare_parts(
 
     Parameters
     ----------
-    flights : sequence of Flight
+    flights : sequence of RecordParts
         Records with two halves each.
     solve : ndarray, shape (n, n)
         What turns scores into changes of the estimates.
@@ -132,7 +132,7 @@ def compare_parts(
         By the noise within records.
     freedom : ndarray, shape (n,)
         Degrees of freedom of its diagonal.
-    rest : Flight, optional
+    rest : RecordParts, optional
         One more part that is neither compared nor halved: what was fitted beside the records.
     by_halves, by_records : bool
         Whether the noise of halves, and of records, is known well enough to compare them.
@@ -172,9 +172,9 @@ def _combined(chances: Sequence[float | None]) -> float | None:
     return None if not known else float(-np.expm1(len(known) * np.log1p(-min(*known, CERTAIN))))
 
 
-def _halved(flight: Flight) -> list[Flight]:
+def _halved(flight: RecordParts) -> list[RecordParts]:
     return [
-        Flight(
+        RecordParts(
             flight.scores[k : k + 1],
             flight.information[k : k + 1],
             flight.noise[k : k + 1, :, k : k + 1],

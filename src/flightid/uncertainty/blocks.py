@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.uncertainty.parts import Flight
+from flightid.uncertainty.parts import RecordParts
 from flightid.uncertainty.residual_noise import Autoregression
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class RecordBlock:
     """One record, whitened across outputs; rows are outputs after outputs.
 
     Attributes
@@ -39,7 +39,7 @@ class Block:
     answering: Array | None = None
 
     @classmethod
-    def of(cls, shared: Array, own: Array, residual: Array) -> Block:
+    def of(cls, shared: Array, own: Array, residual: Array) -> RecordBlock:
         """From sensitivities by shared parameters and by own numbers, (n_outputs, n_samples, k)."""
         rows = residual.size
         shared, own = shared.reshape(rows, -1), own.reshape(rows, -1)
@@ -71,12 +71,12 @@ class JointResiduals:
         return replace(self, slopes=self.slopes[:, parameters], total=self.total[:, parameters])
 
 
-def flights_of(apart: Sequence[Array], blocks: Sequence[Block]) -> list[Flight]:
+def flights_of(apart: Sequence[Array], blocks: Sequence[RecordBlock]) -> list[RecordParts]:
     """Records with their halves, from what `_heard` gives of each."""
     return [_flight(each.sum(axis=0), block) for each, block in zip(apart, blocks, strict=True)]
 
 
-def _levels(blocks: Sequence[Block]) -> Array:
+def _levels(blocks: Sequence[RecordBlock]) -> Array:
     """Residual variance of each record and output over that of all, (n_records, n_outputs).
 
     Records of one colour need not be of one level: a harder manoeuvre may be a noisier one.
@@ -88,7 +88,7 @@ def _levels(blocks: Sequence[Block]) -> Array:
     return np.where(known, squares / counts[:, None] / np.where(known, common, 1.0), 1.0)
 
 
-def _halves(block: Block) -> Array:
+def _halves(block: RecordBlock) -> Array:
     """[basis, projected in the first half, projected in the second], (n_outputs, n, m + 2 n)."""
     n_outputs, n_samples = block.residual.shape
     own, shared = (
@@ -103,7 +103,7 @@ def _halves(block: Block) -> Array:
     return wide
 
 
-def noise_heard(models: Sequence[Autoregression], blocks: Sequence[Block]) -> list[Array]:
+def noise_heard(models: Sequence[Autoregression], blocks: Sequence[RecordBlock]) -> list[Array]:
     """XᵀΩX of `_halves` by output of each record, for noise of these models and its own level."""
     return [
         level[:, None, None]
@@ -112,7 +112,7 @@ def noise_heard(models: Sequence[Autoregression], blocks: Sequence[Block]) -> li
     ]
 
 
-def joined(apart: Array, block: Block) -> Array:
+def joined(apart: Array, block: RecordBlock) -> Array:
     """[basis, projected]ᵀ Ω [basis, projected] from halves."""
     m, count = block.basis.shape[1], block.projected.shape[1]
     turn = np.zeros((m + 2 * count, m + count))
@@ -121,7 +121,7 @@ def joined(apart: Array, block: Block) -> Array:
     return np.asarray(turn.T @ apart @ turn)
 
 
-def _flight(answers: Array, block: Block) -> Flight:
+def _flight(answers: Array, block: RecordBlock) -> RecordParts:
     """Scores of both halves, their information, and their noise with the own numbers taken out."""
     wide = _halves(block).reshape(block.residual.size, -1)
     m, count = block.basis.shape[1], block.projected.shape[1]
@@ -131,19 +131,19 @@ def _flight(answers: Array, block: Block) -> Flight:
     # A half is zero in the other, so it meets all of what answers there alone.
     answering = block.projected if block.answering is None else block.answering
     square = np.stack([part.T @ answering for part in parts])
-    return Flight(
+    return RecordParts(
         (halves.T @ block.residual.ravel()).reshape(2, count),
         square,
         (turn.T @ answers @ turn).reshape(2, count, 2, count),
     )
 
 
-def rest_of(flights: Sequence[Flight], beside: JointResiduals | None) -> Flight | None:
+def rest_of(flights: Sequence[RecordParts], beside: JointResiduals | None) -> RecordParts | None:
     """Data that were fitted beside the records, as one more part: its score balances theirs."""
     if beside is None or not beside.measured:
         return None
     score = -sum(flight.scores.sum(axis=0) for flight in flights)
     noise = beside.slopes.T @ beside.slopes
-    return Flight(
+    return RecordParts(
         np.asarray(score)[None], (beside.slopes.T @ beside.total)[None], noise[None, :, None]
     )

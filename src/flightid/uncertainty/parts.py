@@ -24,7 +24,7 @@ MOST_BY_ONE = 0.999
 
 
 @dataclass(frozen=True, eq=False)
-class Flight:
+class RecordParts:
     """The parts of one record: halves, whose noise may be shared.
 
     Attributes
@@ -42,29 +42,29 @@ class Flight:
     noise: Array
 
     @property
-    def whole(self) -> Flight:
+    def whole(self) -> RecordParts:
         """The record as one part."""
-        return Flight(
+        return RecordParts(
             self.scores.sum(axis=0)[None],
             self.information.sum(axis=0)[None],
             self.noise.sum(axis=(0, 2))[None, :, None],
         )
 
-    def of(self, count: int) -> Flight:
+    def of(self, count: int) -> RecordParts:
         """The same of the first parameters alone."""
-        return Flight(
+        return RecordParts(
             self.scores[:, :count],
             self.information[:, :count, :count],
             self.noise[:, :count, :, :count],
         )
 
 
-def chance_alike(flights: Sequence[Flight], freedom: float) -> float | None:
+def chance_alike(flights: Sequence[RecordParts], freedom: float) -> float | None:
     """Probability that parts of one vehicle differ by as much as these do.
 
     Parameters
     ----------
-    flights : sequence of Flight
+    flights : sequence of RecordParts
         Noise of different ones is independent.
     freedom : float
         Degrees of freedom of the noise's level.
@@ -81,7 +81,7 @@ def chance_alike(flights: Sequence[Flight], freedom: float) -> float | None:
 
     Example
     -------
-    >>> one, other = (Flight(np.array([[s]]), np.ones((1, 1, 1)), np.ones((1, 1, 1, 1)))
+    >>> one, other = (RecordParts(np.array([[s]]), np.ones((1, 1, 1)), np.ones((1, 1, 1, 1)))
     ...               for s in (1.0, -1.0))
     >>> round(chance_alike([one, other], np.inf), 3)
     0.157
@@ -133,7 +133,7 @@ class Scatter:
     freedom: Array
 
 
-def scatter(parts: Sequence[Flight], solve: Array, spread: Array) -> Scatter:
+def scatter(parts: Sequence[RecordParts], solve: Array, spread: Array) -> Scatter:
     """Covariance by leaving out one part after the other (jackknife by clusters, CR3).
 
     Unbiased where parts weigh alike and, to a few percent of the variance, where one weighs four
@@ -141,7 +141,7 @@ def scatter(parts: Sequence[Flight], solve: Array, spread: Array) -> Scatter:
 
     Parameters
     ----------
-    parts : sequence of Flight
+    parts : sequence of RecordParts
         Each as one part; two or more.
     solve : ndarray, shape (p, p)
         Inverse of the information of all parts together: what turns scores into changes.
@@ -159,7 +159,7 @@ def scatter(parts: Sequence[Flight], solve: Array, spread: Array) -> Scatter:
 
     Example
     -------
-    >>> parts = [Flight(np.array([[s]]), np.ones((1, 1, 1)), np.ones((1, 1, 1, 1)))
+    >>> parts = [RecordParts(np.array([[s]]), np.ones((1, 1, 1)), np.ones((1, 1, 1, 1)))
     ...          for s in (3.0, 0.0, -3.0)]
     >>> found = scatter(parts, np.full((1, 1), 1 / 3), np.full((1, 1), 1 / 3))
     >>> found.covariance.round(6), found.freedom.round(6)

@@ -21,8 +21,8 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.uncertainty.agreement import Agreement, AgreementTest, compare_parts
 from flightid.uncertainty.blocks import (
-    Block,
     JointResiduals,
+    RecordBlock,
     flights_of,
     joined,
     noise_heard,
@@ -138,7 +138,7 @@ def colour_findings(smallest: float, largest: float) -> list[Finding]:
 
 
 def residual_covariance(
-    blocks: Sequence[Block],
+    blocks: Sequence[RecordBlock],
     beside: JointResiduals | None = None,
     noise: tuple[InputNoise, Array] | None = None,
 ) -> ResidualCovariance:
@@ -146,7 +146,7 @@ def residual_covariance(
 
     Parameters
     ----------
-    blocks : sequence of Block
+    blocks : sequence of RecordBlock
         By record.
     beside : JointResiduals, optional
         Residuals beside the records.
@@ -174,7 +174,7 @@ def residual_covariance(
     Example
     -------
     >>> residual = np.random.default_rng(1).standard_normal((1, 400))
-    >>> block = Block.of(np.ones((1, 400, 1)), np.ones((1, 400, 0)), residual)
+    >>> block = RecordBlock.of(np.ones((1, 400, 1)), np.ones((1, 400, 0)), residual)
     >>> found = residual_covariance([block])
     >>> round(float(found.white[0, 0]), 4)
     0.0025
@@ -230,12 +230,14 @@ def residual_covariance(
     )
 
 
-def white_covariance(blocks: Sequence[Block], covariance: Array, freedom: float) -> AgreementTest:
+def white_covariance(
+    blocks: Sequence[RecordBlock], covariance: Array, freedom: float
+) -> AgreementTest:
     """Covariance of estimates whose errors their own noise model whitens, parts compared.
 
     Parameters
     ----------
-    blocks : sequence of Block
+    blocks : sequence of RecordBlock
         By record.
     covariance : ndarray, shape (n, n)
         By white errors.
@@ -262,7 +264,7 @@ def white_covariance(blocks: Sequence[Block], covariance: Array, freedom: float)
     return compare_parts(flights, root @ root.T, covariance, degrees)
 
 
-def triangle_of(blocks: Sequence[Block], beside: Array | None = None) -> Array:
+def triangle_of(blocks: Sequence[RecordBlock], beside: Array | None = None) -> Array:
     """Triangle of the sensitivities of all records, and of what is fitted beside them."""
     parts = [np.asarray(np.linalg.qr(block.projected, mode="r")) for block in blocks]
     if beside is not None:
@@ -276,7 +278,7 @@ def _inverse_root(triangle: Array) -> Array:
     return np.asarray(solve_triangular(triangle / size, np.eye(len(size))) / size[:, None])
 
 
-def _gain(root: Array, beside: JointResiduals | None, blocks: Sequence[Block]) -> Array:
+def _gain(root: Array, beside: JointResiduals | None, blocks: Sequence[RecordBlock]) -> Array:
     """What turns a gradient into a change of the estimates, from the root R⁻¹ of the information.
 
     Where data follow the parameters, the equations that the estimates solve bend less than the
@@ -305,7 +307,7 @@ def _walks(taken: FittedDirections, noise: InputNoise, whitener: Array) -> Array
     return np.array([periodogram(walk) for walk in walks - directions @ along])
 
 
-def _of_walks(block: Block, noise: InputNoise, whitener: Array) -> Array:
+def _of_walks(block: RecordBlock, noise: InputNoise, whitener: Array) -> Array:
     """Gradients that unit noise of each input and step makes, shape (n_noises, n)."""
     sensitivities = block.projected.reshape(*block.residual.shape, -1)
     paths = noise.transposed(sensitivities * whitener[:, None, None])

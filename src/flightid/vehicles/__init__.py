@@ -1,7 +1,7 @@
 """Vehicles: simulated ones with their autopilots and logs, whose truth is known."""
 
 from flightid.vehicles.ardupilot_log import write_ardupilot_log
-from flightid.vehicles.autopilot import Autopilot, PilotDoublet, RateGains, SidRun
+from flightid.vehicles.autopilot import Autopilot, PilotDoublet, RateGains, SidActivation
 from flightid.vehicles.flight import Flight, fly
 from flightid.vehicles.quadrotor import QuadrotorParameters, Sensors, Turbulence
 from flightid.vehicles.scenario import fly_scenario
@@ -28,7 +28,7 @@ __all__ = [
     "RateGains",
     "RateTruth",
     "Sensors",
-    "SidRun",
+    "SidActivation",
     "Turbulence",
     "TwinRotor",
     "TwinRotorParameters",

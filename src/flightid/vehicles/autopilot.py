@@ -147,7 +147,7 @@ class Autopilot:
 
 
 @dataclass(frozen=True)
-class SidRun:
+class SidActivation:
     """One activation of ArduPilot's system-identification mode.
 
     Attributes
@@ -168,7 +168,7 @@ class SidRun:
 
     Example
     -------
-    >>> SidRun(axis=10, start_s=5.0).duration_s
+    >>> SidActivation(axis=10, start_s=5.0).duration_s
     181.0
     """
 

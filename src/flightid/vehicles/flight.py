@@ -14,7 +14,7 @@ from flightid.errors import OptionError, UnknownNameError
 from flightid.record import Record, Step
 from flightid.result import Result
 from flightid.table import Column, Table
-from flightid.vehicles.autopilot import Autopilot, PilotDoublet, SidRun
+from flightid.vehicles.autopilot import Autopilot, PilotDoublet, SidActivation
 from flightid.vehicles.quadrotor import QuadrotorParameters, Sensors, Turbulence
 from flightid.vehicles.truth import AXES, COMMANDS, RATES, AxisName, Gyro, RateTruth, rate_truth
 
@@ -34,7 +34,7 @@ class Flight(Result, schema="flightid.flight/1", untold={"rows": "time histories
         One row for each logged loop; read a column by its name: ``flight["gyro_x"]``.
     vehicle, autopilot, sensors, turbulence
         What flew, and in what air.
-    runs : tuple of SidRun
+    runs : tuple of SidActivation
         Activations of the system-identification mode.
     doublets : tuple of PilotDoublet
         What the pilot did.
@@ -55,7 +55,7 @@ class Flight(Result, schema="flightid.flight/1", untold={"rows": "time histories
     autopilot: Autopilot
     sensors: Sensors
     turbulence: Turbulence
-    runs: tuple[SidRun, ...]
+    runs: tuple[SidActivation, ...]
     doublets: tuple[PilotDoublet, ...]
     log_every: int
     seed: int
@@ -90,7 +90,7 @@ class Flight(Result, schema="flightid.flight/1", untold={"rows": "time histories
         """Exact transfer function of a rate axis."""
         return rate_truth(axis, self.vehicle, self.autopilot)
 
-    def span(self, run: SidRun) -> tuple[float, float]:
+    def span(self, run: SidActivation) -> tuple[float, float]:
         """Time in which a run's chirp is not silent, s."""
         return run.start_s + 1.0, run.start_s + 1.0 + run.record_s
 
@@ -187,7 +187,7 @@ class Flight(Result, schema="flightid.flight/1", untold={"rows": "time histories
 
 def fly(
     *,
-    runs: Iterable[SidRun] = (),
+    runs: Iterable[SidActivation] = (),
     doublets: Iterable[PilotDoublet] = (),
     duration_s: float | None = None,
     vehicle: QuadrotorParameters | None = None,
@@ -205,7 +205,7 @@ def fly(
 
     Parameters
     ----------
-    runs : iterable of SidRun
+    runs : iterable of SidActivation
         Activations of the system-identification mode, in order of time and not overlapping.
     doublets : iterable of PilotDoublet
         Stick movements.

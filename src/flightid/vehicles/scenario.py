@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 from typing import Any, TypeVar
 
 from flightid.errors import OptionError
-from flightid.vehicles.autopilot import Autopilot, PilotDoublet, RateGains, SidRun
+from flightid.vehicles.autopilot import Autopilot, PilotDoublet, RateGains, SidActivation
 from flightid.vehicles.flight import Flight, fly
 from flightid.vehicles.quadrotor import QuadrotorParameters, Sensors, Turbulence
 
@@ -16,7 +16,7 @@ SCENARIOS = ("advised", "published")
 GROUPS = ("vehicle", "autopilot", "sensors", "turbulence")
 
 
-def advised_runs() -> tuple[SidRun, ...]:
+def advised_runs() -> tuple[SidActivation, ...]:
     """Mixer sweeps of roll, pitch and yaw as we advise: 0.1–12 Hz, so that motors show themselves.
 
     The published settings end at 5 Hz, fade out from 3.9 Hz, and spend 40 of 130 s at 0.05 Hz where
@@ -31,7 +31,7 @@ def advised_runs() -> tuple[SidRun, ...]:
     runs = []
     for number, (axis, magnitude) in enumerate(((10, 0.15), (11, 0.15), (12, 0.15))):
         runs.append(
-            SidRun(
+            SidActivation(
                 axis=axis,
                 start_s=5.0 + 130.0 * number,
                 magnitude=magnitude,
@@ -46,7 +46,7 @@ def advised_runs() -> tuple[SidRun, ...]:
     return tuple(runs)
 
 
-def published_runs() -> tuple[SidRun, ...]:
+def published_runs() -> tuple[SidActivation, ...]:
     """Mixer sweeps of the published rig study (its table 2): 0.05–5 Hz in 130 s, yaw at 0.55.
 
     Example
@@ -54,7 +54,7 @@ def published_runs() -> tuple[SidRun, ...]:
     >>> published_runs()[2].magnitude
     0.55
     """
-    first = SidRun(axis=10, start_s=5.0)
+    first = SidActivation(axis=10, start_s=5.0)
     gap_s = first.duration_s + 10.0
     return (
         first,

@@ -19,7 +19,7 @@ from flightid.control.autopilots.replay_signals import (
     LIMIT,
     RESET,
     AxisSignals,
-    Signal,
+    LoggedSignal,
     every_loop,
     longest_undisturbed,
     read_signals,
@@ -253,11 +253,11 @@ def _grid(loop: AxisLoop, signals: AxisSignals) -> Samples:
     return np.asarray(first + np.arange(count) / loop.loop_rate_hz)
 
 
-def _sampled(signal: Signal, time_s: Samples) -> Samples:
+def _sampled(signal: LoggedSignal, time_s: Samples) -> Samples:
     return np.asarray(np.interp(time_s, signal.time_s, signal.values))
 
 
-def _held(signal: Signal, time_s: Samples) -> Samples:
+def _held(signal: LoggedSignal, time_s: Samples) -> Samples:
     rows = np.searchsorted(signal.time_s, time_s + HALF_STAMP_S, side="right") - 1
     return np.asarray(signal.values[np.maximum(rows, 0)])
 

@@ -24,7 +24,7 @@ LEAST_ROWS = 20
 
 
 @dataclass(frozen=True)
-class Signal:
+class LoggedSignal:
     """Stamped samples, SI units."""
 
     time_s: Samples
@@ -43,34 +43,34 @@ class AxisSignals:
 
     Attributes
     ----------
-    setpoint, rate : Signal
+    setpoint, rate : LoggedSignal
         rad/s.
     filtered_target : bool
         The set-point is taken behind the target's filters.
     setpoint_loops : float
         Loops by which the log is known to note the set-point before it acts.
-    terms : mapping of str to Signal
+    terms : mapping of str to LoggedSignal
         Logged terms, and ``output``, their sum, without any injected signal.
-    flags : Signal or None
+    flags : LoggedSignal or None
         Bits of PIDR.Flags.
-    thrust, acceleration, landed : Signal or None
+    thrust, acceleration, landed : LoggedSignal or None
         What else the controller looks at.
-    unallocated : Signal or None
+    unallocated : LoggedSignal or None
         Torque that the allocation could not give (PX4); zero where it gave all.
     paired : bool
         Set-point, rate and terms stand on the same rows.
     """
 
-    setpoint: Signal
-    rate: Signal
-    terms: Mapping[str, Signal]
+    setpoint: LoggedSignal
+    rate: LoggedSignal
+    terms: Mapping[str, LoggedSignal]
     filtered_target: bool = False
     setpoint_loops: float = 0.0
-    flags: Signal | None = None
-    thrust: Signal | None = None
-    acceleration: Signal | None = None
-    landed: Signal | None = None
-    unallocated: Signal | None = None
+    flags: LoggedSignal | None = None
+    thrust: LoggedSignal | None = None
+    acceleration: LoggedSignal | None = None
+    landed: LoggedSignal | None = None
+    unallocated: LoggedSignal | None = None
     paired: bool = False
     extra: dict[str, str] = field(default_factory=dict)
 
@@ -81,7 +81,7 @@ def every_loop(time_s: Samples, loop: AxisLoop) -> bool:
     return abs(1.0 / (step * loop.loop_rate_hz) - 1.0) < SAME_RATE
 
 
-def longest_undisturbed(flags: Signal) -> tuple[float, float] | None:
+def longest_undisturbed(flags: LoggedSignal) -> tuple[float, float] | None:
     """Longest span in which the autopilot neither set nor reset the integrator, s."""
     broken = (flags.values.astype(int) & (RESET | I_SET)) > 0
     edges = np.flatnonzero(np.diff(np.concatenate([[1], broken.astype(int), [1]])))
@@ -149,14 +149,14 @@ def _from_pid(
     time_s = pid.time_s[rows]
     names = [name for name in PID_TERMS if name in pid]
     values = pid.arrays([*names, "Tar", "Act"])
-    terms = {name: Signal(time_s, values[name][rows], pid.name) for name in names}
+    terms = {name: LoggedSignal(time_s, values[name][rows], pid.name) for name in names}
     total = np.sum([signal.values for signal in terms.values()], axis=0)
-    terms["output"] = Signal(time_s, total, f"sum of {pid.name}")
+    terms["output"] = LoggedSignal(time_s, total, f"sum of {pid.name}")
     if "Err" in pid and filtered:
-        terms = {"Err": Signal(time_s, pid["Err"][rows], pid.name), **terms}
+        terms = {"Err": LoggedSignal(time_s, pid["Err"][rows], pid.name), **terms}
     return AxisSignals(
-        Signal(time_s, values["Tar"][rows] * to_rad, f"{pid.name}.Tar"),
-        Signal(time_s, values["Act"][rows] * to_rad, f"{pid.name}.Act"),
+        LoggedSignal(time_s, values["Tar"][rows] * to_rad, f"{pid.name}.Tar"),
+        LoggedSignal(time_s, values["Act"][rows] * to_rad, f"{pid.name}.Act"),
         terms,
         filtered_target=filtered,
         flags=_flags(pid, rows),
@@ -164,10 +164,10 @@ def _from_pid(
     )
 
 
-def _flags(pid: LogTable, rows: NDArray[np.intp]) -> Signal | None:
+def _flags(pid: LogTable, rows: NDArray[np.intp]) -> LoggedSignal | None:
     if "Flags" not in pid:
         return None
-    return Signal(pid.time_s[rows], pid["Flags"][rows], f"{pid.name}.Flags")
+    return LoggedSignal(pid.time_s[rows], pid["Flags"][rows], f"{pid.name}.Flags")
 
 
 def _from_rate(
@@ -193,22 +193,22 @@ def _from_rate(
     stored = rate.arrays([f"{letter}Des", f"{letter}Out"])
     names = [name for name in ("Tar", "Err", *PID_TERMS) if name in pid]
     values = pid.arrays([*names, "Act"])
-    terms = {name: Signal(time_s, values[name][second], pid.name) for name in names}
+    terms = {name: LoggedSignal(time_s, values[name][second], pid.name) for name in names}
     if every_loop(time_s, loop):
         output = stored[f"{letter}Out"][first] - _injected(log, loop, time_s)
-        terms["output"] = Signal(time_s, output, f"RATE.{letter}Out")
+        terms["output"] = LoggedSignal(time_s, output, f"RATE.{letter}Out")
     else:
         # Between rows an injected signal cannot be told from the controller's own.
         total = np.sum([terms[name].values for name in names if name in PID_TERMS], axis=0)
-        terms["output"] = Signal(time_s, total, f"sum of {pid.name}")
+        terms["output"] = LoggedSignal(time_s, total, f"sum of {pid.name}")
     setpoint = np.radians(stored[f"{letter}Des"][first])
     flags = _flags(pid, second)
     return AxisSignals(
-        Signal(time_s, setpoint, f"RATE.{letter}Des"),
-        Signal(time_s, values["Act"][second], f"{pid.name}.Act"),
+        LoggedSignal(time_s, setpoint, f"RATE.{letter}Des"),
+        LoggedSignal(time_s, values["Act"][second], f"{pid.name}.Act"),
         terms,
         setpoint_loops=float(loop.set_point_delay_loops),
-        flags=None if flags is None else Signal(time_s, flags.values, flags.source),
+        flags=None if flags is None else LoggedSignal(time_s, flags.values, flags.source),
         paired=True,
     )
 
@@ -262,31 +262,31 @@ def _px4(log: Log, loop: AxisLoop, span_s: tuple[float, float] | None) -> AxisSi
     )
 
 
-def _unallocated(log: Log, place: int) -> Signal | None:
+def _unallocated(log: Log, place: int) -> LoggedSignal | None:
     message = "control_allocator_status"
     missing = _optional(log, message, f"unallocated_torque[{place}]")
     achieved = _optional(log, message, "torque_setpoint_achieved")
     if missing is None or achieved is None:
         return None
     values = np.where(achieved.values > 0, 0.0, missing.values)
-    return Signal(missing.time_s, values, missing.source)
+    return LoggedSignal(missing.time_s, values, missing.source)
 
 
 def _table(log: Log, message: str) -> LogTable:
     return log.table(message, min(log.messages[message].instances, default=None))
 
 
-def _signal(table: LogTable, name: str, rows: NDArray[np.intp]) -> Signal:
+def _signal(table: LogTable, name: str, rows: NDArray[np.intp]) -> LoggedSignal:
     """Finite samples in order of time; rates are stamped when the sensor was read."""
     time_s, values = table.time_s[rows], table[name][rows]
     if table.name == "vehicle_angular_velocity" and "timestamp_sample" in table:
         scale = 1.0 if table.unit("timestamp_sample") == "s" else 1e-6
         time_s = table["timestamp_sample"][rows] * scale
     good = np.isfinite(values) & np.concatenate([[True], np.diff(time_s) > 0])
-    return Signal(time_s[good], values[good], f"{table.name}.{name}")
+    return LoggedSignal(time_s[good], values[good], f"{table.name}.{name}")
 
 
-def _optional(log: Log, message: str, name: str) -> Signal | None:
+def _optional(log: Log, message: str, name: str) -> LoggedSignal | None:
     if message not in log or name not in log.table(message):
         return None
     table = _table(log, message)
@@ -297,7 +297,7 @@ def _optional(log: Log, message: str, name: str) -> Signal | None:
 
 def _first(
     log: Log, span_s: tuple[float, float] | None, what: str, *candidates: tuple[str, str]
-) -> Signal:
+) -> LoggedSignal:
     for message, name in candidates:
         if message in log and name in log.table(message):
             table = _table(log, message)
@@ -307,11 +307,11 @@ def _first(
 
 
 def _debiased(
-    log: Log, span_s: tuple[float, float] | None, slow: Signal, place: int
-) -> tuple[Signal, dict[str, str]]:
+    log: Log, span_s: tuple[float, float] | None, slow: LoggedSignal, place: int
+) -> tuple[LoggedSignal, dict[str, str]]:
     """The gyro of every loop, less the bias that the estimator had found."""
     name = f"gyro_rad[{place}]"
     gyro = _first(log, span_s, "gyro", ("sensor_combined", name))
     bias = float(np.median(np.interp(slow.time_s, gyro.time_s, gyro.values) - slow.values))
     note = f"sensor_combined.{name} less a bias of {bias:.2g} rad/s"
-    return Signal(gyro.time_s, gyro.values - bias, gyro.source), {"rate": note}
+    return LoggedSignal(gyro.time_s, gyro.values - bias, gyro.source), {"rate": note}

@@ -12,7 +12,7 @@ from flightid.units import canonical
 
 
 @dataclass(frozen=True)
-class Limits:
+class OutputLimits:
     """Output between two values; seen as linear, a gain of one."""
 
     low: float
@@ -66,7 +66,7 @@ class Equations:
         return f"equations of {self.model.name}"
 
 
-Part = LinearSystem | Limits | RateLimit | Hold | Equations
+Part = LinearSystem | OutputLimits | RateLimit | Hold | Equations
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,7 +82,7 @@ class Block:
         What it is, for messages and pictures.
     inputs, outputs : tuple of str
         Signals.
-    part : LinearSystem, Limits, RateLimit, Hold or Equations
+    part : LinearSystem, OutputLimits, RateLimit, Hold or Equations
         What it does; inputs and outputs in the order of the signals.
     units : mapping of str to str
         Unit by signal, as far as it is known.
@@ -138,7 +138,7 @@ class Block:
         if isinstance(self.part, LinearSystem):
             late = bool(self.part.state_space()[4].any())
             return not self.part.order and not late and self.sample_time_s is None
-        return isinstance(self.part, Limits | RateLimit)
+        return isinstance(self.part, OutputLimits | RateLimit)
 
     @property
     def is_linear(self) -> bool:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flightid.control.loops.block import Block, Equations, Hold, Limits, RateLimit
+from flightid.control.loops.block import Block, Equations, Hold, OutputLimits, RateLimit
 from flightid.errors import ModelError, OptionError
 from flightid.models import StateSpaceModel
 from flightid.models.linear.linear_system import LinearSystem
@@ -181,7 +181,7 @@ def limiter(
     if not (np.isfinite(high) and np.isfinite(bottom) and bottom < high):
         raise OptionError("the limits have no meaning", found=f"{bottom} to {high}",
                           needed="two numbers, the lower one first")  # fmt: skip
-    return Block("limiter", (inputs,), (outputs,), Limits(float(bottom), float(high)),
+    return Block("limiter", (inputs,), (outputs,), OutputLimits(float(bottom), float(high)),
                  units or {}, alike=True)  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.control.loops.block import Block, Hold
 from flightid.control.loops.elements import gain, sum_of
-from flightid.control.loops.response import ResponseParts
+from flightid.control.loops.response import ConnectionBlocks
 from flightid.control.loops.sampled_loop import sampled_system
 from flightid.control.loops.simulation import simulate_connection
 from flightid.control.loops.stability import (
@@ -137,8 +137,8 @@ class Interconnection(
         return self._responding.at(self.outputs, omega_rad_s)
 
     @cached_property
-    def _responding(self) -> ResponseParts:
-        return ResponseParts.of(self.wiring)
+    def _responding(self) -> ConnectionBlocks:
+        return ConnectionBlocks.of(self.wiring)
 
     def linear_system(self, pade_order: int | None = DEFAULT_PADE_ORDER) -> LinearSystem:
         """One continuous linear system near trim.

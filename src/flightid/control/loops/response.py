@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class ResponseParts:
+class ConnectionBlocks:
     """What the response of a connection is computed from.
 
     Attributes
@@ -38,7 +38,7 @@ class ResponseParts:
     inputs: tuple[str, ...]
 
     @classmethod
-    def of(cls, wiring: Wiring) -> ResponseParts:
+    def of(cls, wiring: Wiring) -> ConnectionBlocks:
         """Sort the blocks of a connection."""
         ports = tuple(b for b in wiring.blocks if isinstance(b.part, Hold) or b.sample_time_s)
         inside = [linear_view(block) for block in wiring.blocks if block not in ports]

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid import _native
-from flightid.control.loops.block import Block, Equations, Hold, Limits, RateLimit
+from flightid.control.loops.block import Block, Equations, Hold, OutputLimits, RateLimit
 from flightid.control.loops.linear_core import Core, assemble
 from flightid.control.loops.wiring import Wiring
 from flightid.conventions import Role
@@ -176,7 +176,7 @@ def _held(wiring: Wiring, hold: str) -> set[str]:
 def _stays_held(block: Block, held: set[str]) -> bool:
     if isinstance(block.part, Hold) or block.sample_time_s is not None:
         return True
-    static = isinstance(block.part, Limits) or (
+    static = isinstance(block.part, OutputLimits) or (
         isinstance(block.part, LinearSystem) and not block.part.order
     )
     return static and all(name in held for name in block.inputs)
@@ -265,7 +265,7 @@ def _element(
     initial: Mapping[str, ArrayLike],
 ) -> Port:
     part = block.part
-    if isinstance(part, Limits):
+    if isinstance(part, OutputLimits):
         return "limits", reads, rows, 1, np.array([part.low, part.high])
     if isinstance(part, RateLimit):
         return "rate", reads, rows, 1, np.array([part.rate_per_s * clock.step_s])

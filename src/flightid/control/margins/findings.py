@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from flightid.control.margins.loop_metrics import LoopMetrics
-from flightid.control.margins.loop_source import Loop
+from flightid.control.margins.loop_source import BrokenLoop
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.uncertainty.estimate import Reading
@@ -59,7 +59,7 @@ def guide_finding(
 
 
 def margin_findings(
-    loop: Loop,
+    loop: BrokenLoop,
     metrics: LoopMetrics,
     made: Mapping[str, Reading],
     *,
@@ -70,7 +70,7 @@ def margin_findings(
 
     Parameters
     ----------
-    loop : Loop
+    loop : BrokenLoop
     metrics : LoopMetrics
         Of the estimate.
     made : mapping of str to Estimate
@@ -125,7 +125,7 @@ def margin_findings(
     return tuple(found)
 
 
-def source_findings(loop: Loop, crossover: Reading) -> list[Finding]:
+def source_findings(loop: BrokenLoop, crossover: Reading) -> list[Finding]:
     """What is known of where the loop comes from, and whether it is known where it crosses one."""
     found, valid = list(loop.uncertain.findings), loop.uncertain.valid_rad_s
     if valid is None or crossover.value is None or valid[0] <= crossover.value <= valid[1]:
@@ -142,7 +142,7 @@ def source_findings(loop: Loop, crossover: Reading) -> list[Finding]:
     ]
 
 
-def _verdict_of_band(loop: Loop) -> Finding:
+def _verdict_of_band(loop: BrokenLoop) -> Finding:
     low, high = loop.omega_rad_s[[0, -1]]
     return Finding(
         "stability-of-the-band",
@@ -153,7 +153,7 @@ def _verdict_of_band(loop: Loop) -> Finding:
     )
 
 
-def stability_findings(loop: Loop, metrics: LoopMetrics) -> list[Finding]:
+def stability_findings(loop: BrokenLoop, metrics: LoopMetrics) -> list[Finding]:
     """What the Nyquist criterion says, where it does not say that all is well."""
     count = round(float(metrics.unstable_poles))
     open_poles = f"{loop.unstable_poles} unstable poles of the open"

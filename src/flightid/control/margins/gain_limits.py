@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flightid.control.margins.crossings import gain_crossings, phase_crossings
 from flightid.control.margins.loop_grid import zoomed
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
-from flightid.control.margins.loop_source import Loop
+from flightid.control.margins.loop_source import BrokenLoop
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.uncertainty.estimate import Reading
@@ -32,12 +32,12 @@ GAIN_LIMITS = {
 """How far the gain may go, and where."""
 
 
-def measured_up(loop: Loop) -> tuple[Array, LoopMetrics]:
+def measured_up(loop: BrokenLoop) -> tuple[Array, LoopMetrics]:
     """Frequencies, drawn close around what counts where the loop is a model, and the metrics.
 
     Parameters
     ----------
-    loop : Loop
+    loop : BrokenLoop
 
     Returns
     -------
@@ -54,12 +54,12 @@ def measured_up(loop: Loop) -> tuple[Array, LoopMetrics]:
     return omega, loop.metrics(omega, loop.of(thing, omega))
 
 
-def everywhere(loop: Loop, omega: Array) -> Array | None:
+def everywhere(loop: BrokenLoop, omega: Array) -> Array | None:
     """All frequencies of a model's loop, close around its crossings; None of a measurement.
 
     Parameters
     ----------
-    loop : Loop
+    loop : BrokenLoop
     omega : ndarray, shape (n_f,)
         Frequencies of the band, rad/s.
     """
@@ -72,7 +72,7 @@ def everywhere(loop: Loop, omega: Array) -> Array | None:
 
 
 def gain_limits(
-    numbers: Mapping[str, float], loop: Loop, whole: Array, values: Complex
+    numbers: Mapping[str, float], loop: BrokenLoop, whole: Array, values: Complex
 ) -> dict[str, float]:
     """Gain margins of the band, and where it has none those of all frequencies.
 
@@ -83,7 +83,7 @@ def gain_limits(
     ----------
     numbers : mapping of str to float
         Margins of the band, dB and rad/s; NaN where it has none.
-    loop : Loop
+    loop : BrokenLoop
     whole : ndarray, shape (n_f,)
         Of `everywhere`, rad/s.
     values : ndarray of complex, shape (n_f,)
@@ -104,12 +104,12 @@ def gain_limits(
     return chosen
 
 
-def outside_findings(loop: Loop, made: Mapping[str, Reading]) -> tuple[Finding, ...]:
+def outside_findings(loop: BrokenLoop, made: Mapping[str, Reading]) -> tuple[Finding, ...]:
     """Nearer limits of the gain that lie outside the band in which margins were looked for.
 
     Parameters
     ----------
-    loop : Loop
+    loop : BrokenLoop
     made : mapping of str to Estimate
         Margins as they are told.
 

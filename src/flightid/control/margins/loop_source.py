@@ -38,7 +38,7 @@ Controller = Known | ResponseSource
 
 
 @dataclass(frozen=True, eq=False)
-class Loop:
+class BrokenLoop:
     """One broken loop, negative feedback, with its uncertainty.
 
     Attributes
@@ -97,7 +97,7 @@ def read_loop(
     given: Given,
     band_rad_s: tuple[float, float] | None,
     unstable_poles: int | None,
-) -> Loop:
+) -> BrokenLoop:
     """Read what a caller gave as a loop.
 
     Raises
@@ -137,7 +137,7 @@ def _measured(
     given: Given,
     band_rad_s: tuple[float, float] | None,
     unstable_poles: int,
-) -> Loop:
+) -> BrokenLoop:
     row = response.outputs[_place("output", output, response.outputs)]
     column = response.inputs[_place("input", input, response.inputs)]
     pair = response.select(inputs=[column], outputs=[row], band_rad_s=band_rad_s)
@@ -157,7 +157,7 @@ def _measured(
         del omega  # a measurement has its own
         return np.asarray(thing.response[0, 0])
 
-    return Loop(
+    return BrokenLoop(
         f"{row} / {column}",
         uncertain_of(pair),
         pair.omega_rad_s,
@@ -174,7 +174,7 @@ def _modelled(
     controller: Controller | None,
     band_rad_s: tuple[float, float] | None,
     unstable_poles: int | None,
-) -> Loop:
+) -> BrokenLoop:
     uncertain = uncertain_of(source)
     if isinstance(uncertain.value, Model) and not isinstance(uncertain.value, ResponseSource):
         uncertain = uncertain.then(linear_system)
@@ -207,7 +207,7 @@ def _modelled(
     if band_rad_s is not None:
         whole = whole_grid(lambda at: of(model, at), roots, band_rad_s)
         closed = closed_count(lambda at: of(model, at), whole, count)
-    return Loop(name, uncertain, omega, of, count, None, roots.end_rad_s, closed, whole)
+    return BrokenLoop(name, uncertain, omega, of, count, None, roots.end_rad_s, closed, whole)
 
 
 def closed_count(of: Callable[[Array], Complex], whole: Array, unstable_poles: int) -> int:

@@ -18,7 +18,7 @@ from flightid.control.margins.gain_limits import (
     measured_up,
     outside_findings,
 )
-from flightid.control.margins.loop_source import Controller, Given, Loop, read_loop
+from flightid.control.margins.loop_source import BrokenLoop, Controller, Given, read_loop
 from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -307,14 +307,14 @@ def margins(
     )
 
 
-def drawn_points(loop: Loop, omega: Array) -> Array:
+def drawn_points(loop: BrokenLoop, omega: Array) -> Array:
     """Frequencies for a picture: of a model some, of a measurement all."""
     if loop.measured or len(omega) <= DRAWN_POINTS:
         return omega
     return np.asarray(omega[np.linspace(0, len(omega) - 1, DRAWN_POINTS).astype(int)])
 
 
-def _carried(loop: Loop, omega: Array) -> tuple[list[tuple[Any, Reading]], LoopCurve]:
+def _carried(loop: BrokenLoop, omega: Array) -> tuple[list[tuple[Any, Reading]], LoopCurve]:
     """Every number with its interval, and the curve with its standard errors."""
     names = [name for _, name, _ in QUANTITIES]
     whole = everywhere(loop, omega)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flightid.control.autopilots import AxisLoop
 from flightid.control.autopilots.axis_loop import Gyro
 from flightid.control.tuning.controller_paths import ControllerPaths, loop_responses, standing
-from flightid.control.tuning.evidence import Evidence
+from flightid.control.tuning.evidence import TuningEvidence
 from flightid.control.tuning.gain_search import GainSearchResult, search
 from flightid.control.tuning.gain_search import steps as search_steps
 from flightid.control.tuning.limits import ANGLE
@@ -70,7 +70,7 @@ class Setting:
 
     Attributes
     ----------
-    evidence : Evidence
+    evidence : TuningEvidence
     searched, judged : PlantSet
         Plants of the search, and fresh ones on a finer grid; the estimate first in both.
     gyro : {"raw", "filtered"}
@@ -80,7 +80,7 @@ class Setting:
         Frequencies (rad/s) and spectral density ((rad/s)²/Hz) of the rate's noise.
     """
 
-    evidence: Evidence
+    evidence: TuningEvidence
     searched: PlantSet
     judged: PlantSet
     gyro: Gyro

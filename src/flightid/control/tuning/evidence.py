@@ -35,7 +35,7 @@ class Verdicts(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Evidence:
+class TuningEvidence:
     """What gains may rest on.
 
     Attributes
@@ -79,7 +79,7 @@ def gather(
     band_rad_s: Band | None,
     verification: Verdicts | Iterable[Verdicts] | None,
     nominal: bool,
-) -> Evidence:
+) -> TuningEvidence:
     """Collect plants, or refuse where the data cannot carry gains.
 
     Parameters
@@ -99,7 +99,7 @@ def gather(
 
     Returns
     -------
-    Evidence
+    TuningEvidence
 
     Raises
     ------
@@ -139,7 +139,7 @@ def gather(
             )
         )
     plants = [_linear(each, sample_time_s) for each in uncertain.draws(draws + fresh, seed)]
-    return Evidence(
+    return TuningEvidence(
         _linear(uncertain.value, sample_time_s),
         tuple(_corners(uncertain, sample_time_s)),
         tuple(plants[:draws]),

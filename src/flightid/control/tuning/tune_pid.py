@@ -22,7 +22,7 @@ from flightid.control.tuning.axis_tuning import (
     tune_axis,
 )
 from flightid.control.tuning.controller_paths import ControllerPaths, has_angle_loop
-from flightid.control.tuning.evidence import Band, Evidence, Verdicts, gather
+from flightid.control.tuning.evidence import Band, TuningEvidence, Verdicts, gather
 from flightid.control.tuning.findings import low_coherence, remarks, verdict
 from flightid.control.tuning.flown_gains import Gains, flown_loop
 from flightid.control.tuning.pid_design import PidDesign
@@ -172,7 +172,7 @@ def tune_pid(
 
 
 def make_setting(
-    evidence: Evidence,
+    evidence: TuningEvidence,
     loops: list[AxisLoop],
     outputs: list[str],
     inputs: list[str],

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
-from flightid.dynamics.handling_qualities.curve import Curve, Pair, smoother_of
+from flightid.dynamics.handling_qualities.curve import GainPhaseCurve, Pair, smoother_of
 from flightid.dynamics.handling_qualities.result import AttitudeBandwidth
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
@@ -112,10 +112,10 @@ def attitude_bandwidth(
     if isinstance(source, FrequencyResponse):
         chosen = source.select(outputs=[outputs], inputs=[inputs])
         data: object = chosen
-        curve = Curve.of(chosen, pair, smoother_of(chosen, pair))
+        curve = GainPhaseCurve.of(chosen, pair, smoother_of(chosen, pair))
     else:
         data = source
-        curve = Curve.of(uncertain_of(source).value, pair)
+        curve = GainPhaseCurve.of(uncertain_of(source).value, pair)
     values = bandwidth_numbers(curve)
     if not np.all(np.isfinite(values[:2])):
         raise DataError(
@@ -143,7 +143,7 @@ def _pair(output: str, control: str, band: tuple[float, float], output_is: str, 
     return Pair(output, control, low, high, output_is == "rate", sign)
 
 
-def bandwidth_numbers(curve: Curve) -> Array:
+def bandwidth_numbers(curve: GainPhaseCurve) -> Array:
     """ω_180, phase bandwidth, gain bandwidth, phase delay by two points and by the slope."""
     crossing = curve.falls_through(-180.0)
     margin = curve.falls_through(PHASE_MARGIN_DEG - 180.0)
@@ -164,7 +164,7 @@ def _errors(data: object, pair: Pair, values: Array) -> Uncertain[Array]:
         data = _thinned(data, pair, values)
         smoother = smoother_of(data, pair)
     found = uncertain_of(data, pair.output, pair.input).carried(
-        lambda thing: bandwidth_numbers(Curve.of(thing, pair, smoother))
+        lambda thing: bandwidth_numbers(GainPhaseCurve.of(thing, pair, smoother))
     )
     return uncertain_numbers(values, found.covariance, found.reason)
 
@@ -194,7 +194,9 @@ def _is_nonlinear(values: Array) -> bool:
     return bool(abs(two_points - slope) > NONLINEAR * larger)
 
 
-def _judge(curve: Curve, values: Array, nonlinear: bool, response_type: str) -> tuple[Finding, ...]:
+def _judge(
+    curve: GainPhaseCurve, values: Array, nonlinear: bool, response_type: str
+) -> tuple[Finding, ...]:
     crossing, margin, gain, delay, slope = values
     found = []
     if curve.degrees[0] > LEADING_DEG:

@@ -55,7 +55,7 @@ class Pair:
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class GainPhaseCurve:
     """Decibels and degrees on a grid, and between its frequencies.
 
     Attributes
@@ -73,7 +73,7 @@ class Curve:
     exact: Callable[[float], complex] | None
 
     @classmethod
-    def of(cls, thing: object, pair: Pair, smoother: Array | None = None) -> Curve:
+    def of(cls, thing: object, pair: Pair, smoother: Array | None = None) -> GainPhaseCurve:
         """Curve of a response, a model or a system.
 
         Parameters

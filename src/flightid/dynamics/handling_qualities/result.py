@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.dynamics.handling_qualities.curve import Curve
+from flightid.dynamics.handling_qualities.curve import GainPhaseCurve
 from flightid.dynamics.handling_qualities.rating import Rating, normal_draws, rate
 from flightid.dynamics.handling_qualities.rating_charts import RatingChart
 from flightid.findings import Finding
@@ -39,7 +39,7 @@ class AttitudeBandwidth(
     uncertain : Uncertain
         ω_180, phase bandwidth, gain bandwidth (rad/s), phase delay by two points and by the slope
         of the phase (s), with their covariance; NaN where a finding says why.
-    curve : Curve
+    curve : GainPhaseCurve
         The attitude response, for pictures.
     nonlinear : bool
         The phase beyond ω_180 is no line: the slope counts as phase delay, as the standard says.
@@ -56,7 +56,7 @@ class AttitudeBandwidth(
     input: str
     response_type: str
     uncertain: Uncertain[NDArray[np.float64]]
-    curve: Curve
+    curve: GainPhaseCurve
     nonlinear: bool = False
     findings: tuple[Finding, ...] = ()
 

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 
 from flightid.errors import DataError, OptionError
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
-from flightid.identification.prediction_error.linear_regression import Regression, regress
+from flightid.identification.prediction_error.linear_regression import LinearRegression, regress
 from flightid.models.polynomial.structure import KERNELS
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
@@ -300,7 +300,9 @@ def _shifted(data: SampledChannels, negative: int) -> SampledChannels:
     return SampledChannels(output, inputs, lengths, data.offsets, data.units, data.sample_time_s)
 
 
-def _fir(output: Array, inputs: Array, lengths: Sequence[int], n: int, skip: int) -> Regression:
+def _fir(
+    output: Array, inputs: Array, lengths: Sequence[int], n: int, skip: int
+) -> LinearRegression:
     count = len(inputs)
     return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip)
 

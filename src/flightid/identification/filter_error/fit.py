@@ -51,7 +51,7 @@ _QUARTER_RATE = 0.25
 
 
 @dataclass(frozen=True)
-class _Noise:
+class _AbsoluteNoise:
     """Absolute noises at the estimate."""
 
     process: Mapping[str, float]
@@ -193,7 +193,7 @@ def _freedom(problem: InnovationsProblem, filtered: Sequence[RecordInnovations])
 
 def _noises(
     problem: InnovationsProblem, end: DenseEnd, filtered: Sequence[RecordInnovations]
-) -> _Noise:
+) -> _AbsoluteNoise:
     whitened = [
         np.linalg.solve(np.linalg.cholesky(each.filter.innovation), each.innovations.T)
         for each in filtered
@@ -203,7 +203,7 @@ def _noises(
     process, measured = problem.noise(end.x)
     states = list(problem.model.states)
     densities = {states[k]: float(np.sqrt(common * process[k])) for k in problem.noisy}
-    return _Noise(
+    return _AbsoluteNoise(
         densities,
         np.diag(common * measured),
         common * filtered[0].filter.innovation,

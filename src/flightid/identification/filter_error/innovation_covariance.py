@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.identification.filter_error.innovations import RecordInnovations
-from flightid.uncertainty.blocks import Block, JointResiduals
+from flightid.uncertainty.blocks import JointResiduals, RecordBlock
 from flightid.uncertainty.cramer_rao import inverse_hessian
 from flightid.uncertainty.residual_covariance import ResidualCovariance, residual_covariance
 
@@ -55,7 +55,7 @@ def innovation_covariance(
         first = rows.stop
         basis = _by_output(each.space, n, p)
         blocks.append(
-            Block(
+            RecordBlock(
                 _by_output(jacobian[rows], n, p),
                 np.zeros((basis.shape[1], jacobian.shape[1])),
                 basis,

@@ -12,7 +12,7 @@ from flightid.identification.filter_error.gusts import GUST_UNKNOWNS, candidates
 from flightid.identification.filter_error.innovations import InnovationsProblem
 from flightid.identification.multistart import DenseEnd
 from flightid.identification.records.held_model import LinearPoint
-from flightid.identification.regression.rounds import Limits
+from flightid.identification.regression.rounds import SearchBounds
 
 Array = NDArray[np.float64]
 TRIAL_ITERATIONS = 12
@@ -41,7 +41,11 @@ class _LastPoint:
 
 
 def minimise(
-    problem: InnovationsProblem, start: Array, limits: Limits, *, iterations: int | None = None
+    problem: InnovationsProblem,
+    start: Array,
+    limits: SearchBounds,
+    *,
+    iterations: int | None = None,
 ) -> DenseEnd:
     """Search from one start: parameters inside their bounds, noises inside their reach."""
     point, reach = _LastPoint(problem), problem.reach
@@ -58,7 +62,7 @@ def minimise(
 
 
 def with_gust(
-    problem: InnovationsProblem, groups: list[list[DenseEnd]], limits: Limits
+    problem: InnovationsProblem, groups: list[list[DenseEnd]], limits: SearchBounds
 ) -> tuple[InnovationsProblem, list[list[DenseEnd]]]:
     """The problem and its ends, with a gust state where the likelihood asks for one.
 

@@ -56,7 +56,7 @@ class SearchOutcome:
 
 
 @dataclass
-class _Place:
+class _SearchPoint:
     """A point of the search."""
 
     x: Array
@@ -65,7 +65,7 @@ class _Place:
     cost: float
 
     @classmethod
-    def of(cls, objective: Objective, x: Array) -> _Place | None:
+    def of(cls, objective: Objective, x: Array) -> _SearchPoint | None:
         """None where the model cannot be followed over the records."""
         try:
             estimates = objective.estimates(x)
@@ -93,7 +93,7 @@ def search(objective: Objective, start: Array) -> SearchOutcome:
     ---------
     Madsen, Nielsen & Tingleff, *Methods for Non-linear Least Squares Problems* (2004), §3.2.
     """
-    here = _Place.of(objective, start)
+    here = _SearchPoint.of(objective, start)
     if here is None:
         objective.estimates(start)  # says why, if it is a simulation that cannot be
         raise FitError(
@@ -127,7 +127,7 @@ def search(objective: Objective, start: Array) -> SearchOutcome:
             here, bounds, away = beyond, limits, np.inf
             continue
         tried = _step(jacobian, here, bounds, damping) if damping else whole
-        there = _Place.of(objective, np.clip(here.x + tried, *bounds))
+        there = _SearchPoint.of(objective, np.clip(here.x + tried, *bounds))
         if there is None or there.cost >= here.cost:
             cell = objective.correction.cell(objective.at(here.x)) if bounds is limits else None
             if cell is not None:
@@ -154,8 +154,12 @@ def search(objective: Objective, start: Array) -> SearchOutcome:
 
 
 def _along(
-    objective: Objective, here: _Place, there: _Place, jacobian: Array, bounds: tuple[Array, Array]
-) -> _Place:
+    objective: Objective,
+    here: _SearchPoint,
+    there: _SearchPoint,
+    jacobian: Array,
+    bounds: tuple[Array, Array],
+) -> _SearchPoint:
     """The better of a step and its stretch to the lowest point of the parabola along it.
 
     Where residuals curve, steps overshoot or fall short by the same share again and again.
@@ -168,26 +172,29 @@ def _along(
     share = min(max(-0.5 * slope / bend, 1.0 / STRETCH), STRETCH)
     if abs(share - 1.0) < NEAR:
         return there
-    better = _Place.of(objective, np.clip(here.x + share * way, *bounds))
+    better = _SearchPoint.of(objective, np.clip(here.x + share * way, *bounds))
     return there if better is None or better.cost >= there.cost else better
 
 
 def _beyond(
-    objective: Objective, here: _Place, bounds: tuple[Array, Array], limits: tuple[Array, Array]
-) -> _Place | None:
+    objective: Objective,
+    here: _SearchPoint,
+    bounds: tuple[Array, Array],
+    limits: tuple[Array, Array],
+) -> _SearchPoint | None:
     """A lower cost just across a jump at which the search stands."""
     best = None
     for edge, limit, way in zip(bounds, limits, (-1.0, 1.0), strict=True):
         for place in np.flatnonzero((here.x == edge) & (edge != limit)):
             x = here.x.copy()
             x[place] += way * ACROSS * (bounds[1][place] - bounds[0][place])
-            there = _Place.of(objective, np.clip(x, *limits))
+            there = _SearchPoint.of(objective, np.clip(x, *limits))
             if there is not None and there.cost < (best or here).cost:
                 best = there
     return best
 
 
-def _end(place: _Place, jacobian: Array, count: int, termination: str) -> DenseEnd:
+def _end(place: _SearchPoint, jacobian: Array, count: int, termination: str) -> DenseEnd:
     return DenseEnd(place.x, place.cost, count, termination, place.residuals, jacobian)
 
 
@@ -197,7 +204,7 @@ def _extra(objective: Objective, x: Array) -> Curves:
 
 
 def _learned(
-    objective: Objective, extra: Curves, here: _Place, there: _Place, scale: Array
+    objective: Objective, extra: Curves, here: _SearchPoint, there: _SearchPoint, scale: Array
 ) -> Curves:
     """The slopes that the estimator adds, made to give what the last step did.
 
@@ -220,19 +227,21 @@ def _learned(
     return found
 
 
-def _jacobian(objective: Objective, here: _Place, extra: Curves) -> Array:
+def _jacobian(objective: Objective, here: _SearchPoint, extra: Curves) -> Array:
     own = objective.model_slopes(here.x)
     slopes = [a + b for a, b in zip(own, extra, strict=True)]
     return objective.jacobian(here.estimates, slopes)
 
 
-def _size(jacobian: Array, step: Array, place: _Place) -> float:
+def _size(jacobian: Array, step: Array, place: _SearchPoint) -> float:
     """Effect of a step on the residuals, a parameter, over their scatter."""
     scatter = np.sqrt(place.cost / len(place.residuals) * len(step))
     return float(np.linalg.norm(jacobian @ step) / max(scatter, 1e-300))
 
 
-def _step(jacobian: Array, here: _Place, bounds: tuple[Array, Array], damping: float) -> Array:
+def _step(
+    jacobian: Array, here: _SearchPoint, bounds: tuple[Array, Array], damping: float
+) -> Array:
     """Damped Gauss–Newton step; parameters at a bound that they press against stay there."""
     gradient = jacobian.T @ here.residuals
     low, high = bounds

@@ -36,7 +36,7 @@ from flightid.identification.frequency_domain.estimates import Statistics, stati
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
-from flightid.identification.frequency_domain.response_parts import ResponseParts
+from flightid.identification.frequency_domain.response_parts import PartComparison
 from flightid.identification.frequency_domain.search import minimise
 from flightid.identification.frequency_domain.selection import (
     SelectedResponse,
@@ -102,7 +102,7 @@ def _fit_selected(
     if curves is not None and errors.known is not None and sensitivity is not None:
         # Residuals answer to points and to the model's estimates with opposite signs.
         slopes = np.asarray(-np.linalg.lstsq(sensitivity, groups[0][0].jacobian)[0], np.float64)
-        compare = ResponseParts(without, fitted, selected, errors, slopes).compare
+        compare = PartComparison(without, fitted, selected, errors, slopes).compare
     found = statistics(
         fitted,
         selected,

@@ -13,7 +13,7 @@ from flightid.errors import DataError
 from flightid.models import GreyBoxModel
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.simulation.model_outputs import (
-    Modes,
+    ModeSubset,
     between_samples,
     driven_outputs,
     free_outputs,
@@ -37,14 +37,14 @@ class _SystemRun:
 
     Attributes
     ----------
-    modes : list of Modes
+    modes : list of ModeSubset
     inputs : list of int
         Its inputs among those of the records.
     rows, places : list of int
         Fitted outputs among those of the records, and of the system.
     """
 
-    modes: list[Modes]
+    modes: list[ModeSubset]
     inputs: list[int]
     rows: list[int]
     places: list[int]

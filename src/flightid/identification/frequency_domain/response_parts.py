@@ -18,7 +18,7 @@ from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.models import GreyBoxModel
 from flightid.uncertainty.agreement import AgreementTest, compare_parts
-from flightid.uncertainty.parts import Flight
+from flightid.uncertainty.parts import RecordParts
 
 Array = NDArray[np.float64]
 FAIR = 0.4
@@ -27,7 +27,7 @@ Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class ResponseParts:
+class PartComparison:
     """What is needed to compare the parts of a fit to a response.
 
     Attributes
@@ -90,7 +90,7 @@ class ResponseParts:
                 noise[half, :, half] = known[place, :, place]
             both = slice(2 * k, 2 * k + 2)
             part = np.array(information[both]) @ np.linalg.inv(total)
-            flights.append(Flight(np.array(scores[both]), part, noise))
+            flights.append(RecordParts(np.array(scores[both]), part, noise))
         parts = np.array(shares)
         return compare_parts(
             flights,

@@ -12,7 +12,7 @@ from flightid.identification.narx.details import ChosenTerm
 from flightid.identification.narx.regressors import Regressors
 from flightid.models.narx.structure import NarxStructure
 from flightid.uncertainty.agreement import AgreementTest
-from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.residual_covariance import white_covariance
 
 Array = NDArray[np.float64]
@@ -50,7 +50,7 @@ def compare_weights(
         return None
     ends = np.cumsum(data.lengths)[:-1]
     blocks = [
-        Block.of(part[None] / size, np.zeros((1, len(part), 0)), rest[None] / size)
+        RecordBlock.of(part[None] / size, np.zeros((1, len(part), 0)), rest[None] / size)
         for part, rest in zip(np.split(columns, ends), np.split(errors, ends), strict=True)
     ]
     return white_covariance(blocks, covariance, float(spare))

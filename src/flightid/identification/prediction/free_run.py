@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flightid.models.linear.realisation import Matrices
 from flightid.simulation.model_outputs import (
-    Modes,
+    ModeSubset,
     System,
     between_samples,
     driven_outputs,
@@ -108,14 +108,14 @@ class FreeRun:
         ]
         return found[:n], found[n:]
 
-    def _modes(self, b: Array, d: Array, delays_s: Array) -> list[Modes]:
+    def _modes(self, b: Array, d: Array, delays_s: Array) -> list[ModeSubset]:
         """Parts of the model with its states as further outputs."""
         a, _, c, _, _ = self.matrices
         watched = (a, b, np.vstack([c, np.eye(len(a))]), np.vstack([d, np.zeros(b.shape)]))
         system = System((), (), watched, delays_s)
         if self.free_start:
             return split_modes(system, self.duration_s)
-        return [Modes(watched, delays_s, backwards=False)]
+        return [ModeSubset(watched, delays_s, backwards=False)]
 
     def _answer(self, found: Array) -> Answer:
         n_outputs = len(self.matrices[2])

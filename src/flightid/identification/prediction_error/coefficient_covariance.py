@@ -19,7 +19,7 @@ from flightid.identification.prediction_error.part_blocks import errors_at, part
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 from flightid.uncertainty.agreement import Agreement
-from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.residual_covariance import residual_covariance, white_covariance
 
@@ -117,7 +117,10 @@ def compared(
 
 
 def _by_colour(
-    structure: PolynomialStructure, found: SearchResult, white: Array, blocks: Sequence[Block]
+    structure: PolynomialStructure,
+    found: SearchResult,
+    white: Array,
+    blocks: Sequence[RecordBlock],
 ) -> SearchResult:
     """The vehicle's coefficients by the colour of the errors, where noise has its own poles.
 
@@ -128,7 +131,7 @@ def _by_colour(
     places = np.array([name[0] in "bf" for name in structure.names])
     known = residual_covariance(
         [
-            Block.of(
+            RecordBlock.of(
                 block.projected.reshape(*block.residual.shape, -1)[:, :, places],
                 np.zeros((*block.residual.shape, 0)),
                 block.residual,

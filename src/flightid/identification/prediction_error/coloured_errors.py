@@ -16,7 +16,7 @@ from scipy.signal import lfilter
 
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
-from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.residual_covariance import ResidualCovariance, residual_covariance
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ def output_error_covariance(
         if structure.initial_state != "estimate" or structure.backcast or skip:
             own = own[:, :0]
         blocks.append(
-            Block.of(
+            RecordBlock.of(
                 shared[None, skip:] / size, own[None, skip:], errors[None, span][:, skip:] / size
             )
         )
@@ -153,7 +153,7 @@ def instrumental_covariance(
     total = np.concatenate(list(errors))
     size = float(np.sqrt(total @ total / total.size)) or 1.0
     blocks = [
-        Block.of(each[None] / size, np.zeros((1, len(each), 0)), error[None] / size)
+        RecordBlock.of(each[None] / size, np.zeros((1, len(each), 0)), error[None] / size)
         for each, error in zip(instruments, errors, strict=True)
     ]
     return residual_covariance(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from flightid.errors import DataError
-from flightid.identification.prediction_error.linear_regression import Regression
+from flightid.identification.prediction_error.linear_regression import LinearRegression
 
 Array = NDArray[np.float64]
 LARGEST_DECAY = 0.995
@@ -54,13 +54,13 @@ def kernel(size: float, decay: float, correlation: float, count: int) -> Array:
 
 
 def kernel_estimate(
-    regression: Regression, groups: Sequence[int], kind: str, variance: float | None = None
+    regression: LinearRegression, groups: Sequence[int], kind: str, variance: float | None = None
 ) -> KernelEstimate:
     """Coefficients under a decaying prior whose shape maximises the marginal likelihood.
 
     Parameters
     ----------
-    regression : Regression
+    regression : LinearRegression
         Triangle of all rows.
     groups : sequence of int
         Coefficients of each polynomial, which share size and decay.

@@ -18,7 +18,7 @@ SMALLEST = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Regression:
+class LinearRegression:
     """Coefficients and the triangle of [regressors | output] with `n_rows` rows behind it."""
 
     theta: Array
@@ -53,7 +53,7 @@ def regress(
     nb: Sequence[int],
     nk: Sequence[int],
     skip: int | None = None,
-) -> Regression:
+) -> LinearRegression:
     """Fit A y = Σ B u + e; rows whose lags reach before a record are left out by default."""
     spans = [n + k - 1 for n, k in zip(nb, nk, strict=True) if n]
     orders = (na, list(nb), 0, 0, [0] * len(nb), list(nk))
@@ -62,10 +62,10 @@ def regress(
         output, np.ascontiguousarray(inputs), list(lengths), orders, first
     )
     width = theta.size + 1
-    return Regression(theta, flat.reshape(width, width).T, n_rows, dependent)
+    return LinearRegression(theta, flat.reshape(width, width).T, n_rows, dependent)
 
 
-def require_independent(regression: Regression, structure: PolynomialStructure) -> None:
+def require_independent(regression: LinearRegression, structure: PolynomialStructure) -> None:
     """Refuse a regression whose coefficients the data cannot tell apart.
 
     Raises

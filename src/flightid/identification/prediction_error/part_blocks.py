@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightid import _native
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
-from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.blocks import RecordBlock
 
 Array = NDArray[np.float64]
 BEFORE = {"estimate": "unknown", "zero": "rest", "backcast": "given"}
@@ -40,7 +40,7 @@ def errors_at(
 
 def part_blocks(
     at: Callable[[Array], Array], data: SampledChannels, theta: Array, skip: int
-) -> list[Block]:
+) -> list[RecordBlock]:
     """Blocks of unit variance, by differences: whatever the structure, its start included.
 
     Parameters
@@ -55,7 +55,7 @@ def part_blocks(
 
     Returns
     -------
-    list of Block
+    list of RecordBlock
         By record.
     """
     errors = at(theta)
@@ -66,7 +66,7 @@ def part_blocks(
         slopes[:, place] = (errors - at(moved)) / (moved[place] - value)
     size = float(np.sqrt(errors @ errors / errors.size)) or 1.0
     return [
-        Block.of(
+        RecordBlock.of(
             slopes[None, span][:, skip:] / size,
             np.zeros((1, slopes[span][skip:].shape[0], 0)),
             errors[None, span][:, skip:] / size,

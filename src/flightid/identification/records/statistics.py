@@ -23,7 +23,7 @@ from flightid.identification.records.setup import OwnNumbers, RecordSet
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.uncertainty import correlation as correlation_of
 from flightid.uncertainty.agreement import Agreement
-from flightid.uncertainty.blocks import Block, JointResiduals
+from flightid.uncertainty.blocks import JointResiduals, RecordBlock
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.residual_covariance import residual_covariance, triangle_of
 
@@ -114,7 +114,7 @@ def record_statistics(
         white = np.tensordot(whitener, slopes, axes=1)
         residual = _limited(whitener @ (measured - outputs), limit)
         shared, rest = white[:, :, : len(free)][:, :, inner], white[:, :, len(free) :]
-        blocks.append(Block.of(shared, rest[:, :, np.array(kept, dtype=bool)], residual))
+        blocks.append(RecordBlock.of(shared, rest[:, :, np.array(kept, dtype=bool)], residual))
     other = None if beside is None else beside.of(inner)
     triangle = triangle_of(blocks, None if other is None else other.slopes)
     require_identifiable(names, triangle)
@@ -149,7 +149,10 @@ def record_statistics(
 
 
 def _of_starts(
-    starts: Sequence[HeldStart | None], blocks: Sequence[Block], whitener: Array, inverse: Array
+    starts: Sequence[HeldStart | None],
+    blocks: Sequence[RecordBlock],
+    whitener: Array,
+    inverse: Array,
 ) -> Array:
     """What the noise of measured initial states adds to the covariance of the parameters."""
     total = np.zeros_like(inverse)

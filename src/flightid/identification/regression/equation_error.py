@@ -34,7 +34,13 @@ from flightid.identification.regression.options import (
     RegressionOptions,
 )
 from flightid.identification.regression.right_side import RightSide
-from flightid.identification.regression.rounds import Limits, SettledRounds, settle, solve, stack
+from flightid.identification.regression.rounds import (
+    SearchBounds,
+    SettledRounds,
+    settle,
+    solve,
+    stack,
+)
 from flightid.identification.regression.sampled_equations import (
     Reconstruction,
     StateMeasurements,
@@ -47,7 +53,7 @@ from flightid.identification.regression.weights import (
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
 from flightid.record.several import as_records
-from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.residual_covariance import residual_covariance
 
 Array = NDArray[np.float64]
@@ -87,11 +93,11 @@ def fit_equation_error(
     return _finish("equation error", problem, data, options, settled, limits, inner, known)
 
 
-def _block(residuals: Array, slopes: Array, constants: Array) -> Block:
+def _block(residuals: Array, slopes: Array, constants: Array) -> RecordBlock:
     """One record whose constants are out of residuals and slopes; they follow `constants`."""
     n, k = slopes.shape[2], constants.shape[1]
     flat = np.ascontiguousarray(slopes.reshape(-1, n))
-    return Block(flat, np.zeros((k, n)), constants, np.eye(k), residuals)
+    return RecordBlock(flat, np.zeros((k, n)), constants, np.eye(k), residuals)
 
 
 def fit_fourier_regression(
@@ -154,7 +160,7 @@ def _problem(
     data: Record | Sequence[Record],
     options: RegressionOptions,
     operator: Callable[[StateMeasurements], Operator],
-) -> tuple[EquationRegression, Array, Limits]:
+) -> tuple[EquationRegression, Array, SearchBounds]:
     records = check_records(model, data)
     reconstruction = Reconstruction.of(model, records[0])
     motions = [reconstruction.measured(record) for record in records]
@@ -170,7 +176,7 @@ def _finish(
     data: Record | Sequence[Record],
     options: RegressionOptions,
     settled: SettledRounds,
-    limits: Limits,
+    limits: SearchBounds,
     inner: Inner,
     known: Knowledge,
 ) -> Fit:

@@ -23,7 +23,7 @@ from flightid.identification.frequency_domain.estimates import (
 from flightid.identification.multistart import DenseEnd, local_minima
 from flightid.identification.records.findings import judge_fit
 from flightid.identification.regression.options import RegressionOptions
-from flightid.identification.regression.rounds import Limits
+from flightid.identification.regression.rounds import SearchBounds
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
 from flightid.record.several import as_records
@@ -129,13 +129,13 @@ def require_states(model: StateSpaceModel, method: str) -> None:
         )
 
 
-def limits_of(model: GreyBoxModel, maximum_iterations: int) -> tuple[Array, Limits]:
+def limits_of(model: GreyBoxModel, maximum_iterations: int) -> tuple[Array, SearchBounds]:
     """Start values and bounds of the free parameters."""
     free = model.parameters.free
     start = np.array([float(parameter.value or 0.0) for parameter in free])
     lower = np.array([parameter.minimum for parameter in free])
     upper = np.array([parameter.maximum for parameter in free])
-    return start, Limits(lower, upper, maximum_iterations)
+    return start, SearchBounds(lower, upper, maximum_iterations)
 
 
 def require_linear(model: StateSpaceModel, method: str) -> None:

@@ -53,7 +53,7 @@ class Regression(Protocol):
 
 
 @dataclass(frozen=True)
-class Limits:
+class SearchBounds:
     """Bounds of the free parameters and the most iterations."""
 
     lower: Array
@@ -87,7 +87,7 @@ def stack(slopes: Sequence[Array]) -> Array:
 
 
 def solve(
-    problem: Regression, start: Array, weights: Sequence[Array], limits: Limits
+    problem: Regression, start: Array, weights: Sequence[Array], limits: SearchBounds
 ) -> tuple[DenseEnd, list[Rows]]:
     """Best parameters under these weights, and the rows there: in one step where all is linear."""
     kept: dict[bytes, tuple[list[Rows], Array, Array]] = {}
@@ -125,7 +125,7 @@ def solve(
 
 
 def settle(
-    problem: Regression, start: Array, weigh: Weigh, limits: Limits, count: int
+    problem: Regression, start: Array, weigh: Weigh, limits: SearchBounds, count: int
 ) -> SettledRounds:
     """Alternate weights and parameters until the weights stay.
 
@@ -135,7 +135,7 @@ def settle(
     start : ndarray, shape (n_free,)
     weigh : callable
         Residuals by record to weights (inverse standard deviations) of the same shapes.
-    limits : Limits
+    limits : SearchBounds
     count : int
         Number of records.
     """

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.identification.regression.rounds import Rows
 from flightid.uncertainty.agreement import AgreementTest
-from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.residual_covariance import white_covariance
 from flightid.uncertainty.spectral import averaged, spectral_covariance
 
@@ -83,7 +83,7 @@ def compared_covariance(
         residual = _in_time(_complex(each.residuals * weight))
         slopes = _in_time(_complex(np.moveaxis(each.slopes, 2, 1) * weight[:, None]))
         sensitivity = -np.moveaxis(slopes, 1, 2)
-        blocks.append(Block.of(sensitivity, np.zeros((residual.size, 0)), residual))
+        blocks.append(RecordBlock.of(sensitivity, np.zeros((residual.size, 0)), residual))
     return white_covariance(blocks, covariance, freedom)
 
 

@@ -14,7 +14,7 @@ from flightid.models.innovations.prediction import RANK
 from flightid.models.sampled.recursion import run_recursion, spectral_radius
 from flightid.progress import progress
 from flightid.uncertainty.agreement import Agreement
-from flightid.uncertainty.blocks import Block
+from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.residual_covariance import white_covariance
 
 Array = NDArray[np.float64]
@@ -314,7 +314,7 @@ def _covariance(
     root = np.linalg.inv(triangle)
     ends = np.cumsum([each.size for each in errors])[:-1]
     blocks = [
-        Block.of(part, np.zeros((len(part), 0)), (whiten @ each))
+        RecordBlock.of(part, np.zeros((len(part), 0)), (whiten @ each))
         for part, each in zip(np.split(-jacobian, ends), errors, strict=True)
     ]
     agreed = white_covariance(blocks, root @ root.T, degrees)

@@ -51,7 +51,7 @@ class Realisation:
 
 
 @dataclass(frozen=True)
-class Block:
+class ModelBlock:
     """An actuator at an input, or a sensor or filter at an output.
 
     Attributes
@@ -81,8 +81,8 @@ class Block:
 
     Example
     -------
-    >>> Block("servo", "lat", "second_order_lag", {"omega": 40.0, "zeta": 0.7})
-    Block(servo at lat: second_order_lag, omega = 40, zeta = 0.7)
+    >>> ModelBlock("servo", "lat", "second_order_lag", {"omega": 40.0, "zeta": 0.7})
+    ModelBlock(servo at lat: second_order_lag, omega = 40, zeta = 0.7)
     """
 
     name: str
@@ -116,7 +116,7 @@ class Block:
 
     def __repr__(self) -> str:
         """Place, kind and values on one line."""
-        return f"Block({self.shown()})"
+        return f"ModelBlock({self.shown()})"
 
     def shown(self) -> str:
         """``"servo at lat: second_order_lag, omega = 40, zeta = 0.7"``."""
@@ -143,7 +143,7 @@ class Block:
         return {"at": self.at, "kind": self.kind, **self.values, **note}
 
 
-def read_block(name: str, item: object) -> Block:
+def read_block(name: str, item: object) -> ModelBlock:
     """A block from its table in a model file.
 
     Raises
@@ -158,7 +158,7 @@ def read_block(name: str, item: object) -> Block:
         if key not in item:
             raise ModelError(f"block {name} lacks {key!r}", needed="at and kind")
     texts = [read_text(item.get(key, ""), f"block {name}.{key}") for key in ("at", "kind", "note")]
-    return Block(name, texts[0], texts[1], values, texts[2])
+    return ModelBlock(name, texts[0], texts[1], values, texts[2])
 
 
 def _check_value(subject: str, unit: str, value: object) -> None:

@@ -34,7 +34,7 @@ _COMMANDS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "log": "ln"}
 
 
 @dataclass(frozen=True)
-class Term:
+class Formula:
     """A printed formula.
 
     Attributes
@@ -54,9 +54,9 @@ class Term:
     names: frozenset[str] = frozenset()
 
 
-Slopes = dict[str, Term]
-ZERO = Term("0", number=0.0)
-ONE = Term("1", number=1.0)
+Slopes = dict[str, Formula]
+ZERO = Formula("0", number=0.0)
+ONE = Formula("1", number=1.0)
 
 
 class Printer:
@@ -88,9 +88,9 @@ class Printer:
         self._wanted = frozenset(variables)
         self._definitions = definitions or {}
         self._tables = list(tables)
-        self._known: dict[str, tuple[Term, Slopes]] = {}
+        self._known: dict[str, tuple[Formula, Slopes]] = {}
 
-    def value(self, text: str) -> Term:
+    def value(self, text: str) -> Formula:
         """The formula itself.
 
         Raises
@@ -100,7 +100,7 @@ class Printer:
         """
         return self._walk(text)[0]
 
-    def derivatives(self, text: str) -> list[Term]:
+    def derivatives(self, text: str) -> list[Formula]:
         """Derivative by each variable; ``ZERO`` where the formula does not hold it.
 
         Raises
@@ -111,18 +111,18 @@ class Printer:
         slopes = self._walk(text)[1]
         return [slopes.get(variable, ZERO) for variable in self._variables]
 
-    def _name(self, name: str) -> tuple[Term, Slopes]:
+    def _name(self, name: str) -> tuple[Formula, Slopes]:
         if name not in self._known:
             names, slopes = frozenset([name]), {name: ONE} if name in self._wanted else {}
             if name in self._definitions:
                 # Compiling the model has bounded the chain of definitions and found it open.
                 inner, slopes = self._walk(self._definitions[name])
                 names |= inner.names
-            self._known[name] = Term(latex_name(name), names=names), slopes
+            self._known[name] = Formula(latex_name(name), names=names), slopes
         return self._known[name]
 
-    def _walk(self, text: str) -> tuple[Term, Slopes]:
-        values: list[Term] = []
+    def _walk(self, text: str) -> tuple[Formula, Slopes]:
+        values: list[Formula] = []
         slopes: list[Slopes] = []
         slope: Slopes
         for kind, name, number, places in _native.expression_nodes(text, self._tables):
@@ -143,7 +143,7 @@ class Printer:
         return values[-1], slopes[-1]
 
 
-def _chain(partials: list[Term], inner: list[Slopes]) -> Slopes:
+def _chain(partials: list[Formula], inner: list[Slopes]) -> Slopes:
     slope: Slopes = {}
     for factor, slopes in zip(partials, inner, strict=True):
         for variable, outer in slopes.items():
@@ -151,7 +151,7 @@ def _chain(partials: list[Term], inner: list[Slopes]) -> Slopes:
     return slope
 
 
-def derivatives(text: str, variables: Sequence[str]) -> list[Term]:
+def derivatives(text: str, variables: Sequence[str]) -> list[Formula]:
     r"""Derivatives of a formula by some of its names.
 
     Parameters
@@ -163,7 +163,7 @@ def derivatives(text: str, variables: Sequence[str]) -> list[Term]:
 
     Returns
     -------
-    list of Term
+    list of Formula
         One for each variable; ``ZERO`` where the formula does not hold it.
 
     Raises
@@ -209,32 +209,32 @@ def _index(text: str) -> str:
     return text if len(text) == 1 or text.isdigit() else rf"\mathrm{{{text}}}"
 
 
-def _number(value: float) -> Term:
+def _number(value: float) -> Formula:
     turns = value / math.pi
     if turns == round(turns) and 0.0 < turns <= _TURNS:
-        return Term(r"\pi" if turns == 1.0 else rf"{turns:g} \pi", _PRODUCT, value)
+        return Formula(r"\pi" if turns == 1.0 else rf"{turns:g} \pi", _PRODUCT, value)
     text = f"{value:.6g}"
     if "e" in text:
         digits, power = text.split("e")
         text = rf"{digits} \cdot 10^{{{int(power)}}}"
-    return Term(text, _SUM if value < 0.0 else _ATOM, value)
+    return Formula(text, _SUM if value < 0.0 else _ATOM, value)
 
 
-def _made(latex: str, level: int, *parts: Term) -> Term:
+def _made(latex: str, level: int, *parts: Formula) -> Formula:
     if len(latex) > MAXIMUM_TERM:
         raise ModelError(
             "a derivative of the model is too long to be shown",
             found=f"{len(latex)} characters",
             needed=f"at most {MAXIMUM_TERM}",
         )
-    return Term(latex, level, names=frozenset().union(*(part.names for part in parts)))
+    return Formula(latex, level, names=frozenset().union(*(part.names for part in parts)))
 
 
-def _bracketed(term: Term, level: int) -> str:
+def _bracketed(term: Formula, level: int) -> str:
     return term.latex if term.level >= level else rf"\left({term.latex}\right)"
 
 
-def _negate(a: Term) -> Term:
+def _negate(a: Formula) -> Formula:
     if a.number is not None:
         return ZERO if a.number == 0.0 else _number(-a.number)
     if a.latex.startswith("-") and a.level == _PRODUCT:
@@ -242,7 +242,7 @@ def _negate(a: Term) -> Term:
     return _made("-" + _bracketed(a, _PRODUCT), _PRODUCT, a)
 
 
-def _add(a: Term, b: Term) -> Term:
+def _add(a: Formula, b: Formula) -> Formula:
     if a.number == 0.0:
         return b
     if b.number == 0.0:
@@ -253,7 +253,7 @@ def _add(a: Term, b: Term) -> Term:
     return _made(a.latex + joint + b.latex, _SUM, a, b)
 
 
-def _times(a: Term, b: Term) -> Term:
+def _times(a: Formula, b: Formula) -> Formula:
     if a.number is not None and b.number is not None:
         return _number(a.number * b.number)
     for one, other in ((a, b), (b, a)):
@@ -270,7 +270,7 @@ def _times(a: Term, b: Term) -> Term:
     return _made(f"{_bracketed(a, _PRODUCT)} {_bracketed(b, _PRODUCT)}", _PRODUCT, a, b)
 
 
-def _divide(a: Term, b: Term) -> Term:
+def _divide(a: Formula, b: Formula) -> Formula:
     if a.number == 0.0 or b.number == 1.0:
         return a
     if a.latex.startswith("-") and (a.level == _PRODUCT or a.number is not None):
@@ -278,7 +278,7 @@ def _divide(a: Term, b: Term) -> Term:
     return _made(rf"\frac{{{a.latex}}}{{{b.latex}}}", _PRODUCT, a, b)
 
 
-def _power(a: Term, b: Term) -> Term:
+def _power(a: Formula, b: Formula) -> Formula:
     if b.number == 1.0:
         return a
     if b.number == 0.0:
@@ -287,14 +287,14 @@ def _power(a: Term, b: Term) -> Term:
     return _made(f"{base}^{{{b.latex}}}", _ATOM, a, b)
 
 
-def _call(function: str, *arguments: Term) -> Term:
+def _call(function: str, *arguments: Formula) -> Formula:
     shown = ", ".join(argument.latex for argument in arguments)
     command = _COMMANDS.get(function, function)
     command = f"\\{command}" if command in _STANDARD else rf"\operatorname{{{command}}}"
     return _made(rf"{command}\left({shown}\right)", _ATOM, *arguments)
 
 
-_VALUES: dict[str, Callable[..., Term]] = {
+_VALUES: dict[str, Callable[..., Formula]] = {
     "negate": _negate,
     "add": _add,
     "subtract": lambda a, b: _add(a, _negate(b)),
@@ -336,7 +336,7 @@ _PARTIALS = {
 }
 
 
-def _value(kind: str, inner: list[Term]) -> Term:
+def _value(kind: str, inner: list[Formula]) -> Formula:
     if kind in _VALUES:
         return _VALUES[kind](*inner)
     return _call(_NAMES.get(kind, kind), *inner)
@@ -347,11 +347,11 @@ def _nodes(text: str) -> list[tuple[str, str, float, list[int]]]:
     return _native.expression_nodes(text)
 
 
-def _partials(kind: str, inner: list[Term], value: Term) -> list[Term]:
+def _partials(kind: str, inner: list[Formula], value: Formula) -> list[Formula]:
     known = {"a": inner[0], "b": inner[-1], "f": value}
     found = []
     for text in _PARTIALS[kind]:
-        terms: list[Term] = []
+        terms: list[Formula] = []
         for function, name, number, places in _nodes(text):
             if function == "number":
                 terms.append(_number(number))
@@ -365,24 +365,24 @@ def _partials(kind: str, inner: list[Term], value: Term) -> list[Term]:
     return found
 
 
-def _choice(test: Term, first: Term, second: Term) -> Term:
+def _choice(test: Formula, first: Formula, second: Formula) -> Formula:
     if first == second:
         return first
     rows = rf"{first.latex} & {test.latex} \\ {second.latex} & \text{{otherwise}}"
     return _made(rf"\begin{{cases}} {rows} \end{{cases}}", _ATOM, test, first, second)
 
 
-def _chosen(test: Term, first: Slopes, second: Slopes) -> Slopes:
+def _chosen(test: Formula, first: Slopes, second: Slopes) -> Slopes:
     both = dict.fromkeys([*first, *second])
     return {name: _choice(test, first.get(name, ZERO), second.get(name, ZERO)) for name in both}
 
 
-def _looked_up(name: str, inner: list[Term], mark: str = "") -> Term:
+def _looked_up(name: str, inner: list[Formula], mark: str = "") -> Formula:
     shown = ", ".join(argument.latex for argument in inner)
     return _made(rf"{mark}\mathrm{{{_plain(name)}}}\left({shown}\right)", _ATOM, *inner)
 
 
-def _table_partials(name: str, inner: list[Term], _value: Term) -> list[Term]:
+def _table_partials(name: str, inner: list[Formula], _value: Formula) -> list[Formula]:
     return [
         _looked_up(name, inner, rf"\partial_{{{place}}} ") for place in range(1, len(inner) + 1)
     ]

@@ -23,7 +23,7 @@ _KEYS = {"axes", "values", "unit", "interpolation", "outside", "note"}
 
 
 @dataclass(frozen=True)
-class Axis:
+class TableAxis:
     """Breakpoints of a table along one axis.
 
     Attributes
@@ -35,7 +35,7 @@ class Axis:
 
     Example
     -------
-    >>> Axis((0.0, 0.1), "radian").unit
+    >>> TableAxis((0.0, 0.1), "radian").unit
     'rad'
     """
 
@@ -53,7 +53,7 @@ class TableFunction:
 
     Attributes
     ----------
-    axes : tuple of Axis
+    axes : tuple of TableAxis
         One or two.
     values : tuple of float
         In `unit`, row by row: the last axis runs fastest.
@@ -79,14 +79,15 @@ class TableFunction:
 
     Example
     -------
-    >>> lift = TableFunction((Axis((-0.2, 0.0, 0.2), "rad"),), (-0.6, 0.3, 1.0), outside="hold")
+    >>> incidence = TableAxis((-0.2, 0.0, 0.2), "rad")
+    >>> lift = TableFunction((incidence,), (-0.6, 0.3, 1.0), outside="hold")
     >>> lift
     TableFunction(3 values in 1, linear, outside hold)
     >>> lift([0.1, 0.5])
     array([0.65, 1.  ])
     """
 
-    axes: tuple[Axis, ...]
+    axes: tuple[TableAxis, ...]
     values: tuple[float, ...]
     unit: str = "1"
     interpolation: str = "linear"
@@ -181,12 +182,12 @@ def read_table_function(name: str, item: object) -> TableFunction:
     )
 
 
-def _axis(subject: str, item: object) -> Axis:
+def _axis(subject: str, item: object) -> TableAxis:
     if not isinstance(item, dict) or "points" not in item:
         raise ModelError(f"an axis of {subject} needs points", found=repr(item)[:80])
     require_keys(item, {"points", "unit"}, f"an axis of {subject}")
     points = _numbers(item["points"], f"points of {subject}", 1)
-    return Axis(tuple(points), read_text(item.get("unit", "1"), f"unit of {subject}"))
+    return TableAxis(tuple(points), read_text(item.get("unit", "1"), f"unit of {subject}"))
 
 
 def _numbers(item: object, subject: str, depth: int) -> list[float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
 from flightid.errors import ModelError
-from flightid.models.language.blocks import MAXIMUM_BLOCKS, Block, Realisation, wrapped
+from flightid.models.language.blocks import MAXIMUM_BLOCKS, ModelBlock, Realisation, wrapped
 from flightid.models.language.dimensions import unit_of
 from flightid.models.language.formula import formula_names
 from flightid.models.parameters import Parameter, Parameters
@@ -18,7 +18,7 @@ from flightid.models.state_space.parts import Output
 Value = TypeVar("Value")
 
 
-def written_out(bare: Linearisation, blocks: Sequence[Block]) -> dict[str, Any]:
+def written_out(bare: Linearisation, blocks: Sequence[ModelBlock]) -> dict[str, Any]:
     """What actuators at a model's inputs, and sensors and filters at its outputs, change in it.
 
     Blocks at one place stand one behind the other, in the order given, in the direction of the
@@ -28,7 +28,7 @@ def written_out(bare: Linearisation, blocks: Sequence[Block]) -> dict[str, Any]:
     ----------
     bare : Linearisation
         Model without blocks.
-    blocks : sequence of Block
+    blocks : sequence of ModelBlock
 
     Returns
     -------
@@ -84,7 +84,7 @@ class _Expansion:
             setattr(self, name, dict(getattr(self.bare, name)))
         self.parameters = self.bare.parameters
 
-    def named(self, block: Block) -> Block:
+    def named(self, block: ModelBlock) -> ModelBlock:
         """The block with names of parameters in the place of its numbers."""
         values = dict(block.values)
         new: dict[str, tuple[float, str]] = {}
@@ -102,7 +102,7 @@ class _Expansion:
         self.parameters = Parameters([*self.parameters.values(), *added])
         return replace(block, values=values)
 
-    def _unit_of_leading(self, block: Block) -> str:
+    def _unit_of_leading(self, block: ModelBlock) -> str:
         """Unit of the coefficient of the highest power, from any coefficient that is a formula."""
         listed = list(block.values["denominator"])
         for place, entry in enumerate(listed):
@@ -112,7 +112,7 @@ class _Expansion:
 
     def _coefficients(
         self,
-        block: Block,
+        block: ModelBlock,
         key: str,
         letter: str,
         leading: str,
@@ -131,7 +131,7 @@ class _Expansion:
             found.append(entry if alone else f"{block.name}_{letter}{power}")
         return found
 
-    def _unit(self, text: str, block: Block) -> str:
+    def _unit(self, text: str, block: ModelBlock) -> str:
         units = self.parameters.units
         for name in formula_names(text):
             if name not in units:
@@ -142,7 +142,7 @@ class _Expansion:
                 )
         return unit_of(text, units, subject=f"block {block.name}")
 
-    def actuators(self, place: str, chain: Sequence[Block]) -> None:
+    def actuators(self, place: str, chain: Sequence[ModelBlock]) -> None:
         """Blocks between an input and the equations."""
         signal, unit = place, self.bare.input_units[place]
         level = self.bare.trim.get(place, 0.0)
@@ -171,7 +171,7 @@ class _Expansion:
                 text = _swapped(output.expression, place, signal)
                 table[name] = replace(output, expression=text)
 
-    def sensors(self, place: str, chain: Sequence[Block]) -> None:
+    def sensors(self, place: str, chain: Sequence[ModelBlock]) -> None:
         """Blocks between an output's formula and what is recorded."""
         output = self.measurements[place]
         signal = output.expression
@@ -186,13 +186,13 @@ class _Expansion:
             signal = self._written(block, realised, wrapped(signal), output.unit)
         self.measurements[place] = replace(output, expression=signal)
 
-    def _check_delay(self, block: Block) -> None:
+    def _check_delay(self, block: ModelBlock) -> None:
         unit = self._unit(str(block.values["delay"]), block)
         if unit != "s":
             raise ModelError(f"delay of block {block.name} does not have its unit",
                              found=repr(unit), needed="'s'")  # fmt: skip
 
-    def _settled(self, block: Block, realised: Realisation, level: float) -> float:
+    def _settled(self, block: ModelBlock, realised: Realisation, level: float) -> float:
         """Steady output for a steady input; sets the trim of the first state."""
         if realised.order and level:
             above, below = self.parameters.tape(
@@ -203,7 +203,7 @@ class _Expansion:
                 return level * float(above / below)
         return level
 
-    def _written(self, block: Block, realised: Realisation, signal: str, unit: str) -> str:
+    def _written(self, block: ModelBlock, realised: Realisation, signal: str, unit: str) -> str:
         """Add states, equations and the output of one block; its name."""
         n = realised.order
         names = [f"{block.name}_{k}" for k in range(1, n + 1)]
@@ -258,7 +258,7 @@ def _swapped(text: str, name: str, other: str) -> str:
 
 
 def split_own(
-    blocks: Sequence[Block], table: Mapping[str, Value]
+    blocks: Sequence[ModelBlock], table: Mapping[str, Value]
 ) -> tuple[dict[str, Value], dict[str, Value]]:
     """Entries of a table by state, and those of them that belong to states of blocks.
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TypedDict
 
 from flightid.errors import ModelError
-from flightid.models.language.blocks import Block, read_block
+from flightid.models.language.blocks import ModelBlock, read_block
 from flightid.models.language.reading import (
     read_number,
     read_table,
@@ -49,7 +49,7 @@ class Description(TypedDict):
     biases: dict[str, RecordValue]
 
 
-def from_plain(content: Mapping[str, object]) -> tuple[Description, tuple[Block, ...]]:
+def from_plain(content: Mapping[str, object]) -> tuple[Description, tuple[ModelBlock, ...]]:
     """Read the tables of a state-space model.
 
     Parameters

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 
-from flightid.models.language.symbolic import ZERO, Printer, Term, latex_name
+from flightid.models.language.symbolic import ZERO, Formula, Printer, latex_name
 from flightid.models.state_space.linear import Linearisation
 from flightid.models.state_space.parts import derivative
 
 _BREAK = r" \\ "
-Rows = tuple[tuple[Term, ...], ...]
+Rows = tuple[tuple[Formula, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -20,13 +20,13 @@ class MatrixDisplay:
 
     Attributes
     ----------
-    m, f, g, h1, h0, d : tuple of tuple of Term
+    m, f, g, h1, h0, d : tuple of tuple of Formula
         Rows of the matrices.
     states, inputs, outputs : tuple of str
         Names along rows and columns.
-    delays : tuple of Term
+    delays : tuple of Formula
         Delay of each input.
-    definitions : tuple of (str, Term)
+    definitions : tuple of (str, Formula)
         Auxiliary quantities: printed name and formula.
     is_linear : bool
         Whether no entry holds a state, input or state derivative.
@@ -41,8 +41,8 @@ class MatrixDisplay:
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
-    delays: tuple[Term, ...]
-    definitions: tuple[tuple[str, Term], ...]
+    delays: tuple[Formula, ...]
+    definitions: tuple[tuple[str, Formula], ...]
     is_linear: bool
 
     def motion(self) -> str:
@@ -122,7 +122,7 @@ def matrices_as_latex(model: Linearisation) -> MatrixDisplay:
     )
 
 
-def _part(rows: Sequence[Sequence[Term]], start: int, stop: int) -> Rows:
+def _part(rows: Sequence[Sequence[Formula]], start: int, stop: int) -> Rows:
     return tuple(tuple(row[start:stop]) for row in rows)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid import _native
 from flightid.errors import DataError, SingularError, UnknownNameError
 from flightid.models.adjustable import Adjustable
-from flightid.models.language.blocks import Block
+from flightid.models.language.blocks import ModelBlock
 from flightid.models.language.record_values import RecordValue
 from flightid.models.language.tables import TableFunction
 from flightid.models.linear.linear_system import LinearSystem
@@ -40,7 +40,7 @@ class Linearisation(Adjustable):
     tables: Mapping[str, TableFunction]
     initial: Mapping[str, RecordValue]
     biases: Mapping[str, RecordValue]
-    blocks: tuple[Block, ...]
+    blocks: tuple[ModelBlock, ...]
     bare: Linearisation | None
     source: str
     note: str

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from flightid import _native
 from flightid.errors import ModelError, UnknownNameError
 from flightid.models.estimated import EstimateProvenance
-from flightid.models.language.blocks import Block
+from flightid.models.language.blocks import ModelBlock
 from flightid.models.language.record_values import RecordValue
 from flightid.models.language.tables import TableFunction
 from flightid.models.parameters import Parameters
@@ -61,7 +61,7 @@ class StateSpaceModel(Linearisation, TableView):
         States whose initial values a fit to records frees in each record, or sets.
     biases : mapping of str to RecordValue
         Outputs with a bias, or inputs with a reference shift, in each record.
-    blocks : tuple of Block
+    blocks : tuple of ModelBlock
         Actuators, sensors and filters that are already written out in states and equations.
     bare : StateSpaceModel or None
         The model without its blocks.
@@ -114,7 +114,7 @@ class StateSpaceModel(Linearisation, TableView):
     tables: Mapping[str, TableFunction] = field(default_factory=dict)
     initial: Mapping[str, RecordValue] = field(default_factory=dict)
     biases: Mapping[str, RecordValue] = field(default_factory=dict)
-    blocks: tuple[Block, ...] = ()
+    blocks: tuple[ModelBlock, ...] = ()
     bare: StateSpaceModel | None = field(default=None, compare=False)
     estimated: EstimateProvenance | None = field(default=None, compare=False)
     native: _native.StateSpace = field(init=False, compare=False)
@@ -275,12 +275,12 @@ class StateSpaceModel(Linearisation, TableView):
         >>> yaw = load_model("quadrotor_yaw").with_block(
         ...     "motor", at="tau_psi", kind="first_order_lag", T=0.05)
         >>> print(yaw.blocks[0], list(yaw.states))
-        Block(motor at tau_psi: first_order_lag, T = motor_T) ['r', 'psi', 'motor_1']
+        ModelBlock(motor at tau_psi: first_order_lag, T = motor_T) ['r', 'psi', 'motor_1']
         """
-        block = Block(name, at, kind, values, note)
+        block = ModelBlock(name, at, kind, values, note)
         return self._with_blocks((*self.blocks, block))
 
-    def _with_blocks(self, blocks: tuple[Block, ...]) -> StateSpaceModel:
+    def _with_blocks(self, blocks: tuple[ModelBlock, ...]) -> StateSpaceModel:
         """The structure of the bare model with blocks, and everything else from this one."""
         trim, own = split_own(self.blocks, self.trim)
         initial, own_initial = split_own(self.blocks, self.initial)

@@ -86,7 +86,7 @@ class WindowedErrors:
 
     def _kernels(
         self, inputs: Places, frequencies: Places
-    ) -> Iterator[tuple[_Noise, Complex, Places]]:
+    ) -> Iterator[tuple[_BinNoise, Complex, Places]]:
         """Kernels of all records, some bins of the noise at a time, with the noise there."""
         chosen = self.windows.weights_at(inputs, frequencies)
         lengths = [record.shape[1] for record in self.windows.instruments]
@@ -125,7 +125,7 @@ class WindowedErrors:
         length: int,
         records: Sequence[Sequence[Complex]],
         frequencies: Places,
-    ) -> Iterator[tuple[_Noise, Complex, Places]]:
+    ) -> Iterator[tuple[_BinNoise, Complex, Places]]:
         """Noise and kernels at some bins, for all records of one length."""
         angle = 2.0 * np.pi * columns / length
         noise = self._noise_at(columns, length)
@@ -148,15 +148,15 @@ class WindowedErrors:
                 kernels += [(ahead + mirrored) / 2.0, (ahead - mirrored) / 2.0j]
             yield noise, np.stack(kernels, axis=2), near
 
-    def _noise_at(self, columns: Places, length: int) -> _Noise:
+    def _noise_at(self, columns: Places, length: int) -> _BinNoise:
         omega: Real = np.asarray(2.0 * np.pi * columns / (length * self.sample_time_s))
         density = self.noise.at(omega) / (2.0 * self.sample_time_s)
         twice = np.where((columns == 0) | (2 * columns == length), 1.0, 2.0) / length
-        return _Noise(np.sqrt(twice * density), self.noise.coherency_at(omega))
+        return _BinNoise(np.sqrt(twice * density), self.noise.coherency_at(omega))
 
 
 @dataclass(frozen=True)
-class _Noise:
+class _BinNoise:
     """Noise at some bins.
 
     Attributes
