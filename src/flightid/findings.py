@@ -59,3 +59,14 @@ def worst(findings: list[Finding] | tuple[Finding, ...]) -> Light:
     order = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
     lights = {finding.light for finding in findings}
     return next((light for light in order if light in lights), Light.GREEN)
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun.
+
+    Example
+    -------
+    >>> counted(1, "gap"), counted(2, "gap")
+    ('1 gap', '2 gaps')
+    """
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -58,16 +58,16 @@ def test_a_damaged_log_gets_the_same_verdict(tmp_path: Path) -> None:
     assert {"airborne", "excitation-found"} <= {f.code for f in inspection.findings}
 
 
-def test_a_log_without_anything_to_judge_is_red_and_says_so(tmp_path: Path) -> None:
+def test_a_log_without_anything_to_judge_says_so_and_claims_no_rest(tmp_path: Path) -> None:
     built = UlogBuilder().format("a:uint64_t timestamp;").announce("a", 0)
     built.sample(0, "Q", 2**63).sample(0, "Q", 1)
     path = tmp_path / "empty.ulg"
     path.write_bytes(bytes(built))
     inspection = fid.inspect_log(Log(path, UlogSource(path)))
     assert {f.code for f in inspection.findings} == {
-        "not-airborne",
+        "flight-unknown",
         "no-command-logged",
-        "nothing-excited",
+        "motion-unknown",
     }
     assert inspection.bands[0].reason == "tau_phi and p not logged"
     assert inspection.duration_s == 0.0

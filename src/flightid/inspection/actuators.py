@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,8 @@ from flightid.logs import Log, LogTable
 MOTOR_FUNCTIONS = range(33, 41)
 """SERVOn_FUNCTION of ArduPilot's motors 1 to 8."""
 FEWEST_SAMPLES = 5
+DEFAULT_PWM = (1000.0, 2000.0)
+"""Pulses, µs, of a log without parameters for them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,8 +69,9 @@ def _ardupilot(log: Log) -> Actuators | None:
     ]
     if not motors:
         return None
-    least = parameters.get("MOT_PWM_MIN", 1000.0)
-    span = parameters.get("MOT_PWM_MAX", 2000.0) - least
+    channel = int(parameters.get("RCMAP_THROTTLE", 3))
+    least, most = _limits(parameters, ("MOT_PWM", f"RC{channel}"), DEFAULT_PWM)
+    span = most - least
     return _made(
         table,
         motors,
@@ -87,11 +91,20 @@ def _px4(log: Log) -> Actuators | None:
     table = log.table("actuator_outputs", log.messages["actuator_outputs"].instances[0])
     used = [f"output[{i}]" for i in range(8) if f"output[{i}]" in table]
     used = [name for name in used if np.any(table[name] > 0)]
-    low, high = (log.parameters.get(f"PWM_{end}", default) for end, default in _PWM.items())
+    low, high = _limits(log.parameters, ("PWM", "PWM_MAIN"), DEFAULT_PWM)
     return _made(table, used, low, high) if used else None
 
 
-_PWM = {"MIN": 1000.0, "MAX": 2000.0}
+def _limits(
+    parameters: Mapping[str, float], names: Iterable[str], default: tuple[float, float]
+) -> tuple[float, float]:
+    """The first pair of limits that is one: autopilots write 0 where another pair counts.
+
+    ArduPilot takes the throttle channel's where MOT_PWM_MIN and MOT_PWM_MAX are 0
+    (AP_MotorsMulticopter::get_pwm_output_min).
+    """
+    pairs = ((parameters.get(f"{n}_MIN", 0.0), parameters.get(f"{n}_MAX", 0.0)) for n in names)
+    return next((pair for pair in pairs if 0.0 < pair[0] < pair[1]), default)
 
 
 def _made(table: LogTable, names: list[str], low: float, high: float) -> Actuators:

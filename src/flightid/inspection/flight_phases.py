@@ -14,6 +14,7 @@ from flightid.inspection.thresholds import (
     AIRBORNE_SHARE,
     AIRBORNE_SPEED,
     AIRBORNE_THRUST,
+    GAP_FACTOR,
     LYING_RATE,
     LYING_TILT,
     SHORTEST_SEGMENT,
@@ -41,12 +42,15 @@ class FlightPhases:
         When the vehicle began to fall over; None where it did not.
     evidence : str
         What the spans rest on.
+    is_known : bool
+        Whether the log holds anything that tells flight from ground.
     """
 
     airborne: tuple[Span, ...]
     motors_ran: bool | None
     tipped_s: float | None
     evidence: str
+    is_known: bool = True
 
     @property
     def airborne_s(self) -> float:
@@ -55,29 +59,47 @@ class FlightPhases:
 
 
 def flight_phases(log: Log, actuators: Actuators | None) -> FlightPhases:
-    """Find the airborne spans of a log from throttle (or speed), landing detector and attitude."""
+    """Find the airborne spans of a log from throttle (or speed), landing detector and attitude.
+
+    Where neither throttle nor speed is logged the motors' commands stand in for the throttle, or
+    the landing detector alone tells.
+    """
     ran = None if actuators is None else actuators.ran
+    if ran is False:
+        return FlightPhases((), ran, None, "motor outputs")
     plane = log.vehicle == "plane"
-    carrying = find(log, "airspeed" if plane else "thrust")
-    if carrying is None or ran is False:
-        reason = "motor outputs" if ran is False else "neither throttle nor speed is logged"
-        return FlightPhases((), ran, None, reason)
-    limit = AIRBORNE_SPEED.value if plane else _carrying_throttle(carrying.values)
-    spans = _spans(carrying.time_s, carrying.values > limit)
-    evidence = f"{carrying.label} above {limit:.3g} {carrying.unit}".rstrip(" 1")
+    carrying = find(log, "airspeed" if plane else "thrust") or _mean_motor(log, actuators)
     flying = _landing_detector(log)
+    if carrying is None and flying is None:
+        reason = "no throttle, motor output, speed or landing detector is logged"
+        return FlightPhases((), ran, None, reason, is_known=False)
+    spans, evidence, limit = [(-np.inf, np.inf)], [], 0.0
+    if carrying is not None:
+        limit = AIRBORNE_SPEED.value if plane else _carrying_throttle(carrying.values)
+        spans = _spans(carrying.time_s, carrying.values > limit)
+        evidence.append(f"{carrying.label} above {limit:.3g} {carrying.unit}".removesuffix(" 1"))
     if flying is not None:
         spans = _common(spans, _spans(*flying))
-        evidence += ", landing detector"
-    tipped = _tip_over(log, carrying, limit)
+        evidence.append("landing detector")
+    tipped = None if carrying is None else _tip_over(log, carrying, limit)
     if tipped is not None and not any(start < tipped < stop + FALL_S for start, stop in spans):
         # Moved by hand after landing.
         tipped = None
     if tipped is not None:
         spans = _common(spans, [(-np.inf, tipped)])
-        evidence += ", attitude"
+        evidence.append("attitude")
     kept = tuple(span for span in spans if span[1] - span[0] >= SHORTEST_SEGMENT.value)
-    return FlightPhases(kept, ran, tipped, evidence)
+    return FlightPhases(kept, ran, tipped, ", ".join(evidence))
+
+
+def _mean_motor(log: Log, actuators: Actuators | None) -> Signal | None:
+    """Mean command of a multirotor's motors as a share of their range, in place of a throttle."""
+    if actuators is None or log.vehicle == "plane" or actuators.time_s.size < 2:
+        return None
+    share = (actuators.values - actuators.low) / (actuators.high - actuators.low)
+    good = believable(actuators.time_s)
+    values = share.mean(axis=0)[good]
+    return Signal("thrust", actuators.time_s[good], values, "1", f"mean of {actuators.message}")
 
 
 def _carrying_throttle(throttle: NDArray[np.float64]) -> float:
@@ -88,12 +110,26 @@ def _carrying_throttle(throttle: NDArray[np.float64]) -> float:
 
 
 def _spans(time_s: NDArray[np.float64], mask: NDArray[np.bool_]) -> list[Span]:
-    """Spans of true samples; interruptions shorter than the shortest segment count as true."""
+    """Spans of true samples; interruptions shorter than the shortest segment count as true.
+
+    A silence of the stream ends a span: nobody knows what the vehicle did in it.
+    """
+    longest = 0.5 * SHORTEST_SEGMENT.value
+    if time_s.size > 1:
+        steps = np.diff(time_s)
+        silent = steps > max(longest, GAP_FACTOR.value * float(np.median(steps)))
+        pieces = np.split(np.arange(time_s.size), np.flatnonzero(silent) + 1)
+    else:
+        pieces = [np.arange(time_s.size)]
+    return [span for piece in pieces for span in _runs(time_s[piece], mask[piece], longest)]
+
+
+def _runs(time_s: NDArray[np.float64], mask: NDArray[np.bool_], longest_s: float) -> list[Span]:
     edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
     starts, stops = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
     spans: list[Span] = []
     for start, stop in zip(time_s[starts], time_s[stops], strict=True):
-        if spans and start - spans[-1][1] < 0.5 * SHORTEST_SEGMENT.value:
+        if spans and start - spans[-1][1] < longest_s:
             spans[-1] = (spans[-1][0], float(stop))
         else:
             spans.append((float(start), float(stop)))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.inspection.signals import Span
 from flightid.inspection.stamps import believable
 from flightid.inspection.thresholds import GAP_FACTOR
 from flightid.logs import Log
@@ -79,7 +80,7 @@ def _of(message: str, instance: int | None, stamps: NDArray[np.float64]) -> Stre
     if forward.size < FEWEST_ROWS - 1:
         return None
     middle = float(np.median(forward))
-    gaps = forward[forward > GAP_FACTOR.value * middle]
+    gaps = np.array([stop - start for start, stop in stream_gaps(good)])
     low, high = np.percentile(forward, [5, 95])
     return StreamRate(
         message,
@@ -92,3 +93,12 @@ def _of(message: str, instance: int | None, stamps: NDArray[np.float64]) -> Stre
         float(gaps.max()) if gaps.size else 0.0,
         int(stamps.size - good.size),
     )
+
+
+def stream_gaps(stamps: NDArray[np.float64]) -> list[Span]:
+    """Spans between increasing stamps that are longer than 2.5 median steps, s."""
+    steps = np.diff(stamps)
+    if not steps.size:
+        return []
+    at = np.flatnonzero(steps > GAP_FACTOR.value * float(np.median(steps)))
+    return [(float(stamps[i]), float(stamps[i + 1])) for i in at]

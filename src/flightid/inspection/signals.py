@@ -99,10 +99,15 @@ def places(log: Log, name: str, most: int | None = None) -> list[Signal]:
 
 
 def records(signals: list[Signal], inputs: set[str], spans: Iterable[Span]) -> list[Record]:
-    """Records of the spans at the rate of the slowest signal, cut at gaps."""
+    """Records of the spans at the rate of the slowest signal, cut at gaps.
+
+    A span comes from one stream and ends with it; each part of it that all signals cover is taken.
+    """
     slowest = min(signals, key=lambda signal: signal.rate_hz)
+    begin = max(float(signal.time_s[0]) for signal in signals)
+    end = min(float(signal.time_s[-1]) for signal in signals)
     made: list[Record] = []
-    for span in spans:
+    for span in ((max(start, begin), min(stop, end)) for start, stop in spans):
         try:
             base = to_uniform(
                 {signal.name: (signal.time_s, signal.values) for signal in signals},

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flightid.errors import FlightidError
 from flightid.inspection.axes import AxisChannels, axes_of
@@ -42,6 +41,9 @@ class AxisBand:
         windows and ten samples a cycle, rad/s.
     coherence : float or None
         Mean partial coherence in the band; the largest anywhere where there is no band.
+    largest_coherence : float or None
+        Largest partial coherence at any frequency that the logging rate supports; None where none
+        was computed.
     reason : str
         Why there is no band; empty where there is one.
     """
@@ -53,6 +55,7 @@ class AxisBand:
     band_rad_s: tuple[float, float] | None
     coherence: float | None
     reason: str = ""
+    largest_coherence: float | None = None
 
     @property
     def highest_hz(self) -> float:
@@ -99,12 +102,12 @@ def axis_bands(
         response, why = known[chosen]
         slowest = min(command.rate_hz, motion.rate_hz)
         labels = (command.label, motion.label)
-        band, coherence = None, None
+        band, coherence, largest = None, None, None
         if response is not None and tau in response.inputs:
-            band, coherence, why = _band(response, rate, tau, slowest)
+            band, coherence, largest, why = _band(response, rate, tau, slowest)
         elif response is not None:
             why = f"{labels[0]} did not move"
-        found.append(AxisBand(axis, *labels, slowest, band, coherence, why))
+        found.append(AxisBand(axis, *labels, slowest, band, coherence, why, largest))
     return tuple(found)
 
 
@@ -158,13 +161,15 @@ def _moves(made: list[Record], name: str) -> bool:
 
 def _band(
     response: FrequencyResponse, output: str, tau: str, rate_hz: float
-) -> tuple[tuple[float, float] | None, float | None, str]:
+) -> tuple[tuple[float, float] | None, float | None, float | None, str]:
     row, column = response.outputs.index(output), response.inputs.index(tau)
     omega = response.omega_rad_s
-    coherence = _trusted(response, row, column)
+    enough = response.n_independent[row, column] >= INDEPENDENT_WINDOWS.value - 0.5
+    coherence = np.where(enough, response.coherence[row, column], 0.0)
     fast_enough = omega <= 2.0 * math.pi * rate_hz / SAMPLES_PER_CYCLE.value
     if not np.any(fast_enough):
         return (
+            None,
             None,
             None,
             (
@@ -172,15 +177,15 @@ def _band(
                 "of which the flight holds enough cycles"
             ),
         )
+    if not np.any(enough & fast_enough):
+        windows = "fewer than five independent windows stand behind every frequency"
+        return None, None, None, f"{windows}: coherence is not judged"
     band = usable_band(omega[fast_enough], coherence[fast_enough], MINIMUM_COHERENCE.value)
     largest = float(coherence[fast_enough].max())
+    if band is None and largest >= MINIMUM_COHERENCE.value:
+        why = f"partial coherence reaches 0.6 at single frequencies only (largest {largest:.2f})"
+        return None, largest, largest, why
     if band is None:
-        return None, largest, f"partial coherence stays below 0.6 (largest {largest:.2f})"
+        return None, largest, largest, f"partial coherence stays below 0.6 (largest {largest:.2f})"
     within = (omega >= band[0]) & (omega <= band[1])
-    return band, float(np.mean(coherence[within])), ""
-
-
-def _trusted(response: FrequencyResponse, row: int, column: int) -> NDArray[np.float64]:
-    """Partial coherence, zero where fewer than five independent windows stand behind it."""
-    enough = response.n_independent[row, column] >= INDEPENDENT_WINDOWS.value - 0.5
-    return np.where(enough, response.coherence[row, column], 0.0)
+    return band, float(np.mean(coherence[within])), largest, ""

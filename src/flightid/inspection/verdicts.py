@@ -7,8 +7,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from flightid.conventions import Light
-from flightid.findings import Finding
+from flightid.findings import Finding, counted
 from flightid.inspection import advice
+from flightid.inspection.gap_findings import gap_findings
 from flightid.inspection.thresholds import (
     BAND_GOOD,
     BAND_LEAST,
@@ -31,7 +32,7 @@ def judge(log: Log, found: Inspection) -> tuple[Finding, ...]:
     if found.phases.airborne:
         findings += [*_length(found), *_bands(log, found), *_loop(log, found)]
     findings += [*_logging(log, found), *_excitation(log, found)]
-    return _ranked([*findings, *_quality(found)])
+    return _ranked([*findings, *_quality(log, found)])
 
 
 _RANK = {Light.RED: 0, Light.AMBER: 1, Light.UNKNOWN: 2, Light.GREEN: 3}
@@ -56,7 +57,7 @@ def _flight(log: Log, found: Inspection) -> list[Finding]:
         Finding(
             "airborne",
             Light.GREEN,
-            f"airborne for {phases.airborne_s:.1f} s in {len(phases.airborne)} spans "
+            f"airborne for {phases.airborne_s:.1f} s in {counted(len(phases.airborne), 'span')} "
             f"({phases.evidence})",
         )
     ]
@@ -83,6 +84,13 @@ def _on_the_ground(log: Log, found: Inspection) -> Finding:
             "answering to a vehicle that is moved by hand, the inverse of the controller and not "
             "the vehicle",
             "arm, fly, and hand in a log of the flight",
+        )
+    if not found.phases.is_known:
+        return Finding(
+            "flight-unknown",
+            Light.UNKNOWN,
+            f"whether it flew cannot be told: {found.phases.evidence}",
+            advice.logging(log),
         )
     return Finding(
         "not-airborne",
@@ -145,6 +153,15 @@ def _logging(log: Log, found: Inspection) -> list[Finding]:
 
 def _excitation(log: Log, found: Inspection) -> list[Finding]:
     if not found.excitations:
+        if all(band.output == "" for band in found.bands):
+            return [
+                Finding(
+                    "motion-unknown",
+                    Light.UNKNOWN,
+                    "what moved cannot be told: no axis has both command and body rate in the log",
+                    advice.logging(log),
+                )
+            ]
         return [
             Finding(
                 "nothing-excited",
@@ -174,7 +191,7 @@ def _excitation(log: Log, found: Inspection) -> list[Finding]:
 def _bands(log: Log, found: Inspection) -> list[Finding]:
     findings = [_band(log, band) for band in found.bands if band.rate_hz > 0]
     if all(finding.code != "band" for finding in findings):
-        measured = [band.coherence for band in found.bands if band.coherence is not None]
+        measured = [b.largest_coherence for b in found.bands if b.largest_coherence is not None]
         seen = f"largest found {max(measured):.2f}" if measured else "none could be measured"
         findings.append(
             Finding(
@@ -199,7 +216,7 @@ def _band(log: Log, band: AxisBand) -> Finding:
     low, high = (omega / (2.0 * math.pi) for omega in band.band_rad_s)
     text = (
         f"{band.axis}: usable from {low:.2g} to {high:.2g} Hz ({band.band_rad_s[0]:.3g} to "
-        f"{band.band_rad_s[1]:.3g} rad/s), mean coherence {band.coherence or 0.0:.2f}"
+        f"{band.band_rad_s[1]:.3g} rad/s), mean coherence {band.coherence:.2f}"
     )
     if band.span < BAND_LEAST.value:
         return Finding(
@@ -226,7 +243,7 @@ def _loop(log: Log, found: Inspection) -> list[Finding]:
     ]
 
 
-def _quality(found: Inspection) -> list[Finding]:
+def _quality(log: Log, found: Inspection) -> list[Finding]:
     findings = []
     worst = next(iter(found.saturations), None)
     if worst is not None and worst.share > SATURATED_SHARE.value:
@@ -242,17 +259,7 @@ def _quality(found: Inspection) -> list[Finding]:
         for rate in found.rates:
             if rate.message != message:
                 continue
-            if rate.n_gaps:
-                findings.append(
-                    Finding(
-                        "gaps",
-                        Light.AMBER,
-                        f"{rate.label} has {rate.n_gaps} gap{'s' * (rate.n_gaps > 1)}, the longest "
-                        f"{rate.longest_gap_s:.3g} s (median interval "
-                        f"{1e3 / rate.rate_hz:.3g} ms)",
-                        "use a faster card, or log less; records are cut at gaps",
-                    )
-                )
+            findings += gap_findings(log, rate, found.phases)
             if rate.jitter > JITTER.value:
                 findings.append(
                     Finding(

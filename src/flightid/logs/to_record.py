@@ -185,8 +185,6 @@ def _snapped(
 
     A span that the channels miss by more than their own steps is left as it is, to be refused.
     """
-    if reference is None:
-        return span_s
     begin = max(float(item.time_s[0]) for item in found)
     end = min(float(item.time_s[-1]) for item in found)
     if span_s is not None:
@@ -194,6 +192,8 @@ def _snapped(
         if begin > span_s[0] + slack or end < span_s[1] - slack:
             return span_s
         begin, end = max(begin, span_s[0]), min(end, span_s[1])
+    if reference is None:
+        return None if span_s is None else (begin, end)
     stamps = next(item.time_s for item in found if item.channel.name == reference)
     after = stamps[stamps >= begin]
     return (float(after[0]), end) if after.size and after[0] < end else span_s

@@ -15,12 +15,14 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.conventions import Light
-from flightid.findings import Finding
+from flightid.findings import Finding, counted
 from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange
 from flightid.logs.ulog.names import AIRFRAMES, ARMED, LEVELS, MODES, VEHICLE_TYPES
 
 STAMP = "timestamp"
 MICROSECONDS = "µs"
+CUT = "the file ends inside a record"
+"""Reason of the native half (`framing.rs`) for the bytes after the last whole record."""
 DEFAULT_KINDS = {1: "system", 2: "airframe"}
 
 
@@ -152,14 +154,24 @@ class UlogSource:
     def findings(self) -> list[Finding]:
         """Damage and dropouts."""
         found = []
-        lost = sum(part.size for part in self.skipped)
-        if lost:
+        damaged = [part for part in self.skipped if part.reason != CUT]
+        if len(damaged) < len(self.skipped):
+            found.append(
+                Finding(
+                    "log-cut",
+                    Light.AMBER,
+                    f"{CUT}: the log was cut short, or its writing was",
+                    "copy the log from the card again; what came before is read",
+                )
+            )
+        if damaged:
+            lost = sum(part.size for part in damaged)
             found.append(
                 Finding(
                     "log-damaged",
                     Light.AMBER,
                     f"{lost} of {self._size} bytes could not be read, in "
-                    f"{len(self.skipped)} places; all records between them were kept",
+                    f"{counted(len(damaged), 'place')}; all records between them were kept",
                     "copy the log from the card again and compare; Log.skipped lists the places",
                 )
             )

@@ -1,0 +1,112 @@
+"""What the inspection says of spans: nothing is lost to a rounding, nothing claimed unmeasured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.conventions import Light
+from flightid.inspection.actuators import find_actuators
+from flightid.inspection.flight_phases import FlightPhases, flight_phases
+from flightid.inspection.gap_findings import gap_findings
+from flightid.inspection.rates import stream_rates
+from flightid.inspection.signals import Signal, find, records
+from flightid.logs import Log, read_log
+from flightid.logs.dataflash.writer import DataflashWriter
+from flightid.logs.ulog.reader import UlogSource
+from tests.ulog_builder import UlogBuilder
+
+STAMPS = (1e7 + 1e4 * np.arange(3000)).astype(np.int64)
+MOTORS = {f"SERVO{i}_FUNCTION": 32.0 + i for i in (1, 2)}
+
+
+def written(
+    folder: Path, stamps: np.ndarray = STAMPS, *, events: bool = False, **pwm: float
+) -> Log:
+    """Rates and motor outputs alone, the motors at 1500 µs between the first and last second."""
+    writer = DataflashWriter()
+    writer.message(int(stamps[0]), "ArduCopter V4.6.0 (test)")
+    for name, value in {**MOTORS, **pwm}.items():
+        writer.parameter(name, value)
+    flying = (stamps > stamps[0] + 1e6) & (stamps < stamps[-1] - 1e6)
+    outputs = np.where(flying, 1500.0, 1000.0)
+    writer.add("RCOU", stamps, {"C1": outputs, "C2": outputs})
+    writer.add("RATE", stamps, {"R": np.sin(1e-6 * stamps), "ROut": np.cos(1e-6 * stamps)})
+    if events:
+        paused = np.flatnonzero(np.diff(stamps) > 1e6)[0]
+        writer.add("EV", stamps[paused + 1 : paused + 2], {"Id": [10]})
+    return read_log(writer.write(folder / "flight.bin"))
+
+
+def test_a_span_that_ends_a_microsecond_after_a_stream_keeps_the_stream() -> None:
+    stamps = np.arange(1000) / 100.0
+    signals = [Signal(name, stamps, np.sin(stamps), "1", name) for name in ("tau_phi", "p")]
+    (made,) = records(signals, {"tau_phi"}, [(-1e-6, stamps[-1] + 1e-6)])
+    assert made.n_samples == stamps.size
+
+
+@pytest.mark.parametrize("rate", [None, 50.0])
+def test_a_record_over_such_a_span_is_made_too(tmp_path: Path, rate: float | None) -> None:
+    log = written(tmp_path)
+    span = (log.first_s or 0.0, (log.last_s or 0.0) + 1e-6)
+    made = log.record(names=["tau_phi", "p"], span_s=span, sample_rate_hz=rate)
+    assert made.duration_s > 29.9
+
+
+def test_motors_tell_of_flight_where_no_throttle_is_logged(tmp_path: Path) -> None:
+    log = written(tmp_path, MOT_PWM_MIN=1000.0, MOT_PWM_MAX=2000.0)
+    phases = flight_phases(log, find_actuators(log))
+    assert phases.evidence == "mean of RCOU above 0.219"
+    assert phases.airborne_s == pytest.approx(28.0, abs=0.05)
+
+
+def test_nothing_that_tells_of_flight_is_not_called_never_airborne(tmp_path: Path) -> None:
+    writer = DataflashWriter()
+    writer.message(int(STAMPS[0]), "ArduCopter V4.6.0 (test)")
+    writer.add("RATE", STAMPS, {"R": np.sin(1e-6 * STAMPS), "ROut": np.cos(1e-6 * STAMPS)})
+    found = fid.inspect_log(writer.write(tmp_path / "rates.bin"))
+    codes = {finding.code: finding.light for finding in found.findings}
+    assert codes["flight-unknown"] is Light.UNKNOWN
+    assert "not-airborne" not in codes
+
+
+@pytest.mark.parametrize(
+    ("pwm", "limits"),
+    [
+        ({"MOT_PWM_MIN": 0.0, "MOT_PWM_MAX": 0.0, "RC3_MIN": 1100.0, "RC3_MAX": 1900.0}, 1100.0),
+        ({"MOT_PWM_MIN": 1050.0, "MOT_PWM_MAX": 1950.0, "RC3_MIN": 1100.0}, 1050.0),
+        ({"MOT_PWM_MIN": 0.0, "MOT_PWM_MAX": 0.0}, 1000.0),
+    ],
+)
+def test_zero_is_no_limit_of_a_motor(tmp_path: Path, pwm: dict[str, float], limits: float) -> None:
+    found = find_actuators(written(tmp_path, MOT_SPIN_MIN=0.0, **pwm))
+    assert found is not None
+    assert found.low == limits
+
+
+def test_a_pause_between_arms_is_no_slow_card(tmp_path: Path) -> None:
+    stamps = STAMPS + np.where(np.arange(STAMPS.size) >= 1500, int(2e7), 0)
+    log = written(tmp_path, stamps, events=True)
+    (rate,) = [rate for rate in stream_rates(log) if rate.message == "RATE"]
+    apart = FlightPhases(((11.0, 24.99), (45.0, 58.0)), True, None, "test")
+    (said,) = gap_findings(log, rate, apart)
+    assert (said.code, said.light) == ("pauses", Light.GREEN)
+    flown = FlightPhases(((11.0, 58.0),), True, None, "test")
+    (said,) = gap_findings(log, rate, flown)
+    assert (said.code, said.message[:27]) == ("gaps", "RATE has 1 gap in flight, t")
+
+
+def test_the_gyroscope_of_a_driver_is_read(tmp_path: Path) -> None:
+    built = UlogBuilder().format("sensor_gyro:uint64_t timestamp;float x;float y;float z;")
+    built.announce("sensor_gyro", 0)
+    for index in range(50):
+        built.sample(0, "Q3f", 1_000_000 + 4000 * index, 0.1 * index, 0.2, -0.3)
+    path = tmp_path / "gyro.ulg"
+    path.write_bytes(bytes(built))
+    found = find(Log(path, UlogSource(path)), "p")
+    assert found is not None
+    assert found.label == "sensor_gyro.x"
+    assert found.values[-1] == pytest.approx(4.9)
