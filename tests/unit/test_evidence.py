@@ -164,3 +164,13 @@ def test_a_closed_loop_is_the_reason_before_the_tests_that_it_spoils() -> None:
     verdict = _all_green().with_checks([loop, tests]).verdict
     assert (verdict.light, verdict.action) == (Light.RED, "use an instrument")
     assert verdict.message == "loop closed; they are not white"
+
+
+def test_the_headline_begins_with_what_is_predicted_of_unseen_data() -> None:
+    seen = Check("prediction", Light.GREEN, "predicts 84 % of y")
+    coloured = Check("residuals", Light.AMBER, "errors are not white", "raise the order")
+    both = _all_green().with_checks([coloured, seen]).verdict
+    assert (both.light, both.message) == (Light.AMBER, "predicts 84 % of y; errors are not white")
+    assert _all_green().with_checks([seen]).verdict.message.startswith("predicts 84 % of y; every")
+    poor = Check("prediction", Light.RED, "predicts y no better than a constant", "add terms")
+    assert _all_green().with_checks([poor]).verdict.message == poor.what

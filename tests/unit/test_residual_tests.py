@@ -18,7 +18,7 @@ from flightid.uncertainty.residual_correlation import (
     lag_covariance,
     white_portmanteau,
 )
-from flightid.validation.residuals.residual_tests import is_two_level
+from flightid.validation.residuals.obstacles import is_two_level
 from tests.closeness import assert_close
 
 STEP = "one step ahead"
@@ -335,3 +335,40 @@ def test_kernel_refusals() -> None:
         cross_correlation((e,), (e,), 20)
     with pytest.raises(DataError, match="does not change"):
         cross_correlation((e,), (np.zeros(20),), 2)
+
+
+@pytest.mark.parametrize(("gain", "light"), [(0.02, "amber"), (0.5, "red")])
+def test_a_sure_failure_is_red_only_where_it_is_large(gain: float, light: str) -> None:
+    rng = np.random.default_rng(4)
+    time_s = np.arange(100_000) * 0.02
+    flown = fid.Record.from_arrays(time_s, inputs={"u": rng.standard_normal(time_s.size)})
+    lag = fid.LinearSystem([[-5.0]], [[5.0]], [[1.0]], [[0.0]], ("u",), ("y",))
+    seen = fid.simulate(lag, flown)
+    size = float(np.std(seen["y"]))
+    missed = gain * size * np.roll(flown["u"], 7)
+    noise = 0.1 * size * rng.standard_normal(time_s.size)
+    spoiled = seen.replace({"y": seen["y"] + missed + noise})
+    tests = fid.residual_tests(fid.verify(lag, spoiled))
+    test = tests.test("uε", "y", "u")
+    assert test.verdict.value == "fail"
+    part = 100.0 * np.std(missed) / np.std(spoiled["y"])
+    assert_close(test.worth_percent, part, rtol=0.02, why="the part that u foretells")
+    found = next(f for f in tests.findings if f.code == "residuals-follow-input")
+    assert found.light.value == light
+    assert "% of y" in found.message
+
+
+def test_what_its_own_past_foretells_is_the_power_that_a_filter_takes_out() -> None:
+    rng = np.random.default_rng(5)
+    white = rng.standard_normal(20_000)
+    e = np.zeros_like(white)
+    for k in range(1, e.size):
+        e[k] = 0.8 * e[k - 1] + white[k]
+    time_s = np.arange(e.size) * 0.02
+    lag = fid.LinearSystem([[-5.0]], [[5.0]], [[1.0]], [[0.0]], ("u",), ("y",))
+    flown = fid.Record.from_arrays(time_s, inputs={"u": rng.standard_normal(e.size)})
+    seen = fid.simulate(lag, flown)
+    spoiled = seen.replace({"y": seen["y"] + e})
+    test = fid.residual_tests(fid.verify(lag, spoiled)).test("εε", "y")
+    share = 0.8 * np.std(e) / np.std(spoiled["y"])
+    assert_close(test.worth_percent, 100.0 * share, rtol=0.03, why="0.64 of an AR(1)'s power")

@@ -22,10 +22,11 @@ SETTLED = "estimator settled"
 AGREEMENT = "agreement of parts"
 SIGNS = "declared signs"
 RESIDUALS = "residuals"
+PREDICTION = "prediction"
 GUIDELINES = "guidelines"
 NAMES = (
     INSPECTION, TIME, BAND, COHERENCE, LOOP, HOLD, SETTLED, AGREEMENT, SIGNS, RESIDUALS,
-    GUIDELINES,
+    PREDICTION, GUIDELINES,
 )  # fmt: skip
 ALWAYS = (BAND, COHERENCE, LOOP, SETTLED, AGREEMENT)
 """What every result needs before it may be green."""
@@ -44,6 +45,7 @@ _ABSENT: Mapping[str, tuple[str, str]] = {
     ),
     SIGNS: ("declared signs were not examined", ""),
     RESIDUALS: ("residuals were not tested", "run residual_tests"),
+    PREDICTION: ("no record that the fit has not seen was predicted", "verify it on one"),
     GUIDELINES: ("guidelines were not examined", ""),
 }
 _ORDER = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
@@ -195,11 +197,15 @@ class Evidence(Result, schema="flightid.evidence/1"):
 
     @property
     def verdict(self) -> Finding:
-        """The light with its first reason, as one finding."""
-        reason = self.reason
+        """What the model predicts of unseen data, then the first reason for the light."""
+        reason, predicted = self.reason, self.check(PREDICTION)
+        first = "" if predicted is None else f"{predicted.what}; "
         if self.light is Light.GREEN or reason is None:
-            return Finding("evidence", self.light, "every check that is needed was made and holds")
-        return Finding("evidence", self.light, reason.message, reason.action)
+            what = f"{first}every check that is needed was made and holds"
+            return Finding("evidence", self.light, what)
+        if predicted is not None and reason == predicted.finding:
+            return Finding("evidence", self.light, reason.message, reason.action)
+        return Finding("evidence", self.light, first + reason.message, reason.action)
 
     def check(self, name: str) -> Check | None:
         """The check of a name; None where it was not made."""

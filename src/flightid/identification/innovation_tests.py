@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.uncertainty.agreement import Agreement
+from flightid.uncertainty.foretold import is_material, percent_of_output, share_from_inputs
 from flightid.uncertainty.residual_correlation import (
     Series,
+    autocorrelation,
     cross_correlation,
     independence_portmanteau,
     lag_covariance,
@@ -31,6 +33,7 @@ FEWEST_LAGS = 5
 """Beyond the parameters that were fitted: below it there is no test."""
 ROUNDING = 1e-8
 """Errors over outputs below which there is rounding alone."""
+TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True)
@@ -43,10 +46,13 @@ class InnovationTests:
         That the errors do not foretell themselves.
     independent : float or None
         That past inputs do not foretell the errors.
+    worth_percent : float or None
+        Most of an output that an input still foretells, rms in percent of the output's.
     """
 
     white: float | None
     independent: float | None
+    worth_percent: float | None = None
 
     @property
     def is_white(self) -> bool:
@@ -68,8 +74,10 @@ class InnovationTests:
         'prediction errors are not white (p = 1e-09), which biases the estimates'
         """
         if not self.is_independent:
+            worth = self.worth_percent
+            size = "" if worth is None else f", worth {worth:.2g} % of the output"
             return (
-                f"inputs still foretell the prediction errors (p = {self.independent:.2g}): "
+                f"inputs still foretell the prediction errors (p = {self.independent:.2g}{size}): "
                 "dynamics are missing, and the estimates are biased"
             )
         if not self.is_white:
@@ -87,7 +95,8 @@ class InnovationTests:
         """Verdicts; `biased` says whether coloured errors bias estimates of this structure."""
         if not self.is_independent:
             action = "raise the orders of the input's part, check its delay, or look for feedback"
-            return [Finding("inputs-in-errors", Light.RED, self.why_biased, action)]
+            light = Light.RED if is_material(self.worth_percent) else Light.AMBER
+            return [Finding("inputs-in-errors", light, self.why_biased, action)]
         if self.is_white or not biased:
             return []
         return [
@@ -136,24 +145,33 @@ def innovation_tests(
     lags = min(LAGS + max(spent), shortest // 4)
     if lags < first:
         return InnovationTests(None, None)
-    own, driven = [], []
+    own: list[float] = []
+    driven: list[tuple[float, float]] = []
     for place in range(len(errors[0])):
         e = tuple(row[place] for row in errors)
-        if _size(e) <= ROUNDING * _size(tuple(row[place] for row in outputs)):
+        ratio = _size(e) / max(_size(tuple(row[place] for row in outputs)), TINY)
+        if ratio <= ROUNDING:
             continue
         past = cross_correlation(e, e, lags)[lags + 1 :]
         own.append(white_portmanteau(past, n, spent[0])[2])
         for channel in range(len(inputs[0])):
             u = tuple(row[channel] for row in inputs)
             if _size(u) > 0.0:
-                driven.append(_independence(u, e, n, lags, spent[1]))
-    return InnovationTests(_smallest(own), _smallest([p for p in driven if p is not None]))
+                driven += _independence(u, e, lags, spent[1], ratio)
+    worth = max((percent for _, percent in driven), default=None)
+    return InnovationTests(_smallest(own), _smallest([p for p, _ in driven]), worth)
 
 
-def _independence(u: Series, e: Series, n: int, lags: int, spent: int) -> float | None:
+def _independence(
+    u: Series, e: Series, lags: int, spent: int, ratio: float
+) -> list[tuple[float, float]]:
+    """Chance, and worth in percent of the output; empty where there is no test."""
+    n = sum(row.size for row in e)
     values = cross_correlation(u, e, lags)[lags:]
-    _, degrees, p_value = independence_portmanteau(values, lag_covariance(u, e, lags + 1), n, spent)
-    return p_value if degrees >= 1 else None
+    covariance = lag_covariance(u, e, lags + 1)
+    _, degrees, p_value = independence_portmanteau(values, covariance, n, spent)
+    share = share_from_inputs(values, autocorrelation(u, lags + 1), covariance, n)
+    return [(p_value, percent_of_output(share, ratio, 1.0) or 0.0)] if degrees >= 1 else []
 
 
 def _size(series: Series) -> float:

@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING
 from flightid.identification import PolynomialDetails
 from flightid.models import NarxStructure, PolynomialStructure
 from flightid.table import Cell, Column, Table
-from flightid.validation import Comparison, Verdict
+from flightid.validation import Verdict
 
 if TYPE_CHECKING:
     from flightid.identification import Fit
     from flightid.study.identified import ModelResults
     from flightid.study.truth import Truth
     from flightid.uncertainty.estimate import Estimate
-    from flightid.validation import Verification
 
 HZ = 1 / (2 * math.pi)
 WORDS = {
@@ -112,7 +111,7 @@ def _row(item: ModelResults) -> tuple[Cell, ...]:
         reasons = "; ".join(pair.reason for pair in pairs)
         return (item.name, "left out", None, None, None, None, None, reasons)
     fit = item.fit
-    free = [run for run in map(_on_trial, item.verifications.values()) if run.horizon == "free_run"]
+    free = item.on_unseen.values()
     return (
         item.name,
         structure_words(fit),
@@ -123,10 +122,6 @@ def _row(item: ModelResults) -> tuple[Cell, ...]:
         max((value for run in free for value in run.theil.values()), default=None),
         "; ".join(finding.message for finding in item.left_out) or None,
     )
-
-
-def _on_trial(verified: Verification | Comparison) -> Verification:
-    return verified.first if isinstance(verified, Comparison) else verified
 
 
 def _passed(item: ModelResults) -> str | None:

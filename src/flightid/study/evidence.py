@@ -2,36 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
-from flightid.evidence import Check, inspection_check, residual_check
+from flightid.evidence import Check, Evidence, inspection_check, residual_check
 from flightid.evidence.data_checks import band_checks
-from flightid.evidence.evidence import RESIDUALS
+from flightid.evidence.evidence import GUIDELINES, PREDICTION, RESIDUALS
 from flightid.evidence.gather import worse
-from flightid.findings import Finding
+from flightid.findings import Finding, worst
 from flightid.identification import Fit
 from flightid.inspection import Inspection
 from flightid.responses import FrequencyResponse
+from flightid.study.identified import ModelResults
+from flightid.validation import Verification
 
 
-def examined(
-    fit: Fit,
-    inspection: Inspection | None,
-    found: Sequence[Finding],
-    response: FrequencyResponse | None = None,
-) -> Fit:
+def examined(fit: Fit, item: ModelResults, inspection: Inspection | None) -> Fit:
     """The fit with what the study knows besides, so that every page shows its one light.
 
     Parameters
     ----------
     fit : Fit
+    item : ModelResults
+        Its responses, whose band is that of a fit to records too, residual tests, and predictions
+        of records that the fit has not seen.
     inspection : Inspection or None
         Of the log that the data come from.
-    found : sequence of Finding
-        Of residual tests and of predictions of records that the fit has not seen.
-    response : FrequencyResponse, optional
-        Of the fitted channels, whose band then is that of a fit to records too.
 
     Returns
     -------
@@ -40,12 +36,57 @@ def examined(
     checks: list[Check] = []
     if inspection is not None:
         checks.append(inspection_check(inspection))
+    response = item.response
     if response is not None and not fit.responses and _is_of(response, fit):
         outputs, inputs = tuple(fit.model.outputs), tuple(fit.model.inputs)
         checks += band_checks(response.select(outputs=outputs, inputs=inputs))
-    if found:
-        checks.append(worse(fit.evidence.check(RESIDUALS), residual_check(found)))
+    if item.tests is not None and item.tests.findings:
+        residuals = residual_check(item.tests.findings)
+        checks.append(worse(fit.evidence.check(RESIDUALS), residuals))
+    if item.on_unseen:
+        said = [each for run in item.verifications.values() for each in run.findings]
+        checks.append(prediction_check(item.on_unseen, (*said, *item.reduction_judged)))
+    checks += _guidelines(fit.evidence, item.findings_of_choice)
     return replace(fit, evidence=fit.evidence.with_checks(checks))
+
+
+def prediction_check(runs: Mapping[str, Verification], said: Iterable[Finding]) -> Check:
+    """What a fit predicts of records that it has not seen, and the worst verdict on it.
+
+    Parameters
+    ----------
+    runs : mapping of str to Verification
+        Free runs, by name of the records; one or more.
+    said : iterable of Finding
+        Verdicts on them.
+    """
+    found = tuple(said)
+    light = worst(found)
+    poor = next((each for each in found if each.light is light and each.action), None)
+    return Check(PREDICTION, light, _predicted(runs), "" if poor is None else poor.action)
+
+
+def _predicted(runs: Mapping[str, Verification]) -> str:
+    fits = {f"{y} of “{name}”": v for name, run in runs.items() for y, v in run.fit_percent.items()}
+    least, value = min(fits.items(), key=lambda pair: pair[1])
+    if value <= 0.0:
+        return f"predicts {least} no better than a constant would (fit {value:.3g} %, free run)"
+    if len(fits) == 1:
+        return f"predicts {value:.3g} % of {least}, which it has not seen (free run)"
+    most = max(fits.values())
+    return f"predicts {value:.3g} % ({least}) to {most:.3g} % of what it has not seen (free run)"
+
+
+def _guidelines(evidence: Evidence, found: Iterable[Finding]) -> list[Check]:
+    """The worst verdict on how a structure was chosen, where it is worse than the fit's own."""
+    findings = tuple(found)
+    if not findings:
+        return []
+    light = worst(findings)
+    first = next(each for each in findings if each.light is light)
+    return [
+        worse(evidence.check(GUIDELINES), Check(GUIDELINES, light, first.message, first.action))
+    ]
 
 
 def _is_of(response: FrequencyResponse, fit: Fit) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification import Fit, Reduction
+from flightid.identification.prediction.request import FREE_RUN
 from flightid.models import GreyBoxModel
 from flightid.responses import CoherentPairs, FrequencyResponse
 from flightid.study.model_settings import ModelSettings
@@ -125,15 +126,21 @@ class ModelResults:
         return self.choice.findings
 
     @property
-    def findings_beyond(self) -> tuple[Finding, ...]:
-        """Verdicts of what came before and after the fit."""
-        checks = (self.tests, *self.verifications.values())
-        found = [each for part in checks if part is not None for each in part.findings]
-        found += self.reduction_judged
+    def on_unseen(self) -> dict[str, Verification]:
+        """Free runs of the fitted model through records that it has not seen, by their names."""
+        found = {
+            name: each.first if isinstance(each, Comparison) else each
+            for name, each in self.verifications.items()
+        }
+        return {name: run for name, run in found.items() if run.horizon == FREE_RUN}
+
+    @property
+    def findings_of_choice(self) -> tuple[Finding, ...]:
+        """Verdicts on how the structure came about, and on spectra."""
         if self.settings.structure is None:
-            return tuple(found)
+            return ()
         chosen = (*self.left_out, *self.choice_findings, *goal_findings(self.fit))
-        return (*chosen, *found, *(() if self.spectra is None else self.spectra.findings))
+        return (*chosen, *(() if self.spectra is None else self.spectra.findings))
 
     @property
     def findings(self) -> tuple[Finding, ...]:

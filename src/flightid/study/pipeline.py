@@ -128,17 +128,8 @@ def _examined(item: ModelResults, inspection: Inspection | None) -> ModelResults
     fit = item.fit
     if fit is None:
         return item
-    beyond = [finding for finding in item.findings_beyond if finding not in fit.findings]
     first, *others = item.fits.items()
-    fits = dict(
-        [
-            (
-                first[0],
-                examined(fit, inspection, beyond, next(iter(item.responses.values()), None)),
-            ),
-            *others,
-        ]
-    )
+    fits = dict([(first[0], examined(fit, item, inspection)), *others])
     return replace(item, fitted=replace(item.fitted, fits=fits))
 
 

@@ -92,6 +92,20 @@ def cross_correlation(a: Series, b: Series, maximum_lag: int) -> Array:
     return np.asarray(total / np.sqrt(power))
 
 
+def autocorrelation(a: Series, n_lags: int) -> Array:
+    """Correlations of a series with itself from lag zero; zero beyond the shortest record.
+
+    Example
+    -------
+    >>> autocorrelation((np.array([1.0, -1.0, 1.0, -1.0]),), 2)
+    array([ 1.  , -0.75])
+    """
+    reach = min(n_lags, *(record.size for record in a)) - 1
+    found = np.zeros(n_lags)
+    found[: reach + 1] = cross_correlation(a, a, reach)[reach:]
+    return found
+
+
 def lag_covariance(a: Series, b: Series, n_lags: int) -> Array:
     """Covariance of the cross-correlations of independent series, times the number of samples.
 

@@ -120,6 +120,9 @@ class CorrelationTest:
         Chance of a statistic as large for a good model.
     exceedances, exceedance_limit : int
         Judged lags outside the pointwise band, and how many chance explains in 95 % of cases.
+    worth_percent : float or None
+        Root mean square of the residual that the judged lags foretell, beyond chance, in percent
+        of the output's; None where the output is not known.
 
     Example
     -------
@@ -149,6 +152,7 @@ class CorrelationTest:
     p_value: float | None = None
     exceedances: int | None = None
     exceedance_limit: int | None = None
+    worth_percent: float | None = None
 
     @property
     def name(self) -> str:
@@ -185,6 +189,7 @@ class CorrelationTest:
             "p_value": self.p_value,
             "exceedances": self.exceedances,
             "exceedance_limit": self.exceedance_limit,
+            "worth_percent": self.worth_percent,
         }
 
     def __repr__(self) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.uncertainty.foretold import is_material
 from flightid.uncertainty.residual_correlation import LEVEL
 from flightid.validation.residuals.correlation_result import CorrelationTest, Kind, Verdict
 
@@ -30,7 +31,10 @@ _FEEDBACK = "the residual comes before the input: a loop is closed; declare loop
 
 
 def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]:
-    """Findings: red where a failure survives the number of tests made, amber where chance may do.
+    """Findings of failures: red where neither chance nor a small size excuses them, else amber.
+
+    Chance: of as many tests as were made. Small: of an output that is known, the part that is
+    missed lies below `MATERIAL_PERCENT`.
 
     Example
     -------
@@ -62,11 +66,16 @@ def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]
 def _failure(test: CorrelationTest, n_tests: int) -> Finding:
     p_value = test.p_value or 0.0
     sure = p_value * n_tests < 1.0 - LEVEL
-    chance = "" if sure else f"; among {n_tests} tests chance alone may do that"
+    worth = test.worth_percent
     parts = [f"{test.name} fails: p = {p_value:.2g}", *_limits_missed(test)]
-    message = ", ".join(parts) + chance
+    message = ", ".join(parts)
+    if not sure:
+        message += f"; among {n_tests} tests chance alone may do that"
+    elif worth is not None:
+        message += f"; worth {worth:.2g} % of {test.output}"
     action = _FEEDBACK if _leads(test) else _ACTIONS[test.kind]
-    return Finding(_CODES[test.kind], Light.RED if sure else Light.AMBER, message, action)
+    light = Light.RED if sure and is_material(worth) else Light.AMBER
+    return Finding(_CODES[test.kind], light, message, action)
 
 
 def _limits_missed(test: CorrelationTest) -> Iterator[str]:

@@ -15,8 +15,15 @@ from flightid.record import Record
 from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
 from flightid.uncertainty.feedback import FeedbackTest, declared_loop, find_feedback
+from flightid.uncertainty.foretold import (
+    percent_of_output,
+    share_from_inputs,
+    share_from_past,
+    share_of_lags,
+)
 from flightid.uncertainty.residual_correlation import (
     Series,
+    autocorrelation,
     centred,
     cross_correlation,
     exceedance_limit,
@@ -37,14 +44,11 @@ from flightid.validation.residuals.correlation_result import (
 )
 from flightid.validation.residuals.data import Inputs, ResidualData, Residuals, gather_residuals
 from flightid.validation.residuals.findings import residual_findings
+from flightid.validation.residuals.obstacles import obstacle
 from flightid.validation.residuals.result import ResidualTests
 
 Choice = TypeVar("Choice", Horizon, Loop)
 
-TWO_LEVELS = 1e-6
-"""Variance of u² beyond what u itself explains, over its squared mean, of a two-level input."""
-ROUNDING = 1e-9
-"""A residual below this share of the output is rounding noise."""
 SAMPLES_PER_LAG = 4
 FIRST_JUDGED_LAG = {Loop.CLOSED: 0, Loop.CLOSED_WITHIN_SAMPLE: 1}
 
@@ -208,35 +212,15 @@ class _Setup:
         group = self.data.residuals if kind is Kind.CROSS else self.data.inputs
         u = e if name is None else group[name]
         counts = self.data.horizon is Horizon.ONE_STEP or kind not in NEEDS_ONE_STEP
-        reason = self._obstacle(kind, output, e, u)
+        scale = self.data.scale.get(output, 0.0)
+        open_loop = self.data.horizon is not Horizon.FREE_RUN or self.loop is Loop.OPEN
+        reason = obstacle(kind, e, u, scale=scale, open_loop=open_loop)
         if reason:
             return _not_testable(kind, output, name, counts, reason)
         note = "" if counts else "a free run need not leave white residuals; shown, not counted"
         if kind in NEEDS_ONE_STEP:
             return self._white(kind, output, name, counts, note)
         return self._independent(kind, output, name, note)
-
-    def _obstacle(self, kind: Kind, output: str, e: Series, u: Series) -> str:
-        if _is_constant(e, self.data.scale.get(output, 0.0) * ROUNDING):
-            return "the residual does not change beyond rounding"
-        if kind is Kind.CROSS:
-            return "the other residual does not change" if _is_constant(u, 0.0) else ""
-        return "" if kind is Kind.WHITENESS else self._obstacle_of_input(kind, e, u)
-
-    def _obstacle_of_input(self, kind: Kind, e: Series, u: Series) -> str:
-        if _is_constant(u, 0.0):
-            return "the input does not change"
-        free_run = self.data.horizon is Horizon.FREE_RUN and kind not in NEEDS_ONE_STEP
-        if free_run and self.loop is not Loop.OPEN:
-            return (
-                "a closed loop brings the coloured residual of a free run into the input, whatever "
-                "the model; test against the injected excitation"
-            )
-        if kind in (Kind.EVEN, Kind.EVEN_SQUARED) and is_two_level(u):
-            return "the input has two levels, so its square is constant or a copy of the input"
-        if kind is Kind.EVEN_SQUARED and is_two_level(e):
-            return "the residual has two levels, so its square is constant"
-        return ""
 
     def _white(
         self, kind: Kind, output: str, name: str | None, counts: bool, note: str
@@ -257,8 +241,11 @@ class _Setup:
         values = every[self.maximum_lag + 2 :][: lags.size]
         measures = white_portmanteau(values, self.n_samples, fitted)
         judged = np.ones(lags.size, dtype=np.bool_)
+        share = (share_from_past if kind is Kind.WHITENESS else share_of_lags)(
+            values, self.n_samples
+        )
         return self._judged(
-            _CorrelationValues(kind, output, name, counts, note, lags, values, judged),
+            _CorrelationValues(kind, output, name, counts, note, lags, values, judged, share),
             1.0,
             measures,
         )
@@ -277,7 +264,9 @@ class _Setup:
         if measures[1] < 1:
             reason = "the input's band is too narrow for so many fitted parameters; use more lags"
             return _not_testable(kind, output, name, True, reason)
-        found = _CorrelationValues(kind, output, name, True, note, lags, values, judged)
+        own = autocorrelation(a, lags.size)
+        share = share_from_inputs(values[judged], own, covariance, self.n_samples)
+        found = _CorrelationValues(kind, output, name, True, note, lags, values, judged, share)
         return self._judged(found, float(covariance[0]), measures)
 
     def _judged(
@@ -310,7 +299,12 @@ class _Setup:
             p_value,
             outside,
             limit,
+            self._worth(found.output, found.share),
         )
+
+    def _worth(self, output: str, share: float) -> float | None:
+        size = float(np.std(np.concatenate(centred(self.data.residuals[output]))))
+        return percent_of_output(share, size, self.data.scale.get(output, 0.0))
 
 
 @dataclass(frozen=True)
@@ -323,34 +317,11 @@ class _CorrelationValues:
     lags: NDArray[np.int64]
     values: NDArray[np.float64]
     judged: NDArray[np.bool_]
-
-
-def is_two_level(series: Series) -> bool:
-    """Whether a signal's square holds nothing that the signal itself does not.
-
-    A signal of two levels has a square that is constant about its midpoint, and about any other
-    value a copy of the signal: an unbalanced sequence must not pass for one with a usable square.
-
-    Example
-    -------
-    >>> is_two_level((np.array([0.0, 1.0, 1.0, 0.0, 1.0]),))
-    True
-    """
-    u = np.concatenate(centred(series))
-    square = u**2
-    about = square - np.mean(square)
-    left = about - u * (u @ about) / (u @ u)
-    return bool(np.var(left) < TWO_LEVELS * np.mean(square) ** 2)
+    share: float
 
 
 def _squared(series: Series) -> Series:
     return tuple(record**2 for record in centred(series))
-
-
-def _is_constant(series: Series, floor: float) -> bool:
-    spread = float(np.std(np.concatenate(centred(series))))
-    size = max(float(np.max(np.abs(record))) for record in series)
-    return spread <= max(floor, 1e-12 * size)
 
 
 def _not_testable(

@@ -1,0 +1,120 @@
+"""How much of an output a failed residual test is about: significant is not yet large.
+
+A long record makes any test fail, for no model of a real vehicle is exact. What the failure is
+worth is the part of the residual that could have been foretold, beside the size of the output.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from flightid.uncertainty.residual_correlation import SMALLEST_EIGENVALUE
+
+Array = NDArray[np.float64]
+MATERIAL_PERCENT = 10.0
+"""Of an output's standard deviation: what is missed from there on shows in a prediction."""
+
+
+def share_from_past(values: Array, n_samples: int) -> float:
+    """Share of a residual's power that its own past foretells, less what chance gives.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_lags,)
+        Its correlations at lags 1, 2, ...
+    n_samples : int
+
+    Returns
+    -------
+    float
+        0 to 1.
+
+    Reference
+    ---------
+    Box, Jenkins & Reinsel, Time Series Analysis, 4th ed., section 3.2 (Yule–Walker equations).
+
+    Example
+    -------
+    >>> round(share_from_past(0.9 ** np.arange(1.0, 11.0), 10_000), 2)
+    0.81
+    """
+    known = np.concatenate(([1.0], values[:-1]))
+    weights = linalg.lstsq(linalg.toeplitz(known), values)[0]
+    return _within(float(values @ weights) - values.size / n_samples)
+
+
+def share_from_inputs(values: Array, own: Array, covariance: Array, n_samples: int) -> float:
+    """Share of a residual's power that an input foretells, less what chance gives.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n_lags,)
+        Correlations of input and residual at neighbouring lags.
+    own : ndarray, shape (at least n_lags,)
+        Autocorrelation of the input from lag zero.
+    covariance : ndarray, shape (at least n_lags,)
+        Of `lag_covariance`: what chance gives with a coloured residual.
+    n_samples : int
+
+    Returns
+    -------
+    float
+        0 to 1.
+
+    Reference
+    ---------
+    Ljung, System Identification, 2nd ed., section 16.6.
+
+    Example
+    -------
+    >>> white = np.array([1.0, 0.0])
+    >>> round(share_from_inputs(np.array([0.5, 0.0]), white, white, 10_000), 3)
+    0.25
+    """
+    spread, directions = linalg.eigh(linalg.toeplitz(own[: values.size]))
+    kept = spread > SMALLEST_EIGENVALUE * spread[-1]
+    along = directions[:, kept]
+    found = (along.T @ values) ** 2
+    chance = np.sum(along * (linalg.toeplitz(covariance[: values.size]) @ along), axis=0)
+    return _within(float(np.sum((found - chance / n_samples) / spread[kept])))
+
+
+def share_of_lags(values: Array, n_samples: int) -> float:
+    """Share of power behind independent correlations, less what chance gives.
+
+    Example
+    -------
+    >>> round(share_of_lags(np.array([0.5, 0.0]), 10_000), 3)
+    0.25
+    """
+    return _within(float(values @ values) - values.size / n_samples)
+
+
+def percent_of_output(share: float, residual: float, output: float) -> float | None:
+    """Root mean square that is foretold, in percent of that of the output; None for no output.
+
+    Example
+    -------
+    >>> percent_of_output(0.25, 0.2, 1.0)
+    10.0
+    """
+    return 100.0 * math.sqrt(share) * residual / output if output > 0.0 else None
+
+
+def is_material(percent: float | None) -> bool:
+    """Whether a failure counts as large; where the output is not known it does.
+
+    Example
+    -------
+    >>> is_material(0.5), is_material(12.0), is_material(None)
+    (False, True, True)
+    """
+    return percent is None or percent >= MATERIAL_PERCENT
+
+
+def _within(share: float) -> float:
+    return min(max(share, 0.0), 1.0)
