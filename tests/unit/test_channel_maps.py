@@ -193,3 +193,10 @@ def test_the_real_copter_gives_a_record_at_its_slow_rate(shared_data: Path) -> N
     record = fid.read_log(shared_data / "logs" / "arducopter_457.BIN").record()
     assert_close(record.sample_rate_hz, 10.0, rtol=1e-3, why="PIDR is logged at 10 Hz")
     assert "an injected signal is not in it" in record.channels["tau_phi"].note
+
+
+def test_an_edited_map_is_read_anew(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    for title in ("first", "second"):
+        path.write_text(f'title = "{title}"\nkind = "px4"\nvehicle = "copter"\n[channels]\n')
+        assert channel_map(path).title == title

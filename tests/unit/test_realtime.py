@@ -56,6 +56,20 @@ def test_linear_flight_is_exact() -> None:
     assert "worst delay" in str(session.summary())
 
 
+def test_an_interrupt_ends_the_flight_and_keeps_it() -> None:
+    def leaving(t: float, outputs: object) -> dict[str, float]:
+        if t > 1.0:
+            raise KeyboardInterrupt
+        return stick(t, outputs)
+
+    session = fly_in_real_time(Stepper(SYSTEM, STEP_S), leaving, duration_s=4.0, clock=FakeClock())
+    assert repr(session) == "FlownSession(51 frames, 0 late, stopped by hand)"
+    with pytest.raises(KeyboardInterrupt):
+        fly_in_real_time(
+            Stepper(SYSTEM, STEP_S), lambda t, y: leaving(9.0, y), duration_s=4.0, clock=FakeClock()
+        )
+
+
 def test_equations_fly_as_simulate_does() -> None:
     model = fid.load_model("quadrotor_6dof").with_fixed(tau_d=2 * STEP_S)
     hover = model.trim["F"]

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from flightid.errors import StudyError
-from flightid.study.output import SCHEMA, whole_folder
+from flightid.study.output import SCHEMA, WRITTEN, require_replaceable, whole_folder
 
 
 def _write_results(folder: Path, mark: str) -> None:
@@ -22,7 +22,7 @@ def _break_off(final: Path, failure: type[BaseException]) -> None:
 
 
 def _names(folder: Path) -> list[str]:
-    return sorted(entry.name for entry in folder.iterdir())
+    return sorted(entry.name for entry in folder.iterdir() if entry.name != WRITTEN)
 
 
 def test_folder_appears_when_the_work_is_done(tmp_path: Path) -> None:
@@ -97,4 +97,36 @@ def test_an_empty_folder_may_be_used_and_a_file_may_not(tmp_path: Path) -> None:
         _write_results(folder, "new")
     (tmp_path / "file").touch()
     with pytest.raises(StudyError, match="holds something else"), whole_folder(tmp_path / "file"):
+        pass
+
+
+def test_files_of_the_user_in_an_earlier_result_stay(tmp_path: Path) -> None:
+    final = tmp_path / "out"
+    for mark in ("first", "second"):
+        with whole_folder(final) as folder:
+            _write_results(folder, mark)
+            (folder / "gains.param").write_text(mark)
+            (folder / mark).touch()
+        if mark == "first":
+            (final / "notes").mkdir()
+            (final / "notes" / "mine.txt").write_text("mine")
+            (final / "gains.param").write_text("edited")
+    assert _names(final) == ["gains.kept1.param", "gains.param", "notes", "results.json", "second"]
+    assert (final / "gains.kept1.param").read_text() == "edited"
+    assert (final / "notes" / "mine.txt").read_text() == "mine"
+    assert _names(tmp_path) == ["out"]
+
+
+def test_a_folder_that_holds_inputs_is_refused(tmp_path: Path) -> None:
+    data = tmp_path / "out" / "data.csv"
+    with pytest.raises(StudyError, match="holds what the study reads"):
+        require_replaceable(tmp_path / "out", [data])
+    require_replaceable(tmp_path / "out", [tmp_path / "outer" / "data.csv"])
+
+
+def test_a_result_that_does_not_list_its_files_is_left_alone(tmp_path: Path) -> None:
+    with whole_folder(tmp_path / "out") as folder:
+        _write_results(folder, "first")
+    (tmp_path / "out" / WRITTEN).unlink()
+    with pytest.raises(StudyError, match="holds something else"), whole_folder(tmp_path / "out"):
         pass

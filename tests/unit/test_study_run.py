@@ -66,7 +66,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> fid.Study:
 
 def test_output_is_whole(study: fid.Study) -> None:
     names = sorted(item.name for item in study.output.iterdir())
-    assert names == ["flight.bin", "models", "report.html", "report.txt", "results.json"]
+    reports = ["report.html", "report.txt", "results.json"]
+    assert names == [".written.json", "flight.bin", "models", *reports]
     assert study.output.name == "study-output"
     assert list(study.output.parent.glob(".*")) == []
 

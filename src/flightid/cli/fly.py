@@ -56,7 +56,7 @@ def command(
     output: Path | None,
     as_json: bool,
 ) -> None:
-    """Fly MODEL beside the clock.
+    """Fly MODEL beside the clock; Ctrl-C ends the flight and keeps it.
 
     MODEL is a .toml file, the folder of a study with one model, the JSON of a fit, or the name of a
     library model. Inputs come as JSON datagrams such as {"lat": 0.1}, outputs go to a cockpit

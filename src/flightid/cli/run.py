@@ -25,7 +25,8 @@ from flightid.cli.output import emit_values, json_option, leave_by_verdict, note
 def command(study: Path, output: Path | None, log: Path | None, as_json: bool) -> None:
     """Run a study: log, records, responses, models, verification, report.
 
-    Writes report.html, report.txt and results.json to the output folder, all or nothing.
+    Writes report.html, report.txt and results.json to the output folder, all or nothing;
+    of an earlier run's output only what that run wrote goes.
     docs/study.md describes the study file.
     """
     from flightid.report.text import to_text

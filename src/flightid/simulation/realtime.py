@@ -20,7 +20,7 @@ from flightid.simulation.stepper import Stepper
 from flightid.table import Column, Table
 
 MAXIMUM_DATAGRAM = 8192
-MAXIMUM_FRAMES = 10_000_000
+FEWEST_FRAMES, MAXIMUM_FRAMES = 2, 10_000_000
 
 
 class Clock(Protocol):
@@ -57,15 +57,19 @@ class FlownSession(Result, schema="flightid.flown_session/1", untold={"record": 
         Frames that began later than their instant by more than a tenth of a sample.
     worst_late_s : float
         Longest delay of a frame, s.
+    stopped : bool
+        Whether an interrupt ended it before its time.
     """
 
     record: Record
     late_frames: int
     worst_late_s: float
+    stopped: bool = False
 
     def __repr__(self) -> str:
         """Frames and late ones on one line."""
-        return f"FlownSession({self.record.n_samples} frames, {self.late_frames} late)"
+        stopped = ", stopped by hand" if self.stopped else ""
+        return f"FlownSession({self.record.n_samples} frames, {self.late_frames} late{stopped})"
 
     def summary(self) -> Table:
         """Table of the frames."""
@@ -89,6 +93,8 @@ def fly_in_real_time(
     clock: Clock | None = None,
 ) -> FlownSession:
     """Step a model beside a clock; frames that come late are counted, none is left out.
+
+    An interrupt (Ctrl-C) ends the flight: what was flown until then is returned.
 
     Parameters
     ----------
@@ -124,7 +130,7 @@ def fly_in_real_time(
     """
     beat, step = clock or SystemClock(), stepper.sample_time_s
     count = round(duration_s / step) if math.isfinite(duration_s) else 0
-    if not 2 <= count <= MAXIMUM_FRAMES:
+    if not FEWEST_FRAMES <= count <= MAXIMUM_FRAMES:
         raise OptionError(
             "the flight has no usable length",
             found=f"{duration_s:g} s",
@@ -133,27 +139,32 @@ def fly_in_real_time(
     given = np.empty((len(stepper.inputs), count))
     found = np.empty((len(stepper.outputs), count))
     outputs: Mapping[str, float] = dict.fromkeys(stepper.outputs, 0.0)
-    start, late_frames, worst = beat.now(), 0, 0.0
-    for k in range(count):
-        wait = start + k * step - beat.now()
-        if wait > 0.0:
-            beat.sleep(wait)
-        else:
-            worst = max(worst, -wait)
-            late_frames += -wait > 0.1 * step
-        inputs = {**stepper.rest, **pilot(k * step, outputs)}
-        outputs = stepper.step(inputs)
-        given[:, k] = [inputs[name] for name in stepper.inputs]
-        found[:, k] = list(outputs.values())
-        if show is not None:
-            show(k * step, outputs)
+    start, late_frames, worst, flown = beat.now(), 0, 0.0, 0
+    try:
+        for k in range(count):
+            wait = start + k * step - beat.now()
+            if wait > 0.0:
+                beat.sleep(wait)
+            else:
+                worst = max(worst, -wait)
+                late_frames += -wait > 0.1 * step
+            inputs = {**stepper.rest, **pilot(k * step, outputs)}
+            outputs = stepper.step(inputs)
+            given[:, k] = [inputs[name] for name in stepper.inputs]
+            found[:, k] = list(outputs.values())
+            flown = k + 1
+            if show is not None:
+                show(k * step, outputs)
+    except KeyboardInterrupt:
+        if flown < FEWEST_FRAMES:
+            raise
     record = Record.from_arrays(
-        np.arange(count) * step,
-        inputs=dict(zip(stepper.inputs, given, strict=True)),
-        outputs=dict(zip(stepper.outputs, found, strict=True)),
+        np.arange(flown) * step,
+        inputs=dict(zip(stepper.inputs, given[:, :flown], strict=True)),
+        outputs=dict(zip(stepper.outputs, found[:, :flown], strict=True)),
         name="flown",
     )
-    return FlownSession(record, late_frames, worst)
+    return FlownSession(record, late_frames, worst, flown < count)
 
 
 class UdpLink:

@@ -5,29 +5,35 @@ from __future__ import annotations
 import json
 import secrets
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from flightid.errors import FileFormatError, StudyError
+from flightid.files import sha256_of_file
 from flightid.report.content import Document
 from flightid.report.json import from_dict
 
 RESULTS = "results.json"
+WRITTEN = ".written.json"
+"""What a run wrote, so that the next one removes that and nothing else."""
 SCHEMA = "flightid.study/1"
 
 
 @contextmanager
-def whole_folder(final: Path) -> Iterator[Path]:
+def whole_folder(final: Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
     """Give a temporary folder that becomes `final` when the block succeeds.
 
-    An earlier result of a study at `final` is replaced; any other content is refused. On failure or
+    Of an earlier result of a study at `final` the files that the study wrote go, those that are
+    not its own, or were changed since, stay; any other content is refused. On failure or
     interrupt the temporary folder is removed and what stood at `final` stands there still.
 
     Parameters
     ----------
     final : Path
         Folder to make.
+    inputs : iterable of Path
+        Files that the study reads: a folder that holds one is refused.
 
     Yields
     ------
@@ -37,48 +43,71 @@ def whole_folder(final: Path) -> Iterator[Path]:
     Raises
     ------
     StudyError
-        `final` holds something that no study wrote.
+        `final` holds something that no study wrote, or what this one reads.
     """
-    require_replaceable(final)
+    require_replaceable(final, inputs)
     final.parent.mkdir(parents=True, exist_ok=True)
     temporary = final.with_name(f".{final.name}.{secrets.token_hex(6)}.part")
     temporary.mkdir()
     try:
         yield temporary
+        written = {name: sha256_of_file(file) for name, file in _files(temporary).items()}
+        (temporary / WRITTEN).write_text(json.dumps(written, indent=1), encoding="utf-8")
         _exchange(temporary, final)
     except BaseException:
         shutil.rmtree(temporary, ignore_errors=True)
         raise
 
 
-def require_replaceable(final: Path) -> None:
+def require_replaceable(final: Path, inputs: Iterable[Path] = ()) -> None:
     """Refuse a folder that a study may not replace; call it before the work, not after it.
 
     Raises
     ------
     StudyError
-        `final` holds something that no study wrote.
+        `final` holds something that no study wrote, or one of `inputs`.
     """
+    place = final.resolve()
+    if held := [str(each) for each in inputs if each.resolve().is_relative_to(place)]:
+        raise StudyError(
+            "the output folder holds what the study reads",
+            found=", ".join(held),
+            needed="a folder apart from the inputs",
+            action="name another folder with --output",
+        )
     if not final.exists() or (final.is_dir() and not any(final.iterdir())):
         return
-    if final.is_dir() and _is_ours(final / RESULTS):
+    if final.is_dir() and _is_ours(final / RESULTS) and _written(final) is not None:
         return
     raise StudyError(
         "the output folder holds something else",
         found=str(final),
-        needed="a new folder, an empty one, or the output of an earlier run",
-        action="name another folder with --output",
+        needed=f"a new folder, an empty one, or the output of an earlier run with its {WRITTEN}",
+        action="name another folder with --output, or remove this one yourself",
     )
 
 
 def _is_ours(results: Path) -> bool:
-    if not results.is_file():
-        return False
-    try:
-        values = json.loads(results.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
+    values = _read_json(results)
     return isinstance(values, dict) and values.get("schema") == SCHEMA
+
+
+def _written(folder: Path) -> dict[str, str] | None:
+    """SHA-256 of each file that a run wrote, by its path in the folder; None where no run says."""
+    values = _read_json(folder / WRITTEN)
+    return values if isinstance(values, dict) else None
+
+
+def _read_json(path: Path) -> object:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    files = (entry for entry in sorted(folder.rglob("*")) if entry.is_symlink() or entry.is_file())
+    return {file.relative_to(folder).as_posix(): file for file in files}
 
 
 def _exchange(temporary: Path, final: Path) -> None:
@@ -93,7 +122,23 @@ def _exchange(temporary: Path, final: Path) -> None:
     except BaseException:
         aside.replace(final)
         raise
+    _hand_over(aside, final)
     shutil.rmtree(aside, ignore_errors=True)
+
+
+def _hand_over(aside: Path, final: Path) -> None:
+    """Move the files that are not a run's own into the new folder, beside its own names."""
+    written = _written(aside) or {}
+    for name, file in _files(aside).items():
+        unchanged = not file.is_symlink() and written.get(name) == sha256_of_file(file)
+        if unchanged or name == WRITTEN:
+            continue
+        target, copy = final / name, 0
+        while target.exists() or target.is_symlink():
+            copy += 1
+            target = final / Path(name).with_name(f"{file.stem}.kept{copy}{file.suffix}")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        file.replace(target)
 
 
 def read_report(path: Path) -> Document:

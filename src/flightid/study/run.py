@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Iterator, Mapping, MutableMapping
+from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +45,8 @@ def run_study(
 ) -> Study:
     """Carry out a study file: log or records, responses, models, verification, report.
 
-    The output folder appears whole or not at all. What fails after the fits costs itself alone:
+    The output folder appears whole or not at all; in one of an earlier run, files that no run wrote
+    or that were changed since stay. What fails after the fits costs itself alone:
     the report names it in red, and all that was found stands.
 
     Parameters
@@ -84,7 +86,8 @@ def run_study(
     source = Path(path)
     settings = read_settings(source)
     final = Path(output) if output is not None else source.with_name(f"{source.stem}-output")
-    require_replaceable(final)
+    reads = (source, *_paths(settings), *(() if log is None else (Path(log),)))
+    require_replaceable(final, reads)
     names = tuple(model.name for model in settings.models)
     collected = ErrorList()
     collected.read(require_files, None, settings.record_files if log is None else ())
@@ -129,6 +132,21 @@ def run_study(
         _write(study, folder)
         advance()
     return study
+
+
+def _paths(settings: object) -> Iterator[Path]:
+    """Every path that the settings name."""
+    if isinstance(settings, Path):
+        yield settings
+    elif isinstance(settings, str):
+        yield from [Path(settings)] if settings.endswith(".toml") else []
+    elif isinstance(settings, Mapping):
+        yield from (path for value in settings.values() for path in _paths(value))
+    elif isinstance(settings, tuple | list):
+        yield from (path for value in settings for path in _paths(value))
+    elif is_dataclass(settings) and not isinstance(settings, type):
+        named = (getattr(settings, field.name) for field in fields(settings))
+        yield from (path for value in named for path in _paths(value))
 
 
 def _write(study: Study, folder: Path) -> None:

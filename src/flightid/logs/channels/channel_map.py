@@ -186,7 +186,6 @@ def default_map(kind: str, vehicle: str | None) -> ChannelMap:
     return channel_map(name)
 
 
-@cache
 def channel_map(name: str | Path) -> ChannelMap:
     """Load a channel map.
 
@@ -219,14 +218,17 @@ def channel_map(name: str | Path) -> ChannelMap:
             needed="one of " + ", ".join(DEFAULTS.values()) + ", or a TOML file",
         )
     try:
-        return _parse(tomllib.loads(text))
+        return _parse(text)
     except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError, AttributeError) as error:
         raise FileFormatError(
             f"{name} is not a channel map", found=f"{type(error).__name__}: {error}"
         ) from error
 
 
-def _parse(content: dict[str, Any]) -> ChannelMap:
+@cache
+def _parse(text: str) -> ChannelMap:
+    """The map that a text says: kept by the text, for a file may be edited while we run."""
+    content = tomllib.loads(text)
     channels = tuple(_channel(name, item) for name, item in content["channels"].items())
     hold = content.get("hold")
     known = None if hold is None else require_hold(hold, HOLDS)
