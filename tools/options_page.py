@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from flightid import Noise
+from flightid.control.tuning.controller_options import ControllerOptions
 from flightid.control.tuning.options import TuneOptions
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.excitation import Limits, RateAxis
@@ -58,6 +59,7 @@ def sections() -> dict[str, type[Options]]:
         "simulate model, without records": StickOptions,
         "reduce": ReductionLimits,
         "tune": TuneOptions,
+        "tune_controller": ControllerOptions,
         "TuningRequirements": TuningRequirements,
         "excitation.plan (design)": DesignOptions,
         "RateAxis: the guess of a design": RateAxis,

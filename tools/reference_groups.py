@@ -167,6 +167,8 @@ GROUPS = {
         "Gains",
         "tuning.md",
         (
+            "tune_controller",
+            "ControllerOptions",
             "tune_pid",
             "PidDesign",
             "tune",

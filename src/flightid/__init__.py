@@ -38,10 +38,12 @@ if TYPE_CHECKING:
         disturbance_rejection,
     )
     from flightid.control.margins.margins import Margins, margins
+    from flightid.control.tuning.controller_options import ControllerOptions
     from flightid.control.tuning.pid_design import PidDesign
     from flightid.control.tuning.requirements import TuningRequirements
     from flightid.control.tuning.result import Tuning
     from flightid.control.tuning.tune import tune
+    from flightid.control.tuning.tune_controller import tune_controller
     from flightid.control.tuning.tune_pid import tune_pid
     from flightid.dynamics.conditions.compare_conditions import compare_conditions
     from flightid.dynamics.conditions.result import ConditionComparison
@@ -186,9 +188,11 @@ _HOMES = {
     "PairResponse": "flightid.responses",
     "Parameter": "flightid.models",
     "PidDesign": "flightid.control.tuning.pid_design",
+    "ControllerOptions": "flightid.control.tuning.controller_options",
     "TuningRequirements": "flightid.control.tuning.requirements",
     "Tuning": "flightid.control.tuning.result",
     "tune": "flightid.control.tuning.tune",
+    "tune_controller": "flightid.control.tuning.tune_controller",
     "tune_pid": "flightid.control.tuning.tune_pid",
     "Parameters": "flightid.models",
     "PolynomialModel": "flightid.models",
@@ -254,6 +258,7 @@ __all__ = [
     "CoherentPairs",
     "Comparison",
     "ConditionComparison",
+    "ControllerOptions",
     "DerivativeTable",
     "DiskMargin",
     "DisturbanceRejection",
@@ -358,6 +363,7 @@ __all__ = [
     "to_discrete",
     "to_scipy",
     "tune",
+    "tune_controller",
     "tune_pid",
     "validation",
     "verify",

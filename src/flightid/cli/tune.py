@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +19,9 @@ if TYPE_CHECKING:
 
 
 def _fields() -> dict[str, type[Options]]:
-    from flightid.control.tuning.options import TuneOptions
-    from flightid.control.tuning.requirements import TuningRequirements
+    from flightid.study.tuning import KINDS
 
-    return {"requirements": TuningRequirements, "tuning": TuneOptions}
+    return dict(zip(("requirements", "tuning", "a controller"), KINDS, strict=True))
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
@@ -63,6 +63,9 @@ def command(
 ) -> None:
     """Run STUDY, or take fitted MODELs, and tune the autopilot that the log was flown with.
 
+    With --controller it is a PID of its own around each loop, and no log is needed; --write takes
+    gains.toml then, or gains.c for code.
+
     A MODEL is a .toml file, the JSON of a fit, or the output folder of a study, all models of which
     are taken. The table [tune] of the study holds requirements and options; what is given here goes
     before it, and without either the usual ones apply. Gains keep their margins for every plant
@@ -71,8 +74,7 @@ def command(
     from flightid.study.tuning import TuneSettings
 
     report = None
-    needs, told = parted(options, _fields())
-    asked = {**needs, **told}
+    asked = {name: each for part in parted(options, _fields()) for name, each in part.items()}
     if _is_study(files):
         from flightid.study import run_study
 
@@ -88,15 +90,35 @@ def command(
         click.echo(str(tuning.summary()))
         at = {} if level is None else {"level": level}
         for design in tuning.designs:
+            if design.plain and design.exists:
+                click.echo(f"\n{design.plain.form_table()}")
             click.echo(f"\n{design.promise_table(**at)}")
         if tuning.together:
             click.echo(f"\n{tuning.together_table()}")
     if report is not None:
         note(f"Wrote {report}")
     if target is not None and tuning.exists:
-        for path in tuning.write(target, overwrite=overwrite):
+        for path in _written(tuning, target, overwrite):
             note(f"Wrote {path}")
     leave_by_verdict(tuning.findings)
+
+
+def _written(tuning: Tuning, target: Path, overwrite: bool) -> Iterable[Path]:
+    """Parameter files of an autopilot; C or TOML of a PID of its own."""
+    if target.suffix != ".c":
+        return tuning.write(target, overwrite=overwrite)
+    from flightid import export
+    from flightid.export.names import identifier
+
+    if target.exists() and not overwrite:
+        raise click.UsageError(f"{target} is there already: name another file, or --overwrite")
+    several = len(tuning.designs) > 1
+    names = [f"{target.stem}_{each.axis}" if several else target.stem for each in tuning.designs]
+    made = [
+        export(design, target.with_name(f"{identifier(name)}.c"))
+        for name, design in zip(names, tuning.designs, strict=True)
+    ]
+    return [path for each in made for path in each.files]
 
 
 def _is_study(files: tuple[Path, ...]) -> bool:
@@ -116,7 +138,10 @@ def _of_models(files: tuple[Path, ...], log: Path | None, settings: TuneSettings
     from flightid.models.saved_files import models_of
     from flightid.study.tuning import tune_files
 
-    if log is None:
-        raise click.UsageError("models hold no gains: name the flight with --log")
+    if log is None and settings.controller is None:
+        raise click.UsageError(
+            "models hold no gains: name the flight with --log, or a PID of its own with "
+            "--controller pi_d"
+        )
     found = [path for file in files for path in (models_of(file) if file.is_dir() else [file])]
-    return tune_files(found, read_log(log), settings)
+    return tune_files(found, None if log is None else read_log(log), settings)

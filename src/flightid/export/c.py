@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from flightid.errors import ExportError, OptionError
-from flightid.export.c_source import CSource, Hold, equation_source, linear_source
+from flightid.export.c_source import CSource, Hold, equation_source, file_stem, linear_source
 from flightid.export.exported import ExportFiles
-from flightid.export.names import identifier
 from flightid.export.narx_source import narx_source
 from flightid.files import write_atomically
 from flightid.models import NarxModel, StateSpaceModel
@@ -87,7 +86,7 @@ def export_c(
     -------
     ExportFiles
     """
-    stem = identifier(path.stem)
+    stem = file_stem(path)
     made = model_source(
         model,
         name,
@@ -97,12 +96,6 @@ def export_c(
         substeps=substeps,
         tunable=tunable,
     )
-    if path.stem != stem:
-        raise OptionError(
-            "a C file has a name that its header cannot carry",
-            found=path.name,
-            needed=f"letters, digits and underscores, such as {stem}.c",
-        )
     # The source names the header: it comes first, so that no source is seen without its header.
     header = write_atomically(path.with_suffix(".h"), made.header)
     source = write_atomically(path.with_suffix(".c"), made.source)

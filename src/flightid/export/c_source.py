@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
+from pathlib import Path
 from typing import Literal
 
 import jinja2
@@ -258,6 +259,24 @@ def rendered(
         tables.parameters, sample_time_s, hold, method,
         isinstance(words["equations"], EquationCode),
     )  # fmt: skip
+
+
+def file_stem(path: Path) -> str:
+    """Stem of a C file, which its header can carry.
+
+    Raises
+    ------
+    OptionError
+        It holds more than letters, digits and underscores.
+    """
+    stem = identifier(path.stem)
+    if path.stem != stem:
+        raise OptionError(
+            "a C file has a name that its header cannot carry",
+            found=path.name,
+            needed=f"letters, digits and underscores, such as {stem}.c",
+        )
+    return stem
 
 
 def c_environment() -> jinja2.Environment:

@@ -7,12 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from flightid.control.tuning.pid_design import PidDesign, require_gains
 from flightid.conventions import Light
-from flightid.errors import OptionError
+from flightid.errors import ExportError, OptionError
 from flightid.export.c import export_c
 from flightid.export.exported import ExportFiles
 from flightid.export.fmu import export_fmu
 from flightid.export.jsbsim import export_jsbsim
+from flightid.export.pid_source import export_pid
 from flightid.files import as_path
 from flightid.findings import Finding
 from flightid.identification import Fit
@@ -55,8 +57,9 @@ def export(
 
     Parameters
     ----------
-    source : a fit, a model or a LinearSystem
-        A fit gives its model; what a format can hold of its uncertainty goes along.
+    source : a fit, a model, a LinearSystem or a PidDesign
+        A fit gives its model; what a format can hold of its uncertainty goes along. The design of
+        a PID of its own is written as C or TOML.
     path : str or Path
         File to write; its folder must exist.
     format : str, optional
@@ -109,6 +112,8 @@ def export(
         known = ", ".join(f"{kind} ({suffix})" for suffix, kind in FORMATS.items())
         raise OptionError("format of an export is not known", found=format or place.name,
                           needed=f"one of {known}")  # fmt: skip
+    if isinstance(source, PidDesign):
+        return _controller(source, place, name or place.stem, chosen)
     model = model_of(source)
     if chosen in _WRITERS:
         return _called(_WRITERS[chosen], model, place, name or place.stem, options=options)
@@ -130,6 +135,21 @@ def _called(
             needed=", ".join(sorted(known)),
         )
     return function(*arguments, **options)
+
+
+def _controller(design: PidDesign, path: Path, name: str, format: str) -> ExportFiles:
+    loop = design.plain
+    if loop is None or format not in ("c", "toml"):
+        raise ExportError(
+            "the gains of a controller have no such file",
+            found=f"{design.flown.autopilot} as {format}",
+            needed="a PID of its own, as C or TOML",
+            action="write the gains of an autopilot with the design's write",
+        )
+    require_gains([design])
+    if format == "c":
+        return export_pid(loop, path, name)
+    return ExportFiles("toml", design.write(path, overwrite=True))
 
 
 def _toml(model: object, path: Path) -> ExportFiles:

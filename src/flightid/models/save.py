@@ -67,11 +67,11 @@ def model_as_toml(source: object) -> str:
     plain = {key: value for key, value in model_to_description(source).items() if key != "schema"}
     kind = {"kind": plain.pop("kind", "transfer")}
     single = {k: v for k, v in plain.items() if not isinstance(v, Mapping) and v not in ("", [])}
-    lines = [f"{_key(key)} = {_value(value)}" for key, value in {**kind, **single}.items()]
+    lines = [f"{_key(key)} = {toml_value(value)}" for key, value in {**kind, **single}.items()]
     for name, table in plain.items():
         if isinstance(table, Mapping) and table:
             lines += ["", f"[{_key(name)}]"]
-            lines += [f"{_key(key)} = {_value(value)}" for key, value in table.items()]
+            lines += [f"{_key(key)} = {toml_value(value)}" for key, value in table.items()]
     return "\n".join(lines) + "\n"
 
 
@@ -84,7 +84,8 @@ def _text(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _value(value: object) -> str:
+def toml_value(value: object) -> str:
+    """A value of a TOML file; a table stands in one line."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int | float):
@@ -93,7 +94,7 @@ def _value(value: object) -> str:
         return _text(value)
     if isinstance(value, Mapping):
         kept = {key: entry for key, entry in value.items() if entry not in (None, "")}
-        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in kept.items()) + " }"
+        return "{ " + ", ".join(f"{_key(k)} = {toml_value(v)}" for k, v in kept.items()) + " }"
     if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_value, value)) + "]"
+        return "[" + ", ".join(map(toml_value, value)) + "]"
     raise ModelError("a model holds what TOML cannot", found=type(value).__name__)

@@ -17,6 +17,8 @@ TITLES = {
     "angle step": ("angle, its set-point 1", "rad"),
     "disturbance to rate": ("rate, disturbed by 1", "rad/s"),
     "disturbance to angle": ("angle, disturbed by 1", "rad"),
+    "step": ("output, its set-point 1", ""),
+    "disturbance": ("output, disturbed by 1 at the input", ""),
 }
 PHASE_WINDOW_DEG, GAIN_WINDOW_DB = (-270.0, -45.0), (-30.0, 30.0)
 GRID = 25
@@ -75,15 +77,16 @@ def nichols(design: PidDesign) -> go.Figure:
     problem = design.problem
     count = min(SHOWN, len(problem.plants))
     plants = problem.plants.take(list(range(count)))
-    keep = plants.omega_rad_s > 0.2
+    keep = plants.omega_rad_s > 0.2 / problem.time_scale
     named = {
         label: dict(problem.loops(_gains(design, label)[None], plants).named())
-        for label in ("new gains", "flown gains")
+        for label in _labels(design)
     }
     loops = list(named["new gains"])
     made = look.figure(1, len(loops), column_titles=loops, shared_x=False, height_px=480)
     for column, loop in enumerate(loops, 1):
-        for label, colour in (("flown gains", look.RIVAL), ("new gains", look.MODEL)):
+        for label in reversed(_labels(design)):
+            colour = look.MODEL if label == "new gains" else look.RIVAL
             rows = named[label][loop][0][:, keep]
             for place in range(len(rows) if label == "new gains" else 1):
                 phase, gain = _nichols_curve(rows[place])
@@ -168,10 +171,8 @@ def _map_figure(
             name="all requirements met", showlegend=True,
         )
     )  # fmt: skip
-    for label, colour, symbol in (
-        ("flown gains", look.RIVAL, "circle"),
-        ("new gains", look.MODEL, "star"),
-    ):
+    for label in _labels(design):
+        colour, symbol = (look.MODEL, "star") if label == "new gains" else (look.RIVAL, "circle")
         gains = _gains(design, label)
         made.add_trace(
             go.Scatter(
@@ -190,11 +191,15 @@ def _scale(gains: Array, high: Array, place: int) -> float:
     return float(gains[place]) if gains[place] > 0.0 else 0.05 * float(high[place])
 
 
+def _labels(design: PidDesign) -> list[str]:
+    return ["new gains", "flown gains"] if design.flown.has_flown else ["new gains"]
+
+
 def _gains(design: PidDesign, label: str) -> Array:
     loop = design.loop if label == "new gains" else design.flown
     found = [design.gains[change.name] for change in design.changes]
     if label == "flown gains":
-        found = [change.flown for change in design.changes]
+        found = [change.flown or 0.0 for change in design.changes]
     gains = np.array(found)
     if "angle_tc" in loop.names and "A" in design.problem.kinds:
         gains[-1] = 1.0 / gains[-1]

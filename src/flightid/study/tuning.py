@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from flightid.control.autopilots import axis_loop_of
+from flightid.control.tuning.controller_options import ControllerOptions
 from flightid.control.tuning.options import TuneOptions
+from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.result import Tuning
 from flightid.control.tuning.tune import tune
+from flightid.control.tuning.tune_controller import tune_controller
 from flightid.control.tuning.tune_pid import CHANNELS
 from flightid.errors import StudyError
 from flightid.models import Model, load_model
+from flightid.models.model import model_of
 from flightid.options import options_of
 from flightid.study.reading import TableReader, read_each
 from flightid.validation import Comparison, Verification
@@ -22,6 +26,12 @@ from flightid.validation import Comparison, Verification
 if TYPE_CHECKING:
     from flightid.logs import Log
     from flightid.study.identified import ModelResults
+
+
+KINDS = (TuningRequirements, TuneOptions, ControllerOptions)
+"""Dataclasses whose options are the keys of [tune], and options of ``flightid tune``."""
+AUTOPILOT_ONLY = ("gyro", "angle_loop")
+"""Options that a PID of its own does not know."""
 
 
 @dataclass(frozen=True)
@@ -32,10 +42,13 @@ class TuneSettings:
     ----------
     requirements : TuningRequirements
     options : TuneOptions
+    controller : ControllerOptions or None
+        A PID of its own in place of an autopilot; None where none of its options is given.
     """
 
     requirements: TuningRequirements = field(default_factory=TuningRequirements)
     options: TuneOptions = field(default_factory=TuneOptions)
+    controller: ControllerOptions | None = None
 
     def changed(self, given: Mapping[str, Any]) -> TuneSettings:
         """With some requirements and options replaced, by name.
@@ -45,10 +58,15 @@ class TuneSettings:
         OptionError
             A value outside its range, or requirements that contradict each other.
         """
-        mine = {each.name for each in options_of(TuneOptions)}
+        told: list[dict[str, Any]] = [
+            {name: given[name] for name in given if name in {o.name for o in options_of(kind)}}
+            for kind in KINDS
+        ]
+        own = self.controller
+        if told[2]:
+            own = replace(own or ControllerOptions(), **told[2])
         return TuneSettings(
-            replace(self.requirements, **{k: v for k, v in given.items() if k not in mine}),
-            replace(self.options, **{k: v for k, v in given.items() if k in mine}),
+            replace(self.requirements, **told[0]), replace(self.options, **told[1]), own
         )
 
 
@@ -62,19 +80,22 @@ def read_tune(reader: TableReader) -> TuneSettings:
     OptionError
         Requirements that contradict each other.
     """
-    made = read_each((TuningRequirements, TuneOptions), reader)
-    return TuneSettings(*made)
+    asked = any(each.name in reader for each in options_of(ControllerOptions))
+    requirements, options, controller = read_each(KINDS, reader)
+    return TuneSettings(requirements, options, controller if asked else None)
 
 
-def tune_files(files: Iterable[str | Path], log: Log, settings: TuneSettings) -> Tuning | None:
+def tune_files(
+    files: Iterable[str | Path], log: Log | None, settings: TuneSettings
+) -> Tuning | None:
     """Tune the axes of model files, as `run_study` and ``flightid identify --write`` leave them.
 
     Parameters
     ----------
     files : iterable of str or Path
         The first model of an axis counts; its covariance and evidence are in the file.
-    log : Log
-        The flight, which holds the gains that flew.
+    log : Log or None
+        The flight, which holds the gains that flew; a PID of its own needs none.
     settings : TuneSettings
 
     Returns
@@ -83,10 +104,13 @@ def tune_files(files: Iterable[str | Path], log: Log, settings: TuneSettings) ->
         None where no model is of a rate to its command.
     """
     models: dict[str, object] = {}
-    for model in map(load_model, files):
+    loaded = list(map(load_model, files))
+    if settings.controller is not None:
+        return _controllers([(model, ()) for model in loaded], settings.controller, settings)
+    for model in loaded:
         for axis in _axes(model):
             models.setdefault(axis, model)
-    return _tuned(models, log, settings, {}) if models else None
+    return _tuned(models, _flight(log), settings, {}) if models else None
 
 
 def _axes(model: Model) -> list[str]:
@@ -120,6 +144,9 @@ def tune_models(
     StudyError
         The study reads records, which hold no gains.
     """
+    if settings.controller is not None:
+        known = [(one.fit, tuple(one.verifications.values())) for one in identified if one.fit]
+        return _controllers(known, settings.controller, settings)
     fits: dict[str, object] = {}
     checks = {}
     for item in identified:
@@ -131,13 +158,61 @@ def tune_models(
                 checks[axis] = tuple(item.verifications.values())
     if not fits:
         return None
-    if log is None:
+    return _tuned(fits, _flight(log), settings, checks)
+
+
+def _flight(log: Log | None) -> Log:
+    """The flight, which holds the gains that flew."""
+    if log is not None:
+        return log
+    raise StudyError(
+        "gains of an autopilot cannot be tuned without the log that it flew",
+        needed="a log, or a controller that is no autopilot's",
+        action='tune a PID of its own: [tune] controller = "pi_d" in a study, '
+        "--controller pi_d on the command line",
+    )
+
+
+def _controllers(
+    known: Sequence[tuple[Any, tuple[Verification | Comparison, ...]]],
+    controller: ControllerOptions,
+    settings: TuneSettings,
+) -> Tuning | None:
+    """A PID of its own around each loop that is asked for, of the first model that has it."""
+    designs: dict[str, PidDesign] = {}
+    for model, checks in known:
+        channels = cast(Model, model_of(model))
+        for name in controller.loops or _only_loop(channels):
+            output, input = _loop_channels(name)
+            if name in designs or output not in channels.outputs or input not in channels.inputs:
+                continue
+            asked = {k: v for k, v in vars(settings.options).items() if k not in AUTOPILOT_ONLY}
+            designs[name] = tune_controller(
+                model, inputs=input, outputs=output, controller=controller,
+                requirements=settings.requirements, verification=checks, **asked,
+            )  # fmt: skip
+    missing = [name for name in controller.loops if name not in designs]
+    if missing or not designs:
         raise StudyError(
-            "gains cannot be tuned from records alone",
-            needed="a log, which holds the gains that flew",
-            action="take [tune] out, or call flightid.tune with the gains",
+            "no model has the loop that is to be closed",
+            found=", ".join(missing) or "models with several inputs or outputs, and no loops named",
+            needed="loops as output/input of fitted models",
         )
-    return _tuned(fits, log, settings, checks)
+    return Tuning(tuple(designs.values()), ())
+
+
+def _only_loop(model: Model) -> tuple[str, ...]:
+    """The loop of a model with one input and one output."""
+    if len(model.inputs) == len(model.outputs) == 1:
+        return (f"{model.outputs[0]}/{model.inputs[0]}",)
+    return ()
+
+
+def _loop_channels(name: str) -> tuple[str, str]:
+    output, slash, input = name.partition("/")
+    if not (output and slash and input):
+        raise StudyError("a loop has no such name", found=name, needed="output/input")
+    return output, input
 
 
 def _tuned(

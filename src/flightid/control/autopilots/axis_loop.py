@@ -17,7 +17,7 @@ from flightid.control.autopilots.filters import (
     hold_response,
     sections_response,
 )
-from flightid.control.autopilots.parameter_table import Axis, GainRange, gain_ranges
+from flightid.control.autopilots.parameter_table import GainRange, gain_ranges
 from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -106,8 +106,8 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
 
     Attributes
     ----------
-    axis : {"roll", "pitch", "yaw"}
-        Axis.
+    axis : str
+        ``"roll"``, ``"pitch"`` or ``"yaw"``; of a plain PID the output that it holds.
     values, names : mapping of str to float and to str
         Parameter values and the autopilot's names, by role.
     loop_rate_hz : float
@@ -134,7 +134,7 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     array([0.247])
     """
 
-    axis: Axis
+    axis: str
     values: Mapping[str, float]
     names: Mapping[str, str]
     loop_rate_hz: float
@@ -147,6 +147,8 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     output_unit: ClassVar[str] = "1"
     set_point_delay_loops: ClassVar[int] = 0
     """Loops between an angle error and the rate loop that acts on it."""
+    inner: ClassVar[str] = "rate loop"
+    """What the innermost loop is called."""
 
     def __post_init__(self) -> None:
         if not (self.loop_rate_hz > 0 and self.gyro_rate_hz >= self.loop_rate_hz * (1 - 1e-9)):
@@ -165,6 +167,16 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
             f"{r.upper()} {self.values[r]:.4g}" for r in sorted(shown, key="pidff".find)
         )
         return f"AxisLoop({self.autopilot} {self.axis}, {self.loop_rate_hz:g} Hz, {gains})"
+
+    @property
+    def has_flown(self) -> bool:
+        """Whether its gains have flown, so that new ones are compared with them."""
+        return True
+
+    @property
+    def time_scale(self) -> float:
+        """Of its dynamics over those of a vehicle's rate loop, which a search begins from."""
+        return 1.0
 
     @property
     def gains(self) -> dict[str, float]:

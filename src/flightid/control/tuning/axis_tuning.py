@@ -14,9 +14,9 @@ from flightid.control.tuning.controller_paths import ControllerPaths, loop_respo
 from flightid.control.tuning.evidence import TuningEvidence
 from flightid.control.tuning.gain_search import GainSearchResult, search
 from flightid.control.tuning.gain_search import steps as search_steps
+from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopProblem, Plants
-from flightid.control.tuning.pid_design import Stage, TunedGain
 from flightid.control.tuning.promises import Promise, promises
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.sampled_plants import (
@@ -107,7 +107,7 @@ class AxisResult:
     met : ndarray of bool, shape (n_fresh,)
         Which fresh plants meet every requirement.
     flown_stable : ndarray of bool or None
-        Which of them the flown gains hold stable, the estimate first.
+        Which of them the flown gains hold stable, the estimate first; None where none flew.
     problem : LoopProblem
         With the fresh plants.
     """
@@ -116,7 +116,7 @@ class AxisResult:
     loop: AxisLoop
     promises: tuple[Promise, ...]
     met: NDArray[np.bool_]
-    flown_stable: NDArray[np.bool_]
+    flown_stable: NDArray[np.bool_] | None
     problem: LoopProblem
 
 
@@ -139,6 +139,8 @@ def problem_of(
         limit,
         None if setting.noise is None else np.interp(plants.omega_rad_s, *setting.noise),
         noise_limit,
+        paths.loop.inner,
+        paths.loop.time_scale,
     )
 
 
@@ -147,7 +149,7 @@ def noise_limit(setting: Setting, problem: LoopProblem, flown: Array) -> float |
     need, limits = setting.requirements, []
     if need.output_noise_rms is not None and setting.noise is not None:
         limits.append(need.output_noise_rms)
-    if need.noise_growth is not None:
+    if need.noise_growth is not None and flown.any():
         judged = problem.judge(flown[None], [0])
         if bool(judged.stable[0, 0]):
             limits.append(need.noise_growth * float(judged.noise[0, 0]))
@@ -190,9 +192,9 @@ def tune_axis(
     fresh = problem_of(setting, setting.judged.axis(place, loops, gyro), paths, limit)
     # What flew had the other axes' flown gains around it, not those that they are given here.
     fresh_flown = replace(fresh, plants=setting.judged.axis(place, flown, gyro))
-    old = fresh_flown.judge(before[None])
+    old = fresh_flown.judge(before[None]) if flown[place].has_flown else None
     made, met = promises(fresh, paths.gains_of(loop), old)
-    return AxisResult(found, loop, made, met, old.stable[0], fresh)
+    return AxisResult(found, loop, made, met, None if old is None else old.stable[0], fresh)
 
 
 def axis_steps(setting: Setting, loop: AxisLoop) -> int:
@@ -200,15 +202,22 @@ def axis_steps(setting: Setting, loop: AxisLoop) -> int:
     paths = ControllerPaths(loop, setting.gyro, setting.with_angle)
     low, high = paths.ranges()
     plants = setting.searched.axis(0, [loop] * setting.searched.sampled.n_axes, setting.gyro)
-    return search_steps(LoopProblem(plants, paths, paths.kinds, low, high, setting.requirements))
+    problem = LoopProblem(plants, paths, paths.kinds, low, high, setting.requirements)
+    return search_steps(replace(problem, inner=loop.inner, time_scale=loop.time_scale))
 
 
 def changes_of(paths: ControllerPaths, new: AxisLoop) -> tuple[TunedGain, ...]:
     """Each parameter before and after."""
     ranges, before, after = paths.loop.ranges, paths.loop.gains, new.gains
+    flown = paths.loop.has_flown
     return tuple(
         TunedGain(
-            name, ranges[name].unit, before[name], after[name], ranges[name].low, ranges[name].high
+            name,
+            ranges[name].unit,
+            before[name] if flown else None,
+            after[name],
+            ranges[name].low,
+            ranges[name].high,
         )
         for name in paths.names
     )
@@ -222,7 +231,7 @@ def stages_of(
     limit: float,
 ) -> tuple[Stage, ...]:
     """Steps from the flown gains to the new ones, no ratio above the limit, each judged."""
-    ratios = [abs(np.log(c.new / c.flown)) for c in changes if c.flown > 0.0 and c.new > 0.0]
+    ratios = [abs(np.log(c.ratio)) for c in changes if c.ratio]
     count = max(1, int(np.ceil(max(ratios, default=0.0) / np.log(limit) - 1e-9)))
     paths = ControllerPaths(loops[place], setting.gyro, setting.with_angle)
     plants = setting.searched.axis(place, loops, setting.gyro)
@@ -245,10 +254,10 @@ def stages_of(
 
 def _between(change: TunedGain, share: float) -> float:
     """On the way from flown to new: by ratio, and by difference where one is zero."""
-    if share >= 1.0:
+    if share >= 1.0 or change.flown is None:
         return change.new
-    if change.flown > 0.0 and change.new > 0.0:
-        value = change.flown * (change.new / change.flown) ** share
+    if change.ratio:
+        value = change.flown * change.ratio**share
     else:
         value = change.flown + share * (change.new - change.flown)
     return float(f"{value:.4g}")

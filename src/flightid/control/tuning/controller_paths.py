@@ -78,7 +78,7 @@ class ControllerPaths:
             least, most = known[name].low, known[name].high
             if role == "angle_tc":
                 least, most = 1.0 / most, 1.0 / max(least, LEAST_SHARE * most)
-            low.append(least if role == "d" else max(least, LEAST_SHARE * most))
+            low.append(least if role == "d" else least or LEAST_SHARE * most)
             high.append(most)
         return np.array(low), np.array(high)
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightid.control.autopilots import AxisLoop
 from flightid.control.margins.findings import COHERENCE
 from flightid.control.tuning.axis_tuning import AxisResult
-from flightid.control.tuning.pid_design import Stage, TunedGain
+from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.worst_case import least_share
 from flightid.conventions import Light
 from flightid.findings import Finding
@@ -82,7 +82,9 @@ def remarks(
         Other rates of the model that no loop of the design closes.
     """
     held = result.flown_stable
-    if not bool(held[0]):
+    if held is None:
+        pass
+    elif not bool(held[0]):
         yield Finding(
             "flown-unstable",
             Light.RED,
@@ -103,7 +105,7 @@ def remarks(
             f"the model couples this axis with {', '.join(couplings)}, whose loops are left open",
             "tune the axes together with flightid.tune",
         )
-    outside = [c.name for c in changes if not c.low <= c.flown <= c.high]
+    outside = [c.name for c in changes if c.flown is not None and not c.low <= c.flown <= c.high]
     if outside:
         yield Finding(
             "outside-range", Light.AMBER, f"flown outside its range: {', '.join(outside)}"

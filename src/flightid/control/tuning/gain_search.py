@@ -118,10 +118,15 @@ class _Space:
     kinds: tuple[str, ...]
     low: Array
     high: Array
+    slower: float
 
     @classmethod
     def of(cls, problem: LoopProblem) -> _Space:
-        return cls(problem.kinds, problem.low, problem.high)
+        return cls(problem.kinds, problem.low, problem.high, problem.time_scale)
+
+    @property
+    def _lead(self) -> float:
+        return TIME_SCALE_S * self.slower
 
     def _range(self, kind: str) -> tuple[float, float]:
         place = self.kinds.index(kind)
@@ -139,7 +144,8 @@ class _Space:
             if "D" in self.kinds
             else np.zeros(1)
         )
-        p, ti, td, a = map(np.ravel, np.meshgrid(gains, times_i, times_d, angles))
+        times = self.slower * times_i, self.slower * times_d
+        p, ti, td, a = map(np.ravel, np.meshgrid(gains, *times, angles))
         made = {"P": p, "I": p / ti, "D": p * td, "A": a}
         table = np.column_stack([made[kind] for kind in self.kinds])
         inside = np.all((table >= self.low) & (table <= self.high), axis=1)
@@ -156,7 +162,7 @@ class _Space:
         p = float(gains[self.kinds.index("P")])
         if kind == "I":
             return float(np.log(max(gain, TINY_GAIN) / p))
-        return gain / p / TIME_SCALE_S if kind == "D" else float(np.log(gain))
+        return gain / p / self._lead if kind == "D" else float(np.log(gain))
 
     def to_gains(self, points: Array) -> Array:
         """Points (n, n_gains) to gains inside the ranges."""
@@ -164,14 +170,17 @@ class _Space:
         columns = []
         for kind, x in zip(self.kinds, points.T, strict=True):
             if kind == "D":
-                columns.append(p * x * TIME_SCALE_S)
+                columns.append(p * x * self._lead)
             else:
                 columns.append(p * np.exp(x) if kind == "I" else np.exp(x))
         return np.asarray(np.clip(np.column_stack(columns), self.low, self.high))
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest point."""
-        given = {"I": np.log([1e-3, 1e2]), "D": np.array([0.0, LARGEST_TD_S / TIME_SCALE_S])}
+        given = {
+            "I": np.log(np.array([1e-3, 1e2]) / self.slower),
+            "D": np.array([0.0, LARGEST_TD_S / TIME_SCALE_S]),
+        }
         given |= {kind: np.log(self._range(kind)) for kind in "PA" if kind in self.kinds}
         low, high = np.array([given[kind] for kind in self.kinds]).T
         return low, high

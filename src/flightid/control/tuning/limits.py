@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from flightid.control.tuning.requirements import TuningRequirements
 
 Array = NDArray[np.float64]
-RATE, WHOLE, ANGLE = "rate loop", "whole loop", "angle loop"
+WHOLE, ANGLE = "whole loop", "angle loop"
 TARGET = "target"
 TINY = 1e-12
 
@@ -56,17 +56,19 @@ def limits(
     ----------
     need : TuningRequirements
     loops : iterable of str
-        `RATE`, and `WHOLE` and `ANGLE` where there is an angle loop.
+        The innermost first; `WHOLE` and `ANGLE` where there is an angle loop.
     crossover_limit_rad_s : float or None
-        Highest crossover of the rate loop that the identified band allows, rad/s.
+        Highest crossover of the innermost loop that the identified band allows, rad/s.
     """
     names = tuple(loops)
     made = [limit for loop in names for limit in _margins(need, loop)]
     if crossover_limit_rad_s is not None:
         text = f"≤ {crossover_limit_rad_s:.4g}"
         below = _below(crossover_limit_rad_s)
-        made.append(Limit("identified band", RATE, "crossover_rad_s", text, below, highest=True))
-    return (*made, *(limit for limit in _targets(need) if limit.loop in names))
+        made.append(
+            Limit("identified band", names[0], "crossover_rad_s", text, below, highest=True)
+        )
+    return (*made, *(limit for limit in _targets(need, names[0]) if limit.loop in names))
 
 
 def present(values: Array) -> Array:
@@ -93,12 +95,12 @@ def _margins(need: TuningRequirements, loop: str) -> Iterator[Limit]:
     )
 
 
-def _targets(need: TuningRequirements) -> Iterator[Limit]:
+def _targets(need: TuningRequirements, inner: str) -> Iterator[Limit]:
     for name, loop, field, least in (
-        ("crossover", RATE, "crossover_rad_s", need.crossover_rad_s),
+        ("crossover", inner, "crossover_rad_s", need.crossover_rad_s),
         (
             "disturbance bandwidth",
-            RATE,
+            inner,
             "disturbance_bandwidth_rad_s",
             need.disturbance_bandwidth_rad_s,
         ),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flightid.control.margins.loop_metrics import LoopMetrics, loop_metrics
 from flightid.control.margins.stability_count import unstable_poles
-from flightid.control.tuning.limits import ANGLE, RATE, TINY, WHOLE, limits, present
+from flightid.control.tuning.limits import ANGLE, TINY, WHOLE, limits, present
 from flightid.control.tuning.requirements import TuningRequirements
 
 Array = NDArray[np.float64]
@@ -97,16 +97,19 @@ class Loops:
         Rate to output, with the opposite sign.
     rate, whole, angle : ndarray of complex
         Broken at the output with the angle loop open, with it closed, and at the angle.
+    inner : str
+        What the loop without the angle is called.
     """
 
     control: Complex
     rate: Complex
     whole: Complex
     angle: Complex | None
+    inner: str
 
     def named(self) -> Iterator[tuple[str, Complex]]:
         """Each loop that there is."""
-        yield RATE, self.rate
+        yield self.inner, self.rate
         if self.angle is not None:
             yield WHOLE, self.whole
             yield ANGLE, self.angle
@@ -163,6 +166,10 @@ class LoopProblem:
         Of the rate that the controller is given, (rad/s)²/Hz; None: white, of unknown size.
     noise_limit : float or None
         Largest output noise over gyro noise (or rms output where the noise is known).
+    inner : str
+        What the innermost loop is called.
+    time_scale : float
+        Of the loop's dynamics over those of a vehicle's rate loop.
     """
 
     plants: Plants
@@ -174,6 +181,8 @@ class LoopProblem:
     crossover_limit_rad_s: float | None = None
     noise_psd: Array | None = None
     noise_limit: float | None = None
+    inner: str = "rate loop"
+    time_scale: float = 1.0
 
     def with_plants(self, plants: Plants) -> LoopProblem:
         """The same requirements on other plants, at their frequencies."""
@@ -200,10 +209,10 @@ class LoopProblem:
         control = inner @ feedback
         rate = control[:, None] * plants.rate
         if not self.has_angle or unit is None:
-            return Loops(control, rate, rate, None)
+            return Loops(control, rate, rate, None, self.inner)
         forward = inner @ terms[:-1] + terms[-1]
         outer = (gains[:, -1:] * forward * unit)[:, None] * plants.angle
-        return Loops(control, rate, rate + outer, outer / (1.0 + rate))
+        return Loops(control, rate, rate + outer, outer / (1.0 + rate), self.inner)
 
     def judge(self, gains: Array, rows: list[int] | None = None) -> LoopAssessment:
         """Judge candidates.
@@ -217,8 +226,8 @@ class LoopProblem:
         plants = self.plants if rows is None else self.plants.take(rows)
         omega, loops = plants.omega_rad_s, self.loops(gains, plants)
         stable = np.ones(loops.rate.shape[:2], dtype=bool)
-        for broken in dict.fromkeys((RATE, WHOLE)):
-            difference = 1.0 + (loops.rate if broken == RATE else loops.whole)
+        for broken in (loops.rate,) if loops.angle is None else (loops.rate, loops.whole):
+            difference = 1.0 + broken
             stable &= unstable_poles(omega, difference * plants.rest, plants.unstable) == 0
         metrics = {
             name: loop_metrics(omega, loop, unstable_poles=plants.unstable)
@@ -229,7 +238,7 @@ class LoopProblem:
         return LoopAssessment(
             tuple(parts),
             np.array([*parts.values()]),
-            self._objective(plants, metrics[RATE], 1.0 + loops.whole),
+            self._objective(plants, metrics[self.inner], 1.0 + loops.whole),
             metrics,
             stable,
             noise,
@@ -237,7 +246,7 @@ class LoopProblem:
         )
 
     def _peaks(self, omega: Array, loop: Complex) -> Array:
-        start = int(np.searchsorted(omega, LOWEST_PEAK_RAD_S))
+        start = int(np.searchsorted(omega, LOWEST_PEAK_RAD_S / self.time_scale))
         edges = np.unique(np.linspace(start, len(omega), PEAK_BANDS, endpoint=False).astype(int))
         least = np.minimum.reduceat(np.abs(1.0 + loop), edges, axis=-1)
         peak = self.requirements.peak

@@ -31,5 +31,6 @@ class TuneOptions(Options):
         above=0.0,
         doc="Band that the models were identified in; default: what their fits say.",
     )
+    nominal: bool = option(False, doc="Take a model without covariance, for its own margins alone.")
     draws: int = option(DRAWS, minimum=1, doc="Plants drawn from the covariance.")
     seed: int = option(0, minimum=0, doc="Seed of the draws.")

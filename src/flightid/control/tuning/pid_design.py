@@ -13,66 +13,19 @@ from flightid.control.autopilots import (
     write_ardupilot_parameters,
     write_px4_parameters,
 )
+from flightid.control.autopilots.pid_loop import PidLoop
+from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.promises import Promise
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import ResponseBand
-from flightid.errors import DataError, UnknownNameError
+from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.files import as_path, write_atomically
 from flightid.findings import Finding
+from flightid.models.save import toml_value
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.quantiles import LEVEL, interval_words
-
-
-@dataclass(frozen=True)
-class TunedGain:
-    """One parameter before and after.
-
-    Attributes
-    ----------
-    name, unit : str
-        The autopilot's name.
-    flown, new : float
-    low, high : float
-        Range of the autopilot's documentation.
-
-    Example
-    -------
-    >>> TunedGain("ATC_RAT_RLL_P", "1/(rad/s)", 0.1, 0.15, 0.01, 0.5).ratio
-    1.4999999999999998
-    """
-
-    name: str
-    unit: str
-    flown: float
-    new: float
-    low: float
-    high: float
-
-    @property
-    def ratio(self) -> float | None:
-        """New over flown; None where nothing was flown."""
-        return self.new / self.flown if self.flown > 0.0 else None
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One step of gains on the way.
-
-    Attributes
-    ----------
-    gains : mapping of str to float
-        By the autopilot's names.
-    stable : bool
-        For every plant that the data allow.
-    phase_margin_deg, gain_margin_db : float or None
-        Least ones of all loops and plants, at the output.
-    """
-
-    gains: Mapping[str, float]
-    stable: bool
-    phase_margin_deg: float | None
-    gain_margin_db: float | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -205,11 +158,13 @@ class PidDesign(
             (
                 *(c.name, c.flown),
                 *((c.new, c.ratio) if self.exists else (None, None)),
-                *(c.low, c.high, c.unit),
+                *((c.low, c.high) if self.plain is None else (None, None)),
+                c.unit,
             )
             for c in self.changes
         ]
-        return Table(f"Gains of {self.axis}", columns, tuple(rows), self._words())
+        made = Table(f"Gains of {self.axis}", columns, tuple(rows), self._words())
+        return made if self.flown.has_flown else made.without_empty_columns()
 
     def promise_table(self, *, level: float = LEVEL) -> Table:
         """Margins and bandwidths beside those of the flown gains.
@@ -281,6 +236,8 @@ class PidDesign(
     def write(self, path: str | Path, *, overwrite: bool = False) -> tuple[Path, ...]:
         """Write the gains as the autopilot's parameter files, and the flown ones to go back to.
 
+        Those of a PID of its own are written as TOML, in every form (`flightid.export`: as C).
+
         One file for each step (``name-1.param``, … where there are several), each with a file
         ``….rollback.param`` of the flown values; QGroundControl's layout for PX4.
 
@@ -307,6 +264,11 @@ class PidDesign(
         """
         return write_steps([self], path, overwrite=overwrite)
 
+    @property
+    def plain(self) -> PidLoop | None:
+        """The controller where it is a PID of its own, None where it is an autopilot's."""
+        return self.loop if isinstance(self.loop, PidLoop) else None
+
     def _computed(self) -> dict[str, object]:
         return {
             "autopilot": self.flown.autopilot,
@@ -318,7 +280,8 @@ class PidDesign(
         }
 
     def _tables(self) -> tuple[Table, ...]:
-        return (self.gain_table(), self.promise_table())
+        forms = () if self.plain is None else (self.plain.form_table(),)
+        return (self.gain_table(), *forms, self.promise_table())
 
 
 def write_steps(
@@ -331,13 +294,10 @@ def write_steps(
     DataError
         An axis has no gains.
     """
-    for design in designs:
-        if not design.exists:
-            raise DataError(
-                f"no gains of {design.axis} meet the requirements, so none are written",
-                found=", ".join(design.binding),
-                action="relax a requirement that cannot be met, or identify better",
-            )
+    require_gains(designs)
+    plain = [design.plain for design in designs if design.plain is not None]
+    if plain:
+        return _write_settings(plain, as_path(path), overwrite=overwrite)
     final, count = Path(path), max(len(design.stages) for design in designs)
     write = (
         write_px4_parameters
@@ -354,6 +314,39 @@ def write_steps(
         made = write(changes, name, notes=notes, overwrite=overwrite)
         written += [each for each in (made.path, made.rollback) if each is not None]
     return tuple(written)
+
+
+def require_gains(designs: Sequence[PidDesign]) -> None:
+    """Refuse axes without gains.
+
+    Raises
+    ------
+    DataError
+        An axis has none.
+    """
+    for design in designs:
+        if not design.exists:
+            raise DataError(
+                f"no gains of {design.axis} meet the requirements, so none are written",
+                found=", ".join(design.binding),
+                action="relax a requirement that cannot be met, or identify better",
+            )
+
+
+def _write_settings(loops: Sequence[PidLoop], path: Path, *, overwrite: bool) -> tuple[Path, ...]:
+    """Numbers of controllers, one table each."""
+    if path.suffix != ".toml" or (path.exists() and not overwrite):
+        raise OptionError(
+            "the gains of a PID are written to a new TOML file",
+            found=path.name,
+            needed="a name that ends in .toml, of no file that is there",
+            action="name another file, or export the design as C",
+        )
+    lines = []
+    for loop in loops:
+        told = loop.settings().items()
+        lines += ["[[controller]]", *(f"{key} = {toml_value(value)}" for key, value in told), ""]
+    return (write_atomically(path, "\n".join(lines)),)
 
 
 def _step_changes(design: PidDesign, step: int) -> list[GainChange]:

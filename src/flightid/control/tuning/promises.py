@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.control.autopilots import AxisLoop
 from flightid.control.tuning.limits import ANGLE, limits
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
 from flightid.uncertainty.estimate import Estimate, Reading
@@ -169,11 +170,13 @@ def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None
     values = new.noise[0]
     limit = problem.noise_limit
     before = None if old is None or not old.stable[0, 0] else old.noise[0]
-    name = "noise, rms" if known else "noise over gyro noise"
+    rate = problem.inner == AxisLoop.inner
+    sensor = "gyro" if rate else "measurement"
+    name = "noise, rms" if known else f"noise over {sensor} noise"
     return Promise(
         "output",
         name,
-        _estimate(f"output: {name}", "1" if known else "1/(rad/s)", values),
+        _estimate(f"output: {name}", "1/(rad/s)" if rate and not known else "1", values),
         _worst(values, False),
         None if before is None else _number(before[0]),
         None if before is None or old is None or not old.stable.all() else _worst(before, False),

@@ -29,12 +29,18 @@ SHOWN_S = {
     "angle step": 2.0,
     "disturbance to rate": 2.0,
     "disturbance to angle": 4.0,
+    "step": 2.0,
+    "disturbance": 4.0,
 }
+PLAIN = {"rate step": "step", "disturbance to rate": "disturbance"}
+"""The same of a loop that holds no rate."""
 UNITS = {
     "rate step": "rad/s",
     "angle step": "rad",
     "disturbance to rate": "rad/s",
     "disturbance to angle": "rad",
+    "step": "",
+    "disturbance": "",
 }
 SETTLED_SHARE = 1e-3
 FIRST_S, LONGEST = 8.0, 1 << 16
@@ -106,8 +112,8 @@ def responses(
     Oppenheim & Schafer, *Discrete-Time Signal Processing*, 3rd ed., section 8.4 (sampling of the
     transform is aliasing in time, which vanishes where the response has died away).
     """
-    step = plants.sample_time_s
-    count = 1 << int(np.ceil(np.log2(FIRST_S / step)))
+    step, loop = plants.sample_time_s, loops[place]
+    count = 1 << int(np.ceil(np.log2(FIRST_S * loop.time_scale / step)))
     while True:
         pulses = _pulses(plants, loops, place, gyro, count)
         tails = [
@@ -117,8 +123,9 @@ def responses(
             break
         count *= 4
     found = {}
-    for name, pulse in pulses.items():
-        n = min(count, 1 + round((shown_s or SHOWN_S[name]) / step))
+    for told, pulse in pulses.items():
+        name = told if loop.inner == AxisLoop.inner else PLAIN[told]
+        n = min(count, 1 + round((shown_s or SHOWN_S[name] * loop.time_scale) / step))
         found[name] = (np.arange(n, dtype=np.float64) * step, np.cumsum(pulse, axis=1)[:, :n])
     return found
 

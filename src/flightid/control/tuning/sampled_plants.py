@@ -19,6 +19,8 @@ Complex = NDArray[np.complex128]
 ON_CIRCLE = 1e-9
 LOWEST_RAD_S, KNEE_RAD_S = 1e-5, 0.05
 TAIL_POINTS = 40
+FEWEST_DECADES = 600.0
+"""Least ratio of the highest frequency to the knee: slow loops have a lower one."""
 BELOW_NYQUIST = 1.0 - 1e-4
 """At half the sample rate itself filters are exactly zero."""
 
@@ -37,10 +39,10 @@ def loop_grid(sample_time_s: float, points: int) -> Array:
     -------
     ndarray, shape (TAIL_POINTS + points,)
     """
-    tail = np.geomspace(LOWEST_RAD_S, KNEE_RAD_S, TAIL_POINTS, endpoint=False)
-    return np.concatenate(
-        [tail, np.geomspace(KNEE_RAD_S, BELOW_NYQUIST * np.pi / sample_time_s, points)]
-    )
+    top = BELOW_NYQUIST * np.pi / sample_time_s
+    knee = min(KNEE_RAD_S, top / FEWEST_DECADES)
+    tail = np.geomspace(LOWEST_RAD_S * knee / KNEE_RAD_S, knee, TAIL_POINTS, endpoint=False)
+    return np.concatenate([tail, np.geomspace(knee, top, points)])
 
 
 @dataclass(frozen=True, eq=False)

@@ -163,7 +163,7 @@ def tune_pid(
         gyro,
         angle_loop and has_angle_loop(flown),
         [sign],
-        _noise(gyro_noise, step),
+        noise_density(gyro_noise, step),
     )
     with progress(axis_steps(setting, flown), f"tuning {flown.axis}") as advance:
         result = tune_axis(setting, [flown], [flown], 0, advance)
@@ -200,7 +200,8 @@ def make_setting(
         return sample_plants(turned, outputs, inputs, step, hold_in_model=evidence.hold_in_model)
 
     searched = sampled(evidence.sources)
-    _require_right_way(searched.systems[0], searched, outputs)
+    if all(loop.inner == AxisLoop.inner for loop in loops):
+        _require_right_way(searched.systems[0], searched, outputs)
     judged = sampled((evidence.estimate, *evidence.fresh))
     return Setting(
         evidence,
@@ -232,7 +233,8 @@ def design_of(
     )
     new = [result.loop if k == place else loop for k, loop in enumerate(loops)]
     shown = setting.judged.sampled.take(list(range(min(SHOWN, len(setting.judged.sampled)))))
-    steady = all_flown if bool(result.flown_stable[0]) else None
+    held = result.flown_stable
+    steady = all_flown if held is not None and bool(held[0]) else None
     bands = response_bands(shown, new, steady, place, setting.gyro) if exists else ()
     count = len(result.met)
     return PidDesign(
@@ -296,7 +298,7 @@ def _require_right_way(system: LinearSystem, plants: SampledPlants, outputs: lis
             )
 
 
-def _noise(
+def noise_density(
     given: float | tuple[ArrayLike, ArrayLike] | None, step: float
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Frequencies and one-sided density of the gyro noise."""

@@ -1,0 +1,189 @@
+"""A PID of its own: forms, recursion and code agree, and its margins are those of theory."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.cli.program import run
+from flightid.control.autopilots.pid_loop import PidLoop
+from flightid.errors import DataError, ExportError, OptionError
+from flightid.models.linear.linear_system import LinearSystem
+from tests.closeness import assert_close
+
+LAG = LinearSystem([[-5.0]], [[1.0]], [[10.0]], [[0.0]], ("u",), ("y",), (0.02,))
+
+
+def _loop(**changed: object) -> PidLoop:
+    values = {"p": 2.0, "i": 3.0, "d": 0.2, "b": 0.7, "c": 0.3, "filter_s": 0.04, "tracking_s": 0.3}
+    names = {"p": "Kp", "i": "Ki", "d": "Kd", "b": "b", "c": "c", "filter_s": "Tf",
+             "tracking_s": "Tt"}  # fmt: skip
+    return replace(PidLoop("y", values, names, 50.0, 50.0), **changed)  # type: ignore[arg-type]
+
+
+def _tuned(plant: LinearSystem = LAG, **asked: object) -> fid.PidDesign:
+    options = fid.ControllerOptions(**asked)  # type: ignore[arg-type]
+    return fid.tune_controller(plant, controller=options, nominal=True,
+                               band_rad_s=(0.1, 60.0))  # fmt: skip
+
+
+def test_every_form_is_the_same_transfer_function() -> None:
+    loop = _loop(sampled=False)
+    s = 1j * np.geomspace(0.1, 200.0, 30)
+    ideal, series = loop.form("ideal"), loop.form("series")
+    assert ideal is not None
+    assert series is not None
+    lag = s * 0.04 + 1.0
+    truth = loop.feedback(s.imag, with_hold=False)
+    made = [
+        ideal["K"] * (1.0 + 1.0 / (ideal["Ti"] * s) + ideal["Td"] * s / lag),
+        series["K"] * (1.0 + 1.0 / (series["Ti"] * s)) * (series["Td"] * s + 1.0) / lag,
+    ]
+    for each in made:
+        assert_close(each, truth, rtol=1e-12, why="one transfer function")
+    assert loop.with_gains(Ki=40.0).form("series") is None
+
+
+@pytest.mark.parametrize("side", ["set-point", "measured"])
+def test_the_recursion_answers_as_its_linear_view_says(side: str) -> None:
+    loop, n, omega = _loop(), 4000, 2.0 * np.pi * 2.0
+    tone = np.sin(omega * np.arange(n) / 50.0)
+    pair = (tone, 0.0 * tone) if side == "set-point" else (0.0 * tone, -tone)
+    out = loop.run(*pair).output[-1000:]
+    path = loop.forward if side == "set-point" else loop.feedback
+    gain = path([omega], with_hold=False)[0]
+    phase = omega * np.arange(n)[-1000:] / 50.0
+    wanted = gain.real * np.sin(phase) + gain.imag * np.cos(phase)
+    assert_close(
+        out - out.mean(), wanted - wanted.mean(), atol=1e-9, why="a tone through the recursion"
+    )
+
+
+def test_a_saturated_integral_comes_back_at_once() -> None:
+    target = np.concatenate([np.full(500, 10.0), np.full(50, -0.2)])
+    kept = [_loop(high=1.0).run(target, 0.0 * target).output]
+    wound = _loop(high=1.0).with_gains(Tt=0.0).run(target, 0.0 * target).output
+    assert kept[0].max() == 1.0
+    assert kept[0][520] < 1.0
+    assert wound[-1] == 1.0
+    slow = _loop(rate_per_s=1.0).run(target, 0.0 * target).output
+    assert_close(np.abs(np.diff(slow)).max(), 1.0 / 50.0, rtol=1e-9, why="rate limit")
+
+
+def test_the_code_does_what_the_recursion_does(tmp_path: Path) -> None:
+    loop = _loop(direct=True, low=-1.5, high=2.0, rate_per_s=40.0)
+    design = replace(_tuned(controller_rate_hz=50.0), loop=loop)
+    fid.export(design, tmp_path / "pid.c")
+    build = ["cc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC", "-o"]
+    subprocess.run([*build, tmp_path / "pid.so", tmp_path / "pid.c"], check=True)
+    code = ctypes.CDLL(str(tmp_path / "pid.so"))
+    code.pid_step.restype, number = ctypes.c_double, ctypes.c_double
+    state = (number * 4)()
+    r, y = np.random.default_rng(1).standard_normal((2, 300))
+    made = [code.pid_step(state, number(a), number(b)) for a, b in zip(r, y, strict=True)]
+    assert_close(np.array(made), loop.run(r, y).output, atol=1e-12, why="same arithmetic")
+    code.pid_start(state, number(0.5), number(0.2), number(0.8))
+    assert_close(code.pid_step(state, number(0.5), number(0.2)), 0.8, atol=1e-12, why="bumpless")
+    with pytest.raises(ExportError, match="no recursion"):
+        fid.export(_tuned(), tmp_path / "other.c")
+
+
+def test_margins_are_those_of_the_continuous_loop() -> None:
+    design = _tuned(controller="pi")
+    kp, ki = design.gains["Kp"], design.gains["Ki"]
+    omega = np.geomspace(0.1, 200.0, 200_001)
+    s = 1j * omega
+    loop = (kp + ki / s) * 10.0 / (s + 5.0) * np.exp(-0.02 * s)
+    at = int(np.argmin(np.abs(np.log(np.abs(loop)))))
+    margin = design.promise("loop", "phase margin").nominal
+    assert_close(
+        margin, 180.0 + np.degrees(np.angle(loop[at])), atol=0.05, why="between grid points"
+    )
+    assert_close(
+        design.promise("loop", "crossover").nominal, omega[at], rtol=1e-3, why="between grid points"
+    )
+    assert design.exists
+    assert margin is not None
+    assert margin >= 45.0
+
+
+@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
+def test_slow_and_fast_plants_have_gains_of_their_own_time(factor: float) -> None:
+    plant = LinearSystem(
+        [[-5.0 * factor]], [[factor]], [[10.0]], [[0.0]], ("u",), ("y",), (0.02 / factor,)
+    )
+    design = fid.tune_controller(
+        plant, nominal=True, band_rad_s=(0.1 * factor, 60.0 * factor),
+        controller=fid.ControllerOptions(controller_rate_hz=100.0 * factor),
+    )  # fmt: skip
+    usual = _tuned(controller_rate_hz=100.0)
+    assert design.exists
+    assert_close(design.gains["Kp"], usual.gains["Kp"], rtol=0.03, why="one plant in another time")
+    assert_close(
+        design.gains["Ki"] / factor, usual.gains["Ki"], rtol=0.06, why="one plant in another time"
+    )
+
+
+def test_the_error_is_turned_for_a_plant_that_answers_the_other_way() -> None:
+    plant = replace(LAG, c=-np.asarray(LAG.c))
+    design = _tuned(plant, controller_rate_hz=50.0)
+    assert design.plain is not None
+    assert design.plain.direct
+    assert design.gains == _tuned(controller_rate_hz=50.0).gains
+
+
+def test_an_unstable_plant_is_held() -> None:
+    plant = LinearSystem([[2.0]], [[1.0]], [[-3.0]], [[0.0]], ("u",), ("y",))
+    design = _tuned(plant, controller="pi", controller_rate_hz=200.0)
+    assert design.exists
+    assert design.plain is not None
+    assert design.plain.direct
+    kp, ki = (-design.gains[name] for name in ("Kp", "Ki"))
+    assert np.all(np.roots([1.0, -2.0 - 3.0 * kp, -3.0 * ki]).real < 0.0)
+
+
+def test_two_degrees_of_freedom_bound_the_overshoot() -> None:
+    design = _tuned(controller="two_dof", controller_rate_hz=50.0, overshoot=0.25)
+    assert design.response("step").overshoot <= 0.25
+    b = design.plain.values["b"] if design.plain else 0.0
+    higher = _tuned(controller="pi_d", controller_rate_hz=50.0).response("step").overshoot
+    assert b < 1.0
+    assert higher > 0.25
+
+
+def test_refusals_are_those_of_autopilots(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="errors are not known"):
+        fid.tune_controller(LAG, band_rad_s=(0.1, 60.0))
+    two = LinearSystem([[-1.0]], [[1.0, 2.0]], [[1.0]], [[0.0, 0.0]], ("u", "v"), ("y",))
+    with pytest.raises(OptionError, match="the input of the loop is not clear"):
+        fid.tune_controller(two, nominal=True)
+    with pytest.raises(OptionError, match="leave nothing between"):
+        fid.ControllerOptions(output_low=1.0, output_high=0.0)
+
+
+def test_a_command_ends_in_gains_and_code(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fid.write_model(_fit(), tmp_path / "rig.toml")
+    said = ["tune", str(tmp_path / "rig.toml"), "--controller", "pi_d", "--controller-rate-hz"]
+    for name in ("gains.toml", "gains.c"):
+        assert run([*said, "100", "--draws", "20", "--write", str(tmp_path / name)]) == 0
+        assert "worst" in capsys.readouterr().out
+        assert (tmp_path / name).exists()
+    assert "ideal = {" in (tmp_path / "gains.toml").read_text()
+
+
+def _fit() -> fid.Fit:
+    model = fid.load_model("rate_first_order").with_values({"Lp": -5.0, "Ltphi": 10.0})
+    omega = np.geomspace(0.5, 60.0, 40)
+    data = fid.FrequencyResponse.from_values(
+        omega, model.frequency_response(omega), inputs=model.inputs, outputs=model.outputs,
+        units=model.units, random_error=np.full((1, 1, 40), 0.03),
+    )  # fmt: skip
+    return fid.identify(model, data, correct_bias=False, minimum_coherence=None)
