@@ -175,3 +175,20 @@ def test_what_settles_a_verification_is_not_asked_of_the_records_of_the_fit(
     assert fit is not None
     spectra = compare_free_run(fit, [fit.records[0].measured], {"settle_s": 1e3})
     assert spectra is not None
+
+
+def test_a_black_box_needs_no_band_and_says_what_it_predicts(
+    folder: Path, cache: dict[str, Any]
+) -> None:
+    place = STUDY.rindex("band_rad_s")
+    text = STUDY[:place] + STUDY[STUDY.index("\n", place) + 1 :]
+    found = run(folder, text, cache)
+    black = found.identified[1]
+    assert (black.response, black.coherent) == (None, None)
+    assert black.fit is not None
+    fit_percent = black.on_unseen["unseen"].fit_percent["angle"]
+    said = black.fit.evidence.verdict.message
+    assert said.startswith(f"predicts {fit_percent:.3g} % of angle of “unseen”")
+    reason = black.fit.evidence.reason
+    assert reason is not None
+    assert reason.message in said

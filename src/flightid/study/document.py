@@ -271,8 +271,9 @@ def _options(study: StudyResults) -> dict[str, Cell]:
     settings, response = study.settings, study.settings.response
     if not settings.models:
         return {}
-    options: dict[str, Cell] = {"fit": settings.fit.method}
-    if settings.fit.on_responses:
+    methods = dict.fromkeys(model.fit.method for model in settings.models)
+    options: dict[str, Cell] = {"fit": ", ".join(methods)}
+    if any(item.responses for item in study.identified):
         options |= _told("response", response)
     options |= {f"{name} of a fit": str(value) for name, value in settings.fit.options.items()}
     options |= _told("verification", settings.check)

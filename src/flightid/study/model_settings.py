@@ -172,6 +172,8 @@ def _without_equations(
     reader: TableReader, folder: Path, *, response: ResponseSettings, check: VerifySettings
 ) -> ModelSettings:
     identify = reader.names("identify")
+    # Only a response needs a band: without one no coherence is shown, and all inputs are kept.
+    responds = "coherence" in reader or "band_rad_s" in reader or response.band_rad_s is not None
     structure = read_structure(reader, identify)
     made = ModelSettings(
         reader.text("name"),
@@ -179,7 +181,7 @@ def _without_equations(
         None,
         identify,
         reader.names("verify", ()),
-        _band(reader, response),
+        _band(reader, response) if responds else None,
         response,
         FitSettings(METHODS.get(structure.kind, "prediction_error")),
         replace(check, without_equations=True),
