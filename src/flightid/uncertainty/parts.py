@@ -193,7 +193,7 @@ def _freedom(weights: Array) -> float:
 
 
 def larger(covariance: Array, other: Array) -> Array:
-    """A covariance that is nowhere below either of two, the first being positive.
+    """A covariance that is nowhere below either of two; the first is positive but for rounding.
 
     Example
     -------
@@ -202,7 +202,9 @@ def larger(covariance: Array, other: Array) -> Array:
            [0., 1.]])
     """
     size = np.sqrt(np.diag(covariance))
-    lower = np.linalg.cholesky(covariance / np.outer(size, size))
+    # Parameters that hang together to rounding: Cholesky's root would fail there.
+    own, axes = np.linalg.eigh(covariance / np.outer(size, size))
+    lower = axes * np.sqrt(np.maximum(own, np.finfo(float).eps * own[-1]))
     inner = np.linalg.solve(lower, np.linalg.solve(lower, other / np.outer(size, size)).T)
     sizes, turned = np.linalg.eigh(0.5 * (inner + inner.T))
     root = size[:, None] * (lower @ turned)
