@@ -1,0 +1,280 @@
+"""Gains flown: tunings over right and wrong structures, methods and noise, each in `hover`.
+
+Run: python -m tests.strangers.gains --runs 500 [--first-seed 0] [--jobs 1]
+
+A promise is broken where the vehicle with the tuned gains is unstable or saturates hands off, or
+where its own worst margin lies below the lowest that the table prints for that loop.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import chirp
+
+import flightid as fid
+from flightid.conventions import Light
+from tests.strangers import noises
+from tests.strangers.hover import STEP_S, Axis, Gains, Vehicle, margins, vehicle
+
+TRUTHS = ("first order", "motor lag", "motor lag, no damping", "flapping", "motor lag and flapping")
+STRUCTURES = (
+    "rate_first_order", "rate_gain_lag", "rate_integrator", "rate_integrator_motor_lag",
+    "rate_motor_lag", "rate_second_order", "published",
+)  # fmt: skip
+METHODS = ("frequency_domain", "instrument", "output_error", "joint", "equation_error")
+HOLDS = {
+    "first order": ("rate_first_order", "rate_gain_lag", "rate_motor_lag", "rate_second_order"),
+    "motor lag": ("rate_motor_lag", "rate_second_order"),
+    "motor lag, no damping": ("rate_integrator_motor_lag", "rate_motor_lag"),
+    "flapping": (),
+    "motor lag and flapping": (),
+}
+"""Structures that hold a truth; the gyro's filter is a delay to all."""
+TOLERANCE = {"phase margin": 0.25, "gain margin": 0.1}
+"""Of grids and interpolation: deg, dB."""
+QUIET_S, SATURATED = 8.0, 0.02
+NAMES = {
+    "p": "ATC_RAT_RLL_P",
+    "i": "ATC_RAT_RLL_I",
+    "d": "ATC_RAT_RLL_D",
+    "angle_p": "ATC_ANG_RLL_P",
+}
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What was drawn for a seed."""
+
+    craft: Vehicle
+    flown: Gains
+    structure: str
+    method: str
+    noise: float
+    gust: float
+    every: int
+    amplitude: float
+    top_hz: float
+
+    @property
+    def right(self) -> bool:
+        """Whether the structure holds the truth."""
+        return self.structure in HOLDS[self.craft.name]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a tuning."""
+
+    seed: int
+    flight: Flight
+    verdict: str
+    """refused, none, red, amber or green: of the gains as they would be written."""
+    why: str
+    broken: str
+    """In which way the promise did not hold; empty: it held, or there was none."""
+    seconds: float
+
+
+def drawn(seed: int) -> Flight:
+    """Vehicle, flown gains, structure, method and noise."""
+    r = np.random.default_rng(seed)
+    name = TRUTHS[r.integers(len(TRUTHS))]
+    lagged = "motor" in name
+    craft = vehicle(
+        name,
+        effect=float(np.exp(r.uniform(np.log(60), np.log(300)))),
+        damping=0.0 if "no damping" in name else -float(r.uniform(0.5, 6.0)),
+        motor_s=float(r.uniform(0.02, 0.09)) if lagged else 0.0,
+        mode=(float(r.uniform(9, 30)), float(r.uniform(0.4, 0.9))) if "flapping" in name else None,
+        delay=int(r.integers(1, 9)),
+        gyro_hz=float(r.uniform(30, 90)),
+    )
+    method = METHODS[r.integers(len(METHODS))]
+    structure = STRUCTURES[r.integers(len(STRUCTURES))]
+    if method == "equation_error":
+        structure = "published"
+    elif structure == "published":
+        method = "output_error"
+    return Flight(
+        craft, _flown(craft, r), structure, method,
+        noise=float(np.exp(r.uniform(np.log(0.003), np.log(0.05)))),
+        gust=float(np.exp(r.uniform(np.log(0.003), np.log(0.06)))),
+        every=int(r.choice([1, 1, 4])),
+        amplitude=float(r.uniform(0.05, 0.25)),
+        top_hz=float(r.uniform(4.0, 20.0)),
+    )  # fmt: skip
+
+
+def _flown(craft: Vehicle, r: np.random.Generator) -> Gains:
+    """Timid gains: halved until the margins are 40° and 8 dB."""
+    p = r.uniform(3.0, 8.0) / craft.about["effect"]
+    gains = Gains(p, p, float(r.choice([0.0, 0.015])) * p, float(r.uniform(2.0, 5.0)))
+    while True:
+        axis = Axis(craft, gains)
+        least = [margins(loop) for loop in axis.loops().values()]
+        stable = np.abs(axis.poles()).max() < 1.0
+        if stable and min(m[0] for m in least) > 40 and min(m[1] for m in least) > 8:
+            return gains
+        gains = replace(
+            gains, p=gains.p / 1.4, i=gains.i / 1.6, d=gains.d / 1.4, angle_p=gains.angle_p / 1.2
+        )
+
+
+def record(flight: Flight, seed: int, duration_s: float = 60.0) -> fid.Record:
+    """A sweep injected at the command with both loops closed, as a log at every loop or fourth."""
+    r = np.random.default_rng([seed, 7])
+    n = round(duration_s / STEP_S)
+    t = np.arange(n) * STEP_S
+    fade = np.clip(np.minimum(t, t[-1] - t) / 2.0, 0.0, 1.0)
+    sweep = flight.amplitude * fade * chirp(t, 0.1, t[-1], flight.top_hz, method="logarithmic")
+    commands, rates = Axis(flight.craft, flight.flown).fly(
+        sweep, flight.noise * r.standard_normal(n), flight.gust * noises.ar1(r, n, 0.995)
+    )
+    kept = slice(None, None, flight.every)
+    return fid.Record.from_arrays(
+        t[kept],
+        inputs={"tau_phi": commands[kept]},
+        outputs={"p": rates[kept]},
+        excitations={"injected": sweep[kept]},
+        units={"p": "rad/s"},
+        hold="zero" if flight.every == 1 else None,
+    )
+
+
+def structure_of(name: str) -> fid.TransferFunctionModel | fid.StateSpaceModel:
+    """A library structure; "published": that of the rig study, without lag and delay."""
+    if name != "published":
+        return fid.load_model(name, axis="roll")
+    return fid.StateSpaceModel(
+        states={"p": "rad/s"},
+        input_units={"tau_phi": "1"},
+        measurements={"p": fid.Output("p", "rad/s")},
+        equations={"p'": "Lp*p + Ltphi*tau_phi"},
+        parameters=fid.Parameters(
+            [
+                fid.Parameter("Lp", -3.0, "1/s", -60.0, 0.0),
+                fid.Parameter("Ltphi", 100.0, "rad/s^2", 0.0, 2000.0),
+            ]
+        ),
+    )
+
+
+def fitted(flight: Flight, seed: int) -> fid.Fit:
+    """By the method of the flight, as the documentation says."""
+    model, data = structure_of(flight.structure), record(flight, seed)
+    if flight.method in ("output_error", "equation_error"):
+        return fid.identify(model, data, method=flight.method)
+    estimator = "instrument" if flight.method == "instrument" else "composite"
+    response = fid.estimate_response(data, inputs="tau_phi", outputs="p", estimator=estimator)
+    if flight.method == "joint":
+        return fid.identify(model, (response, record(flight, seed + 10**6)), method="joint")
+    return fid.identify(model, response)
+
+
+def loop_of(gains: Gains, flight: Flight) -> fid.AxisLoop:
+    """The axis as flightid knows it."""
+    values = {NAMES[key]: getattr(gains, key) for key in NAMES}
+    values |= {"ATC_RAT_RLL_FLTE": gains.flte_hz, "ATC_RAT_RLL_FLTD": gains.fltd_hz}
+    values |= {"ATC_RAT_RLL_FLTT": gains.fltt_hz, "INS_GYRO_FILTER": flight.craft.gyro_hz}
+    usual = fid.axis_loop("arducopter", "roll", loop_rate_hz=1 / STEP_S)
+    return usual.with_gains({name: value for name, value in values.items() if name in usual.gains})
+
+
+def tried(seed: int, *, draws: int = 100) -> Outcome:
+    """Draw, fly, fit, tune and fly what was tuned."""
+    begun, flight = time.perf_counter(), drawn(seed)
+    try:
+        fit = fitted(flight, seed)
+        design = fid.tune_pid(fit, gains=loop_of(flight.flown, flight), draws=draws, seed=seed)
+    except fid.FlightidError as error:
+        return Outcome(seed, flight, "refused", str(error), "", time.perf_counter() - begun)
+    except np.linalg.LinAlgError as error:
+        return Outcome(seed, flight, "fault", str(error), "", time.perf_counter() - begun)
+    if not design.exists:
+        why = design.findings[0].message
+        return Outcome(seed, flight, "none", why, "", time.perf_counter() - begun)
+    red = [f.message for f in design.findings if f.light is Light.RED]
+    light = "red" if red else str(design.findings[0].light)
+    broken = broken_promise(design, flight, seed)
+    return Outcome(seed, flight, light, "; ".join(red), broken, time.perf_counter() - begun)
+
+
+def broken_promise(design: fid.PidDesign, flight: Flight, seed: int) -> str:
+    """Fly the tuned gains, and compare their own margins with the least promised."""
+    new = replace(flight.flown, **{key: design.gains[NAMES[key]] for key in NAMES})
+    axis = Axis(flight.craft, new)
+    if np.abs(axis.poles()).max() >= 1.0:
+        return "unstable"
+    if share := saturation(axis, flight, seed):
+        return f"saturated {share:.0%}"
+    for name, loop in axis.loops().items():
+        for kind, true in zip(("phase margin", "gain margin"), margins(loop), strict=True):
+            least = design.promise(name, kind).worst
+            if least is not None and true < least - TOLERANCE[kind]:
+                return f"{name}: {kind} {true:.2f}, promised {least:.2f}"
+    return ""
+
+
+def saturation(axis: Axis, flight: Flight, seed: int) -> float:
+    """Share of saturated loops hands off, above what a quiet vehicle has."""
+    r, n = np.random.default_rng([seed, 11]), round(QUIET_S / STEP_S)
+    push = np.where(np.arange(n) < 40, 0.1, 0.0)
+    commands, _ = axis.fly(push, flight.noise * r.standard_normal(n), np.zeros(n))
+    share = float(np.mean(np.abs(commands[n // 2 :]) >= 1.0))
+    return share if share > SATURATED else 0.0
+
+
+def table(outcomes: list[Outcome]) -> str:
+    """Counts by method, and the whole; then each broken promise."""
+    lines = [f"{'':30s} {'n':>4s} {'ref':>4s} {'none':>4s} {'red':>4s} {'amb':>4s} {'grn':>4s} "
+             f"{'broken':>6s} {'by green':>8s} {'right':>6s} {'not made':>8s}"]  # fmt: skip
+    groups = [("all", outcomes)]
+    groups += [(m, [o for o in outcomes if o.flight.method == m]) for m in METHODS]
+    groups += [(s, [o for o in outcomes if o.flight.structure == s]) for s in STRUCTURES]
+    groups += [(t, [o for o in outcomes if o.flight.craft.name == t]) for t in TRUTHS]
+    for name, chosen in groups:
+        kinds = Counter(o.verdict for o in chosen)
+        made = [o for o in chosen if o.verdict in ("green", "amber")]
+        right = [o for o in chosen if o.flight.right]
+        lines.append(
+            f"{name:30s} {len(chosen):4d} "
+            + " ".join(f"{kinds[k]:4d}" for k in ("refused", "none", "red", "amber", "green"))
+            + f" {sum(bool(o.broken) for o in made):6d}"
+            + f" {sum(bool(o.broken) for o in made if o.verdict == 'green'):8d}"
+            + f" {len(right):6d} {sum(o not in made for o in right):8d}"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Count."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=40)
+    parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--each", action="store_true", help="one line for every tuning")
+    asked = parser.parse_args()
+    seeds = range(asked.first_seed, asked.first_seed + asked.runs)
+    if asked.jobs == 1:
+        outcomes = [tried(seed) for seed in seeds]
+    else:
+        with ProcessPoolExecutor(asked.jobs) as pool:
+            outcomes = list(pool.map(tried, seeds, chunksize=5))
+    print(table(outcomes))
+    for o in outcomes:
+        if asked.each or (o.broken and o.verdict in ("green", "amber")):
+            f = o.flight
+            print(
+                f"{o.seed:5d} {o.verdict:8s} {f.craft.name:24s} {f.structure:26s} {f.method:16s} "
+                f"{'right' if f.right else 'wrong'} {o.seconds:5.1f} s  {o.broken} | {o.why[:150]}"
+            )
+
+
+if __name__ == "__main__":
+    main()
