@@ -56,6 +56,8 @@ GROUPS = {
             "coherent_pairs",
             "CoherentPairs",
             "PairResponse",
+            "response_band",
+            "without_bias",
             "impulse_response",
             "ImpulseResponse",
         ),

@@ -113,6 +113,8 @@ if TYPE_CHECKING:
         PairResponse,
         coherent_pairs,
         estimate_response,
+        response_band,
+        without_bias,
     )
     from flightid.simulation.noise import Noise
     from flightid.simulation.simulate import simulate
@@ -216,6 +218,8 @@ _HOMES = {
     "loops": "flightid.control",
     "Verification": "flightid.validation",
     "estimate_response": "flightid.responses",
+    "response_band": "flightid.responses",
+    "without_bias": "flightid.responses",
     "excitation": "flightid.excitation",
     "identify": "flightid.identification.identify",
     "inspect_log": "flightid.inspection",
@@ -354,6 +358,7 @@ __all__ = [
     "reduce",
     "replay",
     "residual_tests",
+    "response_band",
     "rotor_physics",
     "run_study",
     "scan_orders",
@@ -367,6 +372,7 @@ __all__ = [
     "tune_pid",
     "validation",
     "verify",
+    "without_bias",
     "write_ardupilot_parameters",
     "write_model",
     "write_px4_parameters",

@@ -167,7 +167,7 @@ def estimate_response(
     except DataError as error:
         missing = Finding("no-covariance", Light.UNKNOWN, str(error))
         return replace(response, findings=(*response.findings, missing))
-    linear = LinearEstimate.of(samples, WindowedWeights(errors), len(omega))
+    linear = LinearEstimate.of(samples, WindowedWeights(errors), omega)
     return replace(response, errors=errors, linear=linear)
 
 

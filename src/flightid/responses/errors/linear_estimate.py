@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from flightid.errors import ShapeError
 from flightid.responses.errors.covariance import WindowedErrors
+from flightid.responses.errors.local_errors import LocalErrors
 from flightid.responses.errors.noise import NoiseSpectrum, noise_of_residuals
+from flightid.responses.errors.pilot import Pilot, Pilots
 from flightid.responses.errors.random_error import CovarianceSource, ErrorSelection
 from flightid.responses.windows.local_fit import Bins, LocalFit
 from flightid.responses.windows.samples import Samples
@@ -25,9 +27,6 @@ from flightid.responses.windows.transform import transform
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Places = NDArray[np.intp]
-
-LEAST_NOISE = 1e-12
-"""Share of its first estimate below which noise is rounding."""
 
 
 Functional = Callable[[Sequence[Real]], Complex]
@@ -47,6 +46,10 @@ class OutputWeights(Protocol):
 
         None where the estimate's own noise is as good.
         """
+        ...
+
+    def errors_with(self, noise: NoiseSpectrum, outputs: Places) -> CovarianceSource:
+        """Errors of the whole estimate with another noise in some outputs, in their order."""
         ...
 
 
@@ -86,17 +89,15 @@ class WindowedWeights:
         return apply
 
     def errors_of(self, residuals: Sequence[Real], outputs: Places) -> CovarianceSource | None:
-        """See `OutputWeights`; outputs without a residual keep their noise, as independent."""
-        errors, before = self.errors, self.errors.noise
-        step = errors.sample_time_s
-        highest = float(errors.windows.omega[-1]) / step
-        found = noise_of_residuals(residuals, errors.windows.instruments, step, highest)
-        density = before.density.copy()
-        least = LEAST_NOISE * before.density[outputs]
-        density[outputs] = np.maximum(found.at(before.omega_rad_s), least)
-        coherency = np.tile(np.eye(len(density), dtype=np.complex128), (density.shape[1], 1, 1))
-        coherency[:, outputs[:, None], outputs] = found.coherency_at(before.omega_rad_s)
-        return replace(errors, noise=NoiseSpectrum(before.omega_rad_s, density, coherency))
+        """See `OutputWeights`."""
+        step = self.errors.sample_time_s
+        highest = float(self.errors.windows.omega[-1]) / step
+        instruments = self.errors.windows.instruments
+        return self.errors_with(noise_of_residuals(residuals, instruments, step, highest), outputs)
+
+    def errors_with(self, noise: NoiseSpectrum, outputs: Places) -> CovarianceSource:
+        """See `OutputWeights`; the other outputs keep their noise, as independent."""
+        return replace(self.errors, noise=self.errors.noise.replaced(noise, outputs))
 
 
 @dataclass(frozen=True)
@@ -107,10 +108,13 @@ class LocalWeights:
     ----------
     fits : tuple of LocalFit
     sample_time_s : float
+    noise : NoiseSpectrum
+        At the estimate's frequencies.
     """
 
     fits: tuple[LocalFit, ...]
     sample_time_s: float
+    noise: NoiseSpectrum
 
     def functional(self, outputs: Places, inputs: Places, frequencies: Places) -> Functional:
         """See `OutputWeights`."""
@@ -134,6 +138,10 @@ class LocalWeights:
         del residuals, outputs
         return None
 
+    def errors_with(self, noise: NoiseSpectrum, outputs: Places) -> CovarianceSource:
+        """See `OutputWeights`; the other outputs keep their noise, as independent."""
+        return LocalErrors(self.fits, self.noise.replaced(noise, outputs))
+
 
 @dataclass(frozen=True)
 class LinearEstimate:
@@ -149,6 +157,8 @@ class LinearEstimate:
     sample_time_s : float
     places : tuple of ndarray of int
         Outputs, inputs and frequencies of the estimate that the response holds.
+    pilots : Pilots
+        Models of all outputs that foretell the estimate's bias.
 
     Example
     -------
@@ -168,19 +178,23 @@ class LinearEstimate:
     output_records: tuple[Real, ...]
     sample_time_s: float
     places: tuple[Places, Places, Places]
+    pilots: Pilots
 
     @classmethod
-    def of(cls, samples: Samples, weights: OutputWeights, n_f: int) -> LinearEstimate:
+    def of(cls, samples: Samples, weights: OutputWeights, omega_rad_s: Real) -> LinearEstimate:
         """All outputs, inputs and frequencies of an estimate from `samples`."""
-        sizes = (len(samples.outputs), len(samples.inputs), n_f)
+        sizes = (len(samples.outputs), len(samples.inputs), len(omega_rad_s))
         places = tuple(np.arange(size) for size in sizes)
+        inputs, outputs = tuple(samples.part("inputs")), tuple(samples.part("outputs"))
+        step = samples.sample_time_s
         return cls(
             weights,
             samples.inputs,
-            tuple(samples.part("inputs")),
-            tuple(samples.part("outputs")),
-            samples.sample_time_s,
+            inputs,
+            outputs,
+            step,
             (places[0], places[1], places[2]),
+            Pilots(inputs, outputs, step, float(omega_rad_s[-1])),
         )
 
     def select(self, outputs: Places, inputs: Places, frequencies: Places) -> LinearEstimate:
@@ -219,6 +233,12 @@ class LinearEstimate:
         """The weights made ready to be applied again and again: no shape is checked."""
         return self.weights.functional(*self.places)
 
+    def pilots_of_outputs(self) -> list[Pilot] | None:
+        """Pilot models of the response's outputs; None where records hold too few bins."""
+        found = [self.pilots.found[row] for row in self.places[0]]
+        known = [each for each in found if each is not None]
+        return known if len(known) == len(found) else None
+
     def errors_of(self, residuals: Sequence[Real]) -> CovarianceSource | None:
         """Errors of the response with the noise that a model's residuals show.
 
@@ -234,3 +254,7 @@ class LinearEstimate:
         """
         found = self.weights.errors_of(residuals, self.places[0])
         return None if found is None else ErrorSelection(found, *self.places)
+
+    def errors_with(self, noise: NoiseSpectrum) -> CovarianceSource:
+        """Errors of the response with another noise of its outputs."""
+        return ErrorSelection(self.weights.errors_with(noise, self.places[0]), *self.places)

@@ -20,6 +20,10 @@ from flightid.responses.windows.samples import Samples
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
+LEAST_NOISE = 1e-12
+"""Share of its first estimate below which noise is rounding."""
+AVERAGED = 15
+"""Bins, of all records together, over which residuals of a model that leaves noise are averaged."""
 BEYOND_BAND = 1.5
 """Noise is estimated up to this multiple of the highest frequency of the response."""
 
@@ -51,6 +55,15 @@ class NoiseSpectrum:
         places = np.arange(density.shape[1])
         coherency[:, places, places] = 1.0
         return cls(omega_rad_s, np.maximum(density, 0.0).T, coherency)
+
+    def replaced(self, other: NoiseSpectrum, outputs: NDArray[np.intp]) -> NoiseSpectrum:
+        """With another noise in some outputs; what these share with the others is left out."""
+        density = self.density.copy()
+        least = LEAST_NOISE * density[outputs]
+        density[outputs] = np.maximum(other.at(self.omega_rad_s), least)
+        coherency = np.tile(np.eye(len(density), dtype=np.complex128), (density.shape[1], 1, 1))
+        coherency[:, outputs[:, None], outputs] = other.coherency_at(self.omega_rad_s)
+        return NoiseSpectrum(self.omega_rad_s, density, coherency)
 
     def at(self, omega_rad_s: Real) -> Real:
         """Density between the grid's frequencies, log-linear; held beyond its ends."""
@@ -145,6 +158,41 @@ def noise_of_residuals(
         for given, left in zip(regressors, residuals, strict=True)
     ]
     return _gather(list(_groups(records, len(regressors[0]), highest_rad_s)))
+
+
+def mean_spectrum(
+    residuals: Sequence[Real], sample_time_s: float, highest_rad_s: float, spent: Real
+) -> NoiseSpectrum:
+    """Noise spectra of residuals that hold nothing but noise, averaged over neighbouring bins.
+
+    Parameters
+    ----------
+    residuals : sequence of ndarray, each shape (n_out, n_samples)
+        Of each record.
+    sample_time_s : float
+    highest_rad_s : float
+        Highest frequency that a model was fitted to.
+    spent : ndarray, shape (n_out,)
+        Coefficients of the model of each output, whose freedom the residuals lack.
+
+    Returns
+    -------
+    NoiseSpectrum
+    """
+    records = [Bins.of(each, sample_time_s) for each in residuals]
+    longest = max(records, key=lambda bins: len(bins.omega)).omega
+    inside = longest[longest <= highest_rad_s]
+    size = sum(int(np.count_nonzero(bins.omega <= highest_rad_s)) for bins in records)
+    n_groups = max(1, size // AVERAGED)
+    found = []
+    for group in np.array_split(inside, min(n_groups, len(inside))):
+        low, high = group[0] * (1 - 1e-9), group[-1] * (1 + 1e-9)
+        values = np.concatenate(
+            [b.values[:, (b.omega >= low) & (b.omega <= high)] for b in records], axis=1
+        )
+        found.append((0.5 * (low + high), values.conj() @ values.T / values.shape[1]))
+    grown = np.sqrt(2.0 * size / np.maximum(2.0 * size - spent, 1.0))
+    return _gather([(centre, matrix * np.outer(grown, grown)) for centre, matrix in found])
 
 
 def _gather(found: Sequence[tuple[float, Complex]]) -> NoiseSpectrum:
