@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import plotly.graph_objects as go
@@ -77,20 +78,36 @@ def figure(
     -------
     plotly.graph_objects.Figure
     """
+    height = height_px or MARGIN_PX + ROW_HEIGHT_PX * rows
+    heights, titles = tuple(row_heights or ()), tuple(column_titles or ())
+    return go.Figure(_empty(rows, columns, title, heights, titles, shared_x, height))
+
+
+@lru_cache(maxsize=64)
+def _empty(
+    rows: int,
+    columns: int,
+    title: str,
+    heights: tuple[float, ...],
+    titles: tuple[str, ...],
+    shared_x: bool,
+    height: int,
+) -> go.Figure:
+    """What figures of one form are copies of: a copy costs a fiftieth of a figure."""
     made = make_subplots(
         rows=rows,
         cols=columns,
         shared_xaxes="columns" if shared_x else False,
         vertical_spacing=0.07 / max(1, rows - 1) if rows > 1 else 0.0,
         horizontal_spacing=0.09,
-        row_heights=list(row_heights) if row_heights else None,
-        column_titles=list(column_titles) if column_titles else None,
+        row_heights=list(heights) or None,
+        column_titles=list(titles) or None,
     )
     made.update_layout(
         title={"text": title} if title else None,
         template="none",
         font={"family": FONT, "size": 13},
-        height=height_px or MARGIN_PX + ROW_HEIGHT_PX * rows,
+        height=height,
         margin={"l": 70, "r": 20, "t": 60 if title else 40, "b": 50},
         plot_bgcolor="rgba(0,0,0,0)",
         paper_bgcolor="rgba(0,0,0,0)",
