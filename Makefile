@@ -57,8 +57,8 @@ test: wheel lint  ## everything that must pass before a merge
 	cargo test --workspace --quiet
 	$(PYTEST) --doctest-modules tests --pyargs flightid
 
-test-nightly: wheel  ## every example whole and longer draws, minutes; then what test-slow does
-	$(PYTEST) -m "nightly or slow"
+test-nightly: wheel  ## every example whole and longer draws of properties, minutes; then what test-slow does
+	HYPOTHESIS_PROFILE=nightly $(PYTEST) -m "nightly or slow or hypothesis"
 
 test-slow: wheel  ## Monte Carlo calibration of every printed interval, and the full studies
 	$(PYTEST) -m slow

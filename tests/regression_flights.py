@@ -48,6 +48,7 @@ def fly(
         inputs={"elevator": elevator[::every]},
         outputs={name: fine[name][::every] for name in model.outputs},
         units=model.units,
+        hold="band_limited",
     )
 
 

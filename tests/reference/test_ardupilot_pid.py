@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid import _native
 from flightid.vehicles import RateGains
 from flightid.vehicles.flight import fly
 from tests.closeness import assert_close
+from tests.examples import examples
 
 F = np.float32
 DT = F(0.0025)
@@ -59,7 +60,7 @@ def _plain(
     return np.array(rows, dtype=np.float32)
 
 
-@settings(max_examples=30, deadline=None)
+@examples(30)
 @given(
     seed=st.integers(0, 2**32 - 1),
     flt=st.tuples(*[st.sampled_from([0.0, 2.5, 20.0])] * 3),

@@ -14,6 +14,9 @@ from flightid.logs.dataflash.layout import standard_tables
 from tests.closeness import assert_close
 
 LOGS = ("arducopter_457.BIN", "arducopter_470dev_ground.BIN")
+NIGHTLY = pytest.mark.nightly
+SEEDS = [0, pytest.param(1, marks=NIGHTLY), pytest.param(2, marks=NIGHTLY)]
+FRACTIONS = [pytest.param(0.1, marks=NIGHTLY), 0.5, pytest.param(0.9, marks=NIGHTLY)]
 
 
 def _peer(path: Path) -> list[object]:
@@ -84,7 +87,7 @@ def _multipliers(path: Path) -> dict[tuple[str, str], float]:
 
 
 @pytest.mark.parametrize("name", LOGS)
-@pytest.mark.parametrize("fraction", [0.1, 0.5, 0.9])
+@pytest.mark.parametrize("fraction", FRACTIONS)
 def test_counts_of_a_truncated_log_equal_pymavlinks(
     shared_data: Path, tmp_path: Path, name: str, fraction: float
 ) -> None:
@@ -94,7 +97,7 @@ def test_counts_of_a_truncated_log_equal_pymavlinks(
     assert _our_counts(path) == _peer_counts(path)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_zeroed_block_loses_what_pymavlink_loses(
     shared_data: Path, tmp_path: Path, seed: int, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -110,7 +113,7 @@ def test_a_zeroed_block_loses_what_pymavlink_loses(
     assert sum(r.size for r in zeros) > 65_536 - 600
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", SEEDS)
 def test_random_blocks_lose_no_more_than_pymavlink_loses(
     shared_data: Path, tmp_path: Path, seed: int, capfd: pytest.CaptureFixture[str]
 ) -> None:

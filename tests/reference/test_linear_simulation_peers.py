@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.signal
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid import Record, _native
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.simulation import simulate
 from tests.closeness import assert_close
+from tests.examples import examples
 
 ROUNDING = "both are exact for this hold; only rounding differs"
 
@@ -92,7 +93,7 @@ def test_fractional_delays_agree_with_a_grid_that_holds_every_corner(hold: str) 
         assert_close(coarse[name], exact[name][::fine], atol=1e-10, why=ROUNDING)
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(st.integers(0, 10_000), st.integers(1, 9), st.floats(1e-6, 60.0))
 def test_matrix_exponential_agrees_with_scipy(seed: int, n: int, scale: float) -> None:
     matrix = np.random.default_rng(seed).standard_normal((n, n))

@@ -5,11 +5,12 @@ from __future__ import annotations
 import control
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
 from tests.closeness import assert_close
+from tests.examples import examples
 
 L = fid.loops
 OMEGA = np.geomspace(0.05, 50.0, 25)
@@ -42,7 +43,7 @@ def record(signals: dict[str, np.ndarray], step: float) -> fid.Record:
     return fid.Record.from_arrays(step * np.arange(N), inputs=signals)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(st.integers(0, 100_000), st.sampled_from([None, 0.1]))
 def test_three_random_systems_in_a_circle(seed: int, step: float | None) -> None:
     random = np.random.default_rng(seed)
@@ -72,7 +73,7 @@ def test_three_random_systems_in_a_circle(seed: int, step: float | None) -> None
     assert ours.is_stable == bool(np.all(decay))
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(st.integers(0, 100_000))
 def test_step_responses_of_feedback(seed: int) -> None:
     random = np.random.default_rng(seed)
@@ -95,7 +96,7 @@ def test_step_responses_of_feedback(seed: int) -> None:
     assert_close(same, theirs_held, atol=1e-9 * size, why="the recursion of the held loop")
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(st.integers(0, 100_000))
 def test_digital_control_of_a_continuous_plant(seed: int) -> None:
     random = np.random.default_rng(seed)

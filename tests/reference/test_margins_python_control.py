@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import control
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
@@ -13,6 +13,7 @@ from flightid.control.margins.disk_geometry import gain_limits, phase_limit_deg
 from flightid.control.margins.disk_margin import alphas_of
 from flightid.control.margins.loop_metrics import loop_metrics
 from tests.closeness import assert_close
+from tests.examples import examples
 
 OMEGA = np.geomspace(1e-3, 1e4, 15000)
 
@@ -34,7 +35,7 @@ def random_loop(seed, order):
     return control.tf(gain * above, below)
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 6))
 def test_every_crossing_is_python_controls(seed, order):
     loop = random_loop(seed, order)
@@ -50,7 +51,7 @@ def test_every_crossing_is_python_controls(seed, order):
     assert_close(np.degrees(gains.value), pm, atol=0.01, why="phase margins")
 
 
-@settings(max_examples=80, deadline=None)
+@examples(80)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 6))
 def test_worst_margins_are_python_controls(seed, order):
     loop = random_loop(seed, order)
@@ -82,7 +83,7 @@ def test_published_example():
     assert_close(gm, 3.6, rtol=1e-9, why="the peer knows it too")
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 5), st.sampled_from([-1.0, 0.0, 0.4, 1.0]))
 def test_disk_margins_of_single_loops_are_python_controls(seed, order, skew):
     loop = control.ss(random_loop(seed, order))

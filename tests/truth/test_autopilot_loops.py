@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid.control.autopilots import AUTOPILOTS, AXES, AxisLoop, axis_loop
 from flightid.control.autopilots.gyro_notches import ardupilot_notches, px4_notches
 from tests.closeness import assert_close
+from tests.examples import examples
 
 N, AT = 1 << 14, 40
 LOOP_HZ = 400.0
@@ -98,7 +99,7 @@ def _measured(loop: AxisLoop, omega: np.ndarray, *, of: str, per_loop: int) -> n
 
 
 @pytest.mark.parametrize("autopilot", AUTOPILOTS)
-@settings(max_examples=6, deadline=None)
+@examples(6)
 @given(seed=st.integers(0, 2**32 - 1), axis=st.sampled_from(AXES), per_loop=st.sampled_from([1, 3]))
 def test_feedback_and_forward_are_the_recursions_own(
     autopilot: str, seed: int, axis: str, per_loop: int

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
@@ -18,6 +18,7 @@ from flightid.control.margins.structured_gain import structured_gain
 from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
 from flightid.responses.errors.random_error import StoredCovariance
 from tests.closeness import assert_close
+from tests.examples import examples
 
 
 def siso(gain=4.0, delay=0.1):
@@ -73,7 +74,7 @@ def test_skew_of_the_sensitivity_is_the_modulus_margin():
     assert balanced.phase.value < classical.phase_margin.value
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.floats(0.05, 3.0), st.floats(-1.5, 1.5))
 @example(1.0, 1.0)  # a half plane: its edge goes through infinity
 def test_geometry_of_the_disk(alpha, skew):
@@ -121,7 +122,7 @@ def test_two_loops_at_once_are_weaker_than_each():
         assert np.all(np.linalg.eigvals(a - b @ np.diag(inside) @ c).real < 0)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(st.integers(0, 2**32 - 1))
 def test_structured_gain_of_two_is_a_search_over_one_scaling(seed):
     rng = np.random.default_rng(seed)
@@ -135,7 +136,7 @@ def test_structured_gain_of_two_is_a_search_over_one_scaling(seed):
     assert_close(structured_gain(m), best, rtol=1e-7, why="one scaling")
 
 
-@settings(max_examples=10, deadline=None)
+@examples(10)
 @given(st.integers(0, 2**32 - 1))
 def test_structured_gain_of_three_is_reached_by_phases(seed):
     # Up to three perturbations the bound is exact: some phases give that spectral radius.

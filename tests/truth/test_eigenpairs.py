@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid.dynamics.modes.participation import Eigenpair, eigenpairs
 from tests.closeness import assert_close
+from tests.examples import examples
 
 
 def _nearest(a: np.ndarray, pair: Eigenpair) -> Eigenpair:
     return min(eigenpairs(a), key=lambda each: abs(each.value - pair.value))
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(seed=st.integers(0, 2**31), n=st.integers(2, 6), spread=st.floats(-3.0, 3.0))
 def test_moves_are_the_slopes(seed: int, n: int, spread: float) -> None:
     """Whatever the scaling of the states; step and tolerance follow the distance of neighbours."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid.control.margins.loop_metrics import loop_metrics
 from flightid.errors import DataError, ShapeError
 from tests.closeness import assert_close
+from tests.examples import examples
 
 OMEGA = np.geomspace(1e-2, 1e3, 4000)
 S = 1j * OMEGA
@@ -153,7 +154,7 @@ def response(a, b, c, omega):
 WIDE = np.geomspace(1e-3, 1e4, 8000)
 
 
-@settings(max_examples=100, deadline=None)
+@examples(100)
 @given(loops())
 def test_nyquist_verdict_equals_eigenvalues(loop):
     a, b, c = loop
@@ -170,7 +171,7 @@ def test_nyquist_verdict_equals_eigenvalues(loop):
     assert found.unstable_poles == np.count_nonzero(closed.real > 0)
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(loops(), st.floats(0.2, 5.0))
 def test_gain_moves_gain_margins_and_nothing_else(loop, gain):
     a, b, c = loop
@@ -193,7 +194,7 @@ def test_gain_moves_gain_margins_and_nothing_else(loop, gain):
         )
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.floats(0.3, 8.0), st.floats(0.0, 0.08), st.floats(0.5, 2.0))
 def test_gain_margin_shifts_by_the_gain(gain, delay, factor):
     loop = gain * np.exp(-S * (delay + 0.01)) / (S * (0.02 * S + 1))

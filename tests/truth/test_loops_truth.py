@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
@@ -12,6 +12,7 @@ from scipy.special import lambertw
 import flightid as fid
 from flightid.errors import OptionError, ShapeError, SingularError, UnitError, UnknownNameError
 from tests.closeness import assert_close
+from tests.examples import examples
 
 L = fid.loops
 
@@ -121,7 +122,7 @@ def test_an_actuator_with_rate_limit_agrees_with_adaptive_integration() -> None:
     assert np.max(np.abs(np.diff(found["w"]))) <= 0.005 * (1 + 1e-9)
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(st.integers(0, 10_000), st.sampled_from([0.0, 0.03, 0.1, 0.137]))
 def test_samples_of_a_held_loop_are_those_of_its_simulation(seed: int, late: float) -> None:
     random = np.random.default_rng(seed)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
 from flightid.control.margins.loop_metrics import loop_metrics
 from flightid.identification.uncertain_of import uncertain_of
 from tests.closeness import assert_close
+from tests.examples import examples
 
 LAW = 0.15
 
@@ -133,7 +134,7 @@ def chain(a, b, c):
     )
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 5), st.integers(0, 2), st.booleans())
 def test_nyquist_verdict_of_models_equals_eigenvalues(seed, order, integrators, sampled):
     rng = np.random.default_rng(seed)

@@ -6,12 +6,13 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
 from flightid.record import GapPolicy, StampPolicy, to_uniform
 from tests.closeness import assert_close
+from tests.examples import examples
 
 
 def _phasor(time_s: np.ndarray, values: np.ndarray, frequency_hz: float) -> complex:
@@ -76,7 +77,7 @@ def test_previous_value_holds_and_is_never_filtered() -> None:
     step=st.floats(1e-4, 10.0),
     start=st.floats(-1e3, 1e3),
 )
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_a_channel_on_the_grid_is_copied_bit_for_bit(
     values: list[float], step: float, start: float
 ) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq, differential_evolution
 
@@ -19,6 +19,7 @@ from flightid.control.tuning.sampled_plants import loop_grid, sample_plants
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.vehicles import rate_truth
 from tests.closeness import assert_close
+from tests.examples import examples
 from tests.tuning_loops import closed_loop_poles, integrators_with_delay, largest_pole
 
 control = pytest.importorskip("control")
@@ -119,7 +120,7 @@ def test_an_independent_pi_optimum() -> None:
     damping=st.floats(-8.0, 6.0),
     delay_s=st.floats(0.003, 0.06),
 )
-@settings(max_examples=60)
+@examples(60)
 def test_the_count_is_that_of_the_exact_poles(
     gains: tuple[float, float, float], angle: float, damping: float, delay_s: float
 ) -> None:
@@ -206,7 +207,7 @@ def test_steps_are_those_of_the_recursion() -> None:
     delay_s=st.floats(0.004, 0.25),
     doubt=st.floats(0.002, 0.25),
 )
-@settings(max_examples=4)
+@examples(4)
 def test_designs_are_stable_for_every_plant_or_there_are_none(
     effect: float, damping: float, lag_s: float, delay_s: float, doubt: float
 ) -> None:

@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
 from flightid.errors import DataError, OptionError, ShapeError, SingularError, UnknownNameError
 from flightid.responses.opened import open_loops
 from tests.closeness import assert_close
+from tests.examples import examples
 
 L = fid.loops
 OMEGA = np.geomspace(0.3, 30.0, 12)
@@ -68,7 +69,7 @@ def test_a_closed_loop_is_its_closed_form() -> None:
     assert_close(margin.phase_margin.value, wanted, atol=0.05, why="crossover between grid points")
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(st.integers(0, 10_000))
 def test_opening_what_was_closed_gives_the_bare_responses_back(seed: int) -> None:
     plant = vehicle(seed)
@@ -81,7 +82,7 @@ def test_opening_what_was_closed_gives_the_bare_responses_back(seed: int) -> Non
     assert_close(opened.response, bare, atol=1e-9 * np.max(np.abs(bare)), why="an identity")
 
 
-@settings(max_examples=10, deadline=None)
+@examples(10)
 @given(st.integers(0, 10_000), st.sampled_from([0.1, 1e6]))
 def test_opening_a_record_gives_what_moved_the_vehicle(seed: int, limit: float) -> None:
     closed = fid.close_loop(vehicle(), controller(limit), draws=0)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
@@ -22,6 +22,7 @@ from flightid.errors import (
     UnknownNameError,
 )
 from flightid.logs import DataflashWriter, MessageLayout
+from tests.examples import examples
 
 TIME_US = np.arange(0, 1_000_000, 10_000)
 
@@ -219,7 +220,7 @@ def test_a_layout_of_ones_own_is_written_and_read(tmp_path: Path) -> None:
 SMALL = _writer().to_bytes()
 
 
-@settings(max_examples=150, deadline=None)
+@examples(150)
 @given(st.data())
 def test_damaged_logs_never_break_the_reader(data: st.DataObject) -> None:
     content = bytearray(SMALL)

@@ -43,6 +43,7 @@ def roll_flight(model: fid.StateSpaceModel, offset: float = 0.0) -> fid.Record:
         inputs={"lat": lat[::20] + offset},
         outputs={"p": flown["p"][::20]},
         units=model.units,
+        hold="band_limited",
     )
 
 

@@ -6,16 +6,17 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid import excitation
 from flightid.errors import DataError, OptionError, ShapeError
 from flightid.excitation import Excitation
 from tests.closeness import assert_close
+from tests.examples import examples
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(
     low=st.floats(0.3, 3.0),
     ratio=st.floats(2.0, 20.0),
@@ -39,7 +40,7 @@ def test_a_sweep_keeps_its_amplitude_and_begins_and_ends_in_trim(
     assert abs(made.signals[0, -1]) <= 1e-12 * amplitude
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(
     n_inputs=st.integers(1, 4),
     low=st.floats(1.0, 3.0),
@@ -64,7 +65,7 @@ def test_multisines_are_orthogonal_start_at_zero_and_keep_their_amplitude(
     assert_close(made.peak, np.full(n_inputs, 0.2), rtol=1e-12, why="the amplitude is the peak")
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(amplitude=st.floats(0.01, 5.0), seed=st.integers(0, 99), low=st.floats(0.5, 2.0))
 def test_noise_stays_in_its_band_and_below_its_amplitude(
     amplitude: float, seed: int, low: float
@@ -86,7 +87,7 @@ def test_noise_stays_in_its_band_and_below_its_amplitude(
     assert np.array_equal(made.signals, again.signals)
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(
     widths=st.lists(st.integers(1, 4), min_size=1, max_size=6),
     amplitude=st.floats(0.01, 5.0),

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid import excitation
@@ -19,6 +19,7 @@ from flightid.excitation import Limits, ParameterFile, Plan, RateAxis
 from flightid.excitation.design import KINDS
 from flightid.plot.excitation import excitation_history, excitation_spectrum, plan_spectrum
 from tests.closeness import assert_close
+from tests.examples import examples
 
 AXIS = RateAxis(
     gain=40.0, time_constant_s=0.2, delay_s=0.01, rate_feedback=0.1, attitude_feedback_per_s=4.0
@@ -80,7 +81,7 @@ def test_a_sensible_request_is_a_go(kind: str) -> None:
     json.dumps(plan.to_dict(), allow_nan=False)
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(amplitude=st.floats(0.001, 0.5), factor=st.floats(1.1, 4.0))
 def test_predictions_are_proportional_and_bounds_inverse(amplitude: float, factor: float) -> None:
     small, large = (

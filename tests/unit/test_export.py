@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
@@ -18,6 +18,7 @@ from flightid.errors import ExportError, ModelError, OptionError
 from flightid.export import c_compiler
 from flightid.export.names import comment, identifier, identifiers, text_literal
 from tests.compiled_model import CompiledModel, needs_compiler
+from tests.examples import examples
 from tests.unit.test_saved_models import ARMAX, NARX
 
 EVIL = ['"); system("id"); ("', "*/ int x; /*", "a\nb", "??/", "%s%n", "\\", "ü", "int", "9", ""]
@@ -108,7 +109,7 @@ def test_options_of_c_are_checked(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @given(st.text(max_size=80))
 def test_no_text_leaves_its_literal_or_comment(text: str) -> None:
     assert re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", identifier(text))

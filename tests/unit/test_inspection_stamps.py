@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
 from flightid.inspection.stamps import believable
 from flightid.logs import Log
 from flightid.logs.ulog.reader import UlogSource
+from tests.examples import examples
 from tests.sweep_log import SweepFlight
 from tests.ulog_builder import UlogBuilder
 
@@ -37,7 +38,7 @@ def test_stamps_all_over_the_place_are_not_believed() -> None:
 
 
 @given(st.lists(st.floats(0, 1e5), max_size=60))
-@settings(max_examples=100, deadline=None)
+@examples(100)
 def test_what_is_believed_increases(stamps: list[float]) -> None:
     values = np.array(stamps)
     assert np.all(np.diff(values[believable(values)]) > 0)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.signal
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
@@ -20,6 +20,7 @@ from flightid.models.kinds import model_from_description
 from flightid.models.linear.system_files import MAXIMUM_BYTES
 from flightid.models.save import model_as_toml
 from tests.closeness import assert_close
+from tests.examples import examples
 
 
 def made_system(delays=(0.0, 0.0), sample_time_s=None, n: int = 2) -> fid.LinearSystem:
@@ -197,7 +198,7 @@ def test_toml_round_trip(kind: str, tmp_path: Path) -> None:
     same(fid.load_model(path), SYSTEMS[kind])
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=4, max_size=4))
 def test_every_number_survives_json_and_toml(numbers: list[float]) -> None:
     a, b, c, d = ([[number]] for number in numbers)

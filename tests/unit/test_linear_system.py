@@ -5,7 +5,7 @@ from __future__ import annotations
 import control
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
@@ -13,6 +13,7 @@ from flightid import errors
 from flightid.models import linear_system
 from flightid.models.linear.delay_states import pade_delay
 from tests.closeness import assert_close
+from tests.examples import examples
 
 
 def _random(seed: int, *, delays: bool = True) -> fid.LinearSystem:
@@ -31,7 +32,7 @@ def _random(seed: int, *, delays: bool = True) -> fid.LinearSystem:
     )
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(st.integers(0, 10**6), st.sampled_from(["zero", "first"]))
 def test_sampled_runs_as_the_continuous_system(seed: int, hold: str) -> None:
     system = _random(seed)
@@ -47,7 +48,7 @@ def test_sampled_runs_as_the_continuous_system(seed: int, hold: str) -> None:
         assert_close(again[name], exact[name], rtol=1e-10, atol=1e-12, why="both are exact")
 
 
-@settings(max_examples=40, deadline=None)
+@examples(40)
 @given(st.integers(0, 10**6))
 def test_agrees_with_python_control(seed: int) -> None:
     system = _random(seed, delays=False)

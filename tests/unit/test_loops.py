@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
@@ -19,6 +19,7 @@ from flightid.errors import (
     UnknownNameError,
 )
 from tests.closeness import assert_close
+from tests.examples import examples
 
 L = fid.loops
 OMEGA = np.geomspace(0.1, 60.0, 40)
@@ -243,7 +244,7 @@ def test_an_input_that_acts_at_once_and_late_gets_states_for_its_late_part() -> 
     )  # fmt: skip
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(st.integers(0, 10_000), st.booleans())
 def test_the_order_of_blocks_is_irrelevant(seed: int, delayed: bool) -> None:
     random = np.random.default_rng(seed)

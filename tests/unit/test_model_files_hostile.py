@@ -15,6 +15,7 @@ import flightid as fid
 from flightid.errors import FlightidError
 from flightid.models import StateSpaceModel
 from flightid.models.kinds import model_from_description
+from tests.examples import examples
 
 LIBRARY = files("flightid.models") / "library"
 # Small models that hold every kind of table.
@@ -105,7 +106,7 @@ def _mutated(draw: st.DrawFn) -> str:
 
 
 @given(_mutated())
-@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(examples(120), suppress_health_check=[HealthCheck.too_slow])
 def test_a_damaged_file_is_a_model_or_a_typed_error(text: str) -> None:
     try:
         content = tomllib.loads(text)
@@ -127,7 +128,7 @@ ITEMS = st.recursive(
 
 
 @given(st.sampled_from(sorted(tomllib.loads(WHOLE))), ITEMS, st.data())
-@settings(max_examples=120, deadline=None)
+@examples(120)
 def test_any_value_in_any_place_is_judged(key: str, item: object, data: st.DataObject) -> None:
     content = tomllib.loads(WHOLE)
     table = content[key]

@@ -6,7 +6,7 @@ import copy
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import integrate, interpolate
 
@@ -15,6 +15,7 @@ from flightid.errors import DataError, ModelError
 from flightid.models import RecordValue, StateSpaceModel, TableAxis, TableFunction
 from flightid.models.language.symbolic import Printer
 from tests.closeness import assert_close
+from tests.examples import examples
 
 X = (-0.4, -0.1, 0.0, 0.3, 0.5, 0.9)
 Y = (0.1, 0.2, 0.5, 0.7)
@@ -32,7 +33,7 @@ def _table(interpolation: str, *axes: tuple[float, ...], outside: str = "hold") 
 
 
 @given(st.lists(st.floats(-0.4, 0.9), min_size=1, max_size=8))
-@settings(max_examples=40, deadline=None)
+@examples(40)
 def test_one_axis_is_scipys(places: list[float]) -> None:
     peers = {
         "linear": interpolate.make_interp_spline(X, _values(X), k=1),

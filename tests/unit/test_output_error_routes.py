@@ -47,10 +47,13 @@ def _on_threads(count: int) -> str:
     return found.stdout
 
 
-def test_one_thread_and_many_give_the_same_bits() -> None:
-    alone = _on_threads(1)
-    assert "Malpha" in alone
-    assert _on_threads(3) == alone
+def test_one_thread_and_many_give_the_same_bits(capsys: pytest.CaptureFixture[str]) -> None:
+    exec(compile(FIT, "fit", "exec"), {"__name__": "fit"})
+    here = capsys.readouterr().out
+    assert "Malpha" in here
+    # The threads of this process are those of the machine, unless somebody has said one.
+    alone = os.environ.get("RAYON_NUM_THREADS", str(os.cpu_count())) == "1"
+    assert _on_threads(3 if alone else 1) == here
 
 
 def test_a_study_fits_the_records_themselves(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def assert_same(found: Record, expected: Record) -> None:
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @given(items=st.lists(records(), min_size=1, max_size=3))
 @settings(
-    max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 def test_round_trip_is_bit_exact(tmp_path: Path, suffix: str, items: list[Record]) -> None:
     path = write_records(items, tmp_path / f"flight{suffix}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
@@ -18,6 +18,7 @@ from flightid.responses.windows.windows import (
     shifts_of,
 )
 from tests.closeness import assert_close
+from tests.examples import examples
 
 DT = 0.02
 
@@ -132,7 +133,7 @@ def test_one_window_is_its_own_composite() -> None:
     assert np.all(one.multiple_coherence >= one.coherence.max(axis=1) - 1e-9)
 
 
-@settings(max_examples=15, deadline=None)
+@examples(15)
 @given(gain=st.floats(1e-3, 1e3), shift=st.floats(-100, 100), seed=st.integers(0, 99))
 def test_scaling_an_output_scales_its_response(gain: float, shift: float, seed: int) -> None:
     record = _record(1200, seed)
@@ -144,7 +145,7 @@ def test_scaling_an_output_scales_its_response(gain: float, shift: float, seed: 
     assert_close(after.random_error, before.random_error, rtol=1e-5, why="free of scale")
 
 
-@settings(max_examples=10, deadline=None)
+@examples(10)
 @given(seed=st.integers(0, 99), mix=st.floats(-3, 3))
 def test_order_of_inputs_is_nothing_but_labels(seed: int, mix: float) -> None:
     record = _record(1600, seed, mix=mix)

@@ -7,7 +7,7 @@ import copy
 import numpy as np
 import pytest
 import sympy
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
@@ -15,6 +15,7 @@ from flightid.errors import DataError, FitError, ModelError, SingularError, Unkn
 from flightid.models.language import symbolic
 from flightid.models.state_space.model import StateSpaceModel
 from tests.closeness import assert_close
+from tests.examples import examples
 
 PENDULUM = {
     "kind": "state-space",
@@ -83,7 +84,7 @@ def test_linearisation_at_another_point() -> None:
 
 
 @given(st.floats(0.2, 2.0), st.floats(-1.0, 1.0))
-@settings(max_examples=25, deadline=None)
+@examples(25)
 def test_derivatives_match_central_differences(length: float, theta: float) -> None:
     model, at = _model(), {"theta": theta, "q'": 0.3, "u": 0.5}
     values = {"l": length}
@@ -238,7 +239,7 @@ def test_a_derivative_too_long_is_refused() -> None:
 
 
 @given(st.text("xv()+-*/^' 0123.usin", max_size=60))
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_any_equation_is_taken_or_refused_in_order(text: str) -> None:
     content = {
         "states": {"x": "1", "v": "1/s"},

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid import _native
 from flightid.errors import LogFormatError, MissingColumnError
 from flightid.logs import Log, read_log
 from flightid.logs.ulog.reader import UlogSource
+from tests.examples import examples
 from tests.ulog_builder import UlogBuilder, flight
 
 
@@ -228,7 +229,7 @@ def test_a_damaged_head_costs_one_sample() -> None:
 
 
 @given(data=st.binary(max_size=400))
-@settings(max_examples=200, deadline=None)
+@examples(200)
 def test_any_bytes_behind_a_header_are_read_or_refused(data: bytes) -> None:
     head = bytes(UlogBuilder())
     for prefix in (b"", head[:16], head, bytes(flight(2))):
@@ -242,7 +243,7 @@ def test_any_bytes_behind_a_header_are_read_or_refused(data: bytes) -> None:
 
 
 @given(flips=st.lists(st.tuples(st.integers(16, 10_000), st.integers(0, 255)), max_size=20))
-@settings(max_examples=200, deadline=None)
+@examples(200)
 def test_every_byte_is_accounted_for(flips: list[tuple[int, int]]) -> None:
     data = bytearray(bytes(flight(30)))
     for at, value in flips:

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -24,6 +24,7 @@ from flightid.errors import (
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.plot import verification as pictures
 from tests.closeness import assert_close
+from tests.examples import examples
 
 TIME_S = np.arange(400) * 0.02
 LAG = LinearSystem([[-2.0]], [[3.0]], [[1.0]], [[0.0]], ("u",), ("p",))
@@ -50,7 +51,7 @@ class _Fit:
     model = _WithUnits()
 
 
-@settings(max_examples=60, deadline=None)
+@examples(60)
 @given(y=SIGNALS, y_hat=SIGNALS)
 def test_metrics_keep_their_ranges(y: np.ndarray, y_hat: np.ndarray) -> None:
     if np.std(y) < 1e-3 or np.std(y_hat) < 1e-3:

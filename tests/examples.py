@@ -1,0 +1,16 @@
+"""How many examples a property test draws: a third by default, all that it asks for at night."""
+
+from __future__ import annotations
+
+import os
+
+from hypothesis import settings
+
+PROFILE = os.environ.get("HYPOTHESIS_PROFILE", "steady")
+FEWEST = 6
+
+
+def examples(count: int) -> settings:
+    """Decorator for a property that wants `count` examples in the long run."""
+    drawn = count if PROFILE != "steady" else min(count, max(FEWEST, count // 3))
+    return settings(max_examples=drawn, deadline=None)
