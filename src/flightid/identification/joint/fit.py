@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.identification.fit import Fit
-from flightid.identification.fit_findings import UNKNOWN, judge_cost, judge_intervals
+from flightid.identification.fit_findings import judge_cost, judge_intervals
 from flightid.identification.frequency_domain.bias_findings import BiasOutcome, sizes
 from flightid.identification.frequency_domain.bias_objective import Objective
 from flightid.identification.frequency_domain.bias_rounds import iterate
@@ -39,6 +39,7 @@ from flightid.identification.output_error.fit import (
 )
 from flightid.identification.records.findings import judge_channels
 from flightid.identification.records.setup import RecordSet, prepare_records
+from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
@@ -114,16 +115,7 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
         setup += outcome.findings()
     fit = conclude(found, options, setup, points.beside(found.fitted, following))
     fit = _with_responses(fit, response, points, outcome.provenance(options.hold))
-    return _without_intervals(fit, outcome.withheld) if outcome.withheld else fit
-
-
-def _without_intervals(fit: Fit, reason: str) -> Fit:
-    """The fit with no error bars, each with the reason."""
-    bare = {
-        name: replace(each, stderr=None, reason=each.reason or reason)
-        for name, each in fit.parameters.items()
-    }
-    return replace(fit, parameters=bare, covariance=None, intervals_from=UNKNOWN)
+    return without_intervals(fit, outcome.withheld) if outcome.withheld else fit
 
 
 def _divided(data: Sequence[object]) -> tuple[FrequencyResponse, list[Record]]:

@@ -30,7 +30,7 @@ from flightid.identification.output_error.equation_records import (
     judge_runs,
     segmented_starts,
 )
-from flightid.identification.output_error.process_noise import judge_process_noise
+from flightid.identification.output_error.process_noise import TURBULENT, judge_process_noise
 from flightid.identification.records.findings import judge_channels, judge_fit
 from flightid.identification.records.options import RecordOptions, chosen
 from flightid.identification.records.record_parameters import RecordParameters
@@ -43,6 +43,7 @@ from flightid.identification.records.statistics import (
 from flightid.identification.regression.equation_error import equation_error_start
 from flightid.identification.regression.fourier_output_error_fit import fit_fourier_output_error
 from flightid.identification.regression.options import FourierOutputErrorOptions
+from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.measured_states import state_outputs
 from flightid.record import Channel, Record, Step
@@ -164,7 +165,8 @@ def conclude(
         if runs_of is not None and runs_of.is_segmented
         else judge_process_noise(fitted, prepared.arrays, [outputs for outputs, _ in runs])
     )
-    return _assemble(fitted, prepared, options, groups, runs, known, setup, noise)
+    fit = _assemble(fitted, prepared, options, groups, runs, known, setup, noise)
+    return without_intervals(fit, TURBULENT) if noise else fit
 
 
 def searched(

@@ -1,11 +1,13 @@
 """Whether residuals of a free run are what noise on the states makes of them.
 
 Turbulence drives the states, and a free run does not follow: its residuals are innovations e of a
-Kalman filter, seen through the model's own modes, v = [C (qI - A)^-1 K + I] e. Three accounts
-of v are compared by their likelihood: white noise, autoregressive noise of each output for itself
-(sensors), and noise on the states with the best K. The third has to beat the first at a nominal
-false-alarm rate. Against the second it has to win by the Bayesian information criterion, or outputs
-have to move together at different times, at the same rate: sensors do not.
+Kalman filter, seen through the model's own modes, v = [C (qI - A)^-1 K + I] e. Three accounts of v
+are compared by their likelihood: white noise, autoregressive noise or drift of each output for
+itself (sensors), and noise on the states with the best K. The third has to beat the first at a
+nominal false-alarm rate. Against the second it has to win by far, or outputs have to move together
+at different times: sensors do not. Where the model oscillates it need not win by far: no sensor has
+that colour. A single output whose noise has the colour of one real mode is left to sensors: nothing
+tells them apart, and a covariance by that colour holds for both.
 """
 
 from __future__ import annotations
@@ -43,6 +45,15 @@ ROUNDING = 1e-8
 LONGEST = 3000
 """Samples of a record that are looked at."""
 SAMPLES_PER_NUMBER = 10
+STRONG = 10.0
+"""Advantage that counts as very strong: Kass & Raftery (1995), J. American Statistical Ass. 90."""
+COUPLED = 1e-4
+"""Chance of so much correlation between outputs that move by themselves."""
+TURBULENT = (
+    "the residuals hold noise on the states, which output error does not know: "
+    "method='filter_error' does"
+)
+"""Why there are no intervals."""
 HALF = 0.5
 """Share of an output's residual variance that innovations leave, below which it is red."""
 
@@ -55,20 +66,27 @@ class StateNoise:
     ----------
     p_value : float
         Of white residuals against noise on the states.
-    beats_sensors : bool
-        Whether it is the better account than autoregressive noise of each output.
+    advantage : float
+        Over noise of each output by itself, twice the log-likelihood by Schwarz's criterion.
+    together : float
+        p-value of no correlation between outputs at different times.
+    oscillates : bool
+        Whether the model has modes that no sensor's noise has by chance.
     left : ndarray, shape (n_outputs,)
         Variance of one-step innovations over that of the residuals.
     """
 
     p_value: float
-    beats_sensors: bool
+    advantage: float
+    together: float
+    oscillates: bool
     left: Array
 
     @property
     def is_found(self) -> bool:
-        """Whether both tests say so."""
-        return self.p_value < FALSE_ALARMS and self.beats_sensors
+        """Whether it is the better account than white noise, and than noise of each output."""
+        better = self.advantage > (0.0 if self.oscillates else STRONG) or self.together < COUPLED
+        return self.p_value < FALSE_ALARMS and better
 
 
 def judge_process_noise(
@@ -172,9 +190,11 @@ def state_noise(
     sensors, orders = sensor_errors(white)
     gain = n_rows * (plain - found)
     bic = n_rows * (log_size([sensors]) - found) + np.log(n_rows) * (orders - n * p)
-    together = crossed(sensors) < FALSE_ALARMS
     left = _variances([each[:, ORDER:] for each in ahead]) / _variances(tails)
-    return StateNoise(float(chi2.sf(gain, n * p)), bool(bic > 0.0) or together, left)
+    oscillates = any(np.any(np.abs(np.imag(np.linalg.eigvals(a))) > 0.0) for a, _ in placed)
+    return StateNoise(
+        float(chi2.sf(gain, n * p)), float(bic), crossed(sensors), bool(oscillates), left
+    )
 
 
 def _level(rows: Array) -> Array:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_toeplitz
 from scipy.stats import chi2
 
 from flightid.identification.output_error.innovation_gain import ORDER, innovations
@@ -14,7 +13,7 @@ from flightid.identification.output_error.innovation_gain import ORDER, innovati
 Array = NDArray[np.float64]
 FALSE_ALARMS = 0.01
 """Share of records with white residuals in which something else is found."""
-DRIFTS = (0.9, 0.98, 0.999)
+DRIFTS = (0.6, 0.8, 0.9, 0.95, 0.98, 0.995, 0.999)
 """Poles of a sensor's drift."""
 CROSSED = 25
 """Lags between outputs."""
@@ -56,18 +55,20 @@ def sensor_errors(residuals: Sequence[Array]) -> tuple[Array, int]:
 
 
 def _autoregression(rows: Sequence[Array]) -> tuple[Array, int]:
-    """Errors of the autoregression of the best order, which goes along."""
+    """Errors of the autoregression of the best order, which goes along.
+
+    Least squares on the past: Yule and Walker's equations bend poles near the unit circle.
+    """
     now = np.concatenate([each[0, ORDER:] for each in rows])
-    n = len(now)
-    lags = np.sum([_autocovariance(each[0]) for each in rows], axis=0) / n
-    choices = [(n * float(np.log(lags[0])), np.zeros(0))]
+    past = np.concatenate([_lagged(each, ORDER) for each in rows], axis=1)
+    n, gram, cross = len(now), past @ past.T, past @ now
+    choices = [(n * float(np.log(np.mean(now**2))), np.zeros(0))]
     for order in range(1, ORDER + 1):
-        weights = solve_toeplitz(lags[:order], lags[1 : order + 1])
-        error = max(float(lags[0] - weights @ lags[1 : order + 1]), 1e-300)
+        weights = np.linalg.lstsq(gram[:order, :order], cross[:order], rcond=None)[0]
+        error = max(float(np.mean((now - weights @ past[:order]) ** 2)), 1e-300)
         choices.append((n * np.log(error) + order * np.log(n), weights))
     weights = min(choices, key=lambda each: each[0])[1]
-    past = np.concatenate([_lagged(each, len(weights)) for each in rows], axis=1)
-    return np.asarray(now - weights @ past), len(weights)
+    return np.asarray(now - weights @ past[: len(weights)]), len(weights)
 
 
 def _autocovariance(row: Array) -> Array:
@@ -94,6 +95,4 @@ def _drift(rows: Sequence[Array], pole: float) -> Array:
 def _lagged(rows: Array, order: int) -> Array:
     """Past values, (n_outputs · order, n_samples - ORDER)."""
     n = rows.shape[1]
-    if not order:
-        return np.zeros((0, n - ORDER))
     return np.concatenate([rows[:, ORDER - lag : n - lag] for lag in range(1, order + 1)])

@@ -1,0 +1,29 @@
+"""A fit whose intervals are not shown, since they would not hold what they say."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flightid.identification.fit import Fit
+from flightid.identification.fit_findings import UNKNOWN
+
+
+def without_intervals(fit: Fit, reason: str) -> Fit:
+    """The fit with no error bars, each with the reason.
+
+    Parameters
+    ----------
+    fit : Fit
+    reason : str
+        Why there are none; that of a parameter which had none before stays.
+
+    Returns
+    -------
+    Fit
+        Without covariance, so that nothing computed from it has intervals either.
+    """
+    bare = {
+        name: replace(each, stderr=None, reason=each.reason or reason)
+        for name, each in fit.parameters.items()
+    }
+    return replace(fit, parameters=bare, covariance=None, intervals_from=UNKNOWN)
