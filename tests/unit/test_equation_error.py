@@ -232,3 +232,11 @@ def test_fourier_output_error_refuses_what_has_no_harmonics_apart() -> None:
     record = fid.simulate(bent, driven)
     with pytest.raises(FitError, match=r"equations of 'bent'.*'fourier_regression'"):
         fid.identify(bent, record, method="fourier_output_error")
+
+
+def test_noise_of_derivatives_is_no_misfit() -> None:
+    flight = noisy(fly(short_period()), 0, 8.0)
+    fit = fid.identify(short_period(), flight, method="equation_error")
+    said = [each for each in fit.findings if each.code == "output-unexplained"]
+    assert all(str(each.light) == "green" for each in said), said
+    assert any("white noise of the measurements makes" in each.message for each in said)

@@ -40,6 +40,7 @@ from flightid.identification.records.statistics import (
     RecordStatistics,
     record_statistics,
 )
+from flightid.identification.records.white_noise import explained_percent
 from flightid.identification.regression.equation_error import equation_error_start
 from flightid.identification.regression.fourier_output_error_fit import fit_fourier_output_error
 from flightid.identification.regression.options import FourierOutputErrorOptions
@@ -326,7 +327,7 @@ def _assemble(
         *judge_search(groups, best.cost + _NEAR * prepared.n_samples * len(fitted.outputs)),
         *judge_parameters(found.parameters),
         *judge_correlation(found.names, found.correlation),
-        *judge_fit(costs, found.colour),
+        *judge_fit(costs, found.colour, explained_percent(prepared.records, fitted.outputs)),
         *noise,
     )
     return Fit(

@@ -15,6 +15,8 @@ from flightid.uncertainty.residual_covariance import colour_findings
 ROUNDING_PERCENT = 1e-18
 """Share of an output's variance below which residuals are rounding."""
 GOOD_PERCENT, POOR_PERCENT = 10.0, 40.0
+_SOME = 0.01
+"""Share of a cost from which on what noise makes of it is worth a word."""
 _STILL = 1e-12
 _DEGREES = 180.0 / np.pi
 
@@ -59,29 +61,39 @@ def judge_channels(prepared: RecordSet) -> list[Finding]:
     ]
 
 
-def judge_fit(costs: Mapping[str, float], colour: tuple[float, float]) -> list[Finding]:
+def judge_fit(
+    costs: Mapping[str, float],
+    colour: tuple[float, float],
+    noise: Mapping[str, float] | None = None,
+) -> list[Finding]:
     """Verdicts on what the model explains, and on the colour of the residuals.
 
-    `colour` is the smallest and the largest ratio of a standard error to that for white residuals.
+    Parameters
+    ----------
+    costs : mapping of str to float
+        Percent of each output's variance in the residuals.
+    colour : tuple of float
+        Smallest and largest ratio of a standard error to that for white residuals.
+    noise : mapping of str to float, optional
+        Percent that white noise of the measurements makes, which is no misfit.
     """
     found = []
     for name, cost in costs.items():
+        by_noise = min(cost, (noise or {}).get(name, 0.0))
+        missed = cost - by_noise
         light = (
             Light.GREEN
-            if cost <= GOOD_PERCENT
+            if missed <= GOOD_PERCENT
             else Light.AMBER
-            if cost <= POOR_PERCENT
+            if missed <= POOR_PERCENT
             else Light.RED
         )
+        words = f"{name}: {cost:.3g} % of its variance is left in the residuals"
+        if cost > GOOD_PERCENT and by_noise > _SOME * cost:
+            words += f", of which white noise of the measurements makes {by_noise:.3g} %"
+        action = "look at the residuals: add dynamics, check signs and units, or it is noise"
         found.append(
-            Finding(
-                "output-unexplained",
-                light,
-                f"{name}: {cost:.3g} % of its variance is left in the residuals",
-                ""
-                if light is Light.GREEN
-                else "look at the residuals: add dynamics, check signs and units, or it is noise",
-            )
+            Finding("output-unexplained", light, words, "" if light is Light.GREEN else action)
         )
     # What rounding leaves has a colour that says nothing of noise.
     if max(costs.values(), default=0.0) < ROUNDING_PERCENT:

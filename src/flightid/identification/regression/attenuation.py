@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.conditioning.smoothing import fourier_smooth
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.identification.records.white_noise import white_levels
 from flightid.identification.regression.sampled_equations import StateMeasurements
 from flightid.uncertainty.estimate import Estimate
 
@@ -23,25 +23,11 @@ Array = NDArray[np.float64]
 DRAWS = 8
 LIMIT = 0.5
 """Standard errors of bias above which a 95 % interval holds noticeably less."""
-_QUARTER_RATE = 0.25
 
 
 def state_noise(motions: Sequence[StateMeasurements]) -> list[Array]:
-    """Standard deviation of the white noise of each state, by record.
-
-    Biased where a sensor's filter has taken the noise from the upper half of the band: too small.
-    """
-    return [
-        np.array(
-            [
-                fourier_smooth(
-                    state, motion.sample_time_s, cutoff_hz=_QUARTER_RATE / motion.sample_time_s
-                ).noise
-                for state in motion.states
-            ]
-        )
-        for motion in motions
-    ]
+    """Standard deviation of the white noise of each state, by record."""
+    return [white_levels(motion.states, motion.sample_time_s) for motion in motions]
 
 
 def attenuation(
@@ -84,6 +70,30 @@ def attenuation(
             ]
             moved += refit(noisier) - estimate
     return moved / DRAWS
+
+
+def noise_energy(
+    motions: Sequence[StateMeasurements],
+    residuals: Callable[[Sequence[StateMeasurements]], Sequence[Array]],
+) -> Array:
+    """Sum of squares that noise of the measurements makes of the residuals of each equation.
+
+    `residuals` are those at the estimate, by record, from motions with more noise: what as much
+    noise again changes in them is as large as what the noise that is there does.
+    """
+    before = residuals(motions)
+    generator = np.random.default_rng(1)
+    noisier = []
+    for motion in motions:
+        rows = np.vstack([motion.states, motion.others])
+        draw = white_levels(rows, motion.sample_time_s)[:, None]
+        draw = draw * generator.standard_normal(rows.shape)
+        states, others = np.split(draw, [len(motion.states)])
+        noisier.append(
+            replace(motion, states=motion.states + states, others=motion.others + others)
+        )
+    pairs = zip(residuals(noisier), before, strict=True)
+    return np.asarray(np.sum([np.sum((one - other) ** 2, axis=1) for one, other in pairs], axis=0))
 
 
 def judge_attenuation(

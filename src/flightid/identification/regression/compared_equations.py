@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Role
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.regression.equation_regression import EquationRegression
-from flightid.identification.regression.rounds import Rows, SettledRounds
+from flightid.identification.regression.rounds import SettledRounds
 from flightid.models import StateSpaceModel
 from flightid.record import Channel, Record
 from flightid.units import canonical
@@ -18,10 +18,9 @@ from flightid.units import canonical
 Array = NDArray[np.float64]
 
 
-def compared_costs(problem: EquationRegression, rows: Sequence[Rows]) -> dict[str, float]:
-    """Percent of each equation's measured side that the fit leaves in the residuals."""
+def compared_costs(problem: EquationRegression, left: Array) -> dict[str, float]:
+    """Percent of each equation's measured side that a sum of squares, such as residuals', makes."""
     names = problem.names()
-    left = np.sum([np.sum(each.residuals**2, axis=1) for each in rows], axis=0)
     whole = np.zeros(len(names))
     for place, operator in enumerate(problem.operators):
         for row, equation in enumerate(problem.used):

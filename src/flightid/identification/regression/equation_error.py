@@ -16,7 +16,11 @@ from numpy.typing import NDArray
 from flightid.errors import OptionError
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain.estimates import APART
-from flightid.identification.regression.attenuation import attenuation, judge_attenuation
+from flightid.identification.regression.attenuation import (
+    attenuation,
+    judge_attenuation,
+    noise_energy,
+)
 from flightid.identification.regression.compared_equations import compared_costs, compared_records
 from flightid.identification.regression.equation_operators import FourierRows, LocalMeans, Operator
 from flightid.identification.regression.equation_regression import EquationRegression
@@ -183,27 +187,34 @@ def _finish(
     end = settled.end
     settled_at = problem.renewed(end.x)
 
-    def refit(motions: Sequence[StateMeasurements]) -> Array:
+    def on(motions: Sequence[StateMeasurements]) -> EquationRegression:
         operators = [
             each.with_motion(motion)
             for each, motion in zip(problem.operators, motions, strict=True)
         ]
-        noisier = replace(settled_at, motions=tuple(motions), operators=tuple(operators))
-        return solve(noisier, end.x, settled.weights, limits)[0].x
+        return replace(settled_at, motions=tuple(motions), operators=tuple(operators))
+
+    def refit(motions: Sequence[StateMeasurements]) -> Array:
+        return solve(on(motions), end.x, settled.weights, limits)[0].x
+
+    def residuals(motions: Sequence[StateMeasurements]) -> list[Array]:
+        return [each.residuals for each in on(motions).rows(end.x, settled.weights)]
 
     moved = attenuation(problem.motions, refit, end.x)[inner.mask]
     bias = dict(zip(inner.names, map(float, moved), strict=True))
     records = as_records(data)
+    left = np.sum([np.sum(each.residuals**2, axis=1) for each in settled.rows], axis=0)
     fit = assemble(
         method,
         inner,
         [[end]],
         known,
-        compared_costs(problem, settled.rows),
+        compared_costs(problem, left),
         records,
         compared_records(problem, settled, records),
         options,
         extra={"attenuation": bias, "rounds": settled.rounds},
+        noise=compared_costs(problem, noise_energy(problem.motions, residuals)),
     )
     return replace(fit, findings=(*fit.findings, *judge_attenuation(bias, fit.parameters)))
 

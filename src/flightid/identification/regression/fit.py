@@ -182,6 +182,7 @@ def assemble(
     extra: Mapping[str, object] | None = None,
     noise_covariance: Array | None = None,
     residual_horizon: int | str = "free_run",
+    noise: Mapping[str, float] | None = None,
 ) -> Fit:
     """The result of a regression method."""
     fitted, names = inner.fitted, inner.names
@@ -211,7 +212,7 @@ def assemble(
             *judge_search(groups),
             *judge_parameters(parameters),
             *judge_correlation(names, correlation),
-            *judge_fit(costs, known.colour),
+            *judge_fit(costs, known.colour, noise),
         ),
         provenance={**_provenance(method, fitted, records, options), **(extra or {})},
         records=tuple(fitted_records),
