@@ -139,14 +139,3 @@ def test_a_gust_felt_as_the_velocity_is_found_and_unbends_its_derivatives() -> N
     tests = fid.residual_tests(fit)
     assert tests.horizon == "one step ahead"
     assert all(test.counts for test in tests.tests)
-
-
-def test_a_model_that_bends_is_refused() -> None:
-    model = fid.load_model("quadrotor_6dof")
-    driven = {name: np.zeros(50) for name in model.inputs}
-    seen = {name: np.zeros(50) for name in model.outputs}
-    record = fid.Record.from_arrays(
-        np.arange(50) * 0.02, inputs=driven, outputs=seen, units=dict(model.units)
-    )
-    with pytest.raises(FitError, match="filter error needs a linear model"):
-        fid.identify(model, record, method="filter_error")

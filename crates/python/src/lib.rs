@@ -30,6 +30,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     vehicles::autopilot_controllers::register(module)?;
     vehicles::ardupilot_chirp::register(module)?;
     vehicles::kinematics::register(module)?;
+    simulation::extended_kalman::register(module)?;
     simulation::linear_recursion::register(module)?;
     simulation::linear_simulation::register(module)?;
     simulation::vehicle_loop::register(module)?;

@@ -2,6 +2,7 @@
 
 pub(crate) mod boundary_system;
 pub mod equation_step;
+pub mod extended_kalman;
 pub mod held_input;
 pub mod kinematics;
 pub mod loop_simulation;

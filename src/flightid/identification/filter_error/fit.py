@@ -13,10 +13,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.conditioning.smoothing import fourier_smooth
 from flightid.conventions import Light
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding
+from flightid.identification.filter_error.extended_kalman import (
+    ExtendedProblem,
+    along_the_flight,
+    sizes_of_states,
+)
 from flightid.identification.filter_error.gusts import GUST, GUST_UNKNOWNS, Gust
 from flightid.identification.filter_error.innovation_covariance import innovation_covariance
 from flightid.identification.filter_error.innovations import (
@@ -29,13 +33,13 @@ from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.multistart import DenseEnd, cluster, collect, draw_starts
 from flightid.identification.records.held_model import LinearPoint
+from flightid.identification.records.white_noise import explained_percent, white_levels
 from flightid.identification.regression.fit import (
     Inner,
     Knowledge,
     assemble,
     check_records,
     limits_of,
-    require_linear,
     require_seen,
     require_states,
 )
@@ -47,7 +51,6 @@ from flightid.uncertainty.estimate import Estimate
 Array = NDArray[np.float64]
 _FIRST_SHARE = 0.1
 _FLOOR = 1e-6
-_QUARTER_RATE = 0.25
 
 
 @dataclass(frozen=True)
@@ -68,14 +71,13 @@ def fit_filter_error(
     Raises
     ------
     FitError
-        The model is not linear, or the data cannot tell parameters apart.
+        The data cannot tell parameters apart.
     """
-    require_linear(model, "filter error")
     require_states(model, "filter error")
     records = check_records(model, data)
     problem = _problem(model, records, options)
     groups = cluster(_search(problem, options))
-    if options.gust_states:
+    if options.gust_states and model.is_linear:
         problem, groups = with_gust(
             problem, groups, limits_of(model, options.maximum_iterations)[1]
         )
@@ -115,6 +117,7 @@ def fit_filter_error(
         },
         noise_covariance=noise.measurement,
         residual_horizon=1,
+        noise=explained_percent(records, model.outputs),
     )
 
 
@@ -138,22 +141,24 @@ def _problem(
         options.input_bias,
         options.hold,
     )
-    point = LinearPoint.of(model, model.parameters.independent_values())
+    seen, steps = (model, []) if model.is_linear else along_the_flight(model, records)
+    point = LinearPoint.of(seen, model.parameters.independent_values())
     if options.process_noise is None:
         moved = np.any(np.concatenate([point.a[1:], point.b[1:]], axis=2), axis=(0, 2))
         noisy = tuple(map(int, np.flatnonzero(moved))) or tuple(range(n))
     else:
         noisy = _places(options.process_noise, list(model.states))
     spread = np.sqrt(np.mean([np.var(each.outputs, axis=1) for each in data], axis=0))
-    level = np.sqrt(np.mean([_levels(each) ** 2 for each in data], axis=0))
-    reach = np.abs(np.linalg.pinv(point.c[0])) @ spread
-    reach = np.where(reach > 0.0, reach, reach.mean() or 1.0)
-    return replace(
+    found = [white_levels(each.outputs, each.sample_time_s) for each in data]
+    level = np.sqrt(np.mean([levels**2 for levels in found], axis=0))
+    reach = sizes_of_states(point, spread)
+    made = replace(
         blank,
         noisy=noisy,
         process_scale=_FIRST_SHARE * reach[list(noisy)],
         output_scale=np.maximum(level, _FLOOR * spread + 1e-300),
     )
+    return made if model.is_linear else ExtendedProblem.along(made, steps, reach)
 
 
 def _places(names: Sequence[str], states: list[str]) -> tuple[int, ...]:
@@ -163,13 +168,6 @@ def _places(names: Sequence[str], states: list[str]) -> tuple[int, ...]:
                 "process_noise names an unknown state", found=repr(name), needed=", ".join(states)
             )
     return tuple(sorted({states.index(name) for name in names}))
-
-
-def _levels(data: FilteredData) -> Array:
-    """Deviation of each output's white noise."""
-    cutoff = _QUARTER_RATE / data.sample_time_s
-    rows = [fourier_smooth(row, data.sample_time_s, cutoff_hz=cutoff) for row in data.outputs]
-    return np.array([row.noise for row in rows])
 
 
 def _search(problem: InnovationsProblem, options: FilterErrorOptions) -> list[DenseEnd]:

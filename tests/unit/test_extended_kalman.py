@@ -1,0 +1,83 @@
+"""The extended filter: the steady one where equations are linear, and what it makes of squares."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import flightid as fid
+from flightid import _native
+from flightid.identification.filter_error.steady_filter import ContinuousPoint, steady_filter
+from tests.closeness import assert_close
+from tests.strangers import nonlinear_gusts
+
+STEP_S = 0.05
+
+
+def _linear() -> fid.StateSpaceModel:
+    return fid.StateSpaceModel(
+        states={"x": "m", "v": "m/s"},
+        input_units={"u": "m/s^2"},
+        measurements={"x": fid.Output("x", "m")},
+        equations={"x'": "v", "v'": "-w2*x - k*v + u"},
+        parameters=fid.Parameters(
+            [fid.Parameter("k", 0.5, "1/s"), fid.Parameter("w2", 4.0, "1/s^2")]
+        ),
+    )
+
+
+def test_on_linear_equations_it_becomes_the_steady_filter() -> None:
+    density, variance = np.array([0.0, 0.3]), np.array([0.01])
+    random = np.random.default_rng(0)
+    inputs, measured = random.standard_normal((1, 400)), random.standard_normal((400, 1))
+    model = _linear()
+    innovations, triangles, states = _native.extended_filter(
+        model.native, model.parameters.independent_values(), inputs, measured,
+        (STEP_S, "zero", 4), (np.zeros(2), np.eye(2), [], []), (density, variance),
+    )  # fmt: skip
+    a, c = np.array([[0.0, 1.0], [-4.0, -0.5]]), np.array([[1.0, 0.0]])
+    point = ContinuousPoint(a, c, np.diag(density), np.diag(variance))
+    found = steady_filter(point, [], STEP_S)[0]
+    assert_close(
+        triangles[-1] @ triangles[-1].T, found.innovation, rtol=5e-4, why="process noise of a step"
+    )
+    # The recursion with the steady gain ends where the varying one does.
+    matrix = np.block([[a, np.array([[0.0], [1.0]])], [np.zeros((1, 3))]])
+    driven = _native.matrix_exponential(matrix * STEP_S)[:2, 2]
+    state = np.zeros(2)
+    for sample in range(400):
+        last = state
+        state = found.closed @ state + found.gain @ measured[sample] + driven * inputs[0, sample]
+    assert_close(states[-1], last, rtol=5e-3, why="gain of a step's process noise")
+    assert_close(innovations[-1], measured[-1] - c @ last, rtol=5e-3, why="the same")
+
+
+def test_constants_of_channels_are_found() -> None:
+    model = _linear()
+    time_s = STEP_S * np.arange(600)
+    inputs = np.sin(0.3 * time_s**1.5)[None]
+    clean = fid.simulate(model, fid.Record.from_arrays(time_s, inputs={"u": inputs[0] + 0.2}))
+    measured = clean["x"][:, None] + 0.7
+    # A constant push moves x by a quarter of it for good: x alone tells neither from a bias.
+    for biased, shifted, wanted in (([0], [], 0.75), ([], [0], 3.0)):
+        _, _, states = _native.extended_filter(
+            model.native, model.parameters.independent_values(), inputs, measured,
+            (STEP_S, "first", 4), (np.zeros(3), 10.0 * np.eye(3), shifted, biased),
+            (np.zeros(2), np.array([1e-4])),
+        )  # fmt: skip
+        assert_close(states[-1, 2], wanted, rtol=0.02, why="a start that fades")
+
+
+def test_filter_error_follows_squares_where_output_error_has_no_interval() -> None:
+    record = nonlinear_gusts.flight(1, (0.02, 0.2), 16.0)
+    model = nonlinear_gusts.model()
+    free = fid.identify(model, record, method="output_error")
+    assert all(each.interval95 is None for each in free.parameters.values())
+    assert "filter_error" in free.parameters["Ma"].reason
+    assert free.covariance is None
+    fit = fid.identify(model, record, method="filter_error")
+    for name, truth in nonlinear_gusts.TRUTH.items():
+        found = fit.parameters[name]
+        assert abs(found.value - truth) < 4.0 * found.stderr
+    densities = fit.provenance["process_noise"]
+    assert_close(densities["alpha"], 0.02, rtol=0.15, why="800 samples")
+    assert_close(densities["q"], 0.2, rtol=0.15, why="800 samples")
