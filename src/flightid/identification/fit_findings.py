@@ -175,6 +175,11 @@ def judge_correlation(names: Sequence[str], correlation: NDArray[np.float64]) ->
     ]
 
 
+def rivals(groups: Sequence[Sequence[End]], near: float) -> list[Sequence[End]]:
+    """Minima beside the best one that cost at most `near`."""
+    return [group for group in groups[1:] if group[0].is_converged and group[0].cost <= near]
+
+
 def judge_search(groups: Sequence[Sequence[End]], near: float | None = None) -> list[Finding]:
     """Verdicts on the iteration and on the minima that the starts found.
 
@@ -192,13 +197,13 @@ def judge_search(groups: Sequence[Sequence[End]], near: float | None = None) -> 
             )
         )
     near = _NEAR_COST * best.cost if near is None else near
-    rivals = [group for group in groups[1:] if group[0].is_converged and group[0].cost <= near]
-    if rivals:
+    others = rivals(groups, near)
+    if others:
         found.append(
             Finding(
                 "several-minima",
                 Light.AMBER,
-                f"{len(rivals)} other minima lie within 10 % of the best cost",
+                f"{len(others)} other minima lie within 10 % of the best cost",
                 "narrow the bounds by physics, or fix a parameter",
             )
         )

@@ -7,14 +7,15 @@ negative logarithm of the records' likelihood; native: `joint_objective.rs`.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError
+from flightid.errors import DataError, FlightidError
 from flightid.identification.fit import Fit
-from flightid.identification.fit_findings import judge_cost, judge_intervals
+from flightid.identification.fit_findings import NoiseCost, judge_cost, judge_intervals, rivals
 from flightid.identification.frequency_domain.bias_findings import BiasOutcome, sizes
 from flightid.identification.frequency_domain.bias_objective import Objective
 from flightid.identification.frequency_domain.bias_rounds import iterate
@@ -27,10 +28,12 @@ from flightid.identification.frequency_domain.fit import (
     response_at,
     select_by,
 )
+from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.joint.independence import judge_independence
 from flightid.identification.joint.options import JointOptions
+from flightid.identification.multistart import cluster
 from flightid.identification.output_error.fit import (
     SearchEnd,
     WhitenedResponses,
@@ -46,6 +49,8 @@ from flightid.responses import FrequencyResponse
 from flightid.uncertainty.blocks import JointResiduals
 
 Array = NDArray[np.float64]
+MARGIN, MOST_RIVALS = 50.0, 4
+"""Log-likelihood from which on a minimum lies too far below the best, and most that are tried."""
 
 
 @dataclass(frozen=True)
@@ -107,15 +112,19 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
         *check_start(model, points.selected),
     ]
     found = searched(model, prepared, options, points.native)
-    outcome, following = BiasOutcome("correct_bias=False", possible=False), None
+    made = _Corrected(found, points, None, BiasOutcome("correct_bias=False", possible=False))
     if options.correct_bias:
-        found, points, following, outcome = _without_bias(
-            found, prepared, response, points, options
-        )
-        setup += outcome.findings()
-    fit = conclude(found, options, setup, points.beside(found.fitted, following))
-    fit = _with_responses(fit, response, points, outcome.provenance(options.hold))
-    return without_intervals(fit, outcome.withheld) if outcome.withheld else fit
+        made = _without_bias(found, prepared, response, points, options)
+        setup += made.outcome.findings()
+    beside = made.points.beside(made.found.fitted, made.following)
+    fit = conclude(made.found, options, setup, beside)
+    noise = noise_costs(
+        points.selected,
+        [response_at(fit.model, each.omega_rad_s, k) for k, each in enumerate(points.selected)],
+        points.errors,
+    )
+    fit = _with_responses(fit, response, made.points, noise, made.outcome.provenance(options.hold))
+    return without_intervals(fit, made.outcome.withheld) if made.outcome.withheld else fit
 
 
 def _divided(data: Sequence[object]) -> tuple[FrequencyResponse, list[Record]]:
@@ -137,13 +146,51 @@ def _points(
     return ChosenPoints(selected, error_model(response, selected))
 
 
+@dataclass(frozen=True)
+class _Corrected:
+    """A search whose response is free of the estimator's bias, or why it is not."""
+
+    found: SearchEnd
+    points: ChosenPoints
+    following: Array | None
+    outcome: BiasOutcome
+
+
 def _without_bias(
     found: SearchEnd,
     prepared: RecordSet,
     response: FrequencyResponse,
     points: ChosenPoints,
     options: JointOptions,
-) -> tuple[SearchEnd, ChosenPoints, Array | None, BiasOutcome]:
+) -> _Corrected:
+    """Take the estimator's bias out, and fit again, from each minimum that may be the best.
+
+    Minima of several starts are compared on the corrected response, not where it was biased.
+    """
+    first = _corrected(found, prepared, response, points, options)
+    if not first.outcome.applied:
+        return first
+    ends = [first]
+    for group in rivals(found.groups, found.groups[0][0].cost + MARGIN)[:MOST_RIVALS]:
+        # A rival that cannot be followed over the records is none.
+        with suppress(FlightidError):
+            other = replace(found, groups=[group])
+            ends.append(_corrected(other, prepared, response, points, options))
+    ranked = sorted(
+        (each for each in ends if each.outcome.applied),
+        key=lambda each: each.found.groups[0][0].cost,
+    )
+    groups = cluster([each.found.groups[0][0] for each in ranked])
+    return replace(ranked[0], found=replace(ranked[0].found, groups=groups))
+
+
+def _corrected(
+    found: SearchEnd,
+    prepared: RecordSet,
+    response: FrequencyResponse,
+    points: ChosenPoints,
+    options: JointOptions,
+) -> _Corrected:
     """Take the estimator's bias out of the response, and fit again, until nothing moves."""
     once = replace(options, starts=1)
 
@@ -159,7 +206,7 @@ def _without_bias(
     without = Correction(response, options.hold)
     done = iterate(found.fitted, without, scales, refit)
     if not done.outcome.applied:
-        return found, points, None, done.outcome
+        return _Corrected(found, points, None, done.outcome)
     after = corrected_points(done.data)
     known = without.errors(done.model)
     if known is not None:
@@ -169,13 +216,15 @@ def _without_bias(
     last = searched(done.model, prepared, once, after.native)
     objective = Objective(last.fitted, without, after.selected, after.errors, "likelihood")
     moved = sizes(points.selected, after.selected, after.errors)
-    # The other minima are those of the first search.
-    found = replace(last, groups=[last.groups[0], *found.groups[1:]])
-    return found, after, objective.following(), replace(done.outcome, sizes=moved)
+    return _Corrected(last, after, objective.following(), replace(done.outcome, sizes=moved))
 
 
 def _with_responses(
-    fit: Fit, response: FrequencyResponse, points: ChosenPoints, correction: Mapping[str, object]
+    fit: Fit,
+    response: FrequencyResponse,
+    points: ChosenPoints,
+    noise: Mapping[str, NoiseCost],
+    correction: Mapping[str, object],
 ) -> Fit:
     """The fit of the records with its responses beside them."""
     compared = compare_responses(fit.model, points.selected)
@@ -191,7 +240,7 @@ def _with_responses(
         intervals_from=f"{source} and {fit.intervals_from}",
         findings=(
             *fit.findings,
-            *judge_cost(costs, total / len(costs)),
+            *judge_cost(costs, total / len(costs), noise),
             *judge_intervals(source, outputs_apart=points.errors.outputs_apart),
         ),
         provenance={
