@@ -107,7 +107,8 @@ OWN = {
     ),
     "control.tuning": (
         "requirements of a design and its evidence",
-        "angle_loop gyro_noise name nominal requirements sign signs verification verifications",
+        "accept_red angle_loop gyro_noise name nominal requirements sign signs verification "
+        "verifications",
     ),
     "dynamics": (
         "words of the standards: response types, classes, categories, derivatives",

@@ -162,7 +162,7 @@ def test_steps_of_all_axes_are_written_together(tuning: fid.Tuning, tmp_path: Pa
 def test_nothing_is_written_where_there_are_no_gains(tmp_path: Path) -> None:
     slow = fid.LinearSystem([[-1.0]], [[140.0]], [[1.0]], [[0.0]], ("tau_phi",), ("p",), [0.4])
     design = fid.tune_pid(
-        slow, gains=_loops("roll")["roll"], nominal=True,
+        slow, gains=_loops("roll")["roll"], nominal=True, band_rad_s=(0.5, 90.0),
         requirements=fid.TuningRequirements(crossover_rad_s=20.0, noise_growth=None),
     )  # fmt: skip
     with pytest.raises(DataError, match="so none are written"):
@@ -205,7 +205,7 @@ def test_parameters_by_name_stand_for_loops() -> None:
     loop = axis_loop("px4_multicopter", "yaw", loop_rate_hz=400.0)
     made = fid.tune(
         {"yaw": plant}, gains=loop.gains | {"IMU_GYRO_RATEMAX": 400.0},
-        autopilot="px4_multicopter", nominal=True,
+        autopilot="px4_multicopter", nominal=True, band_rad_s=(0.5, 60.0),
         requirements=fid.TuningRequirements(noise_growth=None), angle_loop=False,
     )  # fmt: skip
     assert made["yaw"].exists

@@ -69,7 +69,8 @@ def command(
     A MODEL is a .toml file, the JSON of a fit, or the output folder of a study, all models of which
     are taken. The table [tune] of the study holds requirements and options; what is given here goes
     before it, and without either the usual ones apply. Gains keep their margins for every plant
-    that the data allow. The exit code is 1 where a verdict on the gains is red.
+    that the data allow. The exit code is 1 where a verdict on the gains is red; nothing is written
+    then, unless --accept-red is given, and the files say so.
     """
     from flightid.study.tuning import TuneSettings
 
@@ -98,15 +99,16 @@ def command(
     if report is not None:
         note(f"Wrote {report}")
     if target is not None and tuning.exists:
-        for path in _written(tuning, target, overwrite):
+        accepted = bool(options.get("accept_red"))
+        for path in _written(tuning, target, overwrite, accepted):
             note(f"Wrote {path}")
     leave_by_verdict(tuning.findings)
 
 
-def _written(tuning: Tuning, target: Path, overwrite: bool) -> Iterable[Path]:
+def _written(tuning: Tuning, target: Path, overwrite: bool, accept_red: bool) -> Iterable[Path]:
     """Parameter files of an autopilot; C or TOML of a PID of its own."""
     if target.suffix != ".c":
-        return tuning.write(target, overwrite=overwrite)
+        return tuning.write(target, overwrite=overwrite, accept_red=accept_red)
     from flightid import export
     from flightid.export.names import identifier
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from flightid.identification.details import Details
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.fitted_response import FittedResponse
 from flightid.identification.local_minimum import LocalMinimum
+from flightid.identification.model_error import ModelErrorBound, model_errors
 from flightid.identification.training import TrainingChannel, training_channels
 from flightid.models import EstimateProvenance, Model
 from flightid.models.linear.linear_system import LinearSystem
@@ -138,6 +140,12 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
         """Where the training records were, by channel; empty for a fit of responses alone."""
         return training_channels([item.measured for item in self.records])
 
+    @cached_property
+    def model_errors(self) -> dict[str, ModelErrorBound]:
+        """How far the model lies from its data by frequency, by ``"output/input"``."""
+        filtered = self.residual_horizon != "free_run" and not self.prediction_errors
+        return model_errors(self.model, self.responses, self.records, filtered=filtered)
+
     def linear_system(self) -> LinearSystem:
         """The linear system of the fitted model; ModelError with the reason where there is none."""
         made: LinearSystem = self.model.linear_system()
@@ -166,6 +174,7 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
             {each.name: each.band_rad_s for each in self.responses},
             self.evidence.to_dict(),
             self.provenance,
+            {name: each.to_dict() for name, each in self.model_errors.items()},
         )
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,10 @@ from flightid.models.language.reading import (
 )
 
 Array = NDArray[np.float64]
-_KEYS = {"names", "covariance", "method", "intervals_from", "bands", "evidence", "provenance"}
+_KEYS = {
+    "names", "covariance", "method", "intervals_from", "bands", "evidence", "provenance",
+    "model_errors",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,6 +47,8 @@ class EstimateProvenance:
         Plain values of the fit's `flightid.evidence.Evidence`.
     provenance : mapping
         Hash of the data, options, version.
+    model_errors : mapping of str to mapping
+        Plain values of the fit's `ModelErrorBound` by response.
 
     Example
     -------
@@ -57,6 +63,7 @@ class EstimateProvenance:
     bands: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     evidence: Mapping[str, object] = field(default_factory=dict)
     provenance: Mapping[str, object] = field(default_factory=dict)
+    model_errors: Mapping[str, Any] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Size and method on one line."""
@@ -73,6 +80,7 @@ class EstimateProvenance:
             "bands": {name: list(band) for name, band in self.bands.items()},
             "evidence": _plain(self.evidence),
             "provenance": _plain(self.provenance),
+            "model_errors": _plain(self.model_errors),
         }
         if self.covariance is not None:
             table["covariance"] = self.covariance.tolist()
@@ -112,6 +120,7 @@ class EstimateProvenance:
             {name: _band(item) for name, item in bands.items()},
             read_table(content, "evidence", required=False),
             read_table(content, "provenance", required=False),
+            read_table(content, "model_errors", required=False),
         )
 
 

@@ -49,11 +49,18 @@ class PlantSet:
 
     @classmethod
     def of(
-        cls, sampled: SampledPlants, points: int, loops: Sequence[AxisLoop], gyro: Gyro
+        cls,
+        sampled: SampledPlants,
+        points: int,
+        loops: Sequence[AxisLoop],
+        gyro: Gyro,
+        factors: Callable[[Array], Complex],
     ) -> PlantSet:
-        """Evaluate plants on a grid of the loop."""
+        """Evaluate plants on a grid of the loop, each with an error of its own structure."""
         omega = loop_grid(sampled.sample_time_s, points)
-        return cls(sampled, omega, *loop_responses(sampled, omega, loops, gyro))
+        rate, angle = loop_responses(sampled, omega, loops, gyro)
+        factor = factors(omega)
+        return cls(sampled, omega, rate * factor, angle * factor)
 
     def axis(self, place: int, loops: list[AxisLoop], gyro: Gyro) -> Plants:
         """Plants of one axis with the other loops closed."""

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.control.tuning.structure_error import Band, errors_of, identified_band, no_band
 from flightid.conventions import Light
 from flightid.dynamics.continuous import to_continuous
 from flightid.errors import DataError, FlightidError
 from flightid.findings import Finding
+from flightid.identification.model_error import ModelErrorBound
 from flightid.identification.uncertain_of import evidence_behind, uncertain_of
 from flightid.models import InnovationsModel, PolynomialModel
 from flightid.models.linear.linear_system import LinearSystem
@@ -21,7 +23,8 @@ from flightid.uncertainty.uncertain import Uncertain
 
 CORNER = 2.0
 """Standard deviations from the estimate to the corners that a search begins with."""
-Band = tuple[float, float]
+UNEXPLAINED_PERCENT = 20.0
+"""Of an output's variance: beyond it no gains, whatever the residuals are."""
 Array = NDArray[np.float64]
 
 
@@ -52,6 +55,8 @@ class TuningEvidence:
     findings : tuple of Finding
     coherences : mapping of str to tuple of ndarray
         By ``"output/input"`` of the fitted responses: frequencies (rad/s) and coherence.
+    errors : mapping of str to ModelErrorBound
+        By ``"output/input"``: how far the model itself was from its data.
     """
 
     estimate: LinearSystem
@@ -62,6 +67,7 @@ class TuningEvidence:
     hold_in_model: bool
     findings: tuple[Finding, ...]
     coherences: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    errors: Mapping[str, ModelErrorBound] = field(default_factory=dict)
 
     @property
     def sources(self) -> tuple[LinearSystem, ...]:
@@ -72,6 +78,7 @@ class TuningEvidence:
 def gather(
     source: object,
     sample_time_s: float,
+    pairs: Sequence[str],
     *,
     draws: int,
     fresh: int,
@@ -79,6 +86,8 @@ def gather(
     band_rad_s: Band | None,
     verification: Verdicts | Iterable[Verdicts] | None,
     nominal: bool,
+    accept_red: bool,
+    needs_band: bool,
 ) -> TuningEvidence:
     """Collect plants, or refuse where the data cannot carry gains.
 
@@ -87,15 +96,21 @@ def gather(
     source : fit or model
     sample_time_s : float
         Of the autopilot's loop, s.
+    pairs : sequence of str
+        ``"output/input"`` of the axes.
     draws, fresh : int
         Draws for the search, and others to judge its result by.
     seed : int
     band_rad_s : tuple of float or None
-        Identified band, rad/s; None: that of the fit's responses.
+        Identified band, rad/s; where the data show one, what both have in common.
     verification : Verification or several, optional
         Predictions of records that the fit has not seen.
     nominal : bool
         Go on without a covariance.
+    accept_red : bool
+        Go on where the data refuse gains; every refusal is then a red finding.
+    needs_band : bool
+        Whether the crossover is bounded by the band.
 
     Returns
     -------
@@ -104,38 +119,24 @@ def gather(
     Raises
     ------
     DataError
-        No covariance; a fit or a verification that is red.
+        No covariance, no identified band, a fit or a verification that is red, too much that the
+        model does not explain.
     """
-    found = _judged(source)
-    _refuse_red("the fit", source)
-    for each in _listed(verification):
-        _refuse_red("the verification", each)
     uncertain: Uncertain[Any] = uncertain_of(source)
-    findings: list[Finding] = [*found]
-    if not uncertain.known:
-        if not nominal:
-            raise DataError(
-                "gains for a model whose errors are not known would promise nothing",
-                found=uncertain.reason,
-                needed="a fit with a covariance",
-                action="fit a measured response or records; or take nominal=True and keep margins",
-            )
+    errors = errors_of(source)
+    band = identified_band(source, errors, pairs, band_rad_s)
+    refusals = [*_refusals(source, uncertain, verification, nominal=nominal)]
+    if band is None and needs_band:
+        refusals.append(no_band(errors, pairs))
+    findings = [_accepted(each, accept_red=accept_red) for each in refusals]
+    findings += _judged(source)
+    if not uncertain.known and nominal:
         findings.append(
             Finding(
                 "no-uncertainty",
                 Light.AMBER,
                 f"margins are those of the model alone: {uncertain.reason}",
                 "identify the vehicle, and keep more margin until then",
-            )
-        )
-    band = band_rad_s or _band(source)
-    if band is None:
-        findings.append(
-            Finding(
-                "band-unknown",
-                Light.UNKNOWN,
-                "nothing says up to which frequency the model was identified",
-                "give band_rad_s, so that the crossover stays inside",
             )
         )
     plants = [_linear(each, sample_time_s) for each in uncertain.draws(draws + fresh, seed)]
@@ -152,7 +153,53 @@ def gather(
             for each in getattr(source, "responses", ())
             if hasattr(each, "measured")
         },
+        errors,
     )
+
+
+def _accepted(refusal: DataError, *, accept_red: bool) -> Finding:
+    """A refusal as a red finding, where the user goes on in spite of it."""
+    if not accept_red:
+        raise refusal
+    text = f"accepted by the user: {refusal.problem}: found {refusal.found}"
+    return Finding("accepted-red", Light.RED, text, str(refusal.action or ""))
+
+
+def _refusals(
+    source: object,
+    uncertain: Uncertain[Any],
+    verification: Verdicts | Iterable[Verdicts] | None,
+    *,
+    nominal: bool,
+) -> Iterator[DataError]:
+    """What forbids gains, the worst first."""
+    examined = evidence_behind(source)
+    if examined is not None and examined.verdict.light is Light.RED:
+        yield _red("the fit", examined.verdict)
+    else:
+        yield from _first_red("the fit", source)
+    for each in _listed(verification):
+        yield from _first_red("the verification", each)
+    left = [
+        f"{name} {cost:.3g} %"
+        for name, cost in getattr(source, "costs", {}).items()
+        if cost > UNEXPLAINED_PERCENT and not getattr(source, "responses", ())
+    ]
+    if left:
+        yield DataError(
+            "too much of the data is left unexplained for gains",
+            found=f"share of variance in the residuals: {', '.join(left)}",
+            needed=f"at most {UNEXPLAINED_PERCENT:g} %",
+            action="add the dynamics that the model lacks (motor lag, delay), or fit the response "
+            "to the injected excitation, which noise does not enter",
+        )
+    if not uncertain.known and not nominal:
+        yield DataError(
+            "gains for a model whose errors are not known would promise nothing",
+            found=uncertain.reason,
+            needed="a fit with a covariance",
+            action="fit a measured response or records; or take nominal=True and keep margins",
+        )
 
 
 def _listed(given: Verdicts | Iterable[Verdicts] | None) -> Sequence[Verdicts]:
@@ -162,44 +209,29 @@ def _listed(given: Verdicts | Iterable[Verdicts] | None) -> Sequence[Verdicts]:
 
 
 def _judged(source: object) -> tuple[Finding, ...]:
-    """The light of a fit's evidence: red is refused, amber goes on with its gains."""
+    """The light of a fit's evidence: amber goes on with its gains."""
     examined = evidence_behind(source)
-    if examined is None:
+    if examined is None or examined.verdict.light in (Light.GREEN, Light.RED):
         return ()
     verdict = examined.verdict
-    if verdict.light is Light.RED:
-        raise DataError(
-            "the fit is red, so no gains are made from it",
-            found=verdict.message,
-            needed="a model that its data support",
-            action=verdict.action or None,
-        )
-    if verdict.light is Light.GREEN:
-        return ()
     text = f"gains rest on a fit that is {verdict.light}: {verdict.message}"
     return (Finding("fit-evidence", verdict.light, text, verdict.action),)
 
 
-def _refuse_red(what: str, result: object) -> None:
+def _first_red(what: str, result: object) -> Iterator[DataError]:
     for finding in getattr(result, "findings", ()):
         if finding.light is Light.RED:
-            raise DataError(
-                f"{what} is red, so no gains are made from it",
-                found=finding.message,
-                needed="a model that its data support",
-                action=finding.action or None,
-            )
+            yield _red(what, finding)
+            return
 
 
-def _band(source: object) -> Band | None:
-    """What all fitted responses have in common."""
-    known_of = getattr(source, "estimated", None)
-    bands = list(known_of.bands.values()) if known_of is not None else []
-    known = [band for band in bands if band is not None]
-    if not known or len(known) < len(bands):
-        return None
-    lows, highs = zip(*known, strict=True)
-    return max(lows), min(highs)
+def _red(what: str, finding: Finding) -> DataError:
+    return DataError(
+        f"{what} is red, so no gains are made from it",
+        found=finding.message,
+        needed="a model that its data support",
+        action=finding.action or None,
+    )
 
 
 def _hold_in_model(source: object) -> bool:

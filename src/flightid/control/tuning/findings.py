@@ -98,6 +98,15 @@ def remarks(
             f"{np.count_nonzero(~held)} of {len(held)} plants are unstable with the flown gains",
             "the spread is wider than what flew: identify better",
         )
+    at_limits = [c.name for c in changes if c.at_limit]
+    if result.found.exists and len(at_limits) == len(changes):
+        yield Finding(
+            "gains-at-limits",
+            Light.RED,
+            f"every gain stands at an end of its range: {', '.join(at_limits)}",
+            "the model knows nothing that limits them: look for the lag and the delay that it "
+            "lacks, and identify up to higher frequencies",
+        )
     if couplings:
         yield Finding(
             "couplings",

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+AT_LIMIT = 1.1e-3
+"""Of the range's upper end: with it the least value that a search takes counts as an end."""
+
 
 @dataclass(frozen=True)
 class TunedGain:
@@ -37,6 +40,12 @@ class TunedGain:
     def ratio(self) -> float | None:
         """New over flown; None where nothing was flown."""
         return self.new / self.flown if self.flown and self.flown > 0.0 else None
+
+    @property
+    def at_limit(self) -> bool:
+        """Whether the new value stands at an end of the range."""
+        near = AT_LIMIT * self.high
+        return self.new >= self.high - near or self.new <= self.low + near
 
 
 @dataclass(frozen=True)

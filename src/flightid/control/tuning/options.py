@@ -34,3 +34,8 @@ class TuneOptions(Options):
     nominal: bool = option(False, doc="Take a model without covariance, for its own margins alone.")
     draws: int = option(DRAWS, minimum=1, doc="Plants drawn from the covariance.")
     seed: int = option(0, minimum=0, doc="Seed of the draws.")
+    accept_red: bool = option(
+        False,
+        doc="Make gains where the data refuse them, and write them: every refusal stands in the "
+        "result and in the files.",
+    )

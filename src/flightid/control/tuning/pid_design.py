@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from pathlib import Path
@@ -19,6 +19,7 @@ from flightid.control.tuning.loop_problem import LoopProblem
 from flightid.control.tuning.promises import Promise
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import ResponseBand
+from flightid.conventions import Light
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.files import as_path, write_atomically
 from flightid.findings import Finding
@@ -233,7 +234,9 @@ class PidDesign(
         """Gains, with the verdicts below; `promise_table` has the margins."""
         return self.gain_table()
 
-    def write(self, path: str | Path, *, overwrite: bool = False) -> tuple[Path, ...]:
+    def write(
+        self, path: str | Path, *, overwrite: bool = False, accept_red: bool = False
+    ) -> tuple[Path, ...]:
         """Write the gains as the autopilot's parameter files, and the flown ones to go back to.
 
         Those of a PID of its own are written as TOML, in every form (`flightid.export`: as C).
@@ -247,6 +250,8 @@ class PidDesign(
             Name of the file, usually ``*.param`` or, for PX4, ``*.params``.
         overwrite : bool
             Whether files that exist may be replaced.
+        accept_red : bool
+            Write in spite of red findings, which then stand at the top of every file.
 
         Returns
         -------
@@ -256,13 +261,13 @@ class PidDesign(
         Raises
         ------
         DataError
-            There are no gains that meet the requirements.
+            There are no gains that meet the requirements, or a finding on them is red.
         OptionError
             A file is already there.
         OSError
             A file cannot be written.
         """
-        return write_steps([self], path, overwrite=overwrite)
+        return write_steps([self], self.findings, path, overwrite=overwrite, accept_red=accept_red)
 
     @property
     def plain(self) -> PidLoop | None:
@@ -285,19 +290,24 @@ class PidDesign(
 
 
 def write_steps(
-    designs: Sequence[PidDesign], path: str | Path, *, overwrite: bool = False
+    designs: Sequence[PidDesign],
+    findings: Iterable[Finding],
+    path: str | Path,
+    *,
+    overwrite: bool = False,
+    accept_red: bool = False,
 ) -> tuple[Path, ...]:
     """Write the steps of several axes together; an axis that arrives earlier stays there.
 
     Raises
     ------
     DataError
-        An axis has no gains.
+        An axis has no gains, or a finding is red and that was not accepted.
     """
-    require_gains(designs)
+    accepted = require_gains(designs, findings, accept_red=accept_red)
     plain = [design.plain for design in designs if design.plain is not None]
     if plain:
-        return _write_settings(plain, as_path(path), overwrite=overwrite)
+        return _write_settings(plain, as_path(path), accepted, overwrite=overwrite)
     final, count = Path(path), max(len(design.stages) for design in designs)
     write = (
         write_px4_parameters
@@ -310,19 +320,21 @@ def write_steps(
             _step_changes(each, min(k, len(each.stages) - 1)) for each in designs
         )
         name = final if count == 1 else final.with_name(f"{final.stem}-{k + 1}{final.suffix}")
-        notes = [f"flightid: step {k + 1} of {count}; fly each before the next"]
+        notes = [f"flightid: step {k + 1} of {count}; fly each before the next", *accepted]
         made = write(changes, name, notes=notes, overwrite=overwrite)
         written += [each for each in (made.path, made.rollback) if each is not None]
     return tuple(written)
 
 
-def require_gains(designs: Sequence[PidDesign]) -> None:
-    """Refuse axes without gains.
+def require_gains(
+    designs: Sequence[PidDesign], findings: Iterable[Finding] = (), *, accept_red: bool = False
+) -> list[str]:
+    """Refuse axes without gains, and red ones that nobody accepted; notes for the files.
 
     Raises
     ------
     DataError
-        An axis has none.
+        An axis has none, or a finding is red.
     """
     for design in designs:
         if not design.exists:
@@ -331,9 +343,23 @@ def require_gains(designs: Sequence[PidDesign]) -> None:
                 found=", ".join(design.binding),
                 action="relax a requirement that cannot be met, or identify better",
             )
+    said = [*findings, *(finding for design in designs for finding in design.findings)]
+    red = {finding.message: finding for finding in said if finding.light is Light.RED}
+    if red and not accept_red:
+        first = next(iter(red.values()))
+        raise DataError(
+            "a finding on the gains is red, so none are written",
+            found=first.message,
+            needed="gains without a red finding",
+            action=f"{first.action or 'mend that'}; accept_red writes them all the same, with "
+            "every red finding at the top of the file",
+        )
+    return [f"RED, accepted by the user: {message}" for message in red]
 
 
-def _write_settings(loops: Sequence[PidLoop], path: Path, *, overwrite: bool) -> tuple[Path, ...]:
+def _write_settings(
+    loops: Sequence[PidLoop], path: Path, notes: Sequence[str], *, overwrite: bool
+) -> tuple[Path, ...]:
     """Numbers of controllers, one table each."""
     if path.suffix != ".toml" or (path.exists() and not overwrite):
         raise OptionError(
@@ -342,7 +368,7 @@ def _write_settings(loops: Sequence[PidLoop], path: Path, *, overwrite: bool) ->
             needed="a name that ends in .toml, of no file that is there",
             action="name another file, or export the design as C",
         )
-    lines = []
+    lines = [f"# {' '.join(note.split())}" for note in notes]
     for loop in loops:
         told = loop.settings().items()
         lines += ["[[controller]]", *(f"{key} = {toml_value(value)}" for key, value in told), ""]

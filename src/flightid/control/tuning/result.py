@@ -176,17 +176,21 @@ class Tuning(Result, schema="flightid.tuning/1"):
         note = "Gains and phases that all outputs may gain or lose at once, each for itself."
         return Table("Coupled axes closed together", columns, rows, (note,))
 
-    def write(self, path: str | Path, *, overwrite: bool = False) -> tuple[Path, ...]:
+    def write(
+        self, path: str | Path, *, overwrite: bool = False, accept_red: bool = False
+    ) -> tuple[Path, ...]:
         """Write all axes as the autopilot's parameter files, step by step; see `PidDesign.write`.
 
         Raises
         ------
         DataError
-            An axis has no gains.
+            An axis has no gains, or a finding is red.
         OptionError
             A file is already there.
         """
-        return write_steps(self.designs, path, overwrite=overwrite)
+        return write_steps(
+            self.designs, self.findings, path, overwrite=overwrite, accept_red=accept_red
+        )
 
     def _computed(self) -> dict[str, object]:
         return {

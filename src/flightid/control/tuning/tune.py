@@ -15,12 +15,13 @@ from flightid.control.margins.disk_margin import alphas_of
 from flightid.control.margins.stability_count import unstable_poles
 from flightid.control.tuning.axis_tuning import AxisResult, PlantSet, Setting, axis_steps, tune_axis
 from flightid.control.tuning.controller_paths import ControllerPaths, has_angle_loop, standing
-from flightid.control.tuning.evidence import Band, Verdicts, gather
+from flightid.control.tuning.evidence import Verdicts, gather
 from flightid.control.tuning.flown_gains import GainsOfAxes, flown_loop
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.result import Together, Tuning
 from flightid.control.tuning.sampled_plants import AxisLoops, whole_loop
+from flightid.control.tuning.structure_error import Band
 from flightid.control.tuning.tune_pid import CHANNELS, DRAWS, design_of, make_setting, tune_pid
 from flightid.errors import OptionError
 from flightid.progress import progress
@@ -51,6 +52,7 @@ def tune(
     draws: int = DRAWS,
     seed: int = 0,
     nominal: bool = False,
+    accept_red: bool = False,
 ) -> Tuning:
     """Gains of several axes; axes of one model are tuned with each other's loops closed.
 
@@ -68,7 +70,7 @@ def tune(
     autopilot : str
         Of parameters given by name; a log tells its autopilot.
     requirements : TuningRequirements, or a mapping of them by axis, optional
-    gyro, angle_loop, band_rad_s, draws, seed, nominal : optional
+    gyro, angle_loop, band_rad_s, draws, seed, nominal, accept_red : optional
         As for `flightid.tune_pid`.
     signs : mapping of str to int, optional
         −1 for an axis whose rate answers the command the other way round.
@@ -101,7 +103,7 @@ def tune(
     ...     {"Ntpsi": 40.0, "tau": 0.03})
     >>> flown = {"yaw": axis_loop("arducopter", "yaw", loop_rate_hz=400.0)}
     >>> tuning = fid.tune({"yaw": plant}, gains=flown, nominal=True, angle_loop=False,
-    ...     requirements=fid.TuningRequirements(noise_growth=None))
+    ...     band_rad_s=(0.5, 60.0), requirements=fid.TuningRequirements(noise_growth=None))
     >>> tuning["yaw"].axis
     'yaw'
     """
@@ -111,7 +113,8 @@ def tune(
             "axes to tune", found=", ".join(unknown) or "none", needed=", ".join(CHANNELS)
         )
     loops = {axis: flown_loop(gains, autopilot, axis) for axis in fits}
-    shared = {"gyro": gyro, "band_rad_s": band_rad_s, "draws": draws, "seed": seed}
+    shared = {"band_rad_s": band_rad_s, "draws": draws, "seed": seed}
+    shared |= {"nominal": nominal, "accept_red": accept_red}
     designs: dict[str, PidDesign] = {}
     together: list[Together] = []
     for axes in _groups(fits):
@@ -122,13 +125,15 @@ def tune(
         if len(axes) == 1:
             designs[axes[0]] = tune_pid(
                 first, gains=loops[axes[0]], requirements=needs[0], angle_loop=angle_loop,
-                sign=turned[0], verification=checks, nominal=nominal, **shared,  # type: ignore[arg-type]
+                gyro=gyro, sign=turned[0], verification=checks, **shared,  # type: ignore[arg-type]
             )  # fmt: skip
             continue
         flown = [loops[axis] for axis in axes]
+        pairs = [f"{CHANNELS[axis][1]}/{CHANNELS[axis][0]}" for axis in axes]
         evidence = gather(
-            first, 1.0 / flown[0].loop_rate_hz, draws=draws, fresh=draws, seed=seed,
-            band_rad_s=band_rad_s, verification=checks, nominal=nominal,
+            first, 1.0 / flown[0].loop_rate_hz, pairs, fresh=draws, verification=checks,
+            needs_band=any(need.band_factor is not None for need in needs),
+            **shared,  # type: ignore[arg-type]
         )  # fmt: skip
         setting = make_setting(
             evidence,

@@ -13,10 +13,11 @@ from flightid.control.autopilots.parameter_table import GainRange
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.axis_tuning import axis_steps, tune_axis
 from flightid.control.tuning.controller_options import WEIGHTS, ControllerOptions
-from flightid.control.tuning.evidence import Band, TuningEvidence, Verdicts, gather
+from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import responses
+from flightid.control.tuning.structure_error import Band
 from flightid.control.tuning.tune_pid import DRAWS, SHOWN, design_of, make_setting, noise_density
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError
@@ -54,6 +55,7 @@ def tune_controller(
     draws: int = DRAWS,
     seed: int = 0,
     nominal: bool = False,
+    accept_red: bool = False,
 ) -> PidDesign:
     """Gains of a PID controller that keep their margins for every plant that the data allow.
 
@@ -70,7 +72,7 @@ def tune_controller(
         Structure, rate, filter, limits.
     requirements : TuningRequirements, optional
         Those of the rate loop are of this loop; growth of noise and steps have no meaning here.
-    band_rad_s, verification, draws, seed, nominal : optional
+    band_rad_s, verification, draws, seed, nominal, accept_red : optional
         As for `flightid.tune_pid`.
 
     Returns
@@ -114,9 +116,10 @@ def tune_controller(
     sampled = rate_hz is not None
     need = replace(requirements or TuningRequirements(), noise_growth=None)
     common = {"draws": draws, "fresh": draws, "seed": seed, "band_rad_s": band_rad_s,
-              "verification": verification, "nominal": nominal}  # fmt: skip
+              "verification": verification, "nominal": nominal, "accept_red": accept_red,
+              "needs_band": need.band_factor is not None}  # fmt: skip
     # A continuous model is drawn alike for any step; a sampled one knows its own rate.
-    evidence = gather(fit, 1.0 / (rate_hz or 1.0), **common)  # type: ignore[arg-type]
+    evidence = gather(fit, 1.0 / (rate_hz or 1.0), ["/".join(channels)], **common)  # type: ignore[arg-type]
     direct, turn = _action(evidence, *channels), _turn(evidence, *channels, rate_hz, need)
     loop = _loop(asked, channels[0], rate_hz or FINE * turn, sampled, direct)
     start = _scaled(loop, turn, _gain(evidence.estimate, *channels, np.array([turn]))[0])

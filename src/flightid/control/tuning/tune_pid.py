@@ -22,13 +22,14 @@ from flightid.control.tuning.axis_tuning import (
     tune_axis,
 )
 from flightid.control.tuning.controller_paths import ControllerPaths, has_angle_loop
-from flightid.control.tuning.evidence import Band, TuningEvidence, Verdicts, gather
+from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
 from flightid.control.tuning.findings import low_coherence, remarks, verdict
 from flightid.control.tuning.flown_gains import Gains, flown_loop
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import response_bands
 from flightid.control.tuning.sampled_plants import SampledPlants, sample_plants
+from flightid.control.tuning.structure_error import Band, perturbed
 from flightid.control.tuning.worst_case import content_of_worst, least_share
 from flightid.errors import ModelError, OptionError
 from flightid.models.linear.linear_system import LinearSystem
@@ -60,6 +61,7 @@ def tune_pid(
     draws: int = DRAWS,
     seed: int = 0,
     nominal: bool = False,
+    accept_red: bool = False,
 ) -> PidDesign:
     """Gains of one axis that keep their margins for every plant that the data allow.
 
@@ -100,6 +102,8 @@ def tune_pid(
     seed : int
     nominal : bool
         Take a model without covariance, for its own margins alone.
+    accept_red : bool
+        Make gains where the data refuse them; each refusal is then a red finding.
 
     Returns
     -------
@@ -109,7 +113,8 @@ def tune_pid(
     Raises
     ------
     DataError
-        The data do not support gains: no covariance, a red fit or verification.
+        The data do not support gains: no covariance, no band in which the model was shown to hold,
+        a red fit or verification, too much that the model leaves unexplained.
     ModelError
         The rate answers the command the other way round.
     OptionError
@@ -148,12 +153,15 @@ def tune_pid(
     evidence = gather(
         fit,
         step,
+        [f"{channels[0][0]}/{channels[1][0]}"],
         draws=draws,
         fresh=draws,
         seed=seed,
         band_rad_s=band_rad_s,
         verification=verification,
         nominal=nominal,
+        accept_red=accept_red,
+        needs_band=need.band_factor is not None,
     )
     setting = make_setting(
         evidence,
@@ -203,10 +211,17 @@ def make_setting(
     if all(loop.inner == AxisLoop.inner for loop in loops):
         _require_right_way(searched.systems[0], searched, outputs)
     judged = sampled((evidence.estimate, *evidence.fresh))
+
+    def plants(found: SampledPlants, points: int, turn: float) -> PlantSet:
+        def factors(omega: np.ndarray) -> np.ndarray:
+            return perturbed(evidence.errors, outputs, inputs, omega, len(found), turn=turn)
+
+        return PlantSet.of(found, points, loops, gyro, factors)
+
     return Setting(
         evidence,
-        PlantSet.of(searched, SEARCH_POINTS, loops, gyro),
-        PlantSet.of(judged, JUDGED_POINTS, loops, gyro),
+        plants(searched, SEARCH_POINTS, 0.0),
+        plants(judged, JUDGED_POINTS, 0.5),
         gyro,
         with_angle,
         requirements,

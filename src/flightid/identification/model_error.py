@@ -1,0 +1,211 @@
+"""How far a fitted model lies from what was measured, by frequency: what no parameter holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError, FlightidError
+from flightid.identification.fitted_record import FittedRecord
+from flightid.identification.fitted_response import FittedResponse
+from flightid.models.model import Model, linear_system
+from flightid.record import Record
+from flightid.responses import FrequencyResponse, estimate_response
+from flightid.responses.bands import usable_band
+from flightid.simulation import simulate
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+SHOWN = 0.5
+"""Relative error up to which a model counts as shown: 6 dB or 30°."""
+SIGMAS = 2.0
+REACH = 0.25 * np.log(2.0)
+"""Half an octave in all: errors of a structure change no faster."""
+FEWEST = 2
+ALIKE = 2.0
+"""Neighbouring estimates that share their windows count as one."""
+MOST = 0.9
+"""Growth ends here: a model that nothing shows is not known to 5 dB upwards and 20 dB down."""
+
+
+@dataclass(frozen=True, eq=False)
+class ModelErrorBound:
+    """Bound of |H_true/H_model − 1| that the data show, at their frequencies.
+
+    Attributes
+    ----------
+    omega_rad_s : ndarray, shape (n,)
+    bound : ndarray, shape (n,)
+        Relative: mean error over half an octave with two of its standard deviations; noise, a wrong
+        structure and parameters that are not known all enlarge it.
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> seen = ModelErrorBound(np.geomspace(1.0, 100.0, 5), np.array([0.1, 0.1, 0.2, 0.6, 2.0]))
+    >>> tuple(round(edge, 1) for edge in seen.band_rad_s)
+    (1.0, 10.0)
+    """
+
+    omega_rad_s: Array
+    bound: Array
+
+    @property
+    def band_rad_s(self) -> tuple[float, float] | None:
+        """Widest band in which the model was shown to hold, rad/s; None where there is none."""
+        return usable_band(self.omega_rad_s, -self.bound, -SHOWN)
+
+    def at(self, omega_rad_s: Array) -> Array:
+        """Bound at any frequency: beyond the band it grows with the distance from it.
+
+        An error of dynamics that are missing grows with the frequency beyond the band that shows
+        it, as that of a lag does.
+        """
+        omega = np.asarray(omega_rad_s, dtype=np.float64)
+        band = self.band_rad_s
+        if band is None:
+            return np.full(omega.shape, MOST)
+        inside = np.interp(np.log(np.clip(omega, *band)), np.log(self.omega_rad_s), self.bound)
+        beyond = np.maximum(omega / band[1], band[0] / omega)
+        return np.asarray(np.minimum(inside * np.maximum(beyond, 1.0), MOST))
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values, four digits."""
+        return {
+            "omega_rad_s": [float(f"{w:.6g}") for w in self.omega_rad_s],
+            "bound": [float(f"{b:.4g}") for b in self.bound],
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> ModelErrorBound:
+        """From plain values.
+
+        Raises
+        ------
+        DataError
+            They are none, as in a file that was changed by hand.
+        """
+        try:
+            omega, bound = (np.array(values[k], dtype=np.float64) for k in ("omega_rad_s", "bound"))
+            sound = omega.shape == bound.shape and omega.ndim == 1 and len(omega) > 1
+            sound = sound and bool(np.all(np.diff(omega) > 0.0) and omega[0] > 0.0)
+            if not (sound and np.all(np.isfinite(bound)) and np.all(bound >= 0.0)):
+                raise ValueError("frequencies must increase and bounds be at least 0")
+        except (KeyError, TypeError, ValueError) as error:
+            raise DataError(
+                "these values are no error of a model", found=str(error)[:200]
+            ) from error
+        return cls(omega, bound)
+
+
+def model_errors(
+    model: Model,
+    responses: Sequence[FittedResponse],
+    records: Sequence[FittedRecord],
+    *,
+    filtered: bool = False,
+) -> dict[str, ModelErrorBound]:
+    """Errors of a fitted model by ``"output/input"``, from what it was fitted to.
+
+    Of responses: measured over model, their estimator's bias taken out as in the fit. Of records:
+    the response of what a free run leaves to the inputs, by way of an injected excitation where
+    the records have one, so that noise that is fed back does not count as an error of the model.
+
+    Parameters
+    ----------
+    model : Model
+    responses : sequence of FittedResponse
+    records : sequence of FittedRecord
+        Used where there are no responses.
+    filtered : bool
+        Whether the records' modelled outputs are no free run.
+
+    Returns
+    -------
+    dict of str to ModelErrorBound
+        Without the pairs for which nothing can be told.
+
+    Assumes
+    -------
+    A linear vehicle. Biased where a loop was closed and no excitation is known: a direct estimate
+    and the fit then err alike.
+
+    Reference
+    ---------
+    Goodwin, Gevers & Ninness, *IEEE Trans. Automatic Control* 37 (1992), 913–928 (bias and
+    variance of an estimated response); Ljung, *System Identification*, 2nd ed., section 16.6
+    (model error models).
+    """
+    found: dict[str, ModelErrorBound] = {}
+    for each in responses:
+        omega, (low, high) = each.measured.omega_rad_s, each.band_rad_s
+        inside = (omega >= low) & (omega <= high)
+        ratio = each.measured.response[inside] / each.model[inside]
+        spread = each.measured.random_error[inside] * np.abs(ratio)
+        found |= _named(each.name, omega[inside], ratio - 1.0, spread)
+    return found or _of_records(model, records, filtered)
+
+
+def _of_records(
+    model: Model, records: Sequence[FittedRecord], filtered: bool
+) -> dict[str, ModelErrorBound]:
+    if not records:
+        return {}
+    found: dict[str, ModelErrorBound] = {}
+    try:
+        left = [_left_over(model, each, filtered) for each in records]
+        seen = _response(left, model)
+        known = linear_system(model).frequency_response(seen.omega_rad_s)
+    except FlightidError:
+        return {}
+    for i, output in enumerate(model.outputs):
+        for j, name in enumerate(model.inputs):
+            if np.all(known[i, j] != 0.0):
+                error = seen.response[i, j] / known[i, j]
+                spread = seen.random_error[i, j] * np.abs(error)
+                found |= _named(f"{output}/{name}", seen.omega_rad_s, error, spread)
+    return found
+
+
+def _left_over(model: Model, item: FittedRecord, filtered: bool) -> Record:
+    """Measured minus a free run of the model."""
+    if not filtered:
+        return item.residual_record()
+    run = simulate(model, item.measured)
+    return item.measured.replace({name: item.measured[name] - run[name] for name in item.outputs})
+
+
+def _response(records: Sequence[Record], model: Model) -> FrequencyResponse:
+    """By way of the excitations where there are enough of them, else directly."""
+    counts = [len(record.excitations) for record in records]
+    estimator = "instrument" if min(counts) >= len(model.inputs) else "composite"
+    return estimate_response(
+        records,
+        inputs=model.inputs,
+        outputs=model.outputs,
+        estimator=estimator,
+        covariance=False,
+        loop="open",
+    )
+
+
+def _named(name: str, omega: Array, error: Complex, spread: Array) -> dict[str, ModelErrorBound]:
+    """Mean error about each frequency with its own doubt; nothing of fewer than two frequencies."""
+    if len(omega) < FEWEST:
+        return {}
+    logs = np.log(omega)
+    low = np.searchsorted(logs, logs - REACH)
+    high = np.searchsorted(logs, logs + REACH, side="right")
+    count = high - low
+    means, powers = (_window_means(values, low, high) for values in (error, spread**2))
+    doubt = np.sqrt(powers.real * np.minimum(ALIKE / count, 1.0))
+    return {name: ModelErrorBound(omega, np.abs(means) + SIGMAS * doubt)}
+
+
+def _window_means(values: Array | Complex, low: Array, high: Array) -> Complex:
+    sums = np.concatenate([[0.0], np.cumsum(values.astype(np.complex128))])
+    return np.asarray((sums[high] - sums[low]) / (high - low))
