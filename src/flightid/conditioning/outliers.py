@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from flightid.conditioning.detrend import chosen_channels
 from flightid.record import Record, Step
+from flightid.record.checks import REMOVE_OUTLIERS
 from flightid.record.outlying import bridge_outliers
 from flightid.table import Cell
 
@@ -76,4 +77,4 @@ def remove_outliers(
         if count:
             replaced[name], counts[name] = samples, count
     options: dict[str, Cell] = {"deviations": deviations, "half_width": half_width, **counts}
-    return record.replace(replaced, step=Step("conditioning.remove_outliers", options))
+    return record.replace(replaced, step=Step(REMOVE_OUTLIERS, options))

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from functools import lru_cache
 
 import numpy as np
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
-from flightid.evidence.evidence import BAND, COHERENCE, LOOP, TIME, Check
+from flightid.evidence.evidence import BAND, COHERENCE, LOOP, SAMPLES, TIME, Check
 from flightid.evidence.feedback import feedback_test
 from flightid.evidence.spans import judge_coherence, judge_span, spans_of
+from flightid.findings import counted, worst
 from flightid.record import Record
+from flightid.record.checks import data_findings, record_findings
 from flightid.record.time_question import time_question
 from flightid.responses import FrequencyResponse, estimate_response
 from flightid.responses.windows.windows import CYCLES_AT_LOWEST, HIGHEST_FRACTION
@@ -48,6 +50,27 @@ def time_checks(records: Sequence[Record]) -> list[Check]:
     """The question that a record's stamps raise, if they raise one."""
     asked = next(filter(None, map(time_question, records)), None)
     return [] if asked is None else [Check(TIME, asked.light, asked.message, asked.action)]
+
+
+def sample_checks(
+    data: Sequence[Record | FrequencyResponse], channels: Collection[str]
+) -> list[Check]:
+    """The worst that was found in the samples of the fitted channels, with what else there is."""
+    found = [
+        finding
+        for each in data
+        for finding in (
+            record_findings(each, channels)
+            if isinstance(each, Record)
+            else data_findings(each.history, channels)
+        )
+    ]
+    if not found:
+        return []
+    first = next(finding for finding in found if finding.light is worst(tuple(found)))
+    others = len({finding.message for finding in found}) - 1
+    more = f" (and {counted(others, 'other finding')} on the samples)" if others else ""
+    return [Check(SAMPLES, first.light, first.message + more, first.action)]
 
 
 def loop_of_responses(responses: Sequence[FrequencyResponse]) -> Check | None:

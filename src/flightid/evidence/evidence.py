@@ -14,6 +14,7 @@ from flightid.table import Column, Table
 
 INSPECTION = "inspection"
 TIME = "time base"
+SAMPLES = "samples"
 BAND = "excitation band"
 COHERENCE = "coherence"
 LOOP = "loop"
@@ -25,7 +26,7 @@ RESIDUALS = "residuals"
 PREDICTION = "prediction"
 GUIDELINES = "guidelines"
 NAMES = (
-    INSPECTION, TIME, BAND, COHERENCE, LOOP, HOLD, SETTLED, AGREEMENT, SIGNS, RESIDUALS,
+    INSPECTION, TIME, SAMPLES, BAND, COHERENCE, LOOP, HOLD, SETTLED, AGREEMENT, SIGNS, RESIDUALS,
     PREDICTION, GUIDELINES,
 )  # fmt: skip
 ALWAYS = (BAND, COHERENCE, LOOP, SETTLED, AGREEMENT)
@@ -34,6 +35,7 @@ ALWAYS = (BAND, COHERENCE, LOOP, SETTLED, AGREEMENT)
 _ABSENT: Mapping[str, tuple[str, str]] = {
     INSPECTION: ("the log was not inspected", "run inspect_log, or `flightid inspect`"),
     TIME: ("the time base was not examined", ""),
+    SAMPLES: ("the samples were not examined", ""),
     BAND: ("the band that the inputs excite was not examined", "fit records or their responses"),
     COHERENCE: ("coherence was not examined", "fit records or a response estimated from them"),
     LOOP: ("whether a loop was closed was not examined", "declare loop='open' or 'closed'"),

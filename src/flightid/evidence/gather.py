@@ -11,6 +11,7 @@ from flightid.evidence.data_checks import (
     loop_of_records,
     loop_of_responses,
     power_of_records,
+    sample_checks,
     time_checks,
 )
 from flightid.evidence.evidence import (
@@ -110,6 +111,7 @@ def gather_evidence(made: FitFacts) -> Evidence:
     responses = [each for each in made.data if isinstance(each, FrequencyResponse)]
     records = [each for each in made.data if isinstance(each, Record)]
     checks: list[Check] = time_checks(records)
+    checks += sample_checks(made.data, {*made.inputs, *made.outputs})
     if made.spans:
         checks += [judge_span(made.spans), judge_coherence(made.spans)]
     elif records:

@@ -24,6 +24,7 @@ from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.logs.extraction import ChannelSamples, extract, find
 from flightid.logs.self_check import InjectionCheck, check_injection, chirp_clock, paired_rows
 from flightid.record import Channel, InputShape, Record, Step
+from flightid.record.checks import entry_steps
 from flightid.record.timebase import GapPolicy, to_uniform
 from flightid.table import Cell
 from flightid.units import convert
@@ -86,18 +87,19 @@ def make_record(
         units={item.channel.name: item.channel.unit for item in found},
         name=name or log.path.stem,
     )
-    labels = [
-        Channel(i.channel.name, i.channel.unit, i.channel.role, i.note)
-        for role in Role
-        for i in found
-        if i.channel.role == role
-    ]
+    ordered = [item for role in Role for item in found if item.channel.role == role]
+    labels = [Channel(i.channel.name, i.channel.unit, i.channel.role, i.note) for i in ordered]
     options: dict[str, Cell] = {"log": log.path.name, "map": chosen.title, **base.options}
     options |= {"left_out": ", ".join(left_out) or None}
     if check is not None:
         options |= {"sid_run": repr(run), "injection": str(check.findings[0])}
     shape = _input_shape(declared, chosen, found, base.sample_time_s)
-    return record.replace(channels=labels, step=Step("Log.record", options), input_shape=shape)
+    made = record.replace(channels=labels, step=Step("Log.record", options), input_shape=shape)
+    for step in entry_steps(
+        [(c, i.time_s, i.values) for c, i in zip(labels, ordered, strict=True)]
+    ):
+        made = made.replace(step=step)
+    return made
 
 
 def _input_shape(

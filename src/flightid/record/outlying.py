@@ -81,9 +81,8 @@ def bridge_outliers(
     return np.where(bad, np.interp(time_s, time_s[good], samples[good]), samples), count
 
 
-def _outlying(
-    samples: NDArray[np.float64], deviations: float, half_width: int
-) -> NDArray[np.bool_]:
+def distances(samples: NDArray[np.float64], half_width: int) -> tuple[NDArray[np.float64], float]:
+    """Distance of each sample from its running median, and their robust standard deviation."""
     # A tenth of a second of imports that no record without outliers needs.
     from scipy.ndimage import median_filter  # noqa: PLC0415
 
@@ -93,7 +92,13 @@ def _outlying(
         # More than half of the samples are their neighbours' median: a held or quiet channel.
         moved = away[away > 0.0]
         typical = float(np.median(moved)) if moved.size else 0.0
-    spread = NORMAL_MAD * typical
+    return away, NORMAL_MAD * typical
+
+
+def _outlying(
+    samples: NDArray[np.float64], deviations: float, half_width: int
+) -> NDArray[np.bool_]:
+    away, spread = distances(samples, half_width)
     # A clean curve lies near its running median everywhere: what rounding adds is no outlier.
     rounding = 1e-9 * float(np.ptp(samples))
     return np.asarray(away > deviations * spread + rounding)

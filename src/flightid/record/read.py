@@ -14,6 +14,7 @@ from flightid.conventions import Role
 from flightid.errors import DataError, OptionError, UnitError, UnknownNameError
 from flightid.files import sha256_of_file
 from flightid.record.channel import DECLARED, Channel
+from flightid.record.checks import REMOVE_OUTLIERS, entry_steps
 from flightid.record.formats import ColumnTable, FileFormat, csv, file_format, matlab, netcdf
 from flightid.record.formats import parquet as parquet_format
 from flightid.record.formats.columns import is_unit
@@ -23,7 +24,7 @@ from flightid.record.interpolation import Interpolation, is_coarser, usual_metho
 from flightid.record.outlying import bridge_outliers
 from flightid.record.record import Record
 from flightid.record.rows import column_unit, manoeuvres, require_sensible_base, row_stamps
-from flightid.record.stamps import GAP_FACTOR
+from flightid.record.stamps import mean_spacing_s
 from flightid.record.store import RECORD_COLUMN, stored_records
 from flightid.record.timebase import to_uniform
 from flightid.record.validation import require_period, unknown_channel
@@ -172,14 +173,14 @@ def read_records(
     for part, label in manoeuvres(table, record_column, stamps, split_gaps=resample_to_s is None):
         if sample_time_s is None:
             options["time_unit"] = (units or {}).get(time_column) or table.units.get(time_column)
-            options["row_spacing_s"] = _spacing_s(stamps[part])
+            options["row_spacing_s"] = mean_spacing_s(stamps[part])
         history = (Step("read_records", dict(options), VERSION),)
         rows = {name: values[part] for name, values in columns.items()}
         for grid, samples, more in _pieces(stamps[part], rows, wanted, base):
             records.append(_record(grid, samples, wanted, label or source.stem, (*history, *more)))
     if len(records) > 1 and len({item.name for item in records}) == 1:
         records = [item.replace(name=f"{item.name}[{index}]") for index, item in enumerate(records)]
-    kept = base.hold_after(_spacing_s(stamps), wanted)
+    kept = base.hold_after(mean_spacing_s(stamps), wanted)
     return [_declared(item, InputShape(kept, period_s, loop)) for item in records]
 
 
@@ -215,14 +216,6 @@ class _Base:
         driving = [ways[item.channel.name] for item in wanted if item.channel.role is Role.INPUT]
         filtered = self.hold is not None and any(way != "previous" for way in driving)
         return "band_limited" if filtered else self.hold
-
-
-def _spacing_s(stamps: NDArray[np.float64]) -> float:
-    """Mean spacing of rows outside gaps, s."""
-    spacing = np.diff(stamps)
-    if not spacing.size:
-        return 0.0
-    return float(np.mean(spacing[spacing <= GAP_FACTOR * np.median(spacing)]))
 
 
 def _declared(record: Record, given: InputShape) -> Record:
@@ -329,6 +322,7 @@ def _pieces(
     if base.outliers is not None:
         rows, step = _without_outliers(stamps, rows, wanted, base.outliers)
         steps = (step,)
+    steps += entry_steps([(c.channel, stamps, rows[c.channel.name]) for c in wanted])
     if base.resample_to_s is None:
         return [(stamps, rows, steps)]
     require_sensible_base(stamps, base.resample_to_s, base.time_column)
@@ -336,7 +330,7 @@ def _pieces(
         {key: (stamps, values) for key, values in rows.items()},
         sample_time_s=base.resample_to_s,
         gaps="split",
-        interpolation=base.methods(wanted, _spacing_s(stamps)),
+        interpolation=base.methods(wanted, mean_spacing_s(stamps)),
     )
     steps = (*steps, Step("conditioning.to_uniform", made.options, VERSION))
     return [(span.time_s, span.samples, steps) for span in made.spans]
@@ -358,7 +352,7 @@ def _without_outliers(
         samples, count = bridge_outliers(name, stamps, rows[name], **limits)
         if count:
             rows, counts = {**rows, name: samples}, {**counts, name: count}
-    return rows, Step("conditioning.remove_outliers", {**limits, **counts}, VERSION)
+    return rows, Step(REMOVE_OUTLIERS, {**limits, **counts}, VERSION)
 
 
 def _record(

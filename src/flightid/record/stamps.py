@@ -16,6 +16,14 @@ UNIFORM_TOLERANCE = 1e-3
 """Largest departure from a uniform grid, in sample times, that counts as rounding of stamps."""
 
 
+def mean_spacing_s(stamps: NDArray[np.float64]) -> float:
+    """Mean spacing of stamps outside gaps, s; 0 below two."""
+    spacing = np.diff(stamps)
+    if not spacing.size:
+        return 0.0
+    return float(np.mean(spacing[spacing <= GAP_FACTOR * np.median(spacing)]))
+
+
 class StampPolicy(StrEnum):
     """What to do with a stamp that does not exceed the one before it.
 
@@ -66,8 +74,7 @@ class StampedSamples:
     @property
     def sample_time_s(self) -> float:
         """Mean time between stamps outside gaps, s; coarse stamps would mislead a median."""
-        spacing = np.diff(self.time_s)
-        return float(np.mean(spacing[spacing <= GAP_FACTOR * np.median(spacing)]))
+        return mean_spacing_s(self.time_s)
 
     @property
     def jitter(self) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
 from flightid.record import Record
+from flightid.record.checks import CHECK, checked_history
 from flightid.record.history import Step
 from flightid.record.several import as_records
 from flightid.units import clash
@@ -107,8 +108,14 @@ def gather(
         {name: listed[0].unit(name) for name in every},
         listed[0].sample_time_s,
         tuple(arrays),
-        listed[0].history,
+        _history(listed),
     )
+
+
+def _history(records: Sequence[Record]) -> tuple[Step, ...]:
+    """The first record's history, with what was found in the samples of all."""
+    found = [step for record in records[1:] for step in checked_history(record)]
+    return (*checked_history(records[0]), *(step for step in found if step.operation == CHECK))
 
 
 def _names(given: Iterable[str] | str | None, default: Sequence[str]) -> tuple[str, ...]:

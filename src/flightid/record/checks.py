@@ -1,0 +1,120 @@
+"""What was found in the samples of a record when they entered; it travels in the record's history.
+
+Files and logs are examined before anything is resampled, for a filter spreads a spike; a record
+that was made from arrays when it is asked for the first time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.record.angle_units import angle_unit_faults
+from flightid.record.channel import Channel
+from flightid.record.history import Step
+from flightid.record.record import Record
+from flightid.record.sample_faults import Array, SampleFault, sample_faults
+from flightid.version import VERSION
+
+CHECK = "Record.check"
+ENTRIES = frozenset({"read_records", "Log.record", CHECK})
+"""Steps after which a record has been examined."""
+REMOVE_OUTLIERS = "conditioning.remove_outliers"
+MENDED = {REMOVE_OUTLIERS: "spikes"}
+"""What a step takes out of the channels that its options count."""
+
+
+def fault_steps(faults: Iterable[SampleFault]) -> tuple[Step, ...]:
+    """Steps of a history that say what was found."""
+    return tuple(
+        Step(
+            CHECK,
+            {
+                "channel": fault.channel,
+                "start_s": fault.start_s,
+                "stop_s": fault.stop_s,
+                "code": fault.finding.code,
+                "light": str(fault.finding.light),
+                "found": fault.finding.message,
+                "action": fault.finding.action,
+            },
+            VERSION,
+        )
+        for fault in faults
+    )
+
+
+def entry_steps(entering: Sequence[tuple[Channel, Array, Array]]) -> tuple[Step, ...]:
+    """What channels show as they enter, each on its own stamps, as steps of a history."""
+    found = [
+        fault
+        for channel, time_s, samples in entering
+        for fault in sample_faults(
+            channel.name, time_s, samples, unit=channel.unit, role=channel.role
+        )
+    ]
+    pairs = {channel.name: (time_s, samples) for channel, time_s, samples in entering}
+    units = {channel.name: channel.unit for channel, _, _ in entering}
+    return fault_steps(found + angle_unit_faults(pairs, units))
+
+
+def checked_history(record: Record) -> tuple[Step, ...]:
+    """History of a record with what was found in its own span when it entered, or is found now."""
+    if not any(step.operation in ENTRIES for step in record.history):
+        channels = [(channel, record.time_s, record[n]) for n, channel in record.channels.items()]
+        return (*record.history, *entry_steps(channels))
+    first, last = float(record.time_s[0]), float(record.time_s[-1])
+    return tuple(step for step in record.history if _touches(step, first, last))
+
+
+def _touches(step: Step, first_s: float, last_s: float) -> bool:
+    if step.operation != CHECK:
+        return True
+    options = step.options
+    return float(options["stop_s"] or 0.0) >= first_s and float(options["start_s"] or 0.0) <= last_s
+
+
+def data_findings(
+    history: Sequence[Step], channels: Iterable[str] | None = None
+) -> tuple[Finding, ...]:
+    """Findings that a history holds on some channels.
+
+    Parameters
+    ----------
+    history : sequence of Step
+        Of a record, by `checked_history`, or of a response.
+    channels : iterable of str, optional
+        Default: all.
+
+    Returns
+    -------
+    tuple of Finding
+
+    Example
+    -------
+    >>> import numpy as np
+    >>> t = np.arange(400) / 100
+    >>> y = np.sin(3 * t) + 50.0 * (t == 2.0)
+    >>> record = Record.from_arrays(t, outputs={"y": y})
+    >>> [finding.code for finding in data_findings(checked_history(record))]
+    ['spikes']
+    """
+    wanted = None if channels is None else set(channels)
+    found: dict[tuple[str, str, str], Finding] = {}
+    for step in history:
+        options, mended = step.options, MENDED.get(step.operation)
+        found = {
+            key: one for key, one in found.items() if key[0] != mended or key[1] not in options
+        }
+        if step.operation != CHECK or (wanted is not None and options["channel"] not in wanted):
+            continue
+        code, channel, said = (str(options[key]) for key in ("code", "channel", "found"))
+        light = Light(str(options["light"]))
+        found[code, channel, said] = Finding(code, light, said, str(options["action"] or ""))
+    return tuple(found.values())
+
+
+def record_findings(record: Record, channels: Iterable[str] | None = None) -> tuple[Finding, ...]:
+    """Findings on the samples of a record in its own span."""
+    return data_findings(checked_history(record), channels)

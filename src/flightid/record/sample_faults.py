@@ -1,0 +1,238 @@
+"""What samples show of damage, channel by channel: spikes, dead stretches, repeats, limits, wraps.
+
+Each test asks for several signs at once, for what it says makes a fit red or amber: a manoeuvre may
+be sharp, a sensor coarse, a simulated channel free of noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.conventions import Light, Role
+from flightid.findings import Finding, counted
+from flightid.record.outlying import distances
+from flightid.record.repeats import found_staircase
+from flightid.units import DIMENSIONLESS, is_convertible, si_base
+
+Array = NDArray[np.float64]
+FEWEST = 50
+"""Samples below which nothing is judged."""
+HALF_WIDTH = 3
+FAR, FAR_FROM_NEIGHBOURS, NEIGHBOURS = 12.0, 5.0, 12
+"""A spike lies so many robust deviations, and so many times its neighbours, from its median."""
+HARMFUL = 0.5
+"""Least height of a spike over the range of the middle 98 %."""
+RED_SHARE = 0.05
+"""Share of a channel's variance, or of its samples, from which a fault is red."""
+DEAD_SAMPLES, DEAD_SHARE, NOISY = 20, 0.01, 0.3
+LIMIT_SHARE, LIMIT_RUN, LIMIT_RUNS, LEVELS = 0.01, 3, 3, 30
+TURN = 2.0 * np.pi
+
+
+@dataclass(frozen=True)
+class SampleFault:
+    """A finding on one channel and the stretch of time that it concerns.
+
+    Attributes
+    ----------
+    channel : str
+    start_s, stop_s : float
+    finding : Finding
+    """
+
+    channel: str
+    start_s: float
+    stop_s: float
+    finding: Finding
+
+
+def sample_faults(
+    name: str, time_s: Array, samples: Array, *, unit: str, role: Role
+) -> list[SampleFault]:
+    """Examine the samples of one channel on its own stamps, before anything is resampled.
+
+    Parameters
+    ----------
+    name : str
+        Channel, for messages.
+    time_s, samples : ndarray, shape (n,)
+        Increasing stamps, s; samples that are not finite are passed over.
+    unit : str
+    role : Role
+        Inputs may step, stand still and meet limits: they are examined for spikes and wraps alone.
+
+    Returns
+    -------
+    list of SampleFault
+
+    Example
+    -------
+    >>> t = np.arange(400) / 100
+    >>> y = np.sin(3 * t) + 0.01 * np.random.default_rng(0).standard_normal(400)
+    >>> y[200] = 90.0
+    >>> [fault.finding.code for fault in sample_faults("y", t, y, unit="1", role=Role.OUTPUT)]
+    ['spikes']
+    """
+    present = np.isfinite(samples) & np.isfinite(time_s)
+    stamps, values = time_s[present], samples[present]
+    if values.size < FEWEST or np.ptp(values) == 0.0:
+        return []
+    if role is Role.INPUT:
+        checks = [_input_spikes, _wraps]
+    else:
+        checks = [_spikes, _wraps, _dead, _held, _clipped]
+    return [fault for check in checks if (fault := check(name, stamps, values, unit))]
+
+
+def _fault(
+    name: str, stamps: Array, at: NDArray[np.intp], finding: tuple[str, Light, str, str]
+) -> SampleFault:
+    code, light, said, action = finding
+    return SampleFault(
+        name, float(stamps[at[0]]), float(stamps[at[-1]]), Finding(code, light, said, action)
+    )
+
+
+def _alone(values: Array) -> tuple[NDArray[np.intp], Array, float]:
+    """Samples alone, far from the median of their neighbours; distances from it; their spread."""
+    from scipy.ndimage import maximum_filter1d  # noqa: PLC0415
+
+    away, spread = distances(values, HALF_WIDTH)
+    low, high = np.percentile(values, [1, 99])
+    tall = (away > FAR * spread) & (away > HARMFUL * (high - low))
+    # The largest of the neighbours, without the few samples that a spike may last.
+    around = maximum_filter1d(np.where(tall, 0.0, away), 2 * NEIGHBOURS + 1, mode="nearest")
+    crowd = np.convolve(tall, np.ones(2 * (NEIGHBOURS + HALF_WIDTH) + 1), mode="same")
+    alone = tall & (away > FAR_FROM_NEIGHBOURS * around) & (crowd <= HALF_WIDTH)
+    return np.flatnonzero(alone), away, spread
+
+
+def _input_spikes(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
+    """Spikes beyond all else that the input does; those of one height, or from rest, are pulses."""
+    at, _, _ = _alone(values)
+    rest = np.delete(values, at)
+    range_ = float(np.ptp(rest))
+    pulses = at.size > 1 and float(np.ptp(values[at])) < HARMFUL * range_
+    if not at.size or range_ == 0.0 or pulses:
+        return None
+    margin = HARMFUL * range_
+    beyond = (values[at] < rest.min() - margin) | (values[at] > rest.max() + margin)
+    return _spikes(name, stamps, values, unit) if np.any(beyond) else None
+
+
+def _spikes(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
+    at, away, spread = _alone(values)
+    if not at.size:
+        return None
+    share = float(np.sum(away[at] ** 2) / np.sum((values - np.median(values)) ** 2))
+    light = Light.RED if share >= RED_SHARE else Light.AMBER
+    said = (
+        f"{counted(at.size, 'sample')} of {name} {'stands' if at.size == 1 else 'stand'} alone, "
+        f"{float(np.max(away[at])):.3g}{_of(unit)} from the neighbours at most "
+        f"({100 * share:.0f} % of the channel's variance; the first at {stamps[at[0]]:.6g} s)"
+    )
+    # Between the spikes and all others, so that what is advised takes out these and no more.
+    others = max(float(np.max(np.delete(away, at))), 1e-3 * float(np.min(away[at])))
+    deviations = float(np.sqrt(np.min(away[at]) * others)) / spread if spread > 0.0 else FAR
+    action = (
+        f"bridge them where they are read: [conditioning] outliers = {{ deviations = "
+        f"{deviations:.0f} }} in a study, conditioning.remove_outliers in Python"
+    )
+    return _fault(name, stamps, at, ("spikes", light, said, action))
+
+
+def _of(unit: str) -> str:
+    return "" if unit == DIMENSIONLESS else f" {unit}"
+
+
+def _wraps(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
+    if not is_convertible(unit, "rad"):
+        return None
+    turn = TURN / si_base(unit)[0]
+    steps = np.diff(values)
+    at = np.flatnonzero(np.abs(np.abs(steps) - turn) < 0.05 * turn)
+    if not at.size or np.median(np.abs(steps)) > 0.1 * turn:
+        return None
+    said = f"{name} jumps by a whole turn {counted(at.size, 'time')}: a heading that wraps"
+    return _fault(name, stamps, at, ("wrapped", Light.RED, said, "unwrap it before it is fitted"))
+
+
+def _dead(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
+    """Stretches of one and the same value in a channel whose noise never rests.
+
+    One at the beginning or the end may be rest.
+    """
+    del unit
+    starts, stops = _runs(np.diff(values) == 0.0)
+    inner = (starts > 0) & (stops < values.size - 1)
+    starts, stops = starts[inner], stops[inner]
+    long = (stops - starts) >= max(DEAD_SAMPLES, DEAD_SHARE * values.size)
+    if not long.any():
+        return None
+    moving = np.ones(values.size - 1, dtype=np.bool_)
+    for start, stop in zip(starts[long], stops[long], strict=True):
+        moving[start:stop] = False
+    steps = np.diff(values)[moving]
+    turning = np.mean(np.diff(np.sign(steps)) != 0) if steps.size > DEAD_SAMPLES else 0.0
+    if turning < NOISY or np.mean(steps == 0.0) > 1.0 - 2 * NOISY:
+        return None
+    first, last = int(starts[long][0]), int(stops[long][-1])
+    share = float(np.sum((stops - starts)[long])) / values.size
+    longest = int(np.argmax(stops - starts))
+    light = Light.RED if share >= RED_SHARE else Light.AMBER
+    said = (
+        f"{name} stands still at one value for {100 * share:.2g} % of its samples, from "
+        f"{stamps[starts[longest]]:.6g} to {stamps[stops[longest]]:.6g} s at the longest, though "
+        "its noise never rests elsewhere: nothing was measured there"
+    )
+    action = "cut the record before and after, or leave the channel out"
+    return _fault(name, stamps, np.array([first, last]), ("flat", light, said, action))
+
+
+def _held(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
+    del unit
+    found = found_staircase(values)
+    if found is None or found.samples < 2:
+        return None
+    said = (
+        f"{name} repeats its samples: it changes every {found.samples} rows, so that it was "
+        f"measured {found.samples} times slower than it is stored, and lags by half of that"
+    )
+    action = f"resample the record to every {found.samples}th row (resample_to_s)"
+    ends = np.array([0, values.size - 1])
+    return _fault(name, stamps, ends, ("samples-repeated", Light.AMBER, said, action))
+
+
+def _clipped(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
+    """Flat tops at the very extremes, met and left abruptly, again and again."""
+    if np.unique(values).size < LEVELS:
+        return None
+    typical = float(np.median(np.abs(np.diff(values))))
+    for end in (float(values.max()), float(values.min())):
+        starts, stops = _runs(values == end)
+        inner = (stops - starts >= LIMIT_RUN) & (starts > 0) & (stops < values.size)
+        starts, stops = starts[inner], stops[inner]
+        share = float(np.sum(stops - starts)) / values.size
+        if starts.size < LIMIT_RUNS or share < LIMIT_SHARE:
+            continue
+        steps = np.minimum(np.abs(values[starts - 1] - end), np.abs(values[stops] - end))
+        if np.median(steps) < 0.1 * typical:
+            continue
+        light = Light.RED if share >= RED_SHARE else Light.AMBER
+        said = (
+            f"{name} is cut off at {end:.6g}{_of(unit)} for {100 * share:.2g} % of its samples, "
+            f"{starts.size} times"
+        )
+        action = "fit records in which it stays inside its range; fly a smaller amplitude"
+        ends = np.array([starts[0], stops[-1] - 1])
+        return _fault(name, stamps, ends, ("clipped", light, said, action))
+    return None
+
+
+def _runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First and one past the last of each run of true."""
+    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
+    return np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)

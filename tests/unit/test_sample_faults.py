@@ -1,0 +1,112 @@
+"""Damage in samples is named where a record enters and travels with it; health is silent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.conditioning import remove_outliers
+from flightid.conventions import Light
+from flightid.record import Record
+from flightid.record.checks import data_findings, record_findings
+
+N = 3000
+TIME_S = np.arange(N) / 100.0
+NOISE = np.random.default_rng(3).standard_normal((3, N))
+ROLL = np.sin(1.3 * TIME_S) + 0.4 * np.sin(7.0 * TIME_S) + 0.02 * NOISE[0]
+
+
+def spiked() -> np.ndarray:
+    samples = ROLL.copy()
+    samples[[400, 1500, 2600]] = 40.0
+    return samples
+
+
+def codes(samples: np.ndarray, unit: str = "1") -> list[tuple[str, Light]]:
+    record = Record.from_arrays(TIME_S, outputs={"y": samples}, units={"y": unit})
+    return [(finding.code, finding.light) for finding in record_findings(record)]
+
+
+def dead(share: float) -> np.ndarray:
+    samples = ROLL.copy()
+    samples[1000 : 1000 + int(share * N)] = samples[1000]
+    return samples
+
+
+@pytest.mark.parametrize(
+    ("samples", "unit", "found"),
+    [
+        (ROLL, "rad", []),
+        (NOISE[0], "1", []),
+        (np.round(20 * ROLL) / 20, "1", []),
+        (np.sign(np.sin(1.3 * TIME_S)), "1", []),
+        (np.cumsum(np.sign(NOISE[1])), "1", []),
+        (np.sin(np.exp(0.15 * TIME_S)) * np.exp(0.1 * TIME_S), "1", []),
+        (spiked(), "1", [("spikes", Light.RED)]),
+        (ROLL + 3.0 * (np.arange(N) == 700), "1", [("spikes", Light.AMBER)]),
+        (dead(0.02), "1", [("flat", Light.AMBER)]),
+        (dead(0.2), "1", [("flat", Light.RED)]),
+        (np.repeat(ROLL[::5], 5), "1", [("samples-repeated", Light.AMBER)]),
+        (np.clip(ROLL, -1.2, 1.2), "1", [("clipped", Light.RED)]),
+        (np.mod(0.7 * TIME_S, 2 * np.pi), "rad", [("wrapped", Light.RED)]),
+        (np.mod(40.0 * TIME_S, 360.0), "deg", [("wrapped", Light.RED)]),
+    ],
+)
+def test_damage_has_a_name_and_health_has_none(
+    samples: np.ndarray, unit: str, found: list[tuple[str, Light]]
+) -> None:
+    assert codes(samples, unit) == found
+
+
+def test_a_pulse_between_the_levels_of_an_input_is_no_spike() -> None:
+    pulses = np.where(np.arange(N) % 400 == 7, 1.0, -1.0)
+    record = Record.from_arrays(TIME_S, inputs={"u": pulses})
+    assert record_findings(record) == ()
+    beyond = Record.from_arrays(TIME_S, inputs={"u": np.where(np.arange(N) == 50, 99.0, ROLL)})
+    assert [finding.code for finding in record_findings(beyond)] == ["spikes"]
+
+
+@pytest.mark.parametrize(
+    ("factor", "wrong"), [(1.0, False), (180 / np.pi, True), (np.pi / 180, True)]
+)
+def test_degrees_beside_radians_are_seen_without_a_unit(factor: float, wrong: bool) -> None:
+    rate = np.gradient(ROLL - 0.02 * NOISE[0], TIME_S) + 0.05 * NOISE[1] + 0.01
+    record = Record.from_arrays(
+        TIME_S, outputs={"phi": ROLL, "p": factor * rate}, units={"phi": "rad", "p": "rad/s"}
+    )
+    found = [finding.code for finding in record_findings(record)]
+    assert found == (["units-swapped"] if wrong else [])
+
+
+def test_findings_are_those_of_the_rows_and_survive_filters(tmp_path: Path) -> None:
+    path = tmp_path / "flight.csv"
+    table = np.column_stack([TIME_S, NOISE[2], spiked()])
+    np.savetxt(path, table, delimiter=",", header="time [s],u,p [rad/s]", comments="")
+    slow = {"inputs": "u", "outputs": "p", "resample_to_s": 0.05}
+    (record,) = fid.read_records(path, **slow)  # type: ignore[arg-type]
+    assert [finding.code for finding in record_findings(record)] == ["spikes"]
+    assert record_findings(record, ["u"]) == ()
+    assert record_findings(record.segment(5.0, 14.0)) == record_findings(record)
+    assert record_findings(record.segment(27.0, 30.0)) == ()
+    fid.write_records([record], tmp_path / "kept.parquet")
+    (stored,) = fid.read_records(tmp_path / "kept.parquet")
+    assert record_findings(stored) == record_findings(record)
+    (clean,) = fid.read_records(path, outliers={"deviations": 40.0}, **slow)  # type: ignore[arg-type]
+    assert record_findings(clean) == ()
+    (whole,) = fid.read_records(path, inputs="u", outputs="p")
+    (said,) = record_findings(whole)
+    advised = float(said.action.split("deviations = ")[1].split()[0])
+    assert record_findings(remove_outliers(whole, deviations=advised)) == ()
+
+
+def test_findings_reach_responses_and_the_evidence_of_fits() -> None:
+    good = Record.from_arrays(TIME_S, inputs={"u": NOISE[2]}, outputs={"y": ROLL})
+    bad = Record.from_arrays(TIME_S, inputs={"u": NOISE[2]}, outputs={"y": spiked()})
+    response = fid.estimate_response([good, bad], window_s=5.0)
+    assert [finding.code for finding in data_findings(response.history)] == ["spikes"]
+    fit = fid.identify(fid.PolynomialModel.arx("u", "y", na=1, nb=1, nk=1), bad)
+    (check,) = [check for check in fit.evidence.checks if check.name == "samples"]
+    assert check.light is Light.RED
