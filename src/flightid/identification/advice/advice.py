@@ -13,6 +13,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.evidence import FeedbackTest, feedback_test
 from flightid.findings import Finding
+from flightid.identification.advice.delays import InputDelay, find_delays
 from flightid.identification.advice.impulse_response import ImpulseResponse, impulse_response
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
@@ -44,9 +45,11 @@ class Advice(Result, schema="flightid.advice/1"):
         Order of persistent excitation of each input, at most 50: how many coefficients of B and A
         together it can tell apart.
     response : ImpulseResponse or None
-        With the delays; None where the records are too short for it.
+        None where the records are too short for it.
     feedback : FeedbackTest
         Whether a loop was closed, tested or declared.
+    acts_after : mapping of str to InputDelay
+        Samples until each input acts.
     findings : tuple of Finding
 
     Example
@@ -62,12 +65,13 @@ class Advice(Result, schema="flightid.advice/1"):
     excitation_orders: Mapping[str, int]
     response: ImpulseResponse | None
     feedback: FeedbackTest
+    acts_after: Mapping[str, InputDelay] = field(default_factory=dict)
     findings: tuple[Finding, ...] = field(default=())
 
     @property
     def delays(self) -> dict[str, int | None]:
-        """Samples until each input acts, where they could be estimated."""
-        return {} if self.response is None else dict(self.response.delays)
+        """Samples until each input acts; None where no effect stands out, or it is too unsure."""
+        return {name: each.samples for name, each in self.acts_after.items()}
 
     def summary(self) -> Table:
         """Table by input, with the findings below."""
@@ -162,16 +166,24 @@ def advise(
         )
     except DataError as error:
         reason = str(error)
+    acts = (
+        dict(zip(names, find_delays(data, n_lags - 1), strict=True))
+        if response is None
+        else dict(response.acts_after)
+    )
     feedback = feedback_test(listed, inputs=names, outputs=(name,), loop=loop)
     findings = (
         *_excitation(orders),
         *_related(names, data),
-        *_responses(response, reason),
+        *_pulse(reason),
+        *_delays(name, acts, data.sample_time_s),
         *_feedback(feedback),
         *_sampling(name, data),
         *_levels(names, data),
     )
-    return Advice(names, name, data.output.size, len(listed), orders, response, feedback, findings)
+    return Advice(
+        names, name, data.output.size, len(listed), orders, response, feedback, acts, findings
+    )
 
 
 def excitation_order(row: Array, data: SampledChannels) -> int:
@@ -223,36 +235,31 @@ def _related(names: Sequence[str], data: SampledChannels) -> list[Finding]:
     return found
 
 
-def _responses(response: ImpulseResponse | None, reason: str) -> list[Finding]:
-    if response is None:
-        return [
-            Finding(
-                "no-pulse-response",
-                Light.AMBER,
-                f"delays are not judged: {reason}",
-                "use a richer input or longer records, or give fewer lags",
-            )
-        ]
+def _pulse(reason: str) -> list[Finding]:
+    if not reason:
+        return []
+    action = "use a richer input or longer records, or give fewer lags"
+    return [Finding("no-pulse-response", Light.AMBER, f"no pulse response: {reason}", action)]
+
+
+def _delays(output: str, acts: Mapping[str, InputDelay], sample_time_s: float) -> list[Finding]:
     found = []
-    for name, delay in response.delays.items():
-        if delay is None:
-            found.append(
-                Finding(
-                    "no-response",
-                    Light.RED,
-                    f"no response of {response.output!r} to {name!r} stands out of the noise",
-                    "leave this input out, or excite it more",
-                )
-            )
+    for name, each in acts.items():
+        if each.interval is None:
+            message = f"no response of {output!r} to {name!r} stands out of the noise"
+            action = "excite this input more, or leave it out"
+            found.append(Finding("no-response", Light.RED, message, action))
+        elif each.samples is None:
+            low, high = each.interval
+            message = f"{output!r} answers {name!r} after {low} to {high} samples: nk is unsure"
+            action = "fit each of them and compare (scan_orders), or excite higher frequencies"
+            found.append(Finding("delay-unsure", Light.AMBER, message, action))
         else:
-            found.append(
-                Finding(
-                    "delay",
-                    Light.GREEN,
-                    f"{response.output!r} answers {name!r} after {delay} samples "
-                    f"({delay * response.sample_time_s:.4g} s): nk = {delay}",
-                )
+            message = (
+                f"{output!r} answers {name!r} after {each.samples} samples "
+                f"({each.samples * sample_time_s:.4g} s): nk = {each.samples}"
             )
+            found.append(Finding("delay", Light.GREEN, message))
     return found
 
 

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from flightid.errors import DataError, OptionError
+from flightid.identification.advice.delays import InputDelay, find_delays
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
 from flightid.identification.prediction_error.linear_regression import LinearRegression, regress
 from flightid.models.polynomial.structure import KERNELS
@@ -52,8 +53,8 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
         Regularisation.
     n_samples : int
         Samples that were fitted.
-    delays : mapping of str to int or None
-        First lag from 0 on that chance does not explain, by input; None where no lag stands out.
+    acts_after : mapping of str to InputDelay
+        Samples until each input acts, from structures with every delay (`advice/delays.py`).
     units : mapping of str to str
     fitted_lags : int
         Lags that were fitted: more than those asked for, where the response outlasts them.
@@ -74,10 +75,15 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
     sample_time_s: float
     kernel: str | None
     n_samples: int
-    delays: Mapping[str, int | None]
+    acts_after: Mapping[str, InputDelay]
     units: Mapping[str, str] = field(default_factory=dict)
     fitted_lags: int = 0
     reason: str = ""
+
+    @property
+    def delays(self) -> dict[str, int | None]:
+        """Samples until each input acts; None where no effect stands out, or it is too unsure."""
+        return {name: each.samples for name, each in self.acts_after.items()}
 
     @property
     def time_s(self) -> Array:
@@ -211,8 +217,9 @@ def impulse_response(
     name = listed[0].outputs[0] if outputs is None else outputs
     names = tuple(listed[0].inputs if inputs is None else inputs)
     _require(names, n_lags, negative_lags, kernel)
-    data = _shifted(gather_channels(listed, name, names, offsets), negative_lags)
-    data.require_change()
+    whole = gather_channels(listed, name, names, offsets)
+    whole.require_change()
+    data = _shifted(whole, negative_lags)
     n = n_lags + negative_lags
     needed = SAMPLES_PER_COEFFICIENT * n * len(names)
     room = sum(max(0, length - n - WHITENER) for length in data.lengths)
@@ -237,7 +244,7 @@ def impulse_response(
         data.sample_time_s,
         kernel,
         rows,
-        {name: _delay(lags, v, c) for name, v, c in zip(names, values, blocks, strict=True)},
+        dict(zip(names, find_delays(whole, n_lags - 1), strict=True)),
         data.units,
         fitted,
         "" if ended else OUTLASTS.format(fitted),
@@ -260,9 +267,14 @@ def _until_ended(
         longer = 2 * n
         room = sum(max(0, length - longer - WHITENER) for length in data.lengths)
         short = room < SAMPLES_PER_COEFFICIENT * longer * count
-        if short or min(data.lengths) <= longer + WHITENER:
+        if short or min(data.lengths) <= longer + WHITENER or not _determined(data, longer):
             return n, found, False
         n = longer
+
+
+def _determined(data: SampledChannels, n: int) -> bool:
+    """Whether the inputs hold as many frequencies as so many lags need."""
+    return _fir(data.output, data.inputs, data.lengths, n, n - 1).dependent is None
 
 
 def _ends(values: Array, covariance: Array, count: int) -> bool:
@@ -333,12 +345,3 @@ def _estimate(data: SampledChannels, n: int, kernel: str | None) -> tuple[Array,
     variance = final.sum_of_squares / (final.n_rows - final.theta.size)
     inverse = np.linalg.inv(final.factor)
     return final.theta, np.asarray(variance * inverse @ inverse.T), final.n_rows
-
-
-def _delay(lags: NDArray[np.int64], values: Array, covariance: Array) -> int | None:
-    """First causal lag outside a band that holds all of them in 95 % of cases without response."""
-    causal = lags >= 0
-    errors = np.sqrt(np.maximum(np.diag(covariance)[causal], 0.0))
-    limit = half_width(LEVEL ** (1.0 / int(np.sum(causal))))
-    outside = np.abs(values[causal]) > limit * errors
-    return int(np.argmax(outside)) if np.any(outside) else None

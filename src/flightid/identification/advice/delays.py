@@ -1,0 +1,254 @@
+"""How many samples pass before each input acts: structures with every delay, compared on the data.
+
+A pulse response tells a delay only where the input is white. Here a few poles stand for the
+response and the noise is whitened, so that slow, periodic and band-limited inputs tell it too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise, product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+from scipy.stats import f as f_distribution
+
+from flightid.identification.prediction_error.linear_regression import reflected, regress
+from flightid.models.sampled.channels import SampledChannels
+
+Array = NDArray[np.float64]
+LEVEL = 0.01
+"""Share of inputs without effect that are said to act."""
+PAST = (2, 4, 8, 16)
+"""Coefficients of A in the first scan."""
+WINDOW = (2, 4, 8)
+"""Coefficients of B in the first scan."""
+POLES = (1, 2, 3)
+"""Orders of the second scan."""
+AROUND = 4
+"""Delays on either side of the first scan's that the second tries."""
+ROUNDS = 8
+"""Of the Steiglitz-McBride iteration."""
+LONG = 40
+MOST_SAMPLES = 20_000
+"""The second scan takes the first records up to so many samples."""
+UNCERTAIN = 10.0
+"""Difference of twice the log likelihood above which a delay is refused: odds of 1 to 150."""
+WIDE = 2
+"""Most samples between the ends of a range for its best value to be told."""
+
+
+@dataclass(frozen=True)
+class InputDelay:
+    """Samples until an input acts.
+
+    Attributes
+    ----------
+    samples : int or None
+        None where no effect stands out, or the data leave more than a sample either way.
+    interval : tuple of int or None
+        Smallest and largest delay that the data do not refuse; None without an effect.
+
+    Example
+    -------
+    >>> InputDelay.of(5, [4, 5, 6]).samples, InputDelay.of(5, [3, 4, 5, 6]).samples
+    (5, None)
+    """
+
+    samples: int | None = None
+    interval: tuple[int, int] | None = None
+
+    @classmethod
+    def of(cls, best: int, alike: Sequence[int]) -> InputDelay:
+        """The best delay among those that do about as well."""
+        low, high = min(alike), max(alike)
+        return cls(best if high - low <= WIDE else None, (low, high))
+
+
+def find_delays(data: SampledChannels, largest: int) -> list[InputDelay]:
+    """Delay of each input.
+
+    ARX structures of all orders and delays are compared from one triangle by the Bayesian
+    information criterion; around the best, output-error structures on whitened signals.
+
+    Parameters
+    ----------
+    data : SampledChannels
+        Means removed.
+    largest : int
+        Longest delay to try, samples.
+
+    Returns
+    -------
+    list of InputDelay
+        With the delays that do almost as well as the best.
+
+    Assumes
+    -------
+    Few poles: a response whose first samples drown in noise is said to begin later.
+
+    Reference
+    ---------
+    Björklund & Ljung, "A review of time-delay estimation techniques", *IEEE CDC* 2003 (section 4.2,
+    explicit one-parameter methods in the time domain); Steiglitz & McBride (1965), IEEE Trans. AC
+    10.
+    """
+    scan = _ArxScan.of(data, largest)
+    acts = [scan.acts(place) for place in range(len(data.inputs))]
+    first = [scan.best(place) for place in range(len(data.inputs))]
+    whitened = _whitened(_shortened(data))
+    found = []
+    for place, seen in enumerate(acts):
+        if not seen:
+            found.append(InputDelay())
+            continue
+        low = max(0, first[place] - AROUND)
+        tried = range(low, min(first[place] + AROUND, scan.largest) + 1)
+        skip = max([*first, tried[-1]]) + max(POLES)
+        costs = {
+            delay: _cost(whitened, [*first[:place], delay, *first[place + 1 :]], skip)
+            for delay in tried
+        }
+        least = min(costs.values())
+        first[place] = min(costs, key=lambda delay: costs[delay])
+        alike = [delay for delay, cost in costs.items() if cost <= least + UNCERTAIN]
+        found.append(InputDelay.of(first[place], alike))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _ArxScan:
+    """The triangle of the longest ARX model, from which all others follow."""
+
+    triangle: Array
+    n_rows: int
+    past: int
+    span: int
+    n_inputs: int
+
+    @classmethod
+    def of(cls, data: SampledChannels, largest: int) -> _ArxScan:
+        m, n = len(data.inputs), data.output.size
+        past = min(max(PAST), max(n // 20, 1), min(data.lengths) // 4)
+        room = (n // 3 - past) // m
+        span = max(min(largest + max(WINDOW), room, min(data.lengths) // 2), 2)
+        made = regress(data.output, data.inputs, data.lengths, past, [span] * m, [0] * m)
+        return cls(made.triangle, made.n_rows, past, span, m)
+
+    @property
+    def largest(self) -> int:
+        """Longest delay whose smallest window fits."""
+        return max(self.span - WINDOW[0], 0)
+
+    def _block(self, place: int) -> range:
+        first = self.past + place * self.span
+        return range(first, first + self.span)
+
+    def _others(self, place: int) -> list[int]:
+        return [k for i in range(self.n_inputs) if i != place for k in self._block(i)]
+
+    def _squares(self, columns: Sequence[int]) -> float:
+        return _left(self.triangle, [*columns, -1])
+
+    def acts(self, place: int) -> bool:
+        """Whether chance explains what all lags of an input explain."""
+        own = list(range(self.past))
+        without = self._squares([*own, *self._others(place)])
+        whole = float(self.triangle[-1, -1] ** 2)
+        free = self.n_rows - self.triangle.shape[1] + 1
+        if whole <= 0.0 or free < 1:
+            return without > whole
+        ratio = (without - whole) / self.span / (whole / free)
+        return float(f_distribution.sf(ratio, self.span, free)) < LEVEL / self.n_inputs
+
+    def best(self, place: int) -> int:
+        """Delay of the best structure, the other inputs with all their lags."""
+        others = self._others(place)
+        # What the other inputs need is taken out once.
+        order = [*others, *range(self.past), *self._block(place), -1]
+        triangle = np.asarray(np.linalg.qr(np.take(self.triangle, order, axis=1), mode="r"))
+        rest = triangle[len(others) :, len(others) :]
+        found = []
+        past = [n for n in PAST if n <= self.past] or [self.past]
+        for n_a, n_b, delay in product(past, WINDOW, range(self.largest + 1)):
+            if delay + n_b > self.span:
+                continue
+            first = self.past + delay
+            columns = [*range(n_a), *range(first, first + n_b), -1]
+            found.append((_criterion(_left(rest, columns), self.n_rows, n_a + n_b), delay))
+        return min(found)[1]
+
+
+def _left(triangle: Array, columns: Sequence[int]) -> float:
+    """What the other columns leave of the last, squared."""
+    kept = np.asarray(np.linalg.qr(np.take(triangle, columns, axis=1), mode="r"))
+    return float(kept[-1, -1] ** 2)
+
+
+def _criterion(squares: float, n: int, numbers: int) -> float:
+    return n * float(np.log(max(squares, np.finfo(float).tiny) / n)) + numbers * float(np.log(n))
+
+
+@dataclass(frozen=True, eq=False)
+class _Signals:
+    output: Array
+    inputs: Array
+    lengths: tuple[int, ...]
+
+    @property
+    def spans(self) -> list[slice]:
+        ends = np.cumsum([0, *self.lengths])
+        return [slice(first, last) for first, last in pairwise(ends.tolist())]
+
+    def filtered(self, top: Array, below: Array) -> _Signals:
+        """Every channel of every record through one filter."""
+        rows = np.vstack([self.output, self.inputs])
+        with np.errstate(over="ignore", invalid="ignore"):
+            made = np.hstack([lfilter(top, below, rows[:, span]) for span in self.spans])
+        return _Signals(made[0], made[1:], self.lengths)
+
+
+def _shortened(data: SampledChannels) -> _Signals:
+    """The first records, or the first samples of the first."""
+    lengths: list[int] = []
+    for length in data.lengths:
+        room = MOST_SAMPLES - sum(lengths)
+        if lengths and room < length:
+            break
+        lengths.append(min(length, room))
+        if lengths[-1] < length:
+            break
+    n = sum(lengths)
+    return _Signals(data.output[:n], data.inputs[:, :n], tuple(lengths))
+
+
+def _whitened(data: _Signals) -> _Signals:
+    """Signals filtered so that what a long model leaves of the output is white."""
+    m, n = len(data.inputs), data.output.size
+    long = max(1, min(LONG, n // (8 * (m + 1)), min(data.lengths) // 4))
+    made = regress(data.output, data.inputs, data.lengths, long, [long + 1] * m, [0] * m)
+    # The longer an ARX model, the more its A is the inverse of the noise model alone.
+    return data.filtered(np.concatenate([[1.0], made.shortest[:long]]), np.ones(1))
+
+
+def _cost(data: _Signals, delays: Sequence[int], skip: int) -> float:
+    """Smallest criterion of output-error structures with one denominator and these delays."""
+    return min(_output_error(data, delays, order, skip) for order in POLES)
+
+
+def _output_error(data: _Signals, delays: Sequence[int], order: int, skip: int) -> float:
+    m = len(delays)
+    below, criterion = np.ones(1), np.inf
+    for _ in range(ROUNDS):
+        flat = data.filtered(np.ones(1), below)
+        if not np.all(np.isfinite(flat.output)):
+            break
+        made = regress(
+            flat.output, flat.inputs, flat.lengths, order, [order] * m, list(delays), skip
+        )
+        # Started from whatever state: only a simulation from rest would have to know it.
+        criterion = _criterion(made.sum_of_squares, made.n_rows, made.theta.size)
+        below = reflected(np.concatenate([[1.0], made.shortest[:order]]))
+    return criterion
