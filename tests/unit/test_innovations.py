@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.errors import DataError, ModelError, OptionError
@@ -271,3 +272,35 @@ def test_a_run_that_leaves_the_numbers_is_held():
     )
     assert run.diverged_at is not None
     assert np.all(np.isfinite(run.predicted["y"]))
+
+
+def _driven(seed: int, numerator: list[float], noise: float = 0.05) -> fid.Record:
+    """A lightly damped pair and a slow pole, in SciPy."""
+    random, n = np.random.default_rng(seed), 1500
+    u = random.standard_normal(n)
+    below = np.convolve([1.0, -2 * 0.98 * np.cos(0.5), 0.98**2], [1.0, -0.7])
+    y = lfilter(numerator, below, u)
+    y += noise * y.std() * random.standard_normal(n)
+    return fid.Record.from_arrays(np.arange(n) / 20, inputs={"u": u}, outputs={"y": y})
+
+
+@pytest.mark.parametrize(
+    ("numerator", "at_once"), [([0.0, 1.0, 0.5], False), ([1.0, 0.3, 0.2], True)]
+)
+def test_data_decide_on_feedthrough_and_order(numerator: list[float], at_once: bool) -> None:
+    fit = fid.identify(M.subspace("u", "y", refine=False), _driven(0, numerator))
+    assert bool(np.any(fit.model.d)) is at_once
+    assert fit.model.order == 3
+    assert "kept third" in fit.details.order.summary().to_text()
+
+
+def test_a_stable_estimate_is_asked_for() -> None:
+    random, n = np.random.default_rng(1), 300
+    u = random.standard_normal(n)
+    y = np.cumsum(np.cumsum(0.01 * u)) + 0.1 * random.standard_normal(n)
+    y += 1e-3 * np.exp(0.03 * np.arange(n))
+    record = fid.Record.from_arrays(np.arange(n) / 20, inputs={"u": u}, outputs={"y": y})
+    for enforce in (False, True):
+        asked = M.subspace("u", "y", 3, offsets="none", enforce_stability=enforce)
+        radius = np.max(np.abs(np.linalg.eigvals(fid.identify(asked, record).model.a)))
+        assert bool(radius < 1.0) is enforce

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 USUAL_HORIZON = 15
 BLOCK = 20_000
 """Columns that are folded into the triangular factor at a time."""
+ROUNDING = 60.0
+"""Minus the logarithm of a share of the outputs' power that is rounding."""
 POOR = 1e-9
 """Ratio of singular values of the inputs' blocks below which they do not excite."""
 
@@ -49,6 +51,18 @@ class SubspaceData:
     def n_inputs(self) -> int:
         """Number of inputs m."""
         return int(self.inputs[0].shape[0])
+
+    def split(self, share: float) -> tuple[SubspaceData, SubspaceData]:
+        """The first share of each record, and the rest."""
+        cuts = [round(share * y.shape[1]) for y in self.outputs]
+        sides = (slice(None, cut) for cut in cuts), (slice(cut, None) for cut in cuts)
+        made = []
+        for spans in sides:
+            kept = list(spans)
+            y = tuple(row[:, k] for row, k in zip(self.outputs, kept, strict=True))
+            u = tuple(row[:, k] for row, k in zip(self.inputs, kept, strict=True))
+            made.append(replace(self, outputs=y, inputs=u))
+        return made[0], made[1]
 
     def horizon(self, structure: SubspaceStructure) -> int:
         """Block rows: as asked, or the usual number, fewer where records are short."""
@@ -98,6 +112,26 @@ def gather(structure: SubspaceStructure, records: Sequence[Record]) -> SubspaceD
         scales,
         channels,
     )
+
+
+def acts_at_once(data: SubspaceData, horizon: int) -> bool:
+    """Whether the inputs of the same sample explain more of the outputs than as many numbers cost.
+
+    What the past of outputs and inputs foretells is taken out first, so no order is assumed.
+
+    Reference: Schwarz (1978), Estimating the dimension of a model, *Annals of Statistics* 6.
+    """
+    past, now, driven = data.lagged(horizon)
+    p, m, samples = data.n_outputs, data.n_inputs, now.shape[1] if now.size else 0
+    if samples <= len(past) + m + p:
+        return False
+    triangle = np.asarray(np.linalg.qr(np.vstack([past, driven, now]).T, mode="r"))
+    first = len(past)
+    late, prompt = triangle[first:, first + m :], triangle[first + m :, first + m :]
+    levels = [np.linalg.slogdet(each.T @ each / samples)[1] for each in (late, prompt)]
+    if not np.isfinite(levels[0]) or levels[0] < -ROUNDING * p:
+        return False
+    return bool(samples * (levels[0] - levels[1]) > p * m * np.log(samples))
 
 
 def _hankel(rows: Array, blocks: int) -> Array:

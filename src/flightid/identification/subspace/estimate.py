@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 from flightid.errors import DataError
 from flightid.identification.subspace.data import RowSpaceFactor, SubspaceData, compress
 from flightid.identification.subspace.matrices import (
+    STABLE,
     feedthrough,
     kalman_gain,
+    stabilised,
     steady_gain,
 )
 from flightid.models.innovations.structure import SubspaceStructure
+from flightid.models.sampled.recursion import spectral_radius
 
 Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array, Array, Array]
@@ -88,8 +91,9 @@ def realise(
         gamma = found.observability[:, :order]
         c = gamma[:p]
         a = np.asarray(np.linalg.lstsq(gamma[:-p], gamma[p:], rcond=None)[0], dtype=np.float64)
+        a = stabilised(a) if structure.enforce_stability else a
         k = kalman_gain(a, c, *found.compressed.residual_covariance(gamma, a, c))
-        b, d = feedthrough(data, a, c, k, direct=structure.direct)
+        b, d = feedthrough(data, a, c, k, direct=bool(structure.direct))
     size = data.scales
     return a, b, size[:, None] * c, size[:, None] * d, k / size
 
@@ -163,6 +167,11 @@ def _from_states(
     moved = np.linalg.lstsq(rows.T, states[:, after].T, rcond=None)[0].T
     a, b, k = np.split(moved, [order, order + m], axis=1)
     c = ahead[:, :order]
+    if structure.enforce_stability and spectral_radius(a) >= STABLE:
+        a = stabilised(a)
+        k = steady_gain(a, c, k, errors @ errors.T / errors.shape[1])
+        b, d = feedthrough(data, a, c, k, direct=bool(structure.direct))
+        return a, b, c, d, k
     return a, b, c, d, steady_gain(a, c, k, errors @ errors.T / errors.shape[1])
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from flightid.identification.innovation_tests import innovation_tests
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.details import FitScore
 from flightid.identification.prediction_error.roots import Errors
-from flightid.identification.subspace.data import SubspaceData, gather
+from flightid.identification.subspace.data import SubspaceData, acts_at_once, gather
 from flightid.identification.subspace.details import SubspaceDetails
 from flightid.identification.subspace.estimate import Matrices, decompose, realise
 from flightid.identification.subspace.findings import judge_innovations
@@ -47,6 +48,8 @@ def fit_subspace(structure: SubspaceStructure, data: Record | Sequence[Record]) 
     """
     records = as_records(data)
     gathered = gather(structure, records)
+    if structure.direct is None:
+        structure = replace(structure, direct=acts_at_once(gathered, gathered.horizon(structure)))
     decomposed = decompose(structure, gathered)
     choice, start = choose_order(structure, gathered, decomposed)
     size = gathered.scales
@@ -70,7 +73,7 @@ def _refined(structure: SubspaceStructure, data: SubspaceData, start: Matrices) 
     return refine(
         data,
         _scaled(start, 1.0 / data.scales),
-        direct=structure.direct,
+        direct=bool(structure.direct),
         initial_state=structure.initial_state,
         maximum_iterations=structure.maximum_iterations,
     )
@@ -120,7 +123,7 @@ def _assemble(
     tests = innovation_tests(found.errors, data.inputs, data.outputs, spent)
     covariance = None if spare or tests.why_biased else _in_units(structure, found, size)
     spread = Errors(model.sample_time_s, covariance, found.degrees)
-    roots = innovations_roots(model, spread, direct=structure.direct)
+    roots = innovations_roots(model, spread, direct=bool(structure.direct))
     measures = determinant_criteria(joint, size[:, None], structure.n_parameters(model.order))
     runs = _free_runs(model, data)
     parameters = _parameters(model)
@@ -140,7 +143,7 @@ def _assemble(
         provenance=_provenance(structure, records, data),
         details=SubspaceDetails(
             roots,
-            innovations_gains(model, spread, direct=structure.direct),
+            innovations_gains(model, spread, direct=bool(structure.direct)),
             measures,
             _scores(structure, data, runs, errors),
             repr(choice),

@@ -12,6 +12,8 @@ from flightid.models.sampled.recursion import run_recursion, spectral_radius
 
 Array = NDArray[np.float64]
 STABLE = 1.0 - 1e-6
+INSIDE = 1.0 - 1e-3
+"""Size of a pole that was at the circle."""
 NOISELESS = 1e-16
 """Innovations with less than this share of the outputs' power are rounding."""
 
@@ -48,6 +50,22 @@ def _riccati(a: Array, c: Array, q: Array, s: Array, r: Array) -> Array | None:
     if not np.all(np.isfinite(gain)) or spectral_radius(a - gain @ c) >= STABLE:
         return None
     return gain
+
+
+def stabilised(a: Array) -> Array:
+    """A with its eigenvalues outside the unit circle mirrored to the inside.
+
+    Example
+    -------
+    >>> stabilised(np.diag([2.0, 0.5])).round(3).tolist()
+    [[0.5, 0.0], [0.0, 0.5]]
+    """
+    values, vectors = np.linalg.eig(a)
+    size = np.abs(values)
+    if not np.any(size >= STABLE):
+        return a
+    inside = np.where(size >= STABLE, np.minimum(1.0 / size, INSIDE) / size * values, values)
+    return np.asarray((vectors * inside @ np.linalg.inv(vectors)).real)
 
 
 def feedthrough(

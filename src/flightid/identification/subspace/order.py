@@ -3,21 +3,40 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.errors import DataError
+from flightid.identification.prediction.request import usual_stretch
 from flightid.identification.prediction_error.information_criteria import Criteria, criteria
 from flightid.identification.subspace.data import SubspaceData
-from flightid.identification.subspace.estimate import RANK, Matrices, Subspace, realise
+from flightid.identification.subspace.estimate import (
+    RANK,
+    Matrices,
+    Subspace,
+    decompose,
+    realise,
+)
 from flightid.models.innovations.model import InnovationsModel
-from flightid.models.innovations.prediction import one_step_errors
+from flightid.models.innovations.prediction import (
+    forced_run,
+    free_motion,
+    motion_from,
+    one_step_errors,
+)
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.result import Result
 from flightid.table import Column, Table
 
 Array = NDArray[np.float64]
+FITTED = 2.0 / 3.0
+"""Share of each record that fits the models which run through the rest of it."""
+STRETCHES = 12
+SAME = 1e-6
+"""Relative difference of mean squares that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +60,9 @@ class OrderChoice(Result, schema="flightid.order_choice/1"):
     horizon : int
     asked : bool
         Whether the order was given.
+    kept_errors : tuple of float
+        Mean squares of free runs through the last third of each record by models of the rest, over
+        the outputs' power. Empty where the order was given or records are short.
 
     Example
     -------
@@ -56,6 +78,7 @@ class OrderChoice(Result, schema="flightid.order_choice/1"):
     criteria: tuple[Criteria, ...]
     horizon: int
     asked: bool
+    kept_errors: tuple[float, ...] = ()
 
     @property
     def smallest_svc(self) -> int:
@@ -85,6 +108,7 @@ class OrderChoice(Result, schema="flightid.order_choice/1"):
             Column("canonical correlation"),
             Column("SVC"),
             Column("BIC", digits=6),
+            Column("free run on the kept third", "%"),
         )
         rows = []
         values = self.singular_values
@@ -94,11 +118,15 @@ class OrderChoice(Result, schema="flightid.order_choice/1"):
             bic = self.criteria[place].bic if place < len(self.criteria) else None
             rho = float(self.correlations[place]) if place < self.correlations.size else None
             value = float(values[place]) if place < values.size else None
-            rows.append((place + 1, value, ratio, rho, svc, bic))
+            run = self.kept_errors[place] if place < len(self.kept_errors) else None
+            percent = None if run is None else 100.0 * (1.0 - math.sqrt(run))
+            rows.append((place + 1, value, ratio, rho, svc, bic, percent))
         notes = (
             f"{self.horizon} block rows of past and of future",
             "SVC: squared next canonical correlation + d ln N / N; BIC of errors one step ahead "
             "before refinement; the smallest value counts",
+            "taken: the fewest states whose free run on the kept third of each record errs no more "
+            "than a standard error above the best; without it the smallest SVC",
         )
         return Table(repr(self), columns, tuple(rows), notes)
 
@@ -115,7 +143,7 @@ class OrderChoice(Result, schema="flightid.order_choice/1"):
 def choose_order(
     structure: SubspaceStructure, data: SubspaceData, found: Subspace
 ) -> tuple[OrderChoice, Matrices]:
-    """Order by the smallest SVC unless one is asked, and the model of that order.
+    """Order by free run on kept samples unless one is asked, and the model of that order.
 
     Reference: Bauer, "Order estimation for subspace methods", *Automatica* 37 (2001).
     """
@@ -137,12 +165,76 @@ def choose_order(
     padded = np.maximum(values[: largest + 1], RANK * values[0])
     ratios = padded[:-1] / padded[1:] if padded.size > 1 else np.ones(1)
     gap = int(np.argmax(ratios)) + 1
-    chosen = structure.order or int(np.argmin(svc)) + 1
+    runs = () if structure.order else kept_errors(structure, data, largest)
+    chosen = structure.order or simplest(runs) or int(np.argmin(svc)) + 1
     choice = OrderChoice(
         chosen, values, found.correlations, gap, tuple(svc), tuple(made), found.horizon,
-        structure.order is not None,
+        structure.order is not None, tuple(float(np.mean(each)) for each in runs),
     )  # fmt: skip
     return choice, fitted[chosen]
+
+
+def kept_errors(structure: SubspaceStructure, data: SubspaceData, largest: int) -> list[Array]:
+    """By order: squared errors of free runs over the outputs' power, in stretches of what was kept.
+
+    Models of the first two thirds of each record run through the last, started by its first
+    stretch. Empty where records are too short for that.
+    """
+    first, kept = data.split(FITTED)
+    try:
+        found = decompose(structure, first)
+        made = [realise(structure, first, found, n) for n in range(1, largest + 1)]
+    except (DataError, np.linalg.LinAlgError):
+        return []
+    skip = usual_stretch(min(y.shape[1] for y in kept.outputs), largest)
+    if min(y.shape[1] for y in kept.outputs) < skip + STRETCHES:
+        return []
+    return [_kept_error(structure, kept, each, skip) for each in made]
+
+
+def _kept_error(
+    structure: SubspaceStructure, kept: SubspaceData, matrices: Matrices, skip: int
+) -> Array:
+    model = InnovationsModel(structure.inputs, structure.outputs, 1.0, *matrices)
+    size, a, c = kept.scales[:, None], matrices[0], matrices[2]
+    squares = []
+    with np.errstate(over="ignore", invalid="ignore"):
+        for y, u in zip(kept.outputs, kept.inputs, strict=True):
+            left = y * size - forced_run(model, u)
+            if not np.all(np.isfinite(left)):
+                return np.full(STRETCHES, np.inf)
+            motion = free_motion(a, c, skip).reshape(len(a), -1).T
+            start = np.asarray(
+                np.linalg.lstsq(motion, left[:, :skip].ravel(), rcond=RANK)[0], float
+            )
+            left -= motion_from(a, c, start, y.shape[1])
+            squares.append(np.mean((left[:, skip:] / size) ** 2, axis=0))
+    joint = np.concatenate(squares)
+    return np.array([np.mean(part) for part in np.array_split(joint, STRETCHES)])
+
+
+def simplest(errors: Sequence[Array]) -> int:
+    """Fewest states that err no more than the best by one standard error; 0 where nothing ran.
+
+    Reference: Breiman et al., *Classification and Regression Trees* (1984), section 3.4.3, of
+    differences in the same stretches.
+
+    Example
+    -------
+    >>> simplest([np.array([9.0, 8.0]), np.array([1.0, 1.2]), np.array([1.1, 1.0])])
+    2
+    """
+    if not errors or not np.isfinite(min(float(np.sum(each)) for each in errors)):
+        return 0
+    best = min(errors, key=lambda each: float(np.mean(each)))
+    for place, each in enumerate(errors):
+        if not np.all(np.isfinite(each)):
+            continue
+        more = each - best
+        spread = float(np.std(more, ddof=1)) / math.sqrt(more.size)
+        if float(np.mean(more)) <= max(spread, SAME * float(np.mean(best))):
+            return place + 1
+    return 0
 
 
 def _prediction_criteria(

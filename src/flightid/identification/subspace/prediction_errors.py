@@ -55,12 +55,16 @@ class RefinementResult:
 
 @dataclass(frozen=True, eq=False)
 class Predictor:
-    """Whitened prediction errors of all records as a function of the entries of the matrices."""
+    """Whitened prediction errors of all records as a function of the entries of the matrices.
+
+    `stable` models alone are allowed where the search starts from one.
+    """
 
     data: SubspaceData
     shapes: tuple[tuple[int, int], ...]
     direct: bool
     free_initial: bool
+    stable: bool = False
 
     def unpack(self, theta: Array) -> Matrices:
         """A, B, C, D, K from their entries."""
@@ -183,7 +187,8 @@ def refine(
     n = start[0].shape[0]
     shapes = [each.shape for each in start]
     free = tuple(shapes) if direct else (*shapes[:3], shapes[4])
-    predictor = Predictor(data, free, direct, initial_state == "estimate")
+    stable = spectral_radius(start[0]) < STABLE
+    predictor = Predictor(data, free, direct, initial_state == "estimate", stable)
     matrices = _balanced(predictor, start)
     iterations, termination, last = 0, "rounds", np.inf
     errors = predictor.fitted_errors(matrices, np.eye(data.n_outputs))
@@ -286,6 +291,8 @@ def _search(
     def residuals(step: Array) -> Array:
         trial = predictor.unpack(origin + basis @ step)
         if spectral_radius(trial[0] - trial[4] @ trial[2]) >= STABLE:
+            return np.full(rows, np.inf)
+        if predictor.stable and spectral_radius(trial[0]) >= STABLE:
             return np.full(rows, np.inf)
         return np.concatenate(predictor.residuals(trial, whiten)[0])
 

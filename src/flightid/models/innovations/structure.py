@@ -20,8 +20,9 @@ class SubspaceOptions(TypedDict, total=False):
 
     method: str
     horizon: int | None
-    direct: bool
+    direct: bool | None
     refine: bool
+    enforce_stability: bool
     initial_state: str
     offsets: str
     maximum_order: int
@@ -38,16 +39,18 @@ class SubspaceStructure(Options):
     ----------
     outputs, inputs : tuple of str
     order : int or None
-        Number of states; None: chosen from the singular values.
+        Number of states; None: chosen by free run on the last third of each record, kept for it.
     method : str
         ``"moesp"`` (past outputs as instruments, PO-MOESP), ``"n4sid"``, ``"cva"`` (canonical
         variates) or ``"pbsid"`` (predictor-based, unbiased under feedback; needs noise).
     horizon : int or None
         Block rows of past and of future; None: 15, less where records are short.
-    direct : bool
-        Whether inputs act without delay (D).
+    direct : bool or None
+        Whether inputs act without delay (D); None: by the data.
     refine : bool
         Whether the subspace estimate is the start of a prediction-error fit, which gives intervals.
+    enforce_stability : bool
+        Poles outside the unit circle are moved inside. A stable estimate stays stable in any case.
     initial_state : str
         State at the first sample of each record: ``"estimate"`` or ``"zero"``.
     offsets : str
@@ -72,14 +75,15 @@ class SubspaceStructure(Options):
     outputs: tuple[str, ...]
     inputs: tuple[str, ...]
     order: int | None = option(
-        None, minimum=1, maximum=LARGEST_ORDER, doc="States; default: by the singular values."
+        None, minimum=1, maximum=LARGEST_ORDER, doc="States; default: by free run on a third kept."
     )
     method: str = option("moesp", choices=METHODS, doc="How the subspace is weighed.")
     horizon: int | None = option(
         None, unit="samples", minimum=1, maximum=LARGEST_HORIZON, doc="Block rows; default: 15."
     )
-    direct: bool = option(False, doc="Inputs act without delay.")
+    direct: bool | None = option(None, doc="Inputs act without delay; default: by the data.")
     refine: bool = option(True, doc="A prediction-error fit follows, which gives intervals.")
+    enforce_stability: bool = option(False, doc="Poles outside the unit circle are moved inside.")
     initial_state: str = option(
         "estimate", choices=INITIAL_STATES, doc="State at the first sample of each record."
     )
@@ -121,6 +125,6 @@ class SubspaceStructure(Options):
 
     def __repr__(self) -> str:
         """Method, channels and order on one line."""
-        states = "order by singular values" if self.order is None else f"{self.order} states"
+        states = "order by the data" if self.order is None else f"{self.order} states"
         channels = f"{', '.join(self.outputs)} from {', '.join(self.inputs)}"
         return f"SubspaceStructure({self.method}, {channels}, {states})"
