@@ -6,6 +6,8 @@ The native halves raise these same classes (`crates/python/src/error.rs`).
 
 from __future__ import annotations
 
+from flightid.surface import spoken
+
 
 class FlightidError(Exception):
     """Root of every error that flightid raises on purpose.
@@ -49,7 +51,7 @@ class FlightidError(Exception):
         text = problem + (": " + "; ".join(clauses) if clauses else "")
         if action is not None:
             text += f". Next: {action}."
-        super().__init__(text)
+        super().__init__(spoken(text))
 
 
 class DataError(FlightidError, ValueError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 
 from flightid.conventions import Light
+from flightid.surface import spoken
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,10 @@ class Finding:
     light: Light
     message: str
     action: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "message", spoken(self.message))
+        object.__setattr__(self, "action", spoken(self.action))
 
     def __str__(self) -> str:
         """Verdict, message and action on one line."""

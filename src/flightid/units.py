@@ -231,8 +231,7 @@ def clash(channel: str, found: str, needed: str, *, where: str, record: str = ""
         found = f"{DIMENSIONLESS} (no unit is known)"
         action = (
             f"say its unit: head the column '{channel} [{needed}]' in the file, or read it with "
-            f"--units {channel}={needed}, in Python units={{{channel!r}: {needed!r}}}, "
-            "in a study [record.units]"
+            f"units={{{channel!r}: {needed!r}}}"
         )
     of = f" of record {record!r}" if record else ""
     return UnitError(

@@ -16,6 +16,7 @@ BASE = {
     "options",
     "progress",
     "result",
+    "surface",
     "table",
     "units",
     "version",

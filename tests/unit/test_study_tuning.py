@@ -101,6 +101,6 @@ def test_records_alone_hold_no_gains() -> None:
 
         verifications: dict[str, object] = {}  # noqa: RUF012
 
-    with pytest.raises(StudyError, match="cannot be tuned from records alone"):
+    with pytest.raises(StudyError, match="cannot be tuned without the log"):
         tune_models([Item()], None, TuneSettings())  # type: ignore[list-item]
     assert tune_models([], None, TuneSettings()) is None

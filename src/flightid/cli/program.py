@@ -11,7 +11,9 @@ from pathlib import Path
 import click
 
 from flightid.cli.output import Exit, note
+from flightid.cli.wording import as_typed
 from flightid.errors import FlightidError
+from flightid.surface import speaking
 from flightid.version import VERSION
 
 ORDER = (
@@ -28,7 +30,17 @@ ORDER = (
 )
 """Verbs in the order of the work, as help lists them; others follow in alphabetical order."""
 NOT_VERBS = frozenset(
-    {"bar", "black_boxes", "option_fields", "output", "pairs", "program", "records", "sources"}
+    {
+        "bar",
+        "black_boxes",
+        "option_fields",
+        "output",
+        "pairs",
+        "program",
+        "records",
+        "sources",
+        "wording",
+    }
 )
 
 
@@ -100,7 +112,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     """
     given = None if arguments is None else list(arguments)
     try:
-        code = program.main(args=given, prog_name="flightid", standalone_mode=False)
+        with speaking(as_typed):
+            code = program.main(args=given, prog_name="flightid", standalone_mode=False)
     except click.ClickException as error:
         error.show()
         return error.exit_code

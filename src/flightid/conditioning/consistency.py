@@ -195,7 +195,7 @@ def _sources(record: Record, channels: Mapping[str, str]) -> dict[str, str]:
             "the consistency check needs all three rates",
             found="no " + ", ".join(missing),
             needed="p, q and r",
-            action="name the channels with channels={...}",
+            action="name the channels",
         )
     if not all(name in source for name in FORCES):
         source = {k: v for k, v in source.items() if k not in (*FORCES, *VELOCITIES)}

@@ -96,7 +96,7 @@ def detrend(
                 raise DataError(
                     f"channel {name!r} has no trim value",
                     needed="a trim value for every channel acted on",
-                    action="declare it in Record.from_arrays(trim=...), or name the channels",
+                    action="declare a trim with the record, or name the channels",
                 )
             level = record.trim[name]
         samples[name] = values - level

@@ -10,6 +10,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
 from flightid.result import Result
+from flightid.surface import spoken
 from flightid.table import Column, Table
 
 INSPECTION = "inspection"
@@ -84,6 +85,8 @@ class Check:
     def __post_init__(self) -> None:
         if self.name not in NAMES:
             raise OptionError("no such check", found=self.name, needed=", ".join(NAMES))
+        object.__setattr__(self, "what", spoken(self.what))
+        object.__setattr__(self, "action", spoken(self.action))
 
     @property
     def finding(self) -> Finding:

@@ -246,7 +246,7 @@ def px4_parameters(
             raise OptionError(
                 "a PX4 multicopter cannot inject a sweep",
                 found=", ".join(asked),
-                needed="vehicle='fixed_wing', or no sweep",
+                needed="a fixed-wing vehicle, or no sweep",
                 action="fly the sweep by stick or from a companion computer, and log it",
             )
         notes.append("PX4 injects only its autotune's steps into the rate set-point; for a sweep,")

@@ -184,7 +184,7 @@ record says: log-likelihood 40 higher, tau 9 standard errors away
             f"the data say that inputs are {BETWEEN[best.hold]} between samples, not "
             f"{BETWEEN[assumed]} as was taken where no record says: log-likelihood "
             f"{best.gain:.3g} higher, {best.parameter} {best.moved:.2g} standard errors away",
-            f"declare hold={best.hold!r} with Record.declare or hold=…, or the hold that is true",
+            f"declare hold={best.hold!r} for the record, or the hold that is true",
         )
     if len(told) == len(matters) and all((each.gain or 0.0) < -DECISIVE for each in told):
         said = f"{taken}; the data prefer it to every other hold that would move an estimate"
@@ -193,5 +193,5 @@ record says: log-likelihood 40 higher, tau 9 standard errors away
         "hold-unknown",
         Light.AMBER,
         f"{taken}; {BETWEEN[furthest.hold]} would move {size}, and the data cannot tell",
-        "declare it with Record.declare or hold=…: a wrong one shifts delays by half a sample",
+        "declare hold=…: a wrong one shifts delays by half a sample",
     )

@@ -144,7 +144,7 @@ def _unknown(assumed: InputHold) -> Finding:
         "hold-unknown",
         Light.UNKNOWN,
         f"inputs taken as {BETWEEN[assumed]} between samples; the record does not say",
-        "declare it with Record.declare or hold=…: a wrong one shifts delays by half a sample",
+        "declare hold=…: a wrong one shifts delays by half a sample",
     )
 
 
@@ -154,7 +154,7 @@ def _stairs(record: str, name: str, stairs: Staircase, assumed: InputHold) -> Fi
         Light.AMBER,
         f"inputs taken as {BETWEEN[assumed]} between samples, yet {name} of {record!r} "
         f"{stairs}; the record does not say",
-        "declare hold='zero' (Record.declare or hold=…) if the vehicle got these steps",
+        "declare hold='zero' if the vehicle got these steps",
     )
 
 
@@ -173,5 +173,5 @@ def _others(name: str, hold: InputHold) -> Finding:
         Light.UNKNOWN,
         f"record {name!r} does not say how its inputs move between samples; taken as "
         f"{BETWEEN[hold]}, as the others do",
-        "declare it with Record.declare",
+        "declare hold=… with the record",
     )

@@ -226,7 +226,7 @@ def _declared(record: Record, given: InputShape) -> Record:
             f"the declared hold contradicts the file of record {record.name!r}",
             found=given.hold,
             needed=known.hold,
-            action="leave it out, or replace what the file says with Record.declare",
+            action="leave it out, or replace what the file says",
         )
     shape = known.with_known(given)
     inputs = [record[name] for name in record.inputs]
@@ -379,7 +379,7 @@ def _selected(
                 f"the declared unit of {name!r} contradicts the file",
                 found=named.unit(name),
                 needed=canonical(unit),
-                action="leave the declaration out and convert with Record.to_units",
+                action="leave the declaration out and convert the record",
             )
     return named
 

@@ -142,7 +142,7 @@ def estimate_response(
         raise DataError(
             "no excitation channel",
             found=f"channels {', '.join(listed[0].channels)}",
-            needed="a channel with the role excitation, or names in excitations",
+            needed="a channel with the role excitation, or excitations=…",
             action="log the injected signal, or use estimator='composite' and mind its bias",
         )
     omega = plan_frequencies(omega_rad_s, band_rad_s, n_omega, samples)

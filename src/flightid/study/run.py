@@ -25,6 +25,7 @@ from flightid.study.taking import take
 from flightid.study.task import load_task
 from flightid.study.tuning import TuneSettings, tune_models
 from flightid.study.uses import use_models
+from flightid.surface import as_key, speaking
 
 
 def _tuning(of_study: TuneSettings | None, asked: bool | Mapping[str, Any]) -> TuneSettings | None:
@@ -83,7 +84,17 @@ def run_study(
     >>> study = fid.run_study("examples/quadrotor_rig/study.toml")   # doctest: +SKIP
     >>> study.output / "report.html"                                 # doctest: +SKIP
     """
-    source = Path(path)
+    with speaking(as_key):
+        return _run(Path(path), output, log, tune, cache)
+
+
+def _run(
+    source: Path,
+    output: str | Path | None,
+    log: str | Path | None,
+    tune: bool | Mapping[str, Any],
+    cache: MutableMapping[str, Any] | None,
+) -> Study:
     settings = read_settings(source)
     final = Path(output) if output is not None else source.with_name(f"{source.stem}-output")
     reads = (source, *_paths(settings), *(() if log is None else (Path(log),)))

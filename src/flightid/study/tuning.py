@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 KINDS = (TuningRequirements, TuneOptions, ControllerOptions)
 """Dataclasses whose options are the keys of [tune], and options of ``flightid tune``."""
-AUTOPILOT_ONLY = ("gyro", "angle_loop")
+AUTOPILOT_ONLY = ("gyro", "angle_loop", "signs")
 """Options that a PID of its own does not know."""
 
 
@@ -168,8 +168,7 @@ def _flight(log: Log | None) -> Log:
     raise StudyError(
         "gains of an autopilot cannot be tuned without the log that it flew",
         needed="a log, or a controller that is no autopilot's",
-        action='tune a PID of its own: [tune] controller = "pi_d" in a study, '
-        "--controller pi_d on the command line",
+        action="tune a PID of its own, controller='pi_d'",
     )
 
 

@@ -116,7 +116,7 @@ def _check_units(wiring: Wiring, data: Record) -> None:
         if needed is not None and canonical(found) != needed:
             raise UnitError(
                 f"input {name!r} of the record has another unit than the loops",
-                found=found, needed=needed, action="convert with Record.to_units",
+                found=found, needed=needed, action="convert the record to these units",
             )  # fmt: skip
 
 

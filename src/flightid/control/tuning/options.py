@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flightid.control.autopilots.axis_loop import Gyro
@@ -30,6 +31,9 @@ class TuneOptions(Options):
         unit="rad/s",
         above=0.0,
         doc="Band that the models were identified in; default: what their fits say.",
+    )
+    signs: Mapping[str, float] | None = option(
+        None, doc="−1 for an axis whose rate answers its command the other way round."
     )
     nominal: bool = option(False, doc="Take a model without covariance, for its own margins alone.")
     draws: int = option(DRAWS, minimum=1, doc="Plants drawn from the covariance.")

@@ -46,7 +46,7 @@ def tune(
     requirements: TuningRequirements | Mapping[str, TuningRequirements] | None = None,
     gyro: Gyro = "filtered",
     angle_loop: bool = True,
-    signs: Mapping[str, int] | None = None,
+    signs: Mapping[str, float] | None = None,
     band_rad_s: Band | None = None,
     verifications: Mapping[str, Verdicts | Iterable[Verdicts]] | None = None,
     draws: int = DRAWS,
@@ -120,7 +120,7 @@ def tune(
     for axes in _groups(fits):
         checks = [each for axis in axes for each in _verdicts(verifications, axis)]
         needs = [_requirements(requirements, axis) for axis in axes]
-        turned = [(signs or {}).get(axis, 1) for axis in axes]
+        turned = [int((signs or {}).get(axis, 1)) for axis in axes]
         first = fits[axes[0]]
         if len(axes) == 1:
             designs[axes[0]] = tune_pid(

@@ -309,7 +309,7 @@ def _require_right_way(system: LinearSystem, plants: SampledPlants, outputs: lis
                 f"{name} answers a positive command with a negative rate",
                 found="negative feedback would become positive",
                 needed="a command and a rate of the same sense",
-                action="check the axes of model and log; take sign=-1 if the command is reversed",
+                action="check the axes of model and log; signs=… turns a command that is reversed",
             )
 
 

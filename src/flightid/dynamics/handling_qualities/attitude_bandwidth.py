@@ -28,8 +28,8 @@ NOISY = 0.03
 """Random error at a crossing beyond which intervals of a reading cover less than they say."""
 LEADING_DEG = 10.0
 """Phase at the beginning of the band above which a control may have the other sign."""
-LATE = "begin the band lower: the phase has passed −135° where it begins; or sign=-1"
-NO_FALL = "widen the band; take the attitude, or output_is='rate', with its sign"
+LATE = "begin the band lower: the phase has passed −135° where it begins; or turn the sign"
+NO_FALL = "widen the band; take the attitude, or say that it is a rate, with its sign"
 MOST_POINTS = 160
 """Measured points that carry errors: more say the same again."""
 Array = NDArray[np.float64]
@@ -201,7 +201,7 @@ def _judge(
     found = []
     if curve.degrees[0] > LEADING_DEG:
         text = f"the phase begins at {curve.degrees[0]:.0f}°, ahead of the control"
-        action = "sign=-1 if the control pulls the other way; begin the band above slow modes"
+        action = "turn the sign if the control pulls the other way; begin the band above slow modes"
         found.append(Finding("sign-doubtful", Light.AMBER, text, action))
     if np.isnan(gain):
         text = "the gain is never 6 dB above that at ω_180 below it"

@@ -329,7 +329,7 @@ def _pairs(source: object, given: Pairs | None) -> tuple[Pairs, list[Finding]]:
             missing.append(_absent("no-control", text, f"axes={{'{axis}': ('{output}', …)}}"))
     if not found and not missing:
         text = f"none of {', '.join(outputs)} is an attitude or a rate by a usual name"
-        missing.append(_absent("no-attitude", text, "name output and control with axes="))
+        missing.append(_absent("no-attitude", text, "name output and control of each axis"))
     return found, missing
 
 

@@ -206,7 +206,7 @@ def _shown(quantity: Reading) -> str:
 
 def _advice(rating: Rating) -> str:
     if rating.at_best:
-        return "give the whole boundary in a chart file of your own (rating_chart(path=...))"
+        return "give the whole boundary in a chart file of your own"
     if len(rating.possible) > 1:
         return "the 95 % interval crosses a boundary: more data, or count on the worse level"
     return rating.chart.doubt

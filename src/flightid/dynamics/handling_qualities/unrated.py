@@ -16,7 +16,7 @@ from flightid.units import conversion_factor
 DOUBTFUL = "sign-doubtful"
 TOLERATED = ("spiral", "phugoid")
 """Modes for whose growth standards of aeroplanes have limits of their own."""
-ASK_N_ALPHA = "say n_alpha (g/rad): in a study under [handling_qualities], in Python as n_alpha="
+ASK_N_ALPHA = "say n_alpha=… (g/rad)"
 
 
 def divergence_findings(modes: Iterable[Mode], rated: Collection[str]) -> list[Finding]:

@@ -76,7 +76,7 @@ def _whole_periods(samples: Samples, records: Sequence[Record]) -> tuple[Samples
             "the records have no common period",
             found=", ".join(str(each) for each in known),
             needed="inputs that repeat, all by the same period_s",
-            action="declare it: record.declare(period_s=…), or use another estimator",
+            action="declare period_s=… of the record, or use another estimator",
         )
     size = period_s / samples.sample_time_s
     if abs(size - round(size)) > WHOLE:

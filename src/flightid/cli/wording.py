@@ -1,0 +1,78 @@
+"""Options in errors and findings as they are typed, in the command where the user stands."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import click
+
+from flightid.cli.option_fields import NONE
+from flightid.surface import ANY, GIVEN, PAIR
+
+NAME = re.compile(r"(?<![\w.\-/\[])[a-z][a-z0-9]*(?:_[a-z0-9]+)+(?![\w(=.])")
+VERB = re.compile(r"\b(?:flightid|fid)\.([a-z_]+)\b(?:\([^)]*\))?")
+
+
+def as_typed(text: str) -> str:
+    """Options with their dashes, verbs as commands, in the command that runs; else as they are.
+
+    Example
+    -------
+    >>> as_typed("declare hold=…")
+    'declare hold=…'
+    """
+    here = click.get_current_context(silent=True)
+    if here is None:
+        return text
+    known, program = _flags(here.command), here.find_root().command
+    made = GIVEN.sub(lambda found: _given(found, known, program), text)
+    made = NAME.sub(lambda found: known[found[0]][-1] if found[0] in known else found[0], made)
+    return VERB.sub(lambda found: _verb(found, program), made)
+
+
+def _given(found: re.Match[str], known: dict[str, list[str]], program: click.Command) -> str:
+    name, value = found["name"], found["value"] or ""
+    command, flags = ("", known[name]) if name in known else _anywhere(program).get(name, ("", []))
+    if not flags:
+        return found[0]
+    told = [flag for flag in flags if not flag.startswith("--no-")]
+    of = f" of flightid {command}" if command else ""
+    if ANY.fullmatch(value) or value == "True":
+        return told[-1] + of
+    if value == "False":
+        return (flags[0] if flags != told else f"{told[-1]} {NONE}") + of
+    if pair := PAIR.fullmatch(value):
+        return f"{told[-1]} {pair['key']}={pair['value']}{of}"
+    plain = NONE if value == "None" else value.strip("'\"")
+    return f"{told[-1]} {plain if ' ' not in plain else repr(plain)}{of}"
+
+
+def _verb(found: re.Match[str], program: click.Command) -> str:
+    return f"flightid {found[1]}" if found[1] in _verbs(program) else found[0]
+
+
+def _verbs(program: click.Command) -> list[str]:
+    return program.list_commands(click.Context(program)) if isinstance(program, click.Group) else []
+
+
+@cache
+def _anywhere(program: click.Command) -> dict[str, tuple[str, list[str]]]:
+    """A command that has an option of a name, and its flags there, by name."""
+    made: dict[str, tuple[str, list[str]]] = {}
+    for verb in _verbs(program):
+        assert isinstance(program, click.Group)
+        command = program.get_command(click.Context(program), verb)
+        for name, flags in _flags(command).items() if command is not None else ():
+            made.setdefault(name, (verb, flags))
+    return made
+
+
+@cache
+def _flags(command: click.Command) -> dict[str, list[str]]:
+    """Flags by name of option: what switches it off first, the shortest last."""
+    return {
+        each.name: [*each.secondary_opts, *sorted(each.opts, key=len, reverse=True)]
+        for each in command.get_params(click.Context(command))
+        if isinstance(each, click.Option) and each.name
+    }

@@ -1,0 +1,65 @@
+"""Words for options where the user stands: Python, the command line or a study file.
+
+Errors, findings and checks are written as Python has them (``hold="zero"``, ``band_rad_s``,
+``flightid.verify``), and pass `spoken` when they are made: a command then says ``--hold zero``, a
+study ``hold = "zero"``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+
+Speaker = Callable[[str], str]
+_speaker: ContextVar[Speaker | None] = ContextVar("speaker", default=None)
+GIVEN = re.compile(
+    r"(?<![\w.\-])(?P<name>[a-z][a-z0-9_]*)=(?![=>])"
+    r"(?P<value>'[^']*'|\"[^\"]*\"|\[[^\]]*\]|\{[^}]*\}|\([^)]*\)|<[^>]*>|…|\.\.\.|-?[\w./]+)?"
+)
+"""An option with its value, as Python has it."""
+PAIR = re.compile(r"\{'(?P<key>[^']*)': '(?P<value>[^']*)'\}")
+"""One entry of a table."""
+ANY = re.compile(r"…|\.\.\.|[\[{(]\W*[\]})]|<.*>|")
+"""Values that stand for whatever the user will give."""
+
+
+@contextmanager
+def speaking(speaker: Speaker) -> Iterator[None]:
+    """Let what is made inside say its options by `speaker`."""
+    before = _speaker.set(speaker)
+    try:
+        yield
+    finally:
+        _speaker.reset(before)
+
+
+def spoken(text: str) -> str:
+    """A sentence with its options as they are written where the user stands.
+
+    Example
+    -------
+    >>> spoken("declare hold='zero'")
+    "declare hold='zero'"
+    >>> with speaking(as_key):
+    ...     spoken("declare hold='zero', or covariance=True")
+    'declare hold = "zero", or covariance = true'
+    """
+    speaker = _speaker.get()
+    return text if speaker is None or not isinstance(text, str) else speaker(text)
+
+
+def as_key(text: str) -> str:
+    """Options as keys of a study file."""
+
+    def key(found: re.Match[str]) -> str:
+        name, value = found["name"], found["value"] or ""
+        if ANY.fullmatch(value):
+            return name
+        if pair := PAIR.fullmatch(value):
+            return f'{name} = {{ {pair["key"]} = "{pair["value"]}" }}'
+        plain = {"True": "true", "False": "false", "None": '"none"'}.get(value, value)
+        return f"{name} = " + plain.replace("'", '"')
+
+    return GIVEN.sub(key, text)
