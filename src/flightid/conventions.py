@@ -30,6 +30,35 @@ class Axis(StrEnum):
     HEAVE = "heave"
 
 
+class AxisConversion(StrEnum):
+    """Conversions of vectors between axes.
+
+    Body: FRD is forward, right, down (flightid's own); FLU is forward, left, up (ROS). Ground: NED
+    is north, east, down; ENU is east, north, up.
+
+    Example
+    -------
+    >>> AxisConversion("enu-to-ned")
+    <AxisConversion.ENU_TO_NED: 'enu-to-ned'>
+    """
+
+    FLU_TO_FRD = "flu-to-frd"
+    FRD_TO_FLU = "frd-to-flu"
+    ENU_TO_NED = "enu-to-ned"
+    NED_TO_ENU = "ned-to-enu"
+
+
+_BODY = ((0, 1), (1, -1), (2, -1))
+_GROUND = ((1, 1), (0, 1), (2, -1))
+COMPONENTS = {
+    AxisConversion.FLU_TO_FRD: _BODY,
+    AxisConversion.FRD_TO_FLU: _BODY,
+    AxisConversion.ENU_TO_NED: _GROUND,
+    AxisConversion.NED_TO_ENU: _GROUND,
+}
+"""New component i is the sign times the old component at the index."""
+
+
 class Light(StrEnum):
     """Verdict against a guideline: meets it, is doubtful, does not meet it, could not be judged."""
 

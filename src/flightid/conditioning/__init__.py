@@ -10,7 +10,7 @@
 """
 
 from flightid.conditioning.align import Skew, align, estimate_skew
-from flightid.conditioning.axes import AxisConversion, convert_attitude, convert_axes, flip_sign
+from flightid.conditioning.axes import convert_attitude, convert_axes, flip_sign
 from flightid.conditioning.consistency import check_consistency
 from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.conditioning.detrend import Trend, detrend
@@ -30,6 +30,7 @@ from flightid.conditioning.smoothing import (
     local_derivative,
     local_mean,
 )
+from flightid.conventions import AxisConversion
 from flightid.record import GapPolicy, Interpolation, StampPolicy, UniformBase, to_uniform
 
 __all__ = [

@@ -3,44 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from enum import StrEnum
 
 import numpy as np
 
+from flightid.conventions import COMPONENTS, AxisConversion
 from flightid.errors import OptionError
 from flightid.record import Record, Step
 from flightid.units import convert
 
 Triad = tuple[str, str, str]
-
-
-class AxisConversion(StrEnum):
-    """Conversions of vectors between axes.
-
-    Body: FRD is forward, right, down (flightid's own); FLU is forward, left, up (ROS). Ground: NED
-    is north, east, down; ENU is east, north, up.
-
-    Example
-    -------
-    >>> AxisConversion("enu-to-ned")
-    <AxisConversion.ENU_TO_NED: 'enu-to-ned'>
-    """
-
-    FLU_TO_FRD = "flu-to-frd"
-    FRD_TO_FLU = "frd-to-flu"
-    ENU_TO_NED = "enu-to-ned"
-    NED_TO_ENU = "ned-to-enu"
-
-
-BODY = ((0, 1), (1, -1), (2, -1))
-GROUND = ((1, 1), (0, 1), (2, -1))
-# New component i is the sign times the old component at the index.
-COMPONENTS = {
-    AxisConversion.FLU_TO_FRD: BODY,
-    AxisConversion.FRD_TO_FLU: BODY,
-    AxisConversion.ENU_TO_NED: GROUND,
-    AxisConversion.NED_TO_ENU: GROUND,
-}
 
 
 def convert_axes(

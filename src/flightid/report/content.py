@@ -1,7 +1,8 @@
 """The content tree: what a report says, before anyone decides how it looks.
 
 A `Document` holds sections, a section holds blocks, and every number stands in exactly one block.
-`report.text`, `report.html` and `report.json` each draw the whole tree.
+`report.text`, `report.html` and `report.json` each draw the whole tree. A column of a table is made
+where its result is: in the result's own `summary()`, one `Column` and its cells; all three follow.
 """
 
 from __future__ import annotations

@@ -19,11 +19,11 @@ from flightid.conditioning import (
     resample,
     velocities_at_cg,
 )
-from flightid.conditioning.axes import AxisConversion
 from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.conditioning.detrend import Trend
 from flightid.conditioning.filter import FilterDesign
 from flightid.conditioning.sensor_position import RATES
+from flightid.conventions import AxisConversion
 from flightid.errors import StudyError
 from flightid.record import Record
 from flightid.simulation import actuator_positions

@@ -1,162 +1,332 @@
-"""Calibrated covariance of estimates: the errors of the data carried through the fit.
+"""Covariance of least-squares estimates whose residuals are coloured: one for all methods.
 
-An estimate that minimises Σ r² moves with its data by δθ = −(JᵀJ)⁻¹ Jᵀ δr. With δr = B δH and the
-covariance Σ of the response errors δH, cov θ = A Σ Aᵀ with A = (JᵀJ)⁻¹ JᵀB: whatever the weights of
-the cost are, the interval speaks of the scatter over repeated flights.
+The usual inverse information assumes white residuals. Residuals of flight data are not: sensors,
+filters and what the model lacks colour them. The noise of each whitened output gets a model
+(`residual_noise.py`), whose autocovariance R stands between the sensitivities s and the inverse D
+of the information: ``D [sum_ij s_i R(i - j) s_j'] D``. Numbers that belong to one record (initial
+states, biases) are taken out of the sensitivities by orthogonal projection, so that the parameters
+that all records share meet in one small matrix.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
-from flightid.errors import SingularError
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.uncertainty.agreement import Agreement, AgreementTest, compare_parts
+from flightid.uncertainty.blocks import (
+    JointResiduals,
+    RecordBlock,
+    flights_of,
+    joined,
+    noise_heard,
+    rest_of,
+)
+from flightid.uncertainty.input_noise import InputNoise
+from flightid.uncertainty.residual_noise import (
+    Autoregression,
+    FittedDirections,
+    noise_models,
+    periodogram,
+)
 
 Array = NDArray[np.float64]
-_DECIBEL = 20.0 / np.log(10.0)
-_DEGREE = 180.0 / np.pi
+ROUNDING = 1e-9
+"""Share of the variance for white residuals below which there is rounding alone."""
+DRAWS = 32
+"""Draws of random walks."""
+COLOURED = 1.5
+"""Ratio of coloured over white standard errors above which residuals count as coloured."""
+LARGEST_RATIO, SMALLEST_RATIO = 50.0, 0.02
+"""Ratios of coloured over white standard errors beyond which neither can be believed."""
 
 
-def estimator_gain(jacobian: Array, sensitivity: Array, *, total: Array | None = None) -> Array:
-    """How far the estimates move with the data, but for the sign.
+@dataclass(frozen=True, eq=False)
+class ResidualCovariance:
+    """What is known of estimates whose residuals are coloured.
+
+    Attributes
+    ----------
+    covariance, white : ndarray, shape (n, n)
+        Of the shared parameters, for residuals of the colour found, or the scatter between parts
+        where they disagree; and for white residuals.
+    freedom : ndarray, shape (n,)
+        Degrees of freedom of each variance: noise models are themselves estimates.
+    own, crossed : tuple of ndarray
+        By record, shapes (n_own, n_own) and (n_own, n): of each record's own numbers, and between
+        these and the parameters.
+    orders : tuple of int
+        Of the outputs' noise models.
+    agreement : Agreement
+        Of records, and of halves of each.
+    """
+
+    covariance: Array
+    white: Array
+    freedom: Array
+    own: tuple[Array, ...]
+    crossed: tuple[Array, ...]
+    orders: tuple[int, ...]
+    agreement: Agreement
+
+    @property
+    def ratios(self) -> Array:
+        """Standard errors over those for white residuals, shape (n,)."""
+        return np.asarray(self.agreement.by_noise / np.sqrt(np.diag(self.white)))
+
+    @property
+    def colour(self) -> tuple[float, float]:
+        """Smallest and largest of `ratios`; one without parameters."""
+        return self.colour_of(len(self.white))
+
+    def colour_of(self, count: int) -> tuple[float, float]:
+        """The same of the first parameters alone."""
+        ratios = self.ratios[:count] if count else np.ones(1)
+        return float(np.min(ratios)), float(np.max(ratios))
+
+    @property
+    def assumed(self) -> str:
+        """What the covariance assumes, in words."""
+        orders = ", ".join(map(str, self.orders))
+        return f"autoregressive noise of each whitened output, order {orders}"
+
+
+def colour_findings(smallest: float, largest: float) -> list[Finding]:
+    """Verdict on the colour of residuals: red where it changes standard errors beyond belief.
+
+    Amber where it widens them, and the intervals allow for it.
 
     Parameters
     ----------
-    jacobian : ndarray, shape (n_residuals, n_parameters)
-        Derivatives J of the weighted residuals with respect to the parameters.
-    sensitivity : ndarray, shape (n_residuals, n_data)
-        Derivatives B of the weighted residuals with respect to the data.
-    total : ndarray, shape (n_residuals, n_parameters), optional
-        Derivatives T of the residuals where the data follow the parameters too, as a corrected
-        response does that is fitted again and again; default: J.
-
-    Returns
-    -------
-    ndarray, shape (n_parameters, n_data)
-        A = (JᵀT)⁻¹ JᵀB.
-
-    Raises
-    ------
-    SingularError
-        Some combination of the parameters has no influence on the residuals.
-
-    Reference
-    ---------
-    Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., §9.7.
+    smallest, largest : float
+        Ratio of standard errors to those for white residuals, over all parameters.
 
     Example
     -------
-    >>> estimator_gain(np.array([[1.0], [1.0]]), np.eye(2))
-    array([[0.5, 0.5]])
+    >>> colour_findings(0.9, 1.2)
+    []
     """
-    scale = np.linalg.norm(jacobian, axis=0)
-    if np.any(scale == 0.0):
-        raise SingularError("a parameter has no influence on the residuals")
-    q, triangle = np.linalg.qr(jacobian / scale)
-    diagonal = np.abs(np.diag(triangle))
-    if np.any(diagonal <= 1e-14 * diagonal.max(initial=0.0)):
-        raise SingularError("the Hessian of the cost is singular to working precision")
-    moved = triangle if total is None else q.T @ (total / scale)
-    return np.asarray(np.linalg.solve(moved, q.T @ sensitivity) / scale[:, None])
+    believed = smallest >= SMALLEST_RATIO and largest <= LARGEST_RATIO
+    if believed and largest <= COLOURED:
+        return []
+    if believed:
+        return [
+            Finding(
+                "residuals-coloured",
+                Light.AMBER,
+                f"residuals are coloured: standard errors are up to {largest:.2g} times those of "
+                "white residuals, and the intervals allow for it",
+                "run residual_tests: where inputs still predict them, dynamics are missing",
+            )
+        ]
+    ratio = largest if largest > LARGEST_RATIO else smallest
+    return [
+        Finding(
+            "colour-absurd",
+            Light.RED,
+            f"the colour of the residuals makes standard errors {ratio:.2g} times those of white "
+            "residuals: neither can be believed",
+            "take longer records; look for drifts, pure tones or constant outputs in the residuals",
+        )
+    ]
 
 
-def decibel_phase_sensitivity(
-    response: NDArray[np.complex128], weight_db: Array, weight_deg: Array
-) -> Array:
-    """Derivatives of weighted dB and degree residuals with respect to the measured response.
-
-    From δ log H = δH / H: its real part moves the magnitude, its imaginary part the phase.
+def residual_covariance(
+    blocks: Sequence[RecordBlock],
+    beside: JointResiduals | None = None,
+    noise: tuple[InputNoise, Array] | None = None,
+) -> ResidualCovariance:
+    """Covariance of estimates by the colour of their residuals.
 
     Parameters
     ----------
-    response : ndarray of complex, shape (n,)
-        Response about which errors are small; the fitted model's, which has less noise.
-    weight_db, weight_deg : ndarray, shape (n,)
-        Square roots of the weights.
+    blocks : sequence of RecordBlock
+        By record.
+    beside : JointResiduals, optional
+        Residuals beside the records.
+    noise : tuple of InputNoise and ndarray (n_outputs,), optional
+        Noise of the inputs, which reaches the outputs as random walks, and what whitens the
+        outputs; of one record alone.
 
     Returns
     -------
-    ndarray, shape (2 n, 2 n)
-        Rows: dB and degrees of each frequency in turn; columns: all real parts, then all imaginary.
-
-    Reference
-    ---------
-    Bendat & Piersol, *Engineering Applications of Correlation and Spectral Analysis*, §11.3.
-
-    Example
-    -------
-    >>> decibel_phase_sensitivity(np.array([1j]), np.ones(1), np.ones(1)).round(3)
-    array([[-0.   , -8.686],
-           [57.296, -0.   ]])
-    """
-    n = len(response)
-    inverse = 1.0 / response
-    result = np.zeros((2 * n, 2 * n))
-    rows = np.arange(n)
-    db, deg = -_DECIBEL * weight_db, -_DEGREE * weight_deg
-    result[2 * rows, rows] = db * inverse.real
-    result[2 * rows, n + rows] = -db * inverse.imag
-    result[2 * rows + 1, rows] = deg * inverse.imag
-    result[2 * rows + 1, n + rows] = deg * inverse.real
-    return result
-
-
-def window_covariance(
-    response: NDArray[np.complex128],
-    random_error: Array,
-    omega_rad_s: Array,
-    window_s: float | None,
-) -> Array:
-    """Approximate covariance of a response of which only the random error is known.
-
-    Neighbouring frequencies closer than a window resolves share their errors, in the proportion of
-    the transform of the squared Hann window.
-
-    Parameters
-    ----------
-    response : ndarray of complex, shape (n,)
-        Measured response.
-    random_error : ndarray, shape (n,)
-        Normalised random error, 1 σ of magnitude and of phase in rad.
-    omega_rad_s : ndarray, shape (n,)
-        Frequencies, rad/s.
-    window_s : float or None
-        Length of the window, s; None where the frequencies are independent.
-
-    Returns
-    -------
-    ndarray, shape (2 n, 2 n)
-        Covariance of all real parts, then all imaginary parts.
+    ResidualCovariance
+        Positive and finite, whatever the residuals are.
 
     Assumes
     -------
-    Stationary noise and input. Biased when the input is a sweep: then each frequency is excited in
-    a part of the record only, and the true correlation is another.
+    Noise of each whitened output that is stationary within a record, of one colour in all records
+    though not of one level, and independent of the others'.
 
     Reference
     ---------
-    Harris (1978), "On the use of windows for harmonic analysis", eq. 21.
+    Morelli & Klein (1997), Accuracy of aerodynamic model parameters estimated from flight test
+    data, J. Guidance, Control and Dynamics 20(1), eqs. 19-25; Satterthwaite (1946), An approximate
+    distribution of estimates of variance components, Biometrics Bulletin 2(6), eq. 17; the
+    elimination: Golub & Pereyra (1973), SIAM J. Numerical Analysis 10.
 
     Example
     -------
-    >>> window_covariance(np.array([2.0 + 0j]), np.array([0.1]), np.array([1.0]), None) + 0.0
-    array([[0.04, 0.  ],
-           [0.  , 0.04]])
+    >>> residual = np.random.default_rng(1).standard_normal((1, 400))
+    >>> block = RecordBlock.of(np.ones((1, 400, 1)), np.ones((1, 400, 0)), residual)
+    >>> found = residual_covariance([block])
+    >>> round(float(found.white[0, 0]), 4)
+    0.0025
     """
-    correlation = np.eye(len(response))
-    if window_s is not None:
-        bins = np.subtract.outer(omega_rad_s, omega_rad_s) * window_s / (2.0 * np.pi)
-        correlation = _squared_hann(bins)
-    shared = correlation * np.outer(random_error, random_error)
-    # Errors of log H are circular: real and imaginary parts alike, uncorrelated.
-    turn = np.outer(response, response.conj()) * shared
-    return np.asarray(np.block([[turn.real, -turn.imag], [turn.imag, turn.real]]))
-
-
-def _squared_hann(bins: Array) -> Array:
-    """Transform of the squared Hann window, (3 + 4 cos + cos 2)/8, made 1 at zero."""
-    return np.asarray(
-        np.sinc(bins)
-        + (np.sinc(bins - 1.0) + np.sinc(bins + 1.0)) * 2.0 / 3.0
-        + (np.sinc(bins - 2.0) + np.sinc(bins + 2.0)) / 6.0
+    triangle = triangle_of(blocks, None if beside is None else beside.slopes)
+    root = _inverse_root(triangle)
+    turned = _gain(root, beside, blocks)
+    taken = []
+    for block in blocks:
+        parts = (block.basis, block.projected @ root)
+        taken.append(FittedDirections(*(part.reshape(*block.residual.shape, -1) for part in parts)))
+    walks = None if noise is None else _walks(taken[0], *noise)
+    models = noise_models([block.residual for block in blocks], taken, walks)
+    apart = noise_heard(models, blocks)
+    answers = [joined(each, block) for each, block in zip(apart, blocks, strict=True)]
+    sizes = [block.basis.shape[1] for block in blocks]
+    heard = sum(each[:, m:, m:] for each, m in zip(answers, sizes, strict=True))
+    variances = turned @ heard @ turned.T
+    shared = np.asarray(variances.sum(axis=0))
+    if beside is not None:
+        brought = beside.slopes @ turned.T
+        shared = shared + brought.T @ brought
+    if noise is not None:
+        brought = _of_walks(blocks[0], *noise) @ turned.T
+        shared = shared + brought.T @ brought
+    own, crossed = [], []
+    for block, each, m in zip(blocks, answers, sizes, strict=True):
+        # Own numbers answer the record's own noise and, through the parameters, everybody's.
+        heard_here = each.sum(axis=0)
+        back = np.linalg.inv(block.triangle)
+        through = back @ block.shared_on_own
+        gain = np.vstack([np.zeros((m, len(turned))), turned.T])
+        direct = np.vstack([back.T, -turned.T @ through.T])
+        others = shared - gain.T @ heard_here @ gain
+        found = direct.T @ heard_here @ direct + through @ others @ through.T
+        own.append(_lifted(found, back @ back.T))
+        crossed.append(direct.T @ heard_here @ gain - through @ others)
+    plain = turned @ np.linalg.inv(root).T
+    white = np.asarray(root @ root.T) if blocks[0].answering is None else plain @ plain.T
+    freedom = _freedom(shared, variances, models)
+    # Random walks from noise of inputs join whatever parts a record is cut into.
+    compared = flights_of(apart, blocks) if noise is None else []
+    rest = rest_of(compared, beside)
+    agreed = compare_parts(compared, turned, _lifted(shared, white), freedom, rest)
+    return ResidualCovariance(
+        agreed.covariance,
+        white,
+        agreed.freedom,
+        tuple(own),
+        tuple(crossed),
+        tuple(model.weights.size for model in models),
+        agreed.agreement,
     )
+
+
+def white_covariance(
+    blocks: Sequence[RecordBlock], covariance: Array, freedom: float
+) -> AgreementTest:
+    """Covariance of estimates whose errors their own noise model whitens, parts compared.
+
+    Parameters
+    ----------
+    blocks : sequence of RecordBlock
+        By record.
+    covariance : ndarray, shape (n, n)
+        By white errors.
+    freedom : float
+        Degrees of freedom of their variance.
+
+    Returns
+    -------
+    AgreementTest
+
+    Reference
+    ---------
+    See `flightid.uncertainty.agreement.compare_parts`.
+    """
+    total = sum(block.residual.shape[1] for block in blocks)
+    power = [
+        np.sum([np.sum(block.residual[o] ** 2) for block in blocks]) / total
+        for o in range(len(blocks[0].residual))
+    ]
+    models = [Autoregression(np.array([level]), np.empty(0), total, 0) for level in power]
+    root = _inverse_root(triangle_of(blocks))
+    degrees = np.full(len(covariance), freedom)
+    flights = flights_of(noise_heard(models, blocks), blocks)
+    return compare_parts(flights, root @ root.T, covariance, degrees)
+
+
+def triangle_of(blocks: Sequence[RecordBlock], beside: Array | None = None) -> Array:
+    """Triangle of the sensitivities of all records, and of what is fitted beside them."""
+    parts = [np.asarray(np.linalg.qr(block.projected, mode="r")) for block in blocks]
+    if beside is not None:
+        parts.append(beside)
+    return np.asarray(np.linalg.qr(np.vstack(parts), mode="r"))
+
+
+def _inverse_root(triangle: Array) -> Array:
+    """R⁻¹ of a triangle: R⁻¹R⁻ᵀ is the covariance for white residuals of unit variance."""
+    size = np.linalg.norm(triangle, axis=0)
+    return np.asarray(solve_triangular(triangle / size, np.eye(len(size))) / size[:, None])
+
+
+def _gain(root: Array, beside: JointResiduals | None, blocks: Sequence[RecordBlock]) -> Array:
+    """What turns a gradient into a change of the estimates, from the root R⁻¹ of the information.
+
+    Where data follow the parameters, the equations that the estimates solve bend less than the
+    cost does, and the gain is larger than the inverse of the information.
+    """
+    answering = [each.answering for each in blocks if each.answering is not None]
+    if answering:
+        pairs = zip(blocks, answering, strict=True)
+        return np.linalg.inv(np.sum([each.projected.T @ slopes for each, slopes in pairs], axis=0))
+    if beside is None:
+        return np.asarray(root @ root.T)
+    follows = (beside.slopes @ root).T @ ((beside.slopes - beside.total) @ root)
+    return np.asarray(root @ np.linalg.solve(np.eye(len(root)) - follows, root.T))
+
+
+def _walks(taken: FittedDirections, noise: InputNoise, whitener: Array) -> Array:
+    """Mean periodogram of what a fit leaves of each output's random walk.
+
+    Draws come from a fixed seed: the same record gives the same intervals.
+    """
+    directions = taken.shared
+    n = directions.shape[1]
+    draws = np.random.default_rng(0).standard_normal((n - 1, noise.steps.shape[2], DRAWS))
+    walks = noise.outputs_of(draws) * whitener[:, None, None]
+    along = np.einsum("onp,ond->pd", directions, walks, optimize=True)
+    return np.array([periodogram(walk) for walk in walks - directions @ along])
+
+
+def _of_walks(block: RecordBlock, noise: InputNoise, whitener: Array) -> Array:
+    """Gradients that unit noise of each input and step makes, shape (n_noises, n)."""
+    sensitivities = block.projected.reshape(*block.residual.shape, -1)
+    paths = noise.transposed(sensitivities * whitener[:, None, None])
+    return np.asarray(paths.reshape(-1, paths.shape[2]))
+
+
+def _freedom(shared: Array, variances: Array, models: Sequence[Autoregression]) -> Array:
+    diagonals = np.diagonal(variances, axis1=1, axis2=2)
+    doubt = sum(
+        variance**2 / model.freedom() for variance, model in zip(diagonals, models, strict=True)
+    )
+    # Errors that are known leave no doubt, nor does a residual that vanishes.
+    doubtful = doubt > 0.0
+    return np.asarray(
+        np.where(doubtful, np.diag(shared) ** 2 / np.where(doubtful, doubt, 1.0), np.inf)
+    )
+
+
+def _lifted(covariance: Array, plain: Array) -> Array:
+    """Of data without noise, rounding alone is left, and that may be negative."""
+    lift = np.maximum(ROUNDING * np.diag(plain) - np.diag(covariance), 0.0)
+    return np.asarray(covariance + np.diag(lift))

@@ -1,7 +1,7 @@
 """Cramér–Rao bounds in the convention of CIFER: from the Hessian of the cost, in no statistics.
 
 These numbers rank parameters and are compared with the published guides. They are not confidence
-intervals: the cost is not a likelihood. Intervals come from `flightid.uncertainty.covariance`.
+intervals: the cost is not a likelihood. Intervals come from `flightid.uncertainty.response_errors`.
 """
 
 from __future__ import annotations

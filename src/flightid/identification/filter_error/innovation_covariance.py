@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from flightid.identification.filter_error.innovations import RecordInnovations
 from flightid.uncertainty.blocks import JointResiduals, RecordBlock
+from flightid.uncertainty.covariance import ResidualCovariance, residual_covariance
 from flightid.uncertainty.cramer_rao import inverse_hessian
-from flightid.uncertainty.residual_covariance import ResidualCovariance, residual_covariance
 
 Array = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import RecordBlock
+from flightid.uncertainty.covariance import residual_covariance, white_covariance
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.residual_covariance import residual_covariance, white_covariance
 
 Array = NDArray[np.float64]
 UNDETERMINED = "the data do not tell the coefficients apart"

@@ -24,8 +24,8 @@ from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.uncertainty import correlation as correlation_of
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import JointResiduals, RecordBlock
+from flightid.uncertainty.covariance import residual_covariance, triangle_of
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.residual_covariance import residual_covariance, triangle_of
 
 Array = NDArray[np.float64]
 Own = tuple[dict[str, Estimate], dict[str, Estimate], dict[str, Estimate]]

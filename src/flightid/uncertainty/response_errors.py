@@ -1,0 +1,162 @@
+"""Calibrated covariance of estimates: the errors of the data carried through the fit.
+
+An estimate that minimises Σ r² moves with its data by δθ = −(JᵀJ)⁻¹ Jᵀ δr. With δr = B δH and the
+covariance Σ of the response errors δH, cov θ = A Σ Aᵀ with A = (JᵀJ)⁻¹ JᵀB: whatever the weights of
+the cost are, the interval speaks of the scatter over repeated flights.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import SingularError
+
+Array = NDArray[np.float64]
+_DECIBEL = 20.0 / np.log(10.0)
+_DEGREE = 180.0 / np.pi
+
+
+def estimator_gain(jacobian: Array, sensitivity: Array, *, total: Array | None = None) -> Array:
+    """How far the estimates move with the data, but for the sign.
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (n_residuals, n_parameters)
+        Derivatives J of the weighted residuals with respect to the parameters.
+    sensitivity : ndarray, shape (n_residuals, n_data)
+        Derivatives B of the weighted residuals with respect to the data.
+    total : ndarray, shape (n_residuals, n_parameters), optional
+        Derivatives T of the residuals where the data follow the parameters too, as a corrected
+        response does that is fitted again and again; default: J.
+
+    Returns
+    -------
+    ndarray, shape (n_parameters, n_data)
+        A = (JᵀT)⁻¹ JᵀB.
+
+    Raises
+    ------
+    SingularError
+        Some combination of the parameters has no influence on the residuals.
+
+    Reference
+    ---------
+    Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., §9.7.
+
+    Example
+    -------
+    >>> estimator_gain(np.array([[1.0], [1.0]]), np.eye(2))
+    array([[0.5, 0.5]])
+    """
+    scale = np.linalg.norm(jacobian, axis=0)
+    if np.any(scale == 0.0):
+        raise SingularError("a parameter has no influence on the residuals")
+    q, triangle = np.linalg.qr(jacobian / scale)
+    diagonal = np.abs(np.diag(triangle))
+    if np.any(diagonal <= 1e-14 * diagonal.max(initial=0.0)):
+        raise SingularError("the Hessian of the cost is singular to working precision")
+    moved = triangle if total is None else q.T @ (total / scale)
+    return np.asarray(np.linalg.solve(moved, q.T @ sensitivity) / scale[:, None])
+
+
+def decibel_phase_sensitivity(
+    response: NDArray[np.complex128], weight_db: Array, weight_deg: Array
+) -> Array:
+    """Derivatives of weighted dB and degree residuals with respect to the measured response.
+
+    From δ log H = δH / H: its real part moves the magnitude, its imaginary part the phase.
+
+    Parameters
+    ----------
+    response : ndarray of complex, shape (n,)
+        Response about which errors are small; the fitted model's, which has less noise.
+    weight_db, weight_deg : ndarray, shape (n,)
+        Square roots of the weights.
+
+    Returns
+    -------
+    ndarray, shape (2 n, 2 n)
+        Rows: dB and degrees of each frequency in turn; columns: all real parts, then all imaginary.
+
+    Reference
+    ---------
+    Bendat & Piersol, *Engineering Applications of Correlation and Spectral Analysis*, §11.3.
+
+    Example
+    -------
+    >>> decibel_phase_sensitivity(np.array([1j]), np.ones(1), np.ones(1)).round(3)
+    array([[-0.   , -8.686],
+           [57.296, -0.   ]])
+    """
+    n = len(response)
+    inverse = 1.0 / response
+    result = np.zeros((2 * n, 2 * n))
+    rows = np.arange(n)
+    db, deg = -_DECIBEL * weight_db, -_DEGREE * weight_deg
+    result[2 * rows, rows] = db * inverse.real
+    result[2 * rows, n + rows] = -db * inverse.imag
+    result[2 * rows + 1, rows] = deg * inverse.imag
+    result[2 * rows + 1, n + rows] = deg * inverse.real
+    return result
+
+
+def window_covariance(
+    response: NDArray[np.complex128],
+    random_error: Array,
+    omega_rad_s: Array,
+    window_s: float | None,
+) -> Array:
+    """Approximate covariance of a response of which only the random error is known.
+
+    Neighbouring frequencies closer than a window resolves share their errors, in the proportion of
+    the transform of the squared Hann window.
+
+    Parameters
+    ----------
+    response : ndarray of complex, shape (n,)
+        Measured response.
+    random_error : ndarray, shape (n,)
+        Normalised random error, 1 σ of magnitude and of phase in rad.
+    omega_rad_s : ndarray, shape (n,)
+        Frequencies, rad/s.
+    window_s : float or None
+        Length of the window, s; None where the frequencies are independent.
+
+    Returns
+    -------
+    ndarray, shape (2 n, 2 n)
+        Covariance of all real parts, then all imaginary parts.
+
+    Assumes
+    -------
+    Stationary noise and input. Biased when the input is a sweep: then each frequency is excited in
+    a part of the record only, and the true correlation is another.
+
+    Reference
+    ---------
+    Harris (1978), "On the use of windows for harmonic analysis", eq. 21.
+
+    Example
+    -------
+    >>> window_covariance(np.array([2.0 + 0j]), np.array([0.1]), np.array([1.0]), None) + 0.0
+    array([[0.04, 0.  ],
+           [0.  , 0.04]])
+    """
+    correlation = np.eye(len(response))
+    if window_s is not None:
+        bins = np.subtract.outer(omega_rad_s, omega_rad_s) * window_s / (2.0 * np.pi)
+        correlation = _squared_hann(bins)
+    shared = correlation * np.outer(random_error, random_error)
+    # Errors of log H are circular: real and imaginary parts alike, uncorrelated.
+    turn = np.outer(response, response.conj()) * shared
+    return np.asarray(np.block([[turn.real, -turn.imag], [turn.imag, turn.real]]))
+
+
+def _squared_hann(bins: Array) -> Array:
+    """Transform of the squared Hann window, (3 + 4 cos + cos 2)/8, made 1 at zero."""
+    return np.asarray(
+        np.sinc(bins)
+        + (np.sinc(bins - 1.0) + np.sinc(bins + 1.0)) * 2.0 / 3.0
+        + (np.sinc(bins - 2.0) + np.sinc(bins + 2.0)) / 6.0
+    )
