@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,8 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification.multistart import CONVERGED, End
 from flightid.uncertainty.estimate import Estimate
+
+Group = TypeVar("Group", bound=Sequence[End])
 
 APPROXIMATE = "random error"
 UNKNOWN = "nothing"
@@ -175,7 +178,7 @@ def judge_correlation(names: Sequence[str], correlation: NDArray[np.float64]) ->
     ]
 
 
-def rivals(groups: Sequence[Sequence[End]], near: float) -> list[Sequence[End]]:
+def rivals(groups: Sequence[Group], near: float) -> list[Group]:
     """Minima beside the best one that cost at most `near`."""
     return [group for group in groups[1:] if group[0].is_converged and group[0].cost <= near]
 

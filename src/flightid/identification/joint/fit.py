@@ -112,7 +112,7 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
         *check_start(model, points.selected),
     ]
     found = searched(model, prepared, options, points.native)
-    made = _Corrected(found, points, None, BiasOutcome("correct_bias=False", possible=False))
+    made = _UnbiasedSearch(found, points, None, BiasOutcome("correct_bias=False", possible=False))
     if options.correct_bias:
         made = _without_bias(found, prepared, response, points, options)
         setup += made.outcome.findings()
@@ -147,7 +147,7 @@ def _points(
 
 
 @dataclass(frozen=True)
-class _Corrected:
+class _UnbiasedSearch:
     """A search whose response is free of the estimator's bias, or why it is not."""
 
     found: SearchEnd
@@ -162,7 +162,7 @@ def _without_bias(
     response: FrequencyResponse,
     points: ChosenPoints,
     options: JointOptions,
-) -> _Corrected:
+) -> _UnbiasedSearch:
     """Take the estimator's bias out, and fit again, from each minimum that may be the best.
 
     Minima of several starts are compared on the corrected response, not where it was biased.
@@ -190,7 +190,7 @@ def _corrected(
     response: FrequencyResponse,
     points: ChosenPoints,
     options: JointOptions,
-) -> _Corrected:
+) -> _UnbiasedSearch:
     """Take the estimator's bias out of the response, and fit again, until nothing moves."""
     once = replace(options, starts=1)
 
@@ -206,7 +206,7 @@ def _corrected(
     without = Correction(response, options.hold)
     done = iterate(found.fitted, without, scales, refit)
     if not done.outcome.applied:
-        return _Corrected(found, points, None, done.outcome)
+        return _UnbiasedSearch(found, points, None, done.outcome)
     after = corrected_points(done.data)
     known = without.errors(done.model)
     if known is not None:
@@ -216,7 +216,7 @@ def _corrected(
     last = searched(done.model, prepared, once, after.native)
     objective = Objective(last.fitted, without, after.selected, after.errors, "likelihood")
     moved = sizes(points.selected, after.selected, after.errors)
-    return _Corrected(last, after, objective.following(), replace(done.outcome, sizes=moved))
+    return _UnbiasedSearch(last, after, objective.following(), replace(done.outcome, sizes=moved))
 
 
 def _with_responses(
