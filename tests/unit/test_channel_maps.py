@@ -18,7 +18,7 @@ from flightid.errors import (
 )
 from flightid.logs import DataflashWriter, channel_map
 from flightid.logs.channels.channel_map import DEFAULTS, default_map
-from flightid.logs.dataflash.reader import UNITS
+from flightid.logs.dataflash.field_units import UNITS
 from flightid.units import canonical, same_dimension
 from tests.closeness import assert_close
 

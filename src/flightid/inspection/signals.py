@@ -61,7 +61,8 @@ def inside(time_s: NDArray[np.float64], spans: Iterable[Span]) -> NDArray[np.boo
     return mask
 
 
-def _map(log: Log) -> ChannelMap:
+def map_of(log: Log) -> ChannelMap:
+    """The shipped map of a log, one of its kind where it does not tell its vehicle."""
     try:
         return default_map(log.kind, log.vehicle)
     except DataError:
@@ -79,7 +80,7 @@ def find(log: Log, name: str) -> Signal | None:
 def places(log: Log, name: str, most: int | None = None) -> list[Signal]:
     """Places of a channel that the log holds, best first."""
     try:
-        channel = _map(log)[name]
+        channel = map_of(log)[name]
     except UnknownNameError:
         return []
     found: list[Signal] = []

@@ -10,6 +10,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding, counted
 from flightid.inspection import advice
 from flightid.inspection.gap_findings import gap_findings
+from flightid.inspection.signals import map_of
 from flightid.inspection.thresholds import (
     BAND_GOOD,
     BAND_LEAST,
@@ -21,6 +22,7 @@ from flightid.inspection.thresholds import (
 )
 from flightid.inspection.usable_band import AxisBand, lowest_hz
 from flightid.logs import Log
+from flightid.logs.scale_check import check_scales
 
 if TYPE_CHECKING:
     from flightid.inspection.inspection import Inspection
@@ -32,7 +34,14 @@ def judge(log: Log, found: Inspection) -> tuple[Finding, ...]:
     if found.phases.airborne:
         findings += [*_length(found), *_bands(log, found), *_loop(log, found)]
     findings += [*_logging(log, found), *_excitation(log, found)]
-    return _ranked([*findings, *_quality(log, found)])
+    return _ranked([*findings, *_quality(log, found), *_scales(log, found)])
+
+
+def _scales(log: Log, found: Inspection) -> list[Finding]:
+    """Streams of one turning that disagree on how far, over the longest flight or the whole log."""
+    span = max(found.phases.airborne, key=lambda span: span[1] - span[0], default=None)
+    checks = check_scales(log, map_of(log), span)
+    return [check.finding for check in checks if check.finding is not None]
 
 
 _RANK = {Light.RED: 0, Light.AMBER: 1, Light.UNKNOWN: 2, Light.GREEN: 3}

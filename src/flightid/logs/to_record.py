@@ -22,9 +22,11 @@ from flightid.logs.channels.channel_map import (
 from flightid.logs.contents import LogContents
 from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.logs.extraction import ChannelSamples, extract, find
+from flightid.logs.scale_check import check_scales
 from flightid.logs.self_check import InjectionCheck, check_injection, chirp_clock, paired_rows
 from flightid.record import Channel, InputShape, Record, Step
-from flightid.record.checks import entry_steps
+from flightid.record.checks import entry_steps, fault_steps
+from flightid.record.sample_faults import SampleFault
 from flightid.record.timebase import GapPolicy, to_uniform
 from flightid.table import Cell
 from flightid.units import convert
@@ -95,9 +97,14 @@ def make_record(
         options |= {"sid_run": repr(run), "injection": str(check.findings[0])}
     shape = _input_shape(declared, chosen, found, base.sample_time_s)
     made = record.replace(channels=labels, step=Step("Log.record", options), input_shape=shape)
-    for step in entry_steps(
-        [(c, i.time_s, i.values) for c, i in zip(labels, ordered, strict=True)]
-    ):
+    entering = [(c, i.time_s, i.values) for c, i in zip(labels, ordered, strict=True)]
+    inside = float(span.time_s[0]), float(span.time_s[-1])
+    scales = [
+        SampleFault(check.quantity, *inside, check.finding)
+        for check in check_scales(log, chosen, inside)
+        if check.finding is not None
+    ]
+    for step in (*entry_steps(entering), *fault_steps(scales)):
         made = made.replace(step=step)
     return made
 

@@ -45,8 +45,12 @@ def ratio_of_increments(
     time_s, values = rate
     middle = 0.5 * (values[1:] + values[:-1]) * np.diff(time_s)
     turned = np.diff(np.interp(edges, time_s, np.concatenate([[0.0], np.cumsum(middle)])))
-    moved = np.diff(np.interp(edges, *angle))
-    turned, moved = turned - turned.mean(), moved - moved.mean()
+    return spread_ratio(np.diff(np.interp(edges, *angle)), turned)
+
+
+def spread_ratio(moved: Array, turned: Array) -> tuple[float, float] | None:
+    """Spread of the first over that of the second, and their correlation; None without motion."""
+    moved, turned = moved - moved.mean(), turned - turned.mean()
     first, second = float(np.sqrt(turned @ turned)), float(np.sqrt(moved @ moved))
     if first == 0.0 or second == 0.0:
         return None

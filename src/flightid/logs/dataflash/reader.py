@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +17,12 @@ from flightid.conventions import Light
 from flightid.errors import MissingColumnError
 from flightid.findings import Finding
 from flightid.logs.dataflash.events import error_text, event_text, mode_text, vehicle_of
+from flightid.logs.dataflash.field_units import (
+    DEGREES_SINCE,
+    UNDECLARED,
+    UNITS,
+    undeclared_units,
+)
 from flightid.logs.source import ByteRange, Event, Gap, MessageInfo, ParameterChange
 from flightid.units import DIMENSIONLESS
 
@@ -24,18 +30,8 @@ GAP_S = 0.2
 """Silence of all messages together that counts as a gap, s: even the slowest standard log bitmask
 writes the inertial sensors at 25 Hz."""
 
-# The labels of ArduPilot's unit table (AP_Logger/LogStructure.h) in flightid's spelling.
-UNITS = {
-    "": "1", "UNKNOWN": "1", "instance": "1", "satellites": "1", "%": "%", "ppm": "ppm",
-    "A": "A", "Ah": "A*h", "A.s": "A*s", "W": "W", "Watt": "W", "W.h": "h*W", "W.s": "s*W",
-    "J": "J", "V": "V", "Ohm": "Ω", "mV": "mV", "B": "B", "B/s": "B/s", "deg": "deg",
-    "deglatitude": "deg", "deglongitude": "deg", "degheading": "deg", "deg/s": "deg/s",
-    "deg/s/s": "deg/s^2", "rad": "rad", "rad/s": "rad/s", "rad/s/s": "rad/s^2", "m": "m",
-    "m/s": "m/s", "m/s/s": "m/s^2", "degC": "°C", "s": "s", "us": "µs", "Hz": "Hz",
-    "rpm": "rpm", "l": "l", "l/s": "l/s", "N.m": "m*N", "Pa": "Pa", "Gauss": "G", "mGauss": "mG",
-}  # fmt: skip
 _VERSION = re.compile(r"^(?P<name>[\w:+ -]*?(?:[Cc]opter|[Pp]lane|[Rr]over|Sub|Tracker|Blimp|Heli)"
-                      r"[\w-]*) V\d")  # fmt: skip
+                      r"[\w-]*) V(?P<age>\d+(\.\d+)?)")  # fmt: skip
 
 
 class _Column(NamedTuple):
@@ -53,6 +49,7 @@ class _Layout:
     file: _native.DataflashFile
     table: int
     n_rows: int
+    assumed: Callable[[], Mapping[str, str]]
 
     @cached_property
     def fields(self) -> list[_Column]:
@@ -65,7 +62,13 @@ class _Layout:
 
     @cached_property
     def units(self) -> dict[str, str]:
-        return {field.label: UNITS.get(field.unit, DIMENSIONLESS) for field in self.fields}
+        known = self.assumed()
+        return {
+            field.label: UNITS.get(field.unit, DIMENSIONLESS)
+            if field.unit
+            else known.get(field.label, DIMENSIONLESS)
+            for field in self.fields
+        }
 
     @cached_property
     def text_fields(self) -> tuple[str, ...]:
@@ -139,8 +142,23 @@ class DataflashSource:
         self._renamed: list[str] = []
         for index, (name, _, count) in enumerate(file.tables()):
             if count > 0:
-                self._adopt(name, _Layout(file, index, count))
+                self._adopt(name, _Layout(file, index, count, partial(self._assumed, name)))
         self._messages = _Messages(file, self._layouts)
+
+    def _assumed(self, name: str) -> Mapping[str, str]:
+        """Units of a message in a log that declares none, by the firmware's age."""
+        if "FMTU" in self._layouts or name not in UNDECLARED:
+            return {}
+        units = undeclared_units(name)
+        if name != "RATE" or not self._holds_hundredths:
+            return units
+        return {label: "cdeg/s" if unit == "deg/s" else unit for label, unit in units.items()}
+
+    @property
+    def _holds_hundredths(self) -> bool:
+        """Whether RATE is that of firmware before ArduCopter 3.4."""
+        age = _VERSION.match(self.firmware)
+        return age is not None and tuple(map(int, age["age"].split("."))) < DEGREES_SINCE
 
     def _adopt(self, name: str, layout: _Layout) -> None:
         """Take in a table of the file; a second layout under one name becomes ``NAME~2``."""
@@ -328,8 +346,16 @@ class DataflashSource:
                 "this is probably two logs in one file; read them apart",
             )
         if "FMTU" not in self._messages:
+            known = ", ".join(name for name in UNDECLARED if name in self._layouts)
+            taken = f"; {known} are read as firmware of its age stores them" if known else ""
+            if "RATE" in self._layouts and self._holds_hundredths:
+                taken += ", RATE in hundredths of a deg/s and its commands to 4500"
             yield Finding(
-                "no-units", Light.AMBER, "the log declares no units (firmware before 2018)"
+                "no-units",
+                Light.AMBER,
+                "the log declares no units: its firmware is older than unit tables, or its "
+                f"beginning is missing{taken}",
+                "name the units of other fields in a channel map of your own",
             )
 
     def _has(self, message: str, *fields: str) -> bool:

@@ -1,0 +1,46 @@
+"""Logs that declare no units: by the firmware's age, and by a check that needs none."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.conventions import Light
+from flightid.record.checks import record_findings
+from tests.old_log import write_old_log
+
+DEGREES = 180.0 / np.pi
+
+
+@pytest.mark.parametrize(
+    ("firmware", "scale"),
+    [("ArduCopter V3.4.6 (test)", DEGREES), ("APM:Copter V3.3.3 (test)", 100.0 * DEGREES)],
+)
+def test_rates_are_in_the_units_of_the_firmwares_age(
+    tmp_path: Path, firmware: str, scale: float
+) -> None:
+    log = fid.read_log(
+        write_old_log(tmp_path / "old.bin", firmware, rate_scale=scale, seconds=30.0)
+    )
+    record = log.record(names=["tau_phi", "p", "q", "r", "phi"])
+    assert np.std(record["q"]) == pytest.approx(0.3 / np.sqrt(2), rel=0.03)
+    assert np.ptp(record["phi"]) == pytest.approx(0.42, abs=0.05)
+    assert record_findings(record) == ()
+    found = {finding.code: finding.light for finding in fid.inspect_log(log).findings}
+    assert found["no-units"] is Light.AMBER
+    assert "scale-contradicted" not in found
+
+
+@pytest.mark.parametrize("scale", [1.0, 1.1 * DEGREES])
+def test_a_scale_that_is_wrong_is_red_with_the_factor(tmp_path: Path, scale: float) -> None:
+    """Firmware that says 3.4 and stores something else."""
+    path = write_old_log(tmp_path / "o.bin", "ArduCopter V3.4.6", rate_scale=scale, seconds=30.0)
+    inspection = fid.inspect_log(path)
+    said = [f for f in inspection.findings if f.code == "scale-contradicted"]
+    assert {finding.light for finding in said} == {Light.RED}
+    assert f"{DEGREES / scale:.4g} times the turning of RATE.P" in " ".join(f.message for f in said)
+    record = fid.read_log(path).record(names=["tau_theta", "q"])
+    assert [finding.code for finding in record_findings(record)] == ["scale-contradicted"]
