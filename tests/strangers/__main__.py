@@ -1,11 +1,17 @@
-"""Print the table: `python -m tests.strangers [PART OF A NAME ...] --runs 500 --jobs 2`."""
+"""Print the table: `python -m tests.strangers [PART OF A NAME ...] --runs 500 --jobs 2`.
+
+`--keep FILE` adds every flight to a file and flies only those that it has not, so that runs add up;
+`--runs 0 --keep FILE` prints what it holds.
+"""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from tests.strangers.cases import CASES
 from tests.strangers.counting import HEADING, count
+from tests.strangers.kept import collected
 
 
 def main() -> None:
@@ -15,13 +21,20 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=100)
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--keep", type=Path, help="file that flights are added to, and read from")
     parser.add_argument("--each", action="store_true", help="coverage of every quantity too")
     asked = parser.parse_args()
     print(HEADING, flush=True)
     for case in CASES:
         if asked.names and not any(part in case.name for part in asked.names):
             continue
-        tally = count(case, asked.runs, first_seed=asked.first_seed, jobs=asked.jobs)
+        if asked.keep:
+            seeds = range(asked.first_seed, asked.first_seed + asked.runs)
+            tally = collected(case, seeds, asked.keep)
+        else:
+            tally = count(case, asked.runs, first_seed=asked.first_seed, jobs=asked.jobs)
+        if not tally.trials:
+            continue
         print(tally.row(), flush=True)
         for name in tally.quantities() if asked.each else ():
             share, n = tally.coverage(name)

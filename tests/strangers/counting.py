@@ -112,13 +112,14 @@ class Tally:
         missed, refused = 100 * self.green_and_missed(), 100 * self.refusals()
         return (
             f"{self.name:44s} {100 * share:6.1f} {count:7d} {self.rms_z():7.2f}  {lights} "
-            f"{missed:6.1f} {refused:6.1f} {1e3 * seconds:8.0f}"
+            f"{missed:6.1f} {refused:6.1f} {1e3 * seconds:8.0f} "
+            f"{len(self.trials):5d}"
         )
 
 
 HEADING = (
     f"{'case':44s} {'held %':>6s} {'of':>7s} {'rms z':>7s}  "
-    f"{'grn':>4s} {'amb':>4s} {'red':>4s} {'g&miss':>6s} {'refuse':>6s} {'ms':>8s}"
+    f"{'grn':>4s} {'amb':>4s} {'red':>4s} {'g&miss':>6s} {'refuse':>6s} {'ms':>8s} {'runs':>5s}"
 )
 
 

@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.errors import DataError, OptionError
+from flightid.identification.prediction_error.linear_regression import regress, regress_lags
 from flightid.plot import polynomial as plot
 from tests.closeness import assert_close
 from tests.polynomial_records import ARMAX, TWO_INPUTS, flown
@@ -17,6 +18,19 @@ P = fid.PolynomialModel
 
 def _codes(item):
     return {finding.code for finding in item.findings}
+
+
+def test_products_of_lags_give_the_triangle_s_regression():
+    random = np.random.default_rng(0)
+    inputs = lfilter([1.0], [1.0, -0.7], random.standard_normal((2, 700)))
+    output, lengths, order = random.standard_normal(700), [300, 400], 60
+    found = regress_lags(output, inputs, lengths, order, order + 4)
+    known = regress(output, inputs, lengths, 0, [order] * 2, [0] * 2, order + 4)
+    assert found.n_rows == known.n_rows
+    assert_close(found.theta, known.theta, why="the same normal equations", rtol=1e-9)
+    assert_close(found.sum_of_squares, known.sum_of_squares, why="the last pivot", rtol=1e-10)
+    equal = regress_lags(output, np.vstack([inputs[:1]] * 2), lengths, order, order)
+    assert equal.dependent is not None
 
 
 def test_pulse_responses_recover_the_model_and_its_delays():

@@ -20,6 +20,7 @@ from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.methods import Method, flat
+from flightid.identification.rival_fits import estimates_alone
 from flightid.record.chosen_hold import ASSUMED, ChosenHold
 from flightid.record.hold import BETWEEN, HOLDS, InputHold
 from flightid.responses import FrequencyResponse
@@ -96,8 +97,11 @@ def with_hold_tested(
     fresh = {key: value for key, value in _STARTED.items() if key in names}
     try:
         # A response keeps what its estimator adds: both holds meet the same points.
-        beside = again(held.hold) if fit.responses and others else fit
-        known = [_other(hold, again(hold), beside, fit) for hold in others]
+        with estimates_alone():
+            # Without a gust's states both are quick, and what differs is the hold alone.
+            apart = fit.responses or fit.provenance.get("gust")
+            beside = again(held.hold) if apart and others else fit
+            known = [_other(hold, again(hold), beside, fit) for hold in others]
     except FlightidError:
         return fit, held
     if not all(np.isfinite(each.moved) for each in known):
@@ -121,8 +125,8 @@ def _other(hold: InputHold, other: Fit, beside: Fit, fit: Fit) -> OtherHold:
         for name in fit.names
     ]
     furthest = int(np.argmax(moved))
-    ended = other.termination in CONVERGED | {""} and fit.termination in CONVERGED | {""}
-    gain = _gain(other, fit) if ended else None
+    ended = {other.termination, beside.termination} <= CONVERGED | {""}
+    gain = _gain(other, beside) if ended else None
     return OtherHold(hold, fit.names[furthest], float(moved[furthest]), gain)
 
 

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 from flightid.errors import DataError, OptionError
 from flightid.identification.advice.delays import InputDelay, find_delays
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
-from flightid.identification.prediction_error.linear_regression import LinearRegression, regress
+from flightid.identification.prediction_error.linear_regression import regress, regress_lags
 from flightid.models.polynomial.structure import KERNELS
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
@@ -274,7 +274,7 @@ def _until_ended(
 
 def _determined(data: SampledChannels, n: int) -> bool:
     """Whether the inputs hold as many frequencies as so many lags need."""
-    return _fir(data.output, data.inputs, data.lengths, n, n - 1).dependent is None
+    return regress_lags(data.output, data.inputs, data.lengths, n, n - 1).dependent is None
 
 
 def _ends(values: Array, covariance: Array, count: int) -> bool:
@@ -312,15 +312,8 @@ def _shifted(data: SampledChannels, negative: int) -> SampledChannels:
     return SampledChannels(output, inputs, lengths, data.offsets, data.units, data.sample_time_s)
 
 
-def _fir(
-    output: Array, inputs: Array, lengths: Sequence[int], n: int, skip: int
-) -> LinearRegression:
-    count = len(inputs)
-    return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip)
-
-
 def _estimate(data: SampledChannels, n: int, kernel: str | None) -> tuple[Array, Array, int]:
-    first = _fir(data.output, data.inputs, data.lengths, n, n - 1)
+    first = regress_lags(data.output, data.inputs, data.lengths, n, n - 1)
     left = np.array(data.output)
     for i, row in enumerate(data.inputs):
         for span in data.spans:
@@ -332,7 +325,7 @@ def _estimate(data: SampledChannels, n: int, kernel: str | None) -> tuple[Array,
     signals = np.vstack([data.output, data.inputs])
     for span in data.spans:
         signals[:, span] = lfilter(whitener, [1.0], signals[:, span])
-    final = _fir(signals[0], signals[1:], data.lengths, n, n - 1 + WHITENER)
+    final = regress_lags(signals[0], signals[1:], data.lengths, n, n - 1 + WHITENER)
     if final.dependent is not None:
         raise DataError(
             "the inputs do not determine the response at every lag",

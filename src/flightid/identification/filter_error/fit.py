@@ -44,6 +44,7 @@ from flightid.identification.regression.fit import (
     require_states,
 )
 from flightid.identification.regression.options import FilterErrorOptions
+from flightid.identification.rival_fits import judged
 from flightid.models import StateSpaceModel
 from flightid.record import Record, Step
 from flightid.uncertainty.estimate import Estimate
@@ -77,7 +78,7 @@ def fit_filter_error(
     records = check_records(model, data)
     problem = _problem(model, records, options)
     groups = cluster(_search(problem, options))
-    if options.gust_states and model.is_linear:
+    if options.gust_states and model.is_linear and judged():
         problem, groups = with_gust(
             problem, groups, limits_of(model, options.maximum_iterations)[1]
         )

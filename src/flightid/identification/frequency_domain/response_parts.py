@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,27 +80,24 @@ class PartComparison:
             scores.append(-gain @ _stacked(self._points(kept)))
             information.append(-gain @ (share[:, None] * slopes))
             weighed.append(gain * np.sqrt(share))
+        parts = np.array(shares)
+        compared = partial(
+            compare_parts, by_halves=_fair(parts), by_records=_fair(parts[0::2] + parts[1::2])
+        )
         total = np.sum(information, axis=0)
-        known = self.errors.propagated(np.vstack([gain, *weighed]))
-        known = known.reshape(2 * count + 1, n, 2 * count + 1, n)
+        # Nobody asks for the noise of parts that are not compared.
+        rows = [gain, *weighed] if any(compared.keywords.values()) else [gain]
+        known = self.errors.propagated(np.vstack(rows))
+        known = known.reshape(len(rows), n, len(rows), n)
         flights = []
         for k in range(count):
             noise = np.zeros((2, n, 2, n))
-            for half in range(2):
-                place = 2 * k + half + 1
+            for half, place in enumerate(range(1, len(rows))[2 * k : 2 * k + 2]):
                 noise[half, :, half] = known[place, :, place]
             both = slice(2 * k, 2 * k + 2)
             part = np.array(information[both]) @ np.linalg.inv(total)
             flights.append(RecordParts(np.array(scores[both]), part, noise))
-        parts = np.array(shares)
-        return compare_parts(
-            flights,
-            np.eye(n),
-            known[0, :, 0],
-            np.full(n, np.inf),
-            by_halves=_fair(parts),
-            by_records=_fair(parts[0::2] + parts[1::2]),
-        )
+        return compared(flights, np.eye(n), known[0, :, 0], np.full(n, np.inf))
 
     @property
     def _places(self) -> NDArray[np.intp]:

@@ -44,6 +44,7 @@ from flightid.identification.records.white_noise import explained_percent
 from flightid.identification.regression.equation_error import equation_error_start
 from flightid.identification.regression.fourier_output_error_fit import fit_fourier_output_error
 from flightid.identification.regression.options import FourierOutputErrorOptions
+from flightid.identification.rival_fits import judged
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.measured_states import state_outputs
@@ -163,7 +164,7 @@ def conclude(
     )
     noise = (
         []
-        if runs_of is not None and runs_of.is_segmented
+        if not judged() or (runs_of is not None and runs_of.is_segmented)
         else judge_process_noise(fitted, prepared.arrays, [outputs for outputs, _ in runs])
     )
     fit = _assemble(fitted, prepared, options, groups, runs, known, setup, noise)

