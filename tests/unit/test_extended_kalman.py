@@ -74,6 +74,8 @@ def test_filter_error_follows_squares_where_output_error_has_no_interval() -> No
     assert all(each.interval95 is None for each in free.parameters.values())
     assert "filter_error" in free.parameters["Ma"].reason
     assert free.covariance is None
+    assert "by noise alone" not in str(free.summary())
+    assert "intervals allow for it" not in str(free.summary())
     fit = fid.identify(model, record, method="filter_error")
     for name, truth in nonlinear_gusts.TRUTH.items():
         found = fit.parameters[name]

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from flightid.conventions import Light
+from flightid.evidence import Check, Evidence
 from flightid.evidence.part_checks import agreement_check
 from flightid.uncertainty.agreement import Agreement, compare_parts
 from flightid.uncertainty.parts import RecordParts, chance_alike, larger, scatter
@@ -85,7 +86,11 @@ def test_records_that_differ_carry_the_scatter_and_students_freedom() -> None:
 def test_one_record_says_that_it_cannot_know() -> None:
     found = agreement_check(Agreement(1, 0.5, None, np.ones(1)))
     assert found.light is Light.GREEN
-    assert "one record does not tell how far flights differ" in found.what
+    assert "One record does not tell how far flights differ" in found.limit
+    evidence = Evidence((found,), ())
+    assert evidence.lines == ("Light: green.", f"{found.limit}.")
+    assert evidence.verdict.message.endswith(found.limit)
+    assert Check.from_dict(found.to_dict()) == found
 
 
 def test_a_vehicle_that_changes_midway_is_red_and_its_bars_reach_both() -> None:

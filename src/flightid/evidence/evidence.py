@@ -69,6 +69,8 @@ class Check:
         What to do about it; empty where nothing is to be done.
     band_rad_s : tuple of float or None
         Frequencies that it is about, rad/s.
+    limit : str
+        What these data cannot tell, however green: said beside the light.
 
     Example
     -------
@@ -81,6 +83,7 @@ class Check:
     what: str
     action: str = ""
     band_rad_s: tuple[float, float] | None = None
+    limit: str = ""
 
     def __post_init__(self) -> None:
         if self.name not in NAMES:
@@ -102,6 +105,7 @@ class Check:
             "what": self.what,
             "action": self.action,
             "band_rad_s": None if self.band_rad_s is None else list(self.band_rad_s),
+            "limit": self.limit,
         }
 
     @classmethod
@@ -114,6 +118,7 @@ class Check:
             values["what"],
             values.get("action", ""),
             None if band is None else (float(band[0]), float(band[1])),
+            values.get("limit", ""),
         )
 
 
@@ -196,9 +201,15 @@ class Evidence(Result, schema="flightid.evidence/1"):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The light, and every reason for which it is not green, one a line."""
+        """The light, every reason for which it is not green, and limits, one a line."""
         reasons = [f for f in self.findings if f.light is not Light.GREEN]
-        return (f"Light: {self.light}.", *(f"[{f.light}] {f.message}" for f in reasons))
+        said = [f"[{f.light}] {f.message}" for f in reasons]
+        return (f"Light: {self.light}.", *said, *(f"{limit}." for limit in self.limits))
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """What the data cannot tell, however green."""
+        return tuple(check.limit for check in self.checks if check.limit)
 
     @property
     def verdict(self) -> Finding:
@@ -207,6 +218,7 @@ class Evidence(Result, schema="flightid.evidence/1"):
         first = "" if predicted is None else f"{predicted.what}; "
         if self.light is Light.GREEN or reason is None:
             what = f"{first}every check that is needed was made and holds"
+            what = "; ".join((what, *self.limits))
             return Finding("evidence", self.light, what)
         if predicted is not None and reason == predicted.finding:
             return Finding("evidence", self.light, reason.message, reason.action)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from flightid.conventions import Light
 from flightid.evidence.evidence import AGREEMENT, Check
 from flightid.uncertainty.agreement import FEWEST_RECORDS, Agreement
 
-ONE = "; one record does not tell how far flights differ"
+ONE = "One record does not tell how far flights differ: what is known is of that flight alone"
 HALVES_ACTION = (
     "do not use one set of numbers: look for a vehicle, trim or wind that changed, for a faulty "
     "stretch, or for dynamics that the model lacks, and fit the parts by themselves"
@@ -26,9 +28,16 @@ def agreement_check(found: Agreement) -> Check:
     Example
     -------
     >>> import numpy as np
-    >>> print(agreement_check(Agreement(1, 0.4, None, np.ones(1))).finding)
-    [green] halves of the record agree (p = 0.4); one record does not tell how far flights differ
+    >>> check = agreement_check(Agreement(1, 0.4, None, np.ones(1)))
+    >>> print(check.finding)
+    [green] halves of the record agree (p = 0.4)
+    >>> check.limit
+    'One record does not tell how far flights differ: what is known is of that flight alone'
     """
+    return replace(_compared(found), limit="" if found.n_records > 1 else ONE)
+
+
+def _compared(found: Agreement) -> Check:
     if not found.tested:
         what = (
             "parts of the data cannot be compared: no two hold the same frequencies and parameters"
@@ -57,4 +66,4 @@ def _alike(found: Agreement) -> str:
     if found.halves is not None:
         whose = "each record" if found.n_records > 1 else "the record"
         tests.append(f"halves of {whose} agree (p = {found.halves:.2g})")
-    return "; ".join(tests) + ("" if found.n_records > 1 else ONE)
+    return "; ".join(tests)

@@ -26,4 +26,14 @@ def without_intervals(fit: Fit, reason: str) -> Fit:
         name: replace(each, stderr=None, reason=each.reason or reason)
         for name, each in fit.parameters.items()
     }
-    return replace(fit, parameters=bare, covariance=None, intervals_from=UNKNOWN)
+    # What parts say of each other stays, what their scatter does to bars goes with the bars.
+    agreement = fit.agreement and replace(fit.agreement, by_scatter=None, freedom=None)
+    findings = tuple(each for each in fit.findings if each.code != "residuals-coloured")
+    return replace(
+        fit,
+        parameters=bare,
+        covariance=None,
+        intervals_from=UNKNOWN,
+        findings=findings,
+        agreement=agreement,
+    )
