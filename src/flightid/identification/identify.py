@@ -68,7 +68,8 @@ def identify(
     **options
         The method's own, any of these:
     starts : int
-        Number of starts: the model's own values, then a Latin hypercube inside the bounds.
+        Number of starts: the model's own values, then a Latin hypercube inside the bounds,
+        or around the values where a bound is open.
     seed : int
         Seed of the hypercube.
     maximum_iterations : int

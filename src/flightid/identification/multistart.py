@@ -21,7 +21,10 @@ CONVERGED = frozenset({"gradient", "step", "cost", "zero", "bounds"})
 _SAME_COST = 1e-6
 _SAME_VALUE = 1e-3
 _DECADES = 1.0
-_OPEN_FACTOR = 10.0
+_NEAR, _WIDE = 0.3, 0.6
+"""Shares of a value by which starts differ from it where a bound is open: the first, and more."""
+_MANY = 8
+"""Starts from which on the wider share counts."""
 
 
 @dataclass(frozen=True)
@@ -57,10 +60,12 @@ E = TypeVar("E", bound=End)
 
 
 def draw_starts(free: Sequence[Parameter], starts: int, seed: int) -> Array:
-    """Start values: the model's own first, the others by a Latin hypercube inside the bounds.
+    """Start values: the model's own first, the others by a Latin hypercube around them.
 
-    A range of one sign over more than a decade is drawn in its logarithm. Where a bound is open the
-    range ends at ten times the value.
+    Where both bounds are known they are the range, drawn in its logarithm where it has one sign
+    and is wider than a decade. Where one is open the value itself is what is known: starts keep
+    its sign and stay within 30 % of it, from the ninth start on within 60 %. A value of zero tells
+    no scale: its starts lie within one.
 
     Parameters
     ----------
@@ -95,18 +100,20 @@ def draw_starts(free: Sequence[Parameter], starts: int, seed: int) -> Array:
     if starts == 1 or not free:
         return own
     shares = qmc.LatinHypercube(d=len(free), rng=np.random.default_rng(seed)).random(starts - 1)
-    columns = [_spread(parameter, shares[:, k]) for k, parameter in enumerate(free)]
+    reach = np.where(np.arange(1, starts) < _MANY, _NEAR, _WIDE)
+    columns = [_spread(parameter, shares[:, k], reach) for k, parameter in enumerate(free)]
     return np.ascontiguousarray(np.vstack([own, np.column_stack(columns)]))
 
 
-def _spread(parameter: Parameter, share: Array) -> Array:
-    value = parameter.value or 0.0
-    reach = _OPEN_FACTOR * abs(value) or 1.0
-    low = parameter.minimum if np.isfinite(parameter.minimum) else min(value, 0.0) - reach
-    high = parameter.maximum if np.isfinite(parameter.maximum) else max(value, 0.0) + reach
-    if low > 0.0 and np.log10(high / low) > _DECADES:
-        return np.asarray(low * (high / low) ** share)
-    return np.asarray(low + (high - low) * share)
+def _spread(parameter: Parameter, share: Array, reach: Array) -> Array:
+    value, low, high = parameter.value or 0.0, parameter.minimum, parameter.maximum
+    if np.isfinite(low) and np.isfinite(high):
+        if low > 0.0 and np.log10(high / low) > _DECADES:
+            return np.asarray(low * (high / low) ** share)
+        return np.asarray(low + (high - low) * share)
+    around = (2.0 * share - 1.0) * reach
+    drawn = value * (1.0 + around) if value else around / _WIDE
+    return np.asarray(np.clip(drawn, low, high))
 
 
 def collect(outcomes: Sequence[E | str]) -> list[E]:

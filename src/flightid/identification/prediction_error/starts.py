@@ -32,7 +32,9 @@ def polynomial_starts(structure: PolynomialStructure, data: SampledChannels) -> 
     Hannan & Rissanen (1982), Biometrika 69; Steiglitz & McBride (1965), IEEE Trans. AC 10.
     """
     innovations, long_a, long_b = _long_model(structure, data)
-    found = []
+    found = [np.array(structure.start)] if structure.start else []
+    if len(found) == structure.starts:
+        return np.ascontiguousarray(found)
     for plant in _plants(structure, data, innovations, long_a, long_b):
         noise = _noise(structure, data, plant)
         found.append(_flat(plant, *noise))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypedDict
 
 from flightid.errors import OptionError
@@ -69,6 +69,8 @@ class PolynomialStructure(Options):
     seed : int
         Of the random starts.
     maximum_iterations : int
+    start : tuple of float
+        Coefficients of the first start, in the order of `names`; empty: the systematic starts.
 
     Raises
     ------
@@ -108,9 +110,16 @@ class PolynomialStructure(Options):
     )
     seed: int = option(0, minimum=0, doc="Seed of the random starts.")
     maximum_iterations: int = option(200, minimum=1, doc="Most steps of each start.")
+    start: tuple[float, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         self._check_orders()
+        if self.start and len(self.start) != self.n_parameters:
+            raise OptionError(
+                "the start does not fit the orders",
+                found=f"{len(self.start)} numbers",
+                needed=f"{self.n_parameters}: {', '.join(self.names)}",
+            )
         super().__post_init__()
         if self.backcast and self.initial_state != "estimate":
             raise OptionError(

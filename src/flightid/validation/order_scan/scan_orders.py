@@ -125,13 +125,13 @@ def scan_orders(
             found=f"{data.sample_time_s:.6g} and {check.sample_time_s:.6g} s",
             action="resample them with conditioning.resample",
         )
+    settle_s = _settle_s(structures, unseen)
     trials = (
-        _native_trials(structures, data, check, unseen)
+        _native_trials(structures, data, check, unseen, settle_s)
         if kind in ("arx", "armax")
-        else _fitted_trials(structures, fitted, unseen, _settle_s(structures, unseen))
+        else _fitted_trials(structures, fitted, unseen, settle_s)
     )
-    trials.sort(key=lambda trial: np.inf if trial.free_run_rms is None else trial.free_run_rms)
-    best = _best(trials, fitted)
+    trials, best = _delivered(trials, fitted, unseen, settle_s)
     start = max(s.longest_lag for s in structures)
     return OrderScan(
         kind, tuple(trials), best, tuple(r.name for r in unseen), start, data.units[name]
@@ -186,6 +186,7 @@ def _native_trials(
     data: SampledChannels,
     check: SampledChannels,
     unseen: Sequence[Record],
+    settle_s: float,
 ) -> list[OrderTrial]:
     start = max(max(s.longest_lag + 1, s.nc) for s in structures)
     shortest = min(*data.lengths, *check.lengths)
@@ -214,7 +215,6 @@ def _native_trials(
         )
     skip = _common_skip(structures)
     n = sum(length - skip for length in data.lengths)
-    settle_s = _settle_s(structures, unseen)
     trials = []
     for structure, each in zip(structures, found, strict=True):
         if each is None:
@@ -285,18 +285,45 @@ def _settle_s(structures: Sequence[PolynomialStructure], unseen: Sequence[Record
     return usual_stretch(shortest, most) * unseen[0].sample_time_s
 
 
-def _best(trials: Sequence[OrderTrial], fitted: Sequence[Record]) -> Fit:
-    """Full fit of the first trial that allows one."""
-    reasons = []
-    for trial in trials:
-        if trial.model is None:
+def _delivered(
+    trials: Sequence[OrderTrial],
+    fitted: Sequence[Record],
+    unseen: Sequence[Record],
+    settle_s: float,
+) -> tuple[list[OrderTrial], Fit]:
+    """Trials in their final order, and the full fit of the first.
+
+    Full fits start from the optimum that was ranked and stay with it. Where one moves it is ranked
+    anew, so that the first trial is always the fit that is delivered.
+    """
+    waiting = sorted(trials, key=_error)
+    made: list[tuple[OrderTrial, Fit]] = []
+    failed: list[OrderTrial] = []
+    reason = "collinear regressors throughout"
+    while waiting and (not made or _error(waiting[0]) < min(_error(each) for each, _ in made)):
+        trial = waiting.pop(0)
+        if trial.model is None or trial.criteria is None:
+            failed.append(trial)
             continue
+        start = tuple(map(float, trial.model.theta))
         try:
-            return identify(replace(trial.structure), fitted)
+            fit = identify(replace(trial.structure, start=start, starts=1), fitted)
         except (DataError, FitError) as error:
-            reasons.append(str(error))
-    raise FitError(
-        "no structure of the scan could be fitted",
-        found=reasons[0] if reasons else "collinear regressors throughout",
-        action="scan lower orders, or use longer or richer records",
-    )
+            reason = str(error)
+            failed.append(replace(trial, free_run_rms=None, fit_percent=None, note=reason))
+            continue
+        judged = _judged(trial.structure, fit.model, trial.criteria, unseen, settle_s, trial.note)
+        made.append((judged, fit))
+    if not made:
+        raise FitError(
+            "no structure of the scan could be fitted",
+            found=reason,
+            action="scan lower orders, or use longer or richer records",
+        )
+    made.sort(key=lambda each: _error(each[0]))
+    rest = sorted([each for each, _ in made[1:]] + waiting + failed, key=_error)
+    return [made[0][0], *rest], made[0][1]
+
+
+def _error(trial: OrderTrial) -> float:
+    return np.inf if trial.free_run_rms is None else trial.free_run_rms
