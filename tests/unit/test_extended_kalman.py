@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import flightid as fid
 from flightid import _native
+from flightid.errors import FitError
 from flightid.identification.filter_error.steady_filter import ContinuousPoint, steady_filter
 from tests.closeness import assert_close
 from tests.strangers import nonlinear_gusts
@@ -83,3 +85,37 @@ def test_filter_error_follows_squares_where_output_error_has_no_interval() -> No
     densities = fit.provenance["process_noise"]
     assert_close(densities["alpha"], 0.02, rtol=0.15, why="800 samples")
     assert_close(densities["q"], 0.2, rtol=0.15, why="800 samples")
+
+
+def test_constants_of_linear_equations_are_followed_or_named() -> None:
+    random = np.random.default_rng(0)
+    model = fid.StateSpaceModel(
+        states={"q": "rad/s"},
+        input_units={"de": "rad"},
+        measurements={"q": fid.Output("q", "rad/s")},
+        equations={"q'": "M0 + Mq*q + Md*de"},
+        parameters=fid.Parameters(
+            [
+                fid.Parameter("M0", 0.1, "1/s^2"),
+                fid.Parameter("Mq", -1.0, "1/s"),
+                fid.Parameter("Md", -4.0, "1/s^2"),
+            ]
+        ),
+    )
+    elevator = 0.05 * np.repeat(random.choice([-1.0, 0.0, 1.0], 30), 20)
+    decay, rate = np.exp(-0.04), np.zeros(elevator.size)
+    for k in range(elevator.size - 1):
+        push = 0.5 * (1.0 - decay) * (0.2 - 8.0 * elevator[k])
+        rate[k + 1] = decay * rate[k] + push + 0.003 * random.standard_normal()
+    record = fid.Record.from_arrays(
+        np.arange(elevator.size) * 0.02,
+        inputs={"de": elevator},
+        outputs={"q": rate + 0.002 * random.standard_normal(elevator.size)},
+        units={"de": "rad", "q": "rad/s"},
+        hold="zero",
+    )
+    found = fid.identify(model, record, method="filter_error", output_bias=False)
+    for name, truth in {"M0": 0.2, "Mq": -2.0, "Md": -8.0}.items():
+        assert abs(found.parameters[name].value - truth) < 4.0 * found.parameters[name].stderr
+    with pytest.raises(FitError, match="M0, output bias of q"):
+        fid.identify(model, record, method="filter_error")

@@ -189,6 +189,15 @@ def along_the_flight(
     return model.linearise(at) if at else model, steps
 
 
+def has_free_constants(model: StateSpaceModel, point: LinearPoint) -> bool:
+    """Whether a free parameter of linear equations acts as a constant alone, about no trim."""
+    if any(model.trim.values()):
+        return False
+    parts = (point.a, point.b, point.c, point.d, point.delays_s[:, :, None])
+    moves = [np.any(part[1:] != 0.0, axis=(1, 2)) for part in parts]
+    return not bool(np.all(np.any(moves, axis=0)))
+
+
 def sizes_of_states(point: LinearPoint, spread: Array) -> Array:
     """Deviations of the states as the outputs show them; the mean for those not seen."""
     found = np.abs(np.linalg.pinv(point.c[0])) @ spread

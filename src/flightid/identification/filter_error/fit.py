@@ -19,6 +19,7 @@ from flightid.findings import Finding
 from flightid.identification.filter_error.extended_kalman import (
     ExtendedProblem,
     along_the_flight,
+    has_free_constants,
     sizes_of_states,
 )
 from flightid.identification.filter_error.gusts import GUST, GUST_UNKNOWNS, Gust
@@ -32,7 +33,11 @@ from flightid.identification.filter_error.search import minimise, with_gust
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.multistart import DenseEnd, cluster, collect, draw_starts
+from flightid.identification.output_error.distinct import require_distinct
+from flightid.identification.output_error.equation_records import equation_runs
 from flightid.identification.records.held_model import LinearPoint
+from flightid.identification.records.options import RecordOptions
+from flightid.identification.records.setup import prepare_records
 from flightid.identification.records.white_noise import explained_percent, white_levels
 from flightid.identification.regression.fit import (
     Inner,
@@ -78,7 +83,7 @@ def fit_filter_error(
     records = check_records(model, data)
     problem = _problem(model, records, options)
     groups = cluster(_search(problem, options))
-    if options.gust_states and model.is_linear and judged():
+    if options.gust_states and not isinstance(problem, ExtendedProblem) and judged():
         problem, groups = with_gust(
             problem, groups, limits_of(model, options.maximum_iterations)[1]
         )
@@ -142,8 +147,9 @@ def _problem(
         options.input_bias,
         options.hold,
     )
-    seen, steps = (model, []) if model.is_linear else along_the_flight(model, records)
+    seen, steps = along_the_flight(model, records)
     point = LinearPoint.of(seen, model.parameters.independent_values())
+    varies = not model.is_linear or has_free_constants(model, point)
     if options.process_noise is None:
         moved = np.any(np.concatenate([point.a[1:], point.b[1:]], axis=2), axis=(0, 2))
         noisy = tuple(map(int, np.flatnonzero(moved))) or tuple(range(n))
@@ -159,7 +165,14 @@ def _problem(
         process_scale=_FIRST_SHARE * reach[list(noisy)],
         output_scale=np.maximum(level, _FLOOR * spread + 1e-300),
     )
-    return made if model.is_linear else ExtendedProblem.along(made, steps, reach)
+    if not varies:
+        return made
+    own = RecordOptions(
+        output_bias=options.output_bias, input_bias=options.input_bias, hold=options.hold
+    )
+    prepared = prepare_records(model, records, own)
+    require_distinct(model, prepared, equation_runs(model, prepared))
+    return ExtendedProblem.along(made, steps, reach)
 
 
 def _places(names: Sequence[str], states: list[str]) -> tuple[int, ...]:
