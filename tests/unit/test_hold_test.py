@@ -76,3 +76,13 @@ def test_a_black_box_has_no_hold_to_forget() -> None:
     structure = fid.PolynomialModel.arx(("de",), "q", na=2, nb=2, nk=1)
     fit = fid.identify(structure, holds.flight(0, "steps", told=False))
     assert fit.evidence.check("input hold") is None
+
+
+def test_bars_reach_what_an_unknown_hold_decides() -> None:
+    told, untold = (
+        _fit("steps", told=each, method="equation_error").parameters["tau"]
+        for each in (True, False)
+    )
+    low, high = untold.interval95
+    assert low < holds.TRUTH["tau"] < high
+    assert untold.stderr > 3.0 * told.stderr

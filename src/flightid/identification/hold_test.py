@@ -53,12 +53,20 @@ class OtherHold:
     gain : float or None
         Logarithm of the likelihood less that of the hold that was assumed; None where a search did
         not end, or the method minimises none that can be compared.
+    shift : tuple of float
+        By how much each estimate moves, in the order of the fit's covariance.
     """
 
     hold: InputHold
     parameter: str
     moved: float
     gain: float | None
+    shift: tuple[float, ...] = ()
+
+    @property
+    def is_likely(self) -> bool:
+        """Whether the data do not speak against it."""
+        return self.gain is None or self.gain > -DECISIVE
 
 
 def with_hold_tested(
@@ -115,19 +123,37 @@ def with_hold_tested(
         finding = replace(finding, message=finding.message + OF_A_LOG)
     said = held.findings if stairs else ()
     fit = replace(fit, provenance={**fit.provenance, "other_holds": sizes})
+    if finding.light is not Light.GREEN and not logged:
+        fit = _widened(fit, known)
     return fit, replace(held, findings=(*said, finding))
 
 
 def _other(hold: InputHold, other: Fit, beside: Fit, fit: Fit) -> OtherHold:
+    shift = [other.parameters[n].value - beside.parameters[n].value for n in fit.names]
     moved = [
-        abs(other.parameters[name].value - beside.parameters[name].value)
-        / (fit.parameters[name].stderr or np.nan)
-        for name in fit.names
+        abs(size) / (fit.parameters[name].stderr or np.nan)
+        for size, name in zip(shift, fit.names, strict=True)
     ]
     furthest = int(np.argmax(moved))
-    ended = {other.termination, beside.termination} <= CONVERGED | {""}
-    gain = _gain(other, beside) if ended else None
-    return OtherHold(hold, fit.names[furthest], float(moved[furthest]), gain)
+    ended = other.termination in CONVERGED | {""} and fit.termination in CONVERGED | {""}
+    gain = _gain(other, fit) if ended else None
+    return OtherHold(
+        hold, fit.names[furthest], float(moved[furthest]), gain, tuple(map(float, shift))
+    )
+
+
+def _widened(fit: Fit, others: Sequence[OtherHold]) -> Fit:
+    """The fit whose bars reach what likely other holds would make of the estimates."""
+    if fit.covariance is None:
+        return fit
+    shifts = np.array([each.shift for each in others if each.is_likely])
+    covariance = fit.covariance + shifts.T @ shifts if len(shifts) else fit.covariance
+    errors = dict(zip(fit.names, np.sqrt(np.diag(covariance)), strict=True))
+    known = {
+        name: replace(each, stderr=float(errors[name])) if name in errors else each
+        for name, each in fit.parameters.items()
+    }
+    return replace(fit, covariance=covariance, parameters=known)
 
 
 def _corrected(data: Data, hold: InputHold, fit: Fit) -> Data:
