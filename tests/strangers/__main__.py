@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from tests.strangers.cases import CASES
+from tests.strangers.cases import CASES, LIGHTS
 from tests.strangers.counting import HEADING, count
 from tests.strangers.kept import collected
 
@@ -25,7 +25,7 @@ def main() -> None:
     parser.add_argument("--each", action="store_true", help="coverage of every quantity too")
     asked = parser.parse_args()
     print(HEADING, flush=True)
-    for case in CASES:
+    for case in (*CASES, *LIGHTS):
         if asked.names and not any(part in case.name for part in asked.names):
             continue
         if asked.keep:

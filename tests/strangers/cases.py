@@ -1,4 +1,4 @@
-"""All conditions: `CASES` of every module in this folder that has them."""
+"""All conditions: `CASES`, and `LIGHTS` whose light alone is counted, of every module here."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import tests.strangers
 from tests.strangers.counting import Case
 
 
-def _found() -> tuple[Case, ...]:
+def _found(kind: str) -> tuple[Case, ...]:
     cases: list[Case] = []
     for module in sorted(item.name for item in pkgutil.iter_modules(tests.strangers.__path__)):
         if module not in ("cases", "__main__"):
             family = importlib.import_module(f"tests.strangers.{module}")
-            cases += getattr(family, "CASES", ())
+            cases += getattr(family, kind, ())
     return tuple(cases)
 
 
-CASES = _found()
+CASES, LIGHTS = _found("CASES"), _found("LIGHTS")

@@ -276,3 +276,16 @@ def test_a_response_of_known_values() -> None:
 
 def test_overlap_choices() -> None:
     assert [shifts_of(x) for x in (0.0, 0.5, 0.75, 0.8)] == [1, 2, 4, 5]
+
+
+def test_an_input_that_moves_in_fragments_alone_is_not_said_to_have_no_power() -> None:
+    random = np.random.default_rng(0)
+
+    def flown(n: int, second: float) -> Record:
+        u, v = random.standard_normal(n), second * random.standard_normal(n)
+        y = np.convolve(u + v, [0.0, 0.5, 0.3])[:n]
+        return Record.from_arrays(np.arange(n) / 50, inputs={"u": u, "v": v}, outputs={"y": y})
+
+    pieces = [flown(3000, 0.0), flown(300, 1.0), flown(300, 1.0)]
+    with pytest.raises(DataError, match=r"'v' moves only in records shorter than a window: .* 6 s"):
+        estimate_response(pieces, window_s=20.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid.conventions import Light
@@ -156,6 +157,7 @@ def estimate_response(
         response = estimate_periodic(samples, listed, omega, step, covariance=covariance)
         return _with_inputs(response, samples, listed, loop)
     plans = plan_windows(window_s, samples, float(omega[-1]), shifts_of(overlap))
+    _require_motion_in_windows(samples, max(plan.length for plan in plans))
     lengths = ", ".join(f"{plan.length * samples.sample_time_s:.6g}" for plan in plans)
     step = Step("estimate_response", options | {"window_s": lengths, "overlap": overlap}, VERSION)
     estimate = estimate_windowed(samples, omega, plans, detrend)
@@ -186,3 +188,18 @@ def _with_inputs(
         loop=test,
         input_shape=InputShape(common_hold(shapes), loop=common_loop(shapes)),
     )
+
+
+def _require_motion_in_windows(samples: Samples, longest: int) -> None:
+    """Refuse windows longer than every record in which an input moves: they do not see it."""
+    for name, rows in zip(samples.inputs, zip(*samples.part("inputs"), strict=True), strict=True):
+        moving = max((row.size for row in rows if np.ptp(row) > 0.0), default=0)
+        if 0 < moving < longest:
+            step = samples.sample_time_s
+            raise DataError(
+                f"input {name!r} moves only in records shorter than a window",
+                found=f"{moving * step:.4g} s at most, windows of {longest * step:.4g} s",
+                needed="windows that fit a record in which it moves",
+                action=f"give window_s up to {moving * step:.4g}, or join the record's pieces by "
+                "filling its gaps where it is read",
+            )
