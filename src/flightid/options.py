@@ -16,10 +16,23 @@ from functools import cache
 from typing import Any, TypeVar
 
 from flightid.errors import FlightidError, OptionError
-from flightid.option_forms import BAND, NAMES, NUMBER, NUMBERS, WHOLE, WORD, Form, forms_of
+from flightid.option_forms import (
+    BAND,
+    FLAG,
+    NAMES,
+    NOTHING,
+    NUMBER,
+    NUMBERS,
+    WHOLE,
+    WORD,
+    Form,
+    forms_of,
+)
 
 Made = TypeVar("Made", bound="Options")
 _KEY = "flightid"
+OFF = "none"
+"""How files and commands write None, for options that may be switched off."""
 
 
 @dataclass(frozen=True)
@@ -351,6 +364,12 @@ def read_value(wanted: Option, value: object) -> object:
     -------
     object
     """
+    # TOML has no word for None.
+    may_be_off = NOTHING in wanted.forms and FLAG not in wanted.forms
+    # 0 equals False, and is a number.
+    is_off = value is False or (isinstance(value, str) and value == OFF)
+    if may_be_off and is_off and OFF not in wanted.choices:
+        return None
     # One name alone may stand for a list of one.
     if isinstance(value, str) and NAMES in wanted.forms and WORD not in wanted.forms:
         return (value,)

@@ -66,6 +66,7 @@ def test_options_in_errors_are_options_of_a_command_or_of_python_alone() -> None
 def test_a_command_says_its_own_flags(name: str) -> None:
     command = program.get_command(click.Context(program), "identify")
     assert command is not None
+    command.get_params(click.Context(command))  # as the parser does before anything is said
     with click.Context(command, parent=click.Context(program)), speaking(as_typed):
         said = str(OptionError(f"{name} has no meaning", action=f"give {name}=…"))
     flag = flags_of(name)[-1]

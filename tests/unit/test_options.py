@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from flightid.control.tuning.requirements import TuningRequirements
 from flightid.errors import OptionError, StudyError
 from flightid.options import Options, checked, option, options_of, read_options
 
@@ -86,3 +87,11 @@ def test_a_key_without_default_must_be_given() -> None:
     with pytest.raises(OptionError, match="name is missing"):
         read_options(Needed, {}, "[needed]")
     assert [each.name for each in options_of(Needed)] == ["name"]
+
+
+@pytest.mark.parametrize("off", ["none", False])
+def test_an_option_without_a_limit_can_be_switched_off_in_a_file(off: object) -> None:
+    made = read_options(TuningRequirements, {"noise_growth": off}, "[tune]")
+    assert made.noise_growth is None
+    with pytest.raises(OptionError, match="step_limit has no meaning"):
+        read_options(TuningRequirements, {"step_limit": off}, "[tune]")

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.pairs import pairs
+from flightid.options import OFF
 
 if TYPE_CHECKING:
     from flightid.option_forms import Form
     from flightid.options import Option, Options
 
-ALL, NONE = "all", "none"
+ALL, NONE = "all", OFF
 SHORT = {
     "attitude_feedback_per_s": "attitude-feedback",
     "attitude_rad": "attitude-limit",
@@ -29,6 +30,7 @@ SHORT = {
     "noise_rad_s": "noise",
     "rate_rad_s": "rate-limit",
     "sample_rate_hz": "rate",
+    "record_column": "experiment",
     "sid_run": "run",
     "span_s": "span",
     "time_column": "time",
@@ -59,6 +61,11 @@ class OptionsCommand(click.Command):
         super().__init__(*args, **kwargs)
         self._fields_of = fields_of
         self._made: list[click.Parameter] | None = None
+
+    @property
+    def is_read(self) -> bool:
+        """Whether the fields have been read."""
+        return self._made is not None
 
     def get_params(self, ctx: click.Context) -> list[click.Parameter]:
         """Options of the command, then those of the fields."""
@@ -172,6 +179,29 @@ def _shown(default: object) -> str:
 
 def _kind(each: Option, forms: set[Form]) -> click.ParamType[Any]:
     """What click checks of one number; words beside numbers are left to the field."""
+    from flightid.option_forms import NOTHING
+
+    kind = _numbers(each, forms)
+    return _OrNone(kind) if NOTHING in forms and kind is not click.STRING else kind
+
+
+class _OrNone(click.ParamType[Any]):
+    """A number, or the word that switches it off."""
+
+    def __init__(self, kind: click.ParamType[Any]) -> None:
+        self.kind, self.name = kind, f"{kind.name} or {NONE}"
+
+    def convert(
+        self,
+        value: Any,  # noqa: ANN401 — as click hands it over
+        param: click.Parameter | None,
+        ctx: click.Context | None,
+    ) -> Any:  # noqa: ANN401
+        """The number, or the word."""
+        return value if value == NONE else self.kind.convert(value, param, ctx)
+
+
+def _numbers(each: Option, forms: set[Form]) -> click.ParamType[Any]:
     from flightid.option_forms import NUMBER, WHOLE, WORD
 
     low, high = each.minimum, each.maximum
@@ -258,8 +288,10 @@ def parted(
 
 
 def _read(each: Option, value: Any) -> Any:  # noqa: ANN401 — whatever the option is
-    from flightid.option_forms import BAND, NUMBER, WHOLE, WORD
+    from flightid.option_forms import BAND, FLAG, NOTHING, NUMBER, WHOLE, WORD
 
+    if value in (NONE, (NONE,)) and NOTHING in each.forms and FLAG not in each.forms:
+        return value if NONE in each.choices else None
     if isinstance(value, str) and WORD in each.forms and {NUMBER, WHOLE} & set(each.forms):
         return _number_or_word(value)
     return _several(each, value) if isinstance(value, tuple) and BAND not in each.forms else value
@@ -272,7 +304,7 @@ def _several(each: Option, value: tuple[Any, ...]) -> Any:  # noqa: ANN401
     flag = flags_of(each.name)[-1]
     if FLAG in each.forms and value in ((ALL,), (NONE,)):
         return value == (ALL,)
-    if WORDS in each.forms:
+    if WORDS in each.forms and (WORD not in each.forms or any("=" in v for v in value)):
         return pairs(flag, value)
     if TABLE in each.forms and (WORD not in each.forms or any("=" in str(v) for v in value)):
         return {name: _number(flag, text) for name, text in pairs(flag, value).items()}

@@ -127,7 +127,9 @@ def _driving(
             flag = flags_of(name)[-1]
             raise click.UsageError(f"{flag} is of shapes, which make a record: give it or RECORDS")
         return read_files(files, *of_files, inputs=inputs, units=model.units)
-    stick = asdict(StickOptions(**shapes))
+    own = getattr(model, "sample_time_s", None)
+    rate = {"sample_rate_hz": 1.0 / own} if own else {}
+    stick = asdict(StickOptions(**(rate | shapes)))
     units = {name: model.units.get(name, "1") for name in inputs}
     is_whole = not getattr(model, "is_linear", True)
     trim = {n: v for n, v in getattr(model, "trim", {}).items() if n in inputs}

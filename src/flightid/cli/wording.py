@@ -7,7 +7,7 @@ from functools import cache
 
 import click
 
-from flightid.cli.option_fields import NONE
+from flightid.cli.option_fields import NONE, OptionsCommand
 from flightid.surface import ANY, GIVEN, PAIR
 
 NAME = re.compile(r"(?<![\w.\-/\[])[a-z][a-z0-9]*(?:_[a-z0-9]+)+(?![\w(=.])")
@@ -23,7 +23,8 @@ def as_typed(text: str) -> str:
     'declare hold=…'
     """
     here = click.get_current_context(silent=True)
-    if here is None:
+    # What is said while a command's options are still being read speaks of none of them.
+    if here is None or (isinstance(here.command, OptionsCommand) and not here.command.is_read):
         return text
     known, program = _flags(here.command), here.find_root().command
     made = GIVEN.sub(lambda found: _given(found, known, program), text)

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flightid.options import Options, option
+from flightid.record.interpolation import Interpolation
+from flightid.record.store import RECORD_COLUMN
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,13 @@ class ReadOptions(Options):
     units: Mapping[str, str] = option(
         default_factory=dict, doc="Unit of a column whose heading says none, such as p=rad/s."
     )
+    record_column: str | None = option(
+        RECORD_COLUMN, doc="Column that tells records of one table apart."
+    )
+    interpolation: str | Mapping[str, str] | None = option(
+        None, choices=[each.value for each in Interpolation],
+        doc="Between samples of a new grid, for all channels or by channel.",
+    )  # fmt: skip
     sample_time_s: float | None = option(
         None, unit="s", above=0.0, doc="Sample time of a table without time column."
     )

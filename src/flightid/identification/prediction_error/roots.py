@@ -18,7 +18,7 @@ from flightid.uncertainty.roots import UncertainRoot
 Array = NDArray[np.float64]
 POLE, ZERO = "pole", "zero"
 NO_FIRST_ORDER = "no error to first order"
-NO_ERRORS = "the coefficients have no errors"
+NO_ERRORS = "the coefficients have no error bars"
 DOUBLE = 1e-6
 """Roots closer than this share of their size have no first-order error."""
 
