@@ -132,10 +132,6 @@ def estimate_skew(
     largest_s : float
         Largest skew that is searched, s.
 
-    Returns
-    -------
-    Skew
-
     Raises
     ------
     UnknownNameError

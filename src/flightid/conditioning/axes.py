@@ -28,10 +28,6 @@ def convert_axes(
     vectors : iterable of (str, str, str)
         Channels of the x, y and z components of each vector.
 
-    Returns
-    -------
-    Record
-
     Raises
     ------
     OptionError
@@ -93,10 +89,6 @@ def convert_attitude(record: Record, angles: Triad = ("phi", "theta", "psi")) ->
     angles : (str, str, str)
         Channels of roll, pitch and yaw, rotation order 3-2-1.
 
-    Returns
-    -------
-    Record
-
     Raises
     ------
     UnknownNameError
@@ -138,10 +130,6 @@ def flip_sign(record: Record, channels: Iterable[str]) -> Record:
         Data.
     channels : iterable of str
         Channels.
-
-    Returns
-    -------
-    Record
 
     Raises
     ------

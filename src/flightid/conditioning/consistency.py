@@ -77,10 +77,6 @@ def check_consistency(
         biases of all inputs, scale factors of the rates whose angle is measured, delays of all
         outputs. Initial states are always estimated.
 
-    Returns
-    -------
-    KinematicConsistency
-
     Raises
     ------
     UnknownNameError

@@ -102,10 +102,6 @@ def filter_record(
     channels : iterable of str, optional
         Channels to act on; default: all.
 
-    Returns
-    -------
-    Record
-
     Raises
     ------
     OptionError

@@ -40,10 +40,6 @@ def accelerations_at_cg(
     half_width : int
         Neighbours on each side of the derivative's parabola.
 
-    Returns
-    -------
-    Record
-
     Raises
     ------
     UnitError
@@ -99,10 +95,6 @@ def velocities_at_cg(
     velocities, rates : (str, str, str)
         Channels along x, y, z.
 
-    Returns
-    -------
-    Record
-
     Raises
     ------
     UnitError
@@ -154,10 +146,6 @@ def air_data_at_cg(
         Position of the vanes relative to the centre of gravity, m; forward, right, down.
     air_data, rates : (str, str, str)
         Channels of airspeed, angle of attack and sideslip; of p, q and r.
-
-    Returns
-    -------
-    Record
 
     Raises
     ------

@@ -193,10 +193,6 @@ def fourier_smooth(
     cutoff_hz : float, optional
         Cut-off, Hz; default: the knee.
 
-    Returns
-    -------
-    SmoothSignal
-
     Raises
     ------
     DataError

@@ -33,10 +33,6 @@ def feedback_test(
     loop : {"open", "closed"}, optional
         The caller's word; default: what the records know, else the test.
 
-    Returns
-    -------
-    FeedbackTest
-
     Raises
     ------
     OptionError

@@ -103,10 +103,6 @@ def gather_evidence(made: FitFacts) -> Evidence:
     Parameters
     ----------
     made : FitFacts
-
-    Returns
-    -------
-    Evidence
     """
     responses = [each for each in made.data if isinstance(each, FrequencyResponse)]
     records = [each for each in made.data if isinstance(each, Record)]

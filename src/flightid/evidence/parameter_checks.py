@@ -21,10 +21,6 @@ def declared_signs(parameters: Mapping[str, Signed]) -> Check:
     ----------
     parameters : mapping of str to (sign, value, interval or None, status)
 
-    Returns
-    -------
-    Check
-
     Example
     -------
     >>> declared_signs({"Lp": (-1, -2.0, (-5.0, 1.0), "free")}).light.value

@@ -47,10 +47,6 @@ def assess(
     n_records : int
         Times it is flown.
 
-    Returns
-    -------
-    Plan
-
     Raises
     ------
     OptionError

@@ -210,10 +210,6 @@ def plan(
     axis : int
         SID_AXIS of ArduPilot's chirp; it decides that input's unit.
 
-    Returns
-    -------
-    Plan
-
     Raises
     ------
     OptionError

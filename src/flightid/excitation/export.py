@@ -138,10 +138,6 @@ def ardupilot_parameters(
     current : mapping of str to float, optional
         Parameters as they are on the vehicle: then the fast attitude bit is added to LOG_BITMASK.
 
-    Returns
-    -------
-    ParameterFile
-
     Raises
     ------
     OptionError
@@ -216,10 +212,6 @@ def px4_parameters(
         MC_AT_SYSID_AMP or FW_AT_SYSID_AMP, 0.1 to 6; left as it is when not given.
     start_hz, stop_hz, duration_s : float, optional
         Sweep of a fixed wing: 0.1 to 30 Hz, 5 to 120 s for each axis.
-
-    Returns
-    -------
-    ParameterFile
 
     Raises
     ------

@@ -45,10 +45,6 @@ def doublet(
     name, unit : str
         Label of the input.
 
-    Returns
-    -------
-    Excitation
-
     Raises
     ------
     OptionError
@@ -98,10 +94,6 @@ def multistep(
         Trim before, and free response after, s.
     name, unit : str
         Label of the input.
-
-    Returns
-    -------
-    Excitation
 
     Raises
     ------
@@ -165,10 +157,6 @@ def modified_3211(
         Trim before, and free response after, s.
     name, unit : str
         Label of the input.
-
-    Returns
-    -------
-    Excitation
 
     Raises
     ------

@@ -49,10 +49,6 @@ def noise(
     unit : str
         Unit of the inputs.
 
-    Returns
-    -------
-    Excitation
-
     Raises
     ------
     OptionError
@@ -122,10 +118,6 @@ def uniform_noise(
         Inputs, independent of one another.
     unit : str
         Unit of the inputs.
-
-    Returns
-    -------
-    Excitation
 
     Raises
     ------

@@ -70,10 +70,6 @@ def sweep(
     name, unit : str
         Label of the input.
 
-    Returns
-    -------
-    Excitation
-
     Raises
     ------
     OptionError
@@ -175,10 +171,6 @@ def ardupilot_chirp(
         Compute as the autopilot does; False gives the exact waveform.
     name : str
         Name of the input.
-
-    Returns
-    -------
-    Excitation
 
     Raises
     ------

@@ -39,10 +39,6 @@ def model_source(
     tunable : bool
         Whether the parameters can be changed in C.
 
-    Returns
-    -------
-    CSource
-
     Raises
     ------
     OptionError
@@ -80,12 +76,7 @@ def export_c(
     substeps: int | None = None,
     tunable: bool = False,
 ) -> ExportFiles:
-    """Write header and source; `model_source` says the options.
-
-    Returns
-    -------
-    ExportFiles
-    """
+    """Write header and source; `model_source` says the options."""
     stem = file_stem(path)
     made = model_source(
         model,

@@ -100,10 +100,6 @@ def linear_source(
     hold : {"zero", "first"}
         What the inputs do between samples.
 
-    Returns
-    -------
-    CSource
-
     Raises
     ------
     OptionError
@@ -162,10 +158,6 @@ def equation_source(
         Runge-Kutta steps in a sample; left out: as `simulate` chooses them.
     radius : float
         Largest product of step and eigenvalue where `substeps` is left out.
-
-    Returns
-    -------
-    CSource
 
     Raises
     ------

@@ -77,10 +77,6 @@ def equation_code(model: StateSpaceModel, prefix: str) -> EquationCode:
     prefix : str
         Beginning of the names of table functions.
 
-    Returns
-    -------
-    EquationCode
-
     Raises
     ------
     ModelError

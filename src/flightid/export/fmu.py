@@ -86,10 +86,6 @@ def export_fmu(
     compile : bool
         Put a binary for this machine into the FMU; without, an importer compiles the sources.
 
-    Returns
-    -------
-    ExportFiles
-
     Raises
     ------
     ExportError

@@ -71,10 +71,6 @@ def export_jsbsim(
     properties : mapping of str to str, optional
         JSBSim property by input or state, for names that are not `PROPERTIES`.
 
-    Returns
-    -------
-    ExportFiles
-
     Raises
     ------
     ExportError

@@ -217,10 +217,6 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
         ----------
         level : float
             Of the intervals.
-
-        Returns
-        -------
-        Table
         """
         words = interval_words(level)
         columns = (

@@ -31,10 +31,6 @@ def evidence_of(fit: Fit, data: Sequence[Any], loop: Loop | None = None) -> Evid
         What it was made from.
     loop : {"open", "closed"}, optional
         The caller's word.
-
-    Returns
-    -------
-    Evidence
     """
     asked = getattr(fit.structure, "parameters", None)
     return gather_evidence(

@@ -126,10 +126,6 @@ def innovation_tests(
     spent : tuple of int
         Parameters that shape the errors' correlation with themselves, and with an input.
 
-    Returns
-    -------
-    InnovationTests
-
     Reference
     ---------
     Ljung, *System Identification*, 2nd ed., section 16.6; Ljung & Box (1978), Biometrika 65(2).

@@ -29,10 +29,6 @@ def inspect_log(log: Log | str | Path) -> Inspection:
     log : Log or path-like
         An opened log or its file.
 
-    Returns
-    -------
-    Inspection
-
     Raises
     ------
     LogFormatError

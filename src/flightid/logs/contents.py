@@ -119,10 +119,6 @@ class LogContents(Result, schema="flightid.log/1"):
         instance : int, optional
             Instance (sensor number, PX4 multi-instance id); default: all rows in file order.
 
-        Returns
-        -------
-        LogTable
-
         Raises
         ------
         MissingColumnError

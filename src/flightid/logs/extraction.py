@@ -72,10 +72,6 @@ def extract(
     span_s : (float, float), optional
         Keep the samples in this span and one on each side.
 
-    Returns
-    -------
-    ChannelSamples
-
     Raises
     ------
     MissingColumnError

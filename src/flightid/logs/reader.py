@@ -49,10 +49,6 @@ def read_log(path: str | Path) -> Log:
     path : path-like
         The file. Its name does not matter.
 
-    Returns
-    -------
-    Log
-
     Raises
     ------
     LogFormatError

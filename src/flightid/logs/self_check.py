@@ -120,10 +120,6 @@ def check_injection(log: LogContents, run: SidRun) -> InjectionCheck:
     run : SidRun
         One of its runs.
 
-    Returns
-    -------
-    InjectionCheck
-
     Assumes that RATE, PIDR, PIDP, PIDY and SIDD are written in the same loop, as one logging call
     of the firmware does.
     """

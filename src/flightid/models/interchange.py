@@ -216,10 +216,6 @@ def from_scipy(
     units : mapping of str to str, optional
         By channel.
 
-    Returns
-    -------
-    LinearSystem
-
     Raises
     ------
     ModelError

@@ -66,10 +66,6 @@ def model_from_description(content: Mapping[str, object]) -> Model:
         Keys ``kind`` (default ``"transfer"``) and those that its reader takes; a model's
         ``to_dict`` writes them.
 
-    Returns
-    -------
-    Model
-
     Raises
     ------
     ModelError

@@ -296,12 +296,7 @@ class Parameters(Mapping[str, Parameter], TableView):
         return Parameters(parameter if p.name == parameter.name else p for p in self.values())
 
     def summary(self) -> Table:
-        """Table of all parameters.
-
-        Returns
-        -------
-        Table
-        """
+        """Table of all parameters."""
         columns = tuple(
             Column(heading)
             for heading in ("parameter", "value", "unit", "min", "max", "status", "tie", "note")

@@ -73,10 +73,6 @@ def chosen_hold(
     fitted : str, optional
         What the model's fit was told, for records that do not know.
 
-    Returns
-    -------
-    ChosenHold
-
     Raises
     ------
     OptionError

@@ -97,10 +97,6 @@ class Record(LabelledSamples, Result, schema="flightid.record/1"):
         hold, period_s, loop : optional
             How inputs move between samples, repeat and are fed back; see `InputShape`.
 
-        Returns
-        -------
-        Record
-
         Raises
         ------
         ShapeError

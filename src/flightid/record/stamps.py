@@ -128,10 +128,6 @@ def stamped(name: str, time_s: ArrayLike, values: ArrayLike, policy: StampPolicy
     policy : StampPolicy
         What to do with repeated and backward stamps.
 
-    Returns
-    -------
-    StampedSamples
-
     Raises
     ------
     ShapeError

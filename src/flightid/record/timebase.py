@@ -75,10 +75,6 @@ def to_uniform(
     interpolation : Interpolation or mapping of str to Interpolation
         How samples arise between stamps, for all channels or by name (others: band-limited).
 
-    Returns
-    -------
-    UniformBase
-
     Raises
     ------
     OptionError

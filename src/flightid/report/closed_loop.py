@@ -24,10 +24,6 @@ def closed_loop_section(
     closed : ClosedLoop
     band_rad_s : tuple of float, optional
         Where margins are looked for, rad/s; as for `ClosedLoop.margins`.
-
-    Returns
-    -------
-    Section
     """
     parts = tuple(
         Section(f"Loop broken at {actuator}, the others closed", margin_blocks(found))

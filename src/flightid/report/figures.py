@@ -26,10 +26,6 @@ def figure_block(figure: go.Figure, caption: str) -> Figure:
         Picture; its samples are kept in single precision, which no screen can tell from double.
     caption : str
         What to see in it.
-
-    Returns
-    -------
-    Figure
     """
     return Figure(_in_single_precision(json.loads(figure.to_json())), caption)
 

@@ -87,10 +87,6 @@ def from_dict(values: Mapping[str, Any]) -> Document:
     values : mapping
         What `to_dict` wrote.
 
-    Returns
-    -------
-    Document
-
     Raises
     ------
     FileFormatError

@@ -42,10 +42,6 @@ def tuning_section(tuning: Tuning, title: str = "Gains") -> Section:
     ----------
     tuning : Tuning
     title : str
-
-    Returns
-    -------
-    Section
     """
     blocks: list[Block] = []
     verdicts = [finding for each in tuning.together for finding in each.findings()]

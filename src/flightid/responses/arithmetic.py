@@ -93,10 +93,6 @@ def apply_known(
     invert : bool
         Divide instead of multiply.
 
-    Returns
-    -------
-    FrequencyResponse
-
     Raises
     ------
     DataError
@@ -273,10 +269,6 @@ def peel_loop(augmented: FrequencyResponse, actuator: Known, gyro: Known) -> Fre
         From stick to rate with the loop closed, one pair.
     actuator, gyro : callable of s, or array_like, shape (n_f,)
         Known responses.
-
-    Returns
-    -------
-    FrequencyResponse
 
     Reference
     ---------

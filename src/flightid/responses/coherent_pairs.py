@@ -143,10 +143,6 @@ def coherent_pairs(
     minimum_decades : float
         Width that a response must have, decades; 0.3 is an octave.
 
-    Returns
-    -------
-    CoherentPairs
-
     Raises
     ------
     OptionError

@@ -88,10 +88,6 @@ def estimate_response(
         Whether anything moved the inputs after what the outputs did; default: what the records
         know, else a test.
 
-    Returns
-    -------
-    FrequencyResponse
-
     Raises
     ------
     DataError

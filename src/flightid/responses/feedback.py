@@ -35,10 +35,6 @@ def feedback_of(
     loop : {"open", "closed"} or None
         The caller's word.
 
-    Returns
-    -------
-    FeedbackTest
-
     Raises
     ------
     OptionError

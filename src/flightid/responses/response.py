@@ -156,10 +156,6 @@ class FrequencyResponse(
         errors : CovarianceSource, optional
         estimator : str
 
-        Returns
-        -------
-        FrequencyResponse
-
         Raises
         ------
         ShapeError
@@ -285,10 +281,6 @@ class FrequencyResponse(
             Keep of the band the frequencies nearest to so many log-spaced ones.
         omega_rad_s : array_like, optional
             Keep the frequencies nearest to these, rad/s, in place of a band.
-
-        Returns
-        -------
-        FrequencyResponse
 
         Raises
         ------

@@ -68,10 +68,6 @@ def average_spectra(
         Tapered cosines and sines of the window length at the chosen frequencies.
     sample_time_s : float
     detrend : {"none", "mean", "line"}
-
-    Returns
-    -------
-    Spectra
     """
     plan, n_f = basis.plan, basis.n_frequencies
     channels = records[0].shape[0]

@@ -34,10 +34,6 @@ def without_bias(source: FrequencyResponse) -> FrequencyResponse:
     ----------
     source : FrequencyResponse
 
-    Returns
-    -------
-    FrequencyResponse
-
     Raises
     ------
     DataError

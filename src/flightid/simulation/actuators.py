@@ -26,10 +26,6 @@ def actuator_positions(record: Record, actuators: Mapping[str, float]) -> Record
     actuators : mapping of str to float
         Bandwidth by input, rad/s; inputs left out stay as they are.
 
-    Returns
-    -------
-    Record
-
     Raises
     ------
     UnknownNameError

@@ -108,10 +108,6 @@ def fly_in_real_time(
     clock : Clock, optional
         Left out: the machine's.
 
-    Returns
-    -------
-    FlownSession
-
     Raises
     ------
     OptionError

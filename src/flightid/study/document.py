@@ -40,10 +40,6 @@ def study_document(study: StudyResults) -> Document:
     ----------
     study : StudyResults
         Results of all stages.
-
-    Returns
-    -------
-    Document
     """
     settings = study.settings
     models = [model_section(item, study.truth) for item in study.identified]
@@ -112,10 +108,6 @@ def parameter_table(study: StudyResults) -> Table:
     ----------
     study : StudyResults
         Results of all stages.
-
-    Returns
-    -------
-    Table
     """
     columns = [
         Column("model"),

@@ -42,10 +42,6 @@ def estimates_table(item: ModelResults, truth: Truth | None) -> Table:
         With several fits.
     truth : Truth or None
         What should have been found, where the flight was simulated.
-
-    Returns
-    -------
-    Table
     """
     (first, *_) = item.fits.values()
     known = {} if truth is None else truth.parameters(first.model)
@@ -77,10 +73,6 @@ def model_table(items: Iterable[ModelResults]) -> Table:
     ----------
     items : iterable of ModelResults
         Of one study.
-
-    Returns
-    -------
-    Table
     """
     columns = (
         Column("model"),

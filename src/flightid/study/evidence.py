@@ -28,10 +28,6 @@ def examined(fit: Fit, item: ModelResults, inspection: Inspection | None) -> Fit
         of records that the fit has not seen.
     inspection : Inspection or None
         Of the log that the data come from.
-
-    Returns
-    -------
-    Fit
     """
     checks: list[Check] = []
     if inspection is not None:

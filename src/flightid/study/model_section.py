@@ -46,10 +46,6 @@ def model_section(item: ModelResults, truth: Truth | None) -> Section:
         Every stage.
     truth : Truth or None
         What should have been found, where the flight was simulated.
-
-    Returns
-    -------
-    Section
     """
     first = blocks_until(item.name, _first, item, truth)
     return Section(item.name, first, tuple(_parts(item, truth)))

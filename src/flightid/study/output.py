@@ -149,10 +149,6 @@ def read_report(path: Path) -> Document:
     path : Path
         Output folder of a study, or its ``results.json``.
 
-    Returns
-    -------
-    Document
-
     Raises
     ------
     FileFormatError

@@ -51,10 +51,6 @@ def read_published(path: Path) -> PublishedFigures:
         Keys ``source`` and ``average_cost``; tables ``[value]``, ``[cramer_rao_percent]`` and
         ``[insensitivity_percent]`` of numbers by parameter; each may be left out but the first.
 
-    Returns
-    -------
-    PublishedFigures
-
     Raises
     ------
     StudyError

@@ -65,10 +65,6 @@ def run_study(
         Results of stages by the hash of all that they depend on. Whoever gives the same mapping
         to the next run pays only for the stages behind what has changed.
 
-    Returns
-    -------
-    Study
-
     Raises
     ------
     StudyError

@@ -136,10 +136,6 @@ def read_settings(path: Path) -> Settings:
     path : Path
         TOML file.
 
-    Returns
-    -------
-    Settings
-
     Raises
     ------
     StudyError

@@ -94,10 +94,6 @@ def recovered(inside: NDArray[np.bool_]) -> Finding:
     ----------
     inside : ndarray of bool, shape (n_parameters,)
         One for each true value.
-
-    Returns
-    -------
-    Finding
     """
     missed = int(inside.size - inside.sum())
     message = f"{inside.size - missed} of {inside.size} true values lie inside their 95 % intervals"

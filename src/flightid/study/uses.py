@@ -77,10 +77,6 @@ def use_models(
         Output of the study.
     faults : Faults
         Takes what fails: a model that was left out, or that does not fit its use.
-
-    Returns
-    -------
-    Uses
     """
     fits = {item.name: item.fit for item in identified if item.fit is not None}
     files: dict[str, str] = {}

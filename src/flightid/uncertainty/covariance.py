@@ -244,10 +244,6 @@ def white_covariance(
     freedom : float
         Degrees of freedom of their variance.
 
-    Returns
-    -------
-    AgreementTest
-
     Reference
     ---------
     See `flightid.uncertainty.agreement.compare_parts`.

@@ -242,10 +242,6 @@ def estimate_table(
     level : float
         Of the intervals.
 
-    Returns
-    -------
-    Table
-
     Example
     -------
     >>> estimate_table("Margins", [Estimate("gain margin", 9.5, "dB")]).rows[0][:3]

@@ -148,10 +148,6 @@ def scatter(parts: Sequence[RecordParts], solve: Array, spread: Array) -> Scatte
     spread : ndarray, shape (p, p)
         Covariance of the estimates by the noise alone, for shares and scales.
 
-    Returns
-    -------
-    Scatter
-
     Reference
     ---------
     Bell & McCaffrey (2002), Bias reduction in standard errors for linear regression with

@@ -131,10 +131,6 @@ def autoregression(
     length : int, optional
         Transform length of the periodogram; default: that of n samples.
 
-    Returns
-    -------
-    Autoregression
-
     Reference
     ---------
     Brockwell & Davis, Time Series: Theory and Methods (2nd ed.), sections 8.1-8.2 (Yule-Walker);

@@ -110,10 +110,6 @@ class Flight(Result, schema="flightid.flight/1", untold={"rows": "time histories
         gyro : {"filtered", "mean", "raw"}
             Which gyro signal the outputs are.
 
-        Returns
-        -------
-        Record
-
         Raises
         ------
         OptionError
@@ -217,10 +213,6 @@ def fly(
         Loops between log rows: 1, 2, 4 or 8 as ArduPilot's LOG_BITMASK allows.
     seed : int
         Seed of all noise; the same seed gives the same flight.
-
-    Returns
-    -------
-    Flight
 
     Raises
     ------

@@ -71,10 +71,6 @@ def stick_record(
     trim : mapping of str to float, optional
         Where the inputs rest, in their units.
 
-    Returns
-    -------
-    Record
-
     Raises
     ------
     UnknownNameError

@@ -93,10 +93,6 @@ def fly_scenario(
         Groups ``vehicle``, ``autopilot``, ``sensors``, ``turbulence``, each with the fields that
         differ from the default.
 
-    Returns
-    -------
-    Flight
-
     Raises
     ------
     OptionError

@@ -180,10 +180,6 @@ def rate_truth(
     autopilot : Autopilot, optional
         For loop rate and gyro filter.
 
-    Returns
-    -------
-    RateTruth
-
     Raises
     ------
     OptionError

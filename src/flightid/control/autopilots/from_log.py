@@ -76,10 +76,6 @@ def axis_loop_of(
     airspeed_scale : float, optional
         Scaling speed over airspeed (planes); default: from the log's mean airspeed.
 
-    Returns
-    -------
-    AxisLoop
-
     Raises
     ------
     DataError

@@ -49,10 +49,6 @@ def axis_loop(
     airspeed_scale, eas2tas : float
         Scaling speed over airspeed, and true over equivalent airspeed (planes only).
 
-    Returns
-    -------
-    AxisLoop
-
     Raises
     ------
     OptionError

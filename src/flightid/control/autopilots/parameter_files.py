@@ -143,10 +143,6 @@ def write_ardupilot_parameters(
     overwrite : bool
         Whether files that exist may be replaced.
 
-    Returns
-    -------
-    WrittenParameters
-
     Raises
     ------
     OptionError
@@ -199,10 +195,6 @@ def write_px4_parameters(
         Parameters that PX4 keeps as integers.
     overwrite : bool
         Whether files that exist may be replaced.
-
-    Returns
-    -------
-    WrittenParameters
 
     Raises
     ------

@@ -84,10 +84,6 @@ def px4_autotune_gains(
     detuning : float
         Weight on the control; more lowers kc.
 
-    Returns
-    -------
-    Px4AutotuneGains
-
     Raises
     ------
     ShapeError

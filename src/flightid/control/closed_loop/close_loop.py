@@ -63,10 +63,6 @@ def close_loop(
         Seed of the draws.
     name : str
 
-    Returns
-    -------
-    ClosedLoop
-
     Raises
     ------
     UnknownNameError

@@ -92,10 +92,6 @@ class ClosedLoop(
         actuator : str
             One of `actuators`.
 
-        Returns
-        -------
-        Interconnection
-
         Raises
         ------
         UnknownNameError
@@ -145,10 +141,6 @@ class ClosedLoop(
         ----------
         level : float
             Of the intervals.
-
-        Returns
-        -------
-        Table
         """
         words = interval_words(level)
         columns = (

@@ -32,10 +32,6 @@ def connect(
     name : str
         For tables and pictures.
 
-    Returns
-    -------
-    Interconnection
-
     Raises
     ------
     ModelError

@@ -32,10 +32,6 @@ def sampled(
     prewarp_rad_s : float, optional
         Where the trapezoidal rule keeps the response exactly, rad/s.
 
-    Returns
-    -------
-    Block
-
     Raises
     ------
     ModelError

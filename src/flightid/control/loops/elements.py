@@ -32,10 +32,6 @@ def gain(
     units : mapping of str to str, optional
         Unit by signal.
 
-    Returns
-    -------
-    Block
-
     Raises
     ------
     ShapeError
@@ -70,10 +66,6 @@ def sum_of(outputs: str, *terms: str, units: Mapping[str, str] | None = None) ->
         Signals; one that is subtracted has a minus before its name.
     units : mapping of str to str, optional
         Unit of one signal or more; all have the same.
-
-    Returns
-    -------
-    Block
 
     Raises
     ------
@@ -117,10 +109,6 @@ def delay(
     units : mapping of str to str, optional
         Unit of a signal; both have the same.
 
-    Returns
-    -------
-    Block
-
     Raises
     ------
     DataError
@@ -158,10 +146,6 @@ def limiter(
         Smallest; minus `high` when left out.
     units : mapping of str to str, optional
         Unit of a signal; both have the same.
-
-    Returns
-    -------
-    Block
 
     Raises
     ------
@@ -202,10 +186,6 @@ def rate_limiter(
         Largest rate either way, in the signal's unit per s.
     units : mapping of str to str, optional
         Unit of a signal; both have the same.
-
-    Returns
-    -------
-    Block
 
     Raises
     ------
@@ -253,10 +233,6 @@ def sample_and_hold(
     units : mapping of str to str, optional
         Unit of a signal; both have the same.
 
-    Returns
-    -------
-    Block
-
     Raises
     ------
     OptionError
@@ -294,10 +270,6 @@ def system(source: object, *, rename: Mapping[str, str] | None = None, name: str
         Signal by channel, where the two have different names.
     name : str
         What to call it in messages; the model's name when left out.
-
-    Returns
-    -------
-    Block
 
     Raises
     ------

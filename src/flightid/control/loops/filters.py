@@ -39,10 +39,6 @@ def low_pass(
     units : mapping of str to str, optional
         Unit of a signal; both have the same.
 
-    Returns
-    -------
-    Block
-
     Raises
     ------
     OptionError
@@ -84,10 +80,6 @@ def high_pass(
     units : mapping of str to str, optional
         Unit of a signal; both have the same.
 
-    Returns
-    -------
-    Block
-
     Raises
     ------
     OptionError
@@ -123,10 +115,6 @@ def washout(
         ω, rad/s: one over the washout time.
     units : mapping of str to str, optional
         Unit of a signal; both have the same.
-
-    Returns
-    -------
-    Block
 
     Raises
     ------
@@ -168,10 +156,6 @@ def notch(
         d, from 0 (nothing passes at the centre) to 1 (no notch).
     units : mapping of str to str, optional
         Unit of a signal; both have the same.
-
-    Returns
-    -------
-    Block
 
     Raises
     ------
@@ -223,10 +207,6 @@ def complementary(
     units : mapping of str to str, optional
         Unit by signal.
 
-    Returns
-    -------
-    Block
-
     Raises
     ------
     OptionError
@@ -270,10 +250,6 @@ def lead_lag(
         T₁ from zero up, T₂ above zero, s.
     units : mapping of str to str, optional
         Unit of a signal; both have the same.
-
-    Returns
-    -------
-    Block
 
     Raises
     ------

@@ -150,10 +150,6 @@ class Interconnection(
         ----------
         pade_order : int or None
             None: refuse delays inside.
-
-        Returns
-        -------
-        LinearSystem
         """
         return continuous_system(self.wiring, self.outputs, pade_order)
 
@@ -181,10 +177,6 @@ class Interconnection(
         """Poles, and whether all decay; with delays inside each pole is exact and they are counted.
 
         Where something is sampled, the poles are those of `sampled`.
-
-        Returns
-        -------
-        Stability
         """
         return self._stability
 
@@ -343,12 +335,7 @@ class Interconnection(
         return f"Interconnection({count}, {ends}, {n} state{'' if n == 1 else 's'})"
 
     def summary(self) -> Table:
-        """Table of the blocks with their signals.
-
-        Returns
-        -------
-        Table
-        """
+        """Table of the blocks with their signals."""
         rows = tuple(
             (block.name, ", ".join(block.inputs), ", ".join(block.outputs), str(block))
             for block in self.blocks

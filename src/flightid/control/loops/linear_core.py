@@ -94,10 +94,6 @@ def assemble(
     late_s : mapping of str to float, optional
         By how much a signal lags behind its carrier, s: a held one by the computation delay.
 
-    Returns
-    -------
-    Core
-
     Raises
     ------
     ModelError

@@ -40,10 +40,6 @@ def transfer(
     units : mapping of str to str, optional
         Unit by signal.
 
-    Returns
-    -------
-    Block
-
     Raises
     ------
     ModelError

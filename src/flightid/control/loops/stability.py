@@ -82,12 +82,7 @@ class Stability(Result, schema="flightid.loop_stability/1"):
         return f"Stability({verdict}, {len(self.poles)} poles{slowest})"
 
     def summary(self) -> Table:
-        """Table of the poles, the least stable first.
-
-        Returns
-        -------
-        Table
-        """
+        """Table of the poles, the least stable first."""
         equivalent: Complex = self.poles
         if self.sample_time_s is not None:
             equivalent = np.asarray(np.log(self.poles + 1e-300) / self.sample_time_s)
@@ -136,10 +131,6 @@ def with_delays(parts: Parts, seeds: Complex) -> Stability:
         Of `delayed_parts`.
     seeds : ndarray of complex
         Poles of an approximation, rad/s.
-
-    Returns
-    -------
-    Stability
     """
     # The approximation's fastest poles are its own, and take longest to lead anywhere.
     kept = seeds[np.argsort(-seeds.real)][: len(parts[0]) + SEEDS_A_DELAY * len(parts[4])]

@@ -109,12 +109,7 @@ class DiskMargin(Result, schema="flightid.disk_margin/1"):
         )
 
     def summary(self, *, level: float = LEVEL) -> Table:
-        """Table of all numbers with their intervals.
-
-        Returns
-        -------
-        Table
-        """
+        """Table of all numbers with their intervals."""
         title = f"Disk margin at {', '.join(self.channels)}, skew {self.skew:g}"
         return estimate_table(title, self.quantities, tuple(map(str, self.findings)), level=level)
 
@@ -155,10 +150,6 @@ def disk_margin(
         Frequencies to look at, rad/s.
     unstable_poles : int, optional
         Unstable poles of the open loops. Left out: counted in models; none in a measurement.
-
-    Returns
-    -------
-    DiskMargin
 
     Raises
     ------

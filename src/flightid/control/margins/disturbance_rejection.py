@@ -81,12 +81,7 @@ class DisturbanceRejection(Result, schema="flightid.disturbance_rejection/1"):
         return f"DisturbanceRejection({self.name}: {shown})"
 
     def summary(self, *, level: float = LEVEL) -> Table:
-        """Table of all numbers with their intervals.
-
-        Returns
-        -------
-        Table
-        """
+        """Table of all numbers with their intervals."""
         notes = tuple(map(str, self.findings))
         return estimate_table(
             f"Disturbance rejection of {self.name}", self.quantities, notes, level=level
@@ -130,10 +125,6 @@ def disturbance_rejection(
         Least bandwidth asked for, rad/s; it depends on axis and task, so that there is no default.
     peak_guide_db : float
         Greatest peak asked for, dB.
-
-    Returns
-    -------
-    DisturbanceRejection
 
     Raises
     ------

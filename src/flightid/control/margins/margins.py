@@ -166,22 +166,12 @@ class Margins(Result, schema="flightid.margins/1"):
         )
 
     def summary(self, *, level: float = LEVEL) -> Table:
-        """Table of all numbers with their intervals.
-
-        Returns
-        -------
-        Table
-        """
+        """Table of all numbers with their intervals."""
         notes = tuple(map(str, self.findings))
         return estimate_table(f"Margins of {self.name}", self.quantities, notes, level=level)
 
     def crossing_table(self) -> Table:
-        """Table of every crossing, by frequency.
-
-        Returns
-        -------
-        Table
-        """
+        """Table of every crossing, by frequency."""
         columns = (Column("frequency", "rad/s"), Column("what"), Column("margin"), Column("unit"))
         rows = [(c.omega_rad_s, "gain passes one", c.margin, "deg") for c in self.crossovers]
         rows += [
@@ -230,10 +220,6 @@ def margins(
         Unstable poles of the open loop. Left out: counted in a model; none in a measurement.
     phase_guide_deg, gain_guide_db : float
         What the findings ask for, at the worse end of the interval.
-
-    Returns
-    -------
-    Margins
 
     Raises
     ------

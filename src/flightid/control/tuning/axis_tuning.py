@@ -183,10 +183,6 @@ def tune_axis(
         Which axis.
     advance : callable
         Told of steps done.
-
-    Returns
-    -------
-    AxisResult
     """
     gyro, paths = setting.gyro, ControllerPaths(loops[place], setting.gyro, setting.with_angle)
     before = paths.gains_of(flown[place])

@@ -112,10 +112,6 @@ def gather(
     needs_band : bool
         Whether the crossover is bounded by the band.
 
-    Returns
-    -------
-    TuningEvidence
-
     Raises
     ------
     DataError

@@ -21,10 +21,6 @@ def flown_loop(gains: Gains | GainsOfAxes, autopilot: str, axis: str) -> AxisLoo
     autopilot, axis : str
         Of parameters given by name; a log tells its own autopilot.
 
-    Returns
-    -------
-    AxisLoop
-
     Raises
     ------
     DataError

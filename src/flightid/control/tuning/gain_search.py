@@ -77,10 +77,6 @@ def search(
     advance : callable
         Told the number of candidates done; the total is `steps`.
 
-    Returns
-    -------
-    GainSearchResult
-
     Reference
     ---------
     Åström & Hägglund, *Advanced PID Control* (2006), chapter 7 (constrained optimisation of

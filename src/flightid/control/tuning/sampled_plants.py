@@ -121,10 +121,6 @@ def sample_plants(
         Whether the models' delays hold the half sample of the output hold, as those of models
         fitted to logged signals do.
 
-    Returns
-    -------
-    SampledPlants
-
     Raises
     ------
     ModelError
@@ -242,10 +238,6 @@ def plants_of_axis(
         Which axis.
     loops : AxisLoops
         Controllers of all axes; that of this one is not used.
-
-    Returns
-    -------
-    Plants
     """
     others = [k for k in range(rate.shape[1]) if k != place]
     own_rate, own_angle = rate[:, place, place], angle[:, place, place]

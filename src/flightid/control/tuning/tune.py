@@ -77,10 +77,6 @@ def tune(
     verifications : mapping of str to Verification or several, optional
         Predictions of unseen records, by axis.
 
-    Returns
-    -------
-    Tuning
-
     Raises
     ------
     DataError

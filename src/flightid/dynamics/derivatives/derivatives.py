@@ -206,10 +206,6 @@ def derivatives(source: object, normalisation: Normalisation | None = None) -> D
     normalisation : FixedWing or Rotorcraft, optional
         Mass, geometry and condition for coefficients without dimensions. Taken as known exactly.
 
-    Returns
-    -------
-    DerivativeTable
-
     Raises
     ------
     ModelError

@@ -68,10 +68,6 @@ def attitude_bandwidth(
     sign : {1, -1}
         −1 for a control that pulls the other way.
 
-    Returns
-    -------
-    AttitudeBandwidth
-
     Raises
     ------
     DataError

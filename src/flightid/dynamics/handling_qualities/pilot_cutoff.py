@@ -111,10 +111,6 @@ def pilot_cutoff(
         Band whose power counts, rad/s; default: all. Begin it above slow trim changes,
         which are no tracking.
 
-    Returns
-    -------
-    PilotCutoff
-
     Raises
     ------
     DataError

@@ -141,10 +141,6 @@ def rate(
     subject : str
         What is rated.
 
-    Returns
-    -------
-    Rating
-
     Raises
     ------
     DataError

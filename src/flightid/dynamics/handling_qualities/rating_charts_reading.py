@@ -35,10 +35,6 @@ def rating_chart(key: str, *, path: str | Path | None = None, **conditions: str)
         The case, for example ``category="A"``; class is written ``**{"class": "IV"}``. Conditions
         that the requirement does not ask for are passed over.
 
-    Returns
-    -------
-    RatingChart
-
     Raises
     ------
     UnknownNameError

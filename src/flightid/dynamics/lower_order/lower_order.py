@@ -71,10 +71,6 @@ def lower_order(
     correct_bias : bool
         Of a measured response: see `identify`.
 
-    Returns
-    -------
-    LowerOrder
-
     Raises
     ------
     DataError

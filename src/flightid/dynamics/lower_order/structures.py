@@ -174,10 +174,6 @@ def equivalent_model(
     units : mapping of str to str
         Of both channels.
 
-    Returns
-    -------
-    TransferFunctionModel
-
     Example
     -------
     >>> print(equivalent_model("roll", "p", "lat", {"p": "rad/s"}))

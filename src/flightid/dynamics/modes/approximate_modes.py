@@ -206,10 +206,6 @@ def approximate_modes(
     flight : {"forward", "hover"}, optional
         Whose formulas; left out: hover where the trim speed (w' by q) is below 5 m/s.
 
-    Returns
-    -------
-    ApproximateModes
-
     Raises
     ------
     ModelError

@@ -84,10 +84,6 @@ def word_of(name: str, unit: str) -> StateWord:
     ----------
     name, unit : str
 
-    Returns
-    -------
-    StateWord
-
     Example
     -------
     >>> word_of("b", "rad").word, word_of("b", "m/s").word
@@ -168,10 +164,6 @@ def name_by_states(
         Of the states; conventional ones are understood.
     units : mapping of str to str
         Of the states.
-
-    Returns
-    -------
-    NamedMode
     """
     words = [word_of(name, units.get(name, "1")) for name in names]
     shares = pair.shares
@@ -193,10 +185,6 @@ def name_by_outputs(value: complex | None, outputs: Iterable[str]) -> NamedMode:
         rad/s.
     outputs : iterable of str
         Outputs that show the mode.
-
-    Returns
-    -------
-    NamedMode
 
     Example
     -------

@@ -86,10 +86,6 @@ def read_states(source: object, states: Mapping[str, str]) -> StateMatrix:
     states : mapping of str to str
         Conventional name by the model's own name of a state.
 
-    Returns
-    -------
-    StateMatrix
-
     Raises
     ------
     ModelError

@@ -120,10 +120,6 @@ def advise(
         Whether anything moved the inputs after what the outputs did; default: what the records
         know, else a test.
 
-    Returns
-    -------
-    Advice
-
     Raises
     ------
     OptionError

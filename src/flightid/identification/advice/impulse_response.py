@@ -177,10 +177,6 @@ def impulse_response(
         Decaying prior for few or poor data; not with negative lags.
     offsets : {"mean", "trim", "none"}
 
-    Returns
-    -------
-    ImpulseResponse
-
     Raises
     ------
     OptionError

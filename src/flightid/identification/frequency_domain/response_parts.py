@@ -57,10 +57,6 @@ class PartComparison:
         inner : ndarray of bool, shape (n_free,)
             Free parameters that are not at a bound.
 
-        Returns
-        -------
-        AgreementTest
-
         Assumes
         -------
         Noise as strong in all parts; at each frequency a part counts by its share of the power,

@@ -121,10 +121,6 @@ def segmented_starts(prepared: RecordSet, runs: EquationRuns) -> RecordSet:
     ----------
     prepared : RecordSet
     runs : EquationRuns
-
-    Returns
-    -------
-    RecordSet
     """
     pairs = zip(prepared.own, runs.segments, strict=True)
     return replace(prepared, own=[_placed(numbers, segments) for numbers, segments in pairs])

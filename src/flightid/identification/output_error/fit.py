@@ -138,10 +138,6 @@ def conclude(
     beside : JointResiduals, optional
         Residuals of unit variance that were fitted together with the records.
 
-    Returns
-    -------
-    Fit
-
     Raises
     ------
     FitError
@@ -186,10 +182,6 @@ def searched(
     options : RecordOptions
     responses : WhitenedResponses, optional
         Fitted together with the records.
-
-    Returns
-    -------
-    SearchEnd
 
     Raises
     ------

@@ -76,10 +76,6 @@ def criteria(sum_of_squares: float, n_samples: int, n_parameters: int) -> Criter
         In the square of the output's unit.
     n_samples, n_parameters : int
 
-    Returns
-    -------
-    Criteria
-
     Reference
     ---------
     Ljung, *System Identification*, 2nd ed., eqs. 16.21 to 16.25; Hurvich & Tsai (1989), Regression

@@ -68,10 +68,6 @@ def kernel_estimate(
     variance : float, optional
         Of the noise; default: of the least-squares residuals.
 
-    Returns
-    -------
-    KernelEstimate
-
     Raises
     ------
     DataError

@@ -214,12 +214,7 @@ class Reduction(Result, schema="flightid.reduction/1", untold={"data": "response
         )
 
     def summary(self) -> Table:
-        """Table of the path: what was dropped, why, and what it cost.
-
-        Returns
-        -------
-        Table
-        """
+        """Table of the path: what was dropped, why, and what it cost."""
         columns = (
             Column("step"),
             Column("parameter"),

@@ -133,12 +133,7 @@ class StructureComparison(Result, schema="flightid.structure_comparison/1"):
         return f"StructureComparison({len(self.rows)} structures{tail})"
 
     def summary(self) -> Table:
-        """Table with one structure a row.
-
-        Returns
-        -------
-        Table
-        """
+        """Table with one structure a row."""
         columns = (
             Column("structure"),
             Column("free parameters"),
@@ -175,10 +170,6 @@ def compare_structures(fits: Mapping[str, Fit]) -> StructureComparison:
     ----------
     fits : mapping of str to Fit
         Results of `flightid.identify` by name, with the same data and options.
-
-    Returns
-    -------
-    StructureComparison
 
     Raises
     ------

@@ -195,10 +195,6 @@ def channel_map(name: str | Path) -> ChannelMap:
         Shipped map (``"arducopter"``, ``"arduplane"``, ``"px4_multicopter"``,
         ``"px4_fixed_wing"``), or a TOML file of the same form.
 
-    Returns
-    -------
-    ChannelMap
-
     Raises
     ------
     UnknownNameError

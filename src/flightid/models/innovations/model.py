@@ -73,10 +73,6 @@ class InnovationsModel(InnovationsForm, TableView):
             Number of states; default: chosen from the singular values.
         **options
             ``method``, ``horizon``, ``direct``, …
-
-        Returns
-        -------
-        SubspaceStructure
         """
         names = tuple(
             (each,) if isinstance(each, str) else tuple(each) for each in (outputs, inputs)

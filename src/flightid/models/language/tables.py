@@ -152,10 +152,6 @@ def read_table_function(name: str, item: object) -> TableFunction:
     item : object
         ``{axes = [{points = […], unit = "rad"}], values = […], unit, interpolation, outside}``.
 
-    Returns
-    -------
-    TableFunction
-
     Raises
     ------
     ModelError

@@ -268,10 +268,6 @@ class LinearSystem(Rational, TableView):
             Of the diagonal approximation; its phase is right to about 1° up to ωτ = 2.5 for order 2
             and ωτ = 4.5 for order 3.
 
-        Returns
-        -------
-        LinearSystem
-
         Raises
         ------
         OptionError

@@ -91,10 +91,6 @@ def read_system(path: str | Path) -> LinearSystem:
     path : str or Path
         ``.mat`` (level 5), ``.json`` or ``.npz``.
 
-    Returns
-    -------
-    LinearSystem
-
     Raises
     ------
     FileFormatError

@@ -40,10 +40,6 @@ class StructureMakers:
             Orders; nb counts coefficients, nk samples of delay.
         **options
             ``initial_state``, ``offsets``, ``starts``, …
-
-        Returns
-        -------
-        PolynomialStructure
         """
         names = (inputs,) if isinstance(inputs, str) else tuple(inputs)
         n = len(names)

@@ -206,10 +206,6 @@ class ModelBuilder:
     def build(self) -> StateSpaceModel:
         """The model, checked and compiled.
 
-        Returns
-        -------
-        StateSpaceModel
-
         Raises
         ------
         ModelError

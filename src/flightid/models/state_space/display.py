@@ -88,10 +88,6 @@ def matrices_as_latex(model: Linearisation) -> MatrixDisplay:
     ----------
     model : Linearisation
 
-    Returns
-    -------
-    MatrixDisplay
-
     Raises
     ------
     ModelError

@@ -117,10 +117,6 @@ class Linearisation(Adjustable):
         at : mapping of str to float, optional
             Point instead of the trim; a linear model has the same matrices everywhere.
 
-        Returns
-        -------
-        StateSpaceMatrices
-
         Raises
         ------
         UnknownNameError

@@ -215,10 +215,6 @@ class StateSpaceModel(Linearisation, TableView):
         require : sequence of str, optional
             Formulas that shall be zero too, such as ``"theta - alpha"`` for level flight.
 
-        Returns
-        -------
-        StateSpaceModel
-
         Raises
         ------
         UnknownNameError
@@ -259,10 +255,6 @@ class StateSpaceModel(Linearisation, TableView):
         note : str, optional
         **values
             What the kind needs: numbers, or formulas of the model's parameters.
-
-        Returns
-        -------
-        StateSpaceModel
 
         Raises
         ------
@@ -315,12 +307,7 @@ class StateSpaceModel(Linearisation, TableView):
         return "\n".join(description.lines(self))
 
     def summary(self) -> Table:
-        """Table of the parameters, with the equations below.
-
-        Returns
-        -------
-        Table
-        """
+        """Table of the parameters, with the equations below."""
         table = self.parameters.summary().without_empty_columns()
         notes = (*description.lines(self), *filter(None, [self.source, self.note]))
         return Table(self.name, table.columns, table.rows, notes)

@@ -98,10 +98,6 @@ class StateSpaceMatrices(NamedTuple):
             The delays are its last n_inputs entries.
         n, p : int
             Numbers of states and outputs.
-
-        Returns
-        -------
-        StateSpaceMatrices
         """
         m_inputs = slopes.shape[1] - 2 * n
         late = values[len(values) - m_inputs :]

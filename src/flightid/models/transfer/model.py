@@ -312,12 +312,7 @@ class TransferFunctionModel(Adjustable, TableView):
         return "\n".join(map(str, self.responses))
 
     def summary(self) -> Table:
-        """Table of the parameters, with the formulas below.
-
-        Returns
-        -------
-        Table
-        """
+        """Table of the parameters, with the formulas below."""
         table = self.parameters.summary().without_empty_columns()
         notes = [*map(str, self.responses), self.source and f"Source: {self.source}", self.note]
         return Table(

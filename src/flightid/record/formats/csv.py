@@ -31,10 +31,6 @@ def read_columns(path: Path) -> ColumnTable:
     path : Path
         The file, UTF-8.
 
-    Returns
-    -------
-    ColumnTable
-
     Raises
     ------
     FileFormatError

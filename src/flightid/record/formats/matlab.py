@@ -32,10 +32,6 @@ def read_columns(path: Path) -> ColumnTable:
     path : Path
         The file.
 
-    Returns
-    -------
-    ColumnTable
-
     Raises
     ------
     FileFormatError
@@ -73,10 +69,6 @@ def read_hdf5_columns(path: Path) -> ColumnTable:
     ----------
     path : Path
         The file.
-
-    Returns
-    -------
-    ColumnTable
 
     Raises
     ------

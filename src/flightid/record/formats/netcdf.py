@@ -27,10 +27,6 @@ def read_columns(path: Path, *, classic: bool) -> ColumnTable:
     classic : bool
         Classic netCDF rather than netCDF-4.
 
-    Returns
-    -------
-    ColumnTable
-
     Raises
     ------
     FileFormatError

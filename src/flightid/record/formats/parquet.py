@@ -32,10 +32,6 @@ def read_columns(path: Path, *, has_labels: bool = False) -> ColumnTable:
     has_labels : bool
         Headings are names as they stand: units in brackets are not taken from them.
 
-    Returns
-    -------
-    ColumnTable
-
     Raises
     ------
     FileFormatError

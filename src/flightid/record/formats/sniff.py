@@ -30,10 +30,6 @@ def file_format(path: Path) -> FileFormat:
     path : Path
         The file.
 
-    Returns
-    -------
-    FileFormat
-
     Raises
     ------
     FileFormatError

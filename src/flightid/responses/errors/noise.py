@@ -100,10 +100,6 @@ def estimate_noise(samples: Samples, omega: Real, response: Complex) -> NoiseSpe
     response : ndarray of complex, shape (n_out, n_in, n_f)
         Needed with excitations only.
 
-    Returns
-    -------
-    NoiseSpectrum
-
     Raises
     ------
     DataError
@@ -148,10 +144,6 @@ def noise_of_residuals(
     sample_time_s : float
     highest_rad_s : float
         Highest frequency of the response.
-
-    Returns
-    -------
-    NoiseSpectrum
     """
     records = [
         Bins.of(np.concatenate([given, left]), sample_time_s)
@@ -174,10 +166,6 @@ def mean_spectrum(
         Highest frequency that a model was fitted to.
     spent : ndarray, shape (n_out,)
         Coefficients of the model of each output, whose freedom the residuals lack.
-
-    Returns
-    -------
-    NoiseSpectrum
     """
     records = [Bins.of(each, sample_time_s) for each in residuals]
     longest = max(records, key=lambda bins: len(bins.omega)).omega

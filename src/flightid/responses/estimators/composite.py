@@ -74,10 +74,6 @@ def combine(parts: Sequence[ConditionalSpectra], valid: NDArray[np.bool_]) -> Co
     valid : ndarray of bool, shape (n_windows, n_f)
         Where a window length may be used; at least one at each frequency.
 
-    Returns
-    -------
-    Composite
-
     Reference
     ---------
     Tischler & Remple, *Aircraft and Rotorcraft System Identification*, 2nd ed., equations

@@ -140,10 +140,6 @@ def condition(
     names : tuple of str
         Names of the inputs, for messages.
 
-    Returns
-    -------
-    ConditionalSpectra
-
     Raises
     ------
     DataError

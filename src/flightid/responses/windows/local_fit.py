@@ -112,10 +112,6 @@ def fit_locally(
     n_inputs : int
     order : int
 
-    Returns
-    -------
-    LocalFit
-
     Reference
     ---------
     Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., section

@@ -100,10 +100,6 @@ def residual_tests(
         take out the inputs (of B, F, per input); zero on records the fit has not seen. Default:
         those of a given fit, else zero.
 
-    Returns
-    -------
-    ResidualTests
-
     Raises
     ------
     OptionError

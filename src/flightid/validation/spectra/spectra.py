@@ -58,10 +58,6 @@ def residual_spectra(
     window_s : float, optional
         Window, s; default: half of the automatic longest, about ten in all records.
 
-    Returns
-    -------
-    ResidualSpectra
-
     Raises
     ------
     DataError
@@ -131,10 +127,6 @@ def compare_spectra(
         Outputs to compare; default: all.
     band_rad_s, n_omega, omega_rad_s, window_s : optional
         As for `residual_spectra`.
-
-    Returns
-    -------
-    SpectrumComparison
 
     Raises
     ------

@@ -186,10 +186,6 @@ def compared(verifications: Mapping[str, Verification]) -> Comparison:
     verifications : mapping of str to Verification
         By name of the model, the one on trial first; two or more.
 
-    Returns
-    -------
-    Comparison
-
     Reference
     ---------
     Good, Permutation, Parametric and Bootstrap Tests of Hypotheses, 3rd ed., section 3.2 (paired

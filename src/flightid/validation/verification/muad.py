@@ -64,10 +64,6 @@ def muad_envelopes(omega_rad_s: ArrayLike) -> Envelopes:
     omega_rad_s : array_like, shape (n_freqs,)
         Frequencies, rad/s, positive.
 
-    Returns
-    -------
-    Envelopes
-
     Raises
     ------
     OptionError
@@ -197,10 +193,6 @@ def mismatch(
         Measured; pairs that the model does not have, or does not fit, are left out.
     minimum_coherence : float
         Frequencies with less are neither judged nor drawn.
-
-    Returns
-    -------
-    Mismatch
 
     Raises
     ------
