@@ -101,7 +101,7 @@ def response_band(
     reason = RANDOM if clean is None else TAKEN_OUT
     known = pair if clean is None else clean
     centre = known.response[0, 0]
-    spread = _spread(known)
+    spread = spread_of(known)
     if spread is None:
         return None
     along, across = half_width(level) * spread
@@ -117,8 +117,8 @@ def response_band(
     )
 
 
-def _spread(known: FrequencyResponse) -> Real | None:
-    """Standard errors along and across the response, shape (2, n_f)."""
+def spread_of(known: FrequencyResponse) -> Real | None:
+    """Standard errors along and across the response of one pair, shape (2, n_f), or None."""
     values = known.response[0, 0]
     if known.errors is None:
         error = known.random_error[0, 0]

@@ -19,6 +19,10 @@ from flightid.uncertainty.quantiles import LEVEL, half_width
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 WITHOUT_BIAS = "without leakage"
+BENT = 0.02
+"""Twice the share by which a straight line between neighbours may miss a pilot."""
+HALVINGS = 4
+MOST_POINTS = 250
 
 
 def without_bias(source: FrequencyResponse) -> FrequencyResponse:
@@ -71,26 +75,64 @@ def without_bias(source: FrequencyResponse) -> FrequencyResponse:
     return found
 
 
-def unbiased(response: FrequencyResponse) -> FrequencyResponse | None:
-    """As `without_bias`, or None where that cannot be had."""
+def unbiased(response: FrequencyResponse, *, refined: bool = False) -> FrequencyResponse | None:
+    """As `without_bias`, or None where that cannot be had.
+
+    `refined` adds frequencies where the response turns too fast for straight lines between
+    neighbours, as at a light mode: there the pilot is known, and what it leaves is interpolated.
+    """
     linear = response.linear
     if linear is None or response.errors is None:
         return None
     pilots = linear.pilots_of_outputs()
     if pilots is None:
         return None
-    omega = response.omega_rad_s
-    columns = linear.places[1]
+    before, columns = response.omega_rad_s, linear.places[1]
+    omega = _refined(before, pilots, columns) if refined else before
+    spread = _between(before, omega)
     seen = linear.functional()(_stacked([each.outputs for each in pilots]))
     own = np.stack([each.frequency_response(omega)[columns] for each in pilots])
-    errors = _errors(response, linear, pilots)
+    kept = {
+        name: getattr(response, name) @ spread
+        for name in ("coherence", "multiple_coherence", "random_error", "n_independent")
+    }
     return replace(
         response,
-        response=response.response - (seen - own),
-        errors=StoredCovariance(errors, len(omega)),
+        **kept,
+        omega_rad_s=omega,
+        response=own + (response.response - seen) @ spread,
+        input_spectrum=None,
+        cross_spectrum=None,
+        output_spectrum=None,
+        errors=StoredCovariance(_errors(response, linear, pilots, omega, spread), len(omega)),
         linear=None,
         estimator=f"{response.estimator}, {WITHOUT_BIAS}",
     )
+
+
+def _refined(omega: Real, pilots: Sequence[Pilot], columns: NDArray[np.intp]) -> Real:
+    """With the middles of intervals, in log frequency, over which a pilot is no straight line."""
+    found = omega
+    for _ in range(HALVINGS):
+        middles = np.sqrt(found[1:] * found[:-1])
+        bent = np.zeros(len(middles), dtype=bool)
+        for pilot in pilots:
+            ends = pilot.frequency_response(found)[columns]
+            own = pilot.frequency_response(middles)[columns]
+            # Of a straight line in log gain and phase the middle is the geometric mean.
+            ratio = own**2 / (ends[:, 1:] * ends[:, :-1])
+            bent |= np.any(np.abs(ratio - 1.0) > BENT, axis=0)
+        if not np.any(bent) or len(found) > MOST_POINTS:
+            break
+        found = np.sort(np.concatenate([found, middles[bent]]))
+    return found
+
+
+def _between(before: Real, omega: Real) -> Real:
+    """Straight lines over log frequency from some points to others, shape (n_before, n)."""
+    logs, wanted = np.log(before), np.log(omega)
+    rows = [np.interp(wanted, logs, row) for row in np.eye(len(before))]
+    return np.asarray(rows)
 
 
 def _stacked(outputs: Sequence[tuple[Real, ...]]) -> list[Real]:
@@ -98,9 +140,15 @@ def _stacked(outputs: Sequence[tuple[Real, ...]]) -> list[Real]:
     return [np.stack(each) for each in zip(*outputs, strict=True)]
 
 
-def _errors(response: FrequencyResponse, linear: LinearEstimate, pilots: Sequence[Pilot]) -> Real:
+def _errors(
+    response: FrequencyResponse,
+    linear: LinearEstimate,
+    pilots: Sequence[Pilot],
+    omega: Real,
+    spread: Real,
+) -> Real:
     """Covariance of the difference, shaped as by `CovarianceSource.covariance`."""
-    omega, columns = response.omega_rad_s, linear.places[1]
+    columns = linear.places[1]
     modelled = _stacked([each.outputs for each in pilots])
     residuals = [y - model for y, model in zip(linear.output_records, modelled, strict=True)]
     highest = BEYOND_BAND * linear.pilots.highest_rad_s
@@ -110,12 +158,15 @@ def _errors(response: FrequencyResponse, linear: LinearEstimate, pilots: Sequenc
     total = source.covariance(*places)
     apply = linear.functional()
     seen = np.stack([apply(each) for each in _slopes(pilots)], axis=1)
+    onto = np.kron(np.eye(2 * len(columns)), spread)
+    found = []
     for row, pilot in enumerate(pilots):
         own = _real(pilot.response_slopes(omega)[:, columns])
         made = _real(seen[row][: len(own)])
         left = _positive(total[row] - made.T @ pilot.covariance @ made)
-        total[row] = (left + own.T @ pilot.covariance @ own) * _widened(pilot)
-    return total
+        known = onto.T @ left @ onto + own.T @ pilot.covariance @ own
+        found.append(_widened(pilot) * known)
+    return np.stack(found)
 
 
 def _widened(pilot: Pilot) -> float:

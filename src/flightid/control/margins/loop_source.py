@@ -16,6 +16,7 @@ from flightid.identification.uncertain_of import uncertain_of
 from flightid.models import Model, linear_system
 from flightid.responses import FrequencyResponse
 from flightid.responses.arithmetic import Known, apply_known, loop_of_sensitivity, open_loop
+from flightid.responses.unbiased import unbiased
 from flightid.uncertainty.uncertain import Uncertain
 
 Array = NDArray[np.float64]
@@ -145,6 +146,7 @@ def _measured(
         raise DataError(
             "too few frequencies to find margins", found=pair.n_frequencies, needed="three or more"
         )
+    pair = unbiased(pair, refined=True) or pair
     if given == "closed":
         pair = open_loop(pair, 1.0)
     elif given == "sensitivity":

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,6 +14,9 @@ from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
 from flightid.identification.uncertain_of import source_findings, uncertain_of
 from flightid.responses import FrequencyResponse, PairResponse
+from flightid.responses.response_band import spread_of
+from flightid.responses.unbiased import WITHOUT_BIAS, unbiased
+from flightid.uncertainty.quantiles import half_width
 from flightid.uncertainty.uncertain import Uncertain, uncertain_numbers
 
 PHASE_MARGIN_DEG = 45.0
@@ -30,6 +35,8 @@ LEADING_DEG = 10.0
 """Phase at the beginning of the band above which a control may have the other sign."""
 LATE = "begin the band lower: the phase has passed −135° where it begins; or turn the sign"
 NO_FALL = "widen the band; take the attitude, or say that it is a rate, with its sign"
+AMBIGUOUS = 3.0
+"""Width of all places where noise may put a passage, over that of its interval of first order."""
 MOST_POINTS = 160
 """Measured points that carry errors: more say the same again."""
 Array = NDArray[np.float64]
@@ -81,7 +88,8 @@ def attitude_bandwidth(
     -------
     A phase that begins between −270° and 90°. Intervals of first order, from the covariance of
     parameters or of the measured response: biased where coherence is low near ω_180 or its double,
-    and by what windows blur, which only a fit takes out.
+    and after arithmetic by what windows blur; before it `without_bias` takes that out. Where noise
+    may move a passage to another place there is no interval.
     Of several passages through −180° the first counts, which noise makes earlier.
 
     Reference
@@ -107,6 +115,7 @@ def attitude_bandwidth(
             raise OptionError(f"{name} is not known", found=given, needed=" or ".join(known))
     if isinstance(source, FrequencyResponse):
         chosen = source.select(outputs=[outputs], inputs=[inputs])
+        chosen = unbiased(chosen, refined=True) or chosen
         data: object = chosen
         curve = GainPhaseCurve.of(chosen, pair, smoother_of(chosen, pair))
     else:
@@ -162,7 +171,35 @@ def _errors(data: object, pair: Pair, values: Array) -> Uncertain[Array]:
     found = uncertain_of(data, pair.output, pair.input).carried(
         lambda thing: bandwidth_numbers(GainPhaseCurve.of(thing, pair, smoother))
     )
-    return uncertain_numbers(values, found.covariance, found.reason)
+    covariance = found.covariance
+    if covariance is not None and isinstance(data, FrequencyResponse):
+        covariance = _certain(covariance, data, pair)
+    return uncertain_numbers(values, covariance, found.reason)
+
+
+def _certain(covariance: Array, data: FrequencyResponse, pair: Pair) -> NDArray[np.float64]:
+    """NaN in the rows of what hangs on a passage that noise may have moved to another place.
+
+    The first passage through a level lies between where the lower edge of the phase's band first
+    reaches it and where the upper edge does; where that is far wider than first order says, the
+    phase comes near the level more than once.
+    """
+    spread = spread_of(data)
+    if spread is None:
+        return covariance
+    curve = GainPhaseCurve.of(data, pair)
+    inside = (data.omega_rad_s >= pair.low) & (data.omega_rad_s <= pair.high)
+    sizes = np.abs(data.response[0, 0, inside])
+    half = np.degrees(half_width() * spread[1, inside] / sizes)
+    found = covariance.copy()
+    for place, level in ((0, -180.0), (1, PHASE_MARGIN_DEG - 180.0)):
+        low = replace(curve, degrees=curve.degrees - half).falls_through(level)
+        high = replace(curve, degrees=curve.degrees + half).falls_through(level)
+        wide = 2.0 * half_width() * float(np.sqrt(covariance[place, place]))
+        if low is None or high is None or high - low > AMBIGUOUS * wide:
+            lost = [place] if place else [0, 2, 3, 4]
+            found[lost, :] = found[:, lost] = np.nan
+    return found
 
 
 def _thinned(response: FrequencyResponse, pair: Pair, values: Array) -> FrequencyResponse:
@@ -271,7 +308,7 @@ def _noise(measured: PairResponse, values: Array) -> tuple[Finding, ...]:
 
 def _windows(data: FrequencyResponse) -> tuple[Finding, ...]:
     """Warning that an estimate is blurred, which no interval holds."""
-    if not data.window_s:
+    if not data.window_s or data.estimator.endswith(WITHOUT_BIAS):
         return ()
     text = "read from a response that windows blur; its intervals hold random errors alone"
     action = "read it from a model fitted to the response: identify takes the windows out"

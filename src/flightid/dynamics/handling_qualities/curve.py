@@ -13,6 +13,7 @@ from flightid.errors import DataError, UnknownNameError
 from flightid.models import LinearSystem, StateSpaceModel, TransferFunctionModel
 from flightid.models.model import linear_system
 from flightid.responses import FrequencyResponse
+from flightid.responses.unbiased import WITHOUT_BIAS
 
 GRID_POINTS = 2000
 SLOPE_POINTS = 200
@@ -175,7 +176,7 @@ def smoother_of(response: FrequencyResponse, pair: Pair) -> Array | None:
     """Local parabolas over log frequency through the measured points of the band.
 
     A crossing read off two noisy neighbours has the slope of their noise. None where the points
-    have no errors, or are few.
+    have no errors, are few, or are smooth: of `without_bias`, a pilot with what it leaves.
 
     Reference
     ---------
@@ -186,6 +187,8 @@ def smoother_of(response: FrequencyResponse, pair: Pair) -> Array | None:
     inside = (measured.omega_rad_s >= pair.low) & (measured.omega_rad_s <= pair.high)
     error = measured.random_error[inside]
     logs = np.log(measured.omega_rad_s[inside])
+    if response.estimator.endswith(WITHOUT_BIAS):
+        return None
     if len(logs) < FEWEST_NEAR or not np.all(error > 0.0):
         return None
     rows = np.zeros((len(logs), len(logs)))

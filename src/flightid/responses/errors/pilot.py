@@ -186,8 +186,9 @@ def fit_pilots(
     Reference
     ---------
     Pintelon & Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., sections
-    6.7.1 (the transient as a polynomial over the same denominator), 9.8 and 9.12; order by the
-    minimum description length, section 11.3.
+    6.7.1 (the transient as a polynomial over the same denominator), 9.8 and 9.12; order by
+    Akaike's criterion for few data (Hurvich & Tsai, *Biometrika* 76, 1989): an order too low would
+    be a bias that no covariance holds.
     """
     return [
         _fit_output(_spectra(inputs, [each[row] for each in outputs], sample_time_s, highest_rad_s))
@@ -230,7 +231,7 @@ def _fit_output(data: _Spectra) -> Pilot | None:
             state = _search(data, order, scale, weights)
             # The criterion for an unknown variance of the noise.
             height = 2.0 * data.size * np.log(max(state.cost, LEAST))
-            height += unknowns * np.log(2.0 * data.size)
+            height += 2.0 * unknowns / (1.0 - (unknowns + 1.0) / (2.0 * data.size))
             since += 1
             if height < lowest:
                 lowest, found, since = height, state, 0
