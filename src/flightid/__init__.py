@@ -1,9 +1,6 @@
 """flightid: flight logs and rig records to validated flight-dynamics models.
 
-The public surface is the names listed in ``__all__``; ARCHITECTURE.md says which stage each one
-belongs to. A stage is loaded when its first name is used, so that ``import flightid`` and
-``flightid --help`` cost nothing: add a public name to the three lists below (a contract test
-compares them).
+A stage is loaded when its first name is used: add a public name to the three lists below.
 """
 
 import sys
@@ -269,8 +266,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    home = _HOMES.get(name)
-    if home is None:
+    if (home := _HOMES.get(name)) is None:
         raise AttributeError(f"module 'flightid' has no attribute {name!r}")
     module = import_module(home)
     return module if home == f"flightid.{name}" else getattr(module, name)
@@ -280,9 +276,8 @@ def __dir__() -> list[str]:
     return sorted(__all__)
 
 
+# Keeps a verb where a room has its name: Python binds an imported room to the package.
 class _Package(ModuleType):
-    """Keeps a verb where a room has its name: Python binds an imported room to the package."""
-
     def __setattr__(self, name: str, value: object) -> None:
         is_room = isinstance(value, ModuleType) and value.__name__ == f"{__name__}.{name}"
         if not (is_room and name in _HOMES and _HOMES[name] != f"{__name__}.{name}"):
