@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.identification.details import Details
 from flightid.identification.fit import Fit
@@ -137,6 +138,13 @@ def _costs(runs: BlackBoxRuns, outputs: Sequence[str]) -> dict[str, float]:
             for record, rows in zip(runs.records, runs.errors, strict=True)
         ]
         spread = sum(float(np.sum((row - row.mean()) ** 2)) for row in about if row.size)
+        if not spread > 0.0:
+            raise DataError(
+                "an output does not change where it is predicted",
+                found=f"{name} constant after the first samples of each record",
+                needed="an output that moves after as many samples as the model has lags",
+                action="give longer records, or leave that output out",
+            )
         found[name] = 100.0 * left / spread
     return found
 

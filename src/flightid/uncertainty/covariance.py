@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
 from flightid.conventions import Light
+from flightid.errors import FitError
 from flightid.findings import Finding
 from flightid.uncertainty.agreement import Agreement, AgreementTest, compare_parts
 from flightid.uncertainty.blocks import (
@@ -271,6 +272,13 @@ def triangle_of(blocks: Sequence[RecordBlock], beside: Array | None = None) -> A
 def _inverse_root(triangle: Array) -> Array:
     """R⁻¹ of a triangle: R⁻¹R⁻ᵀ is the covariance for white residuals of unit variance."""
     size = np.linalg.norm(triangle, axis=0)
+    if not np.all((size > 0.0) & (size < np.inf)):
+        raise FitError(
+            "the data do not see every parameter",
+            found=f"{int(np.sum(~((size > 0.0) & (size < np.inf))))} without a finite effect",
+            needed="residuals that answer to each",
+            action="lower the orders, or look for outliers and unlike scales in the records",
+        )
     return np.asarray(solve_triangular(triangle / size, np.eye(len(size))) / size[:, None])
 
 

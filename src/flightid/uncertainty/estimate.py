@@ -18,6 +18,7 @@ else:
     Number_co = TypeVar("Number_co", bound=float | None, covariant=True)
 
 Interval = tuple[float, float]
+UNHEARD = "to first order its error is below what numbers hold"
 
 
 class Ends(Protocol):
@@ -264,3 +265,18 @@ def estimate_table(
             reasons.setdefault(each.reason, []).append(each.name)
     why = tuple(f"{', '.join(names)}: {reason}." for reason, names in reasons.items())
     return Table(title, columns, tuple(rows), (*notes, *why)).without_empty_columns()
+
+
+def first_order(
+    name: str, value: float, unit: str, variance: float, freedom: float | None = None
+) -> Reading:
+    """An estimate by the variance that a slope carries to it; a variance of nothing is none.
+
+    Example
+    -------
+    >>> first_order("gain", 2.0, "1", 0.0).reason
+    'to first order its error is below what numbers hold'
+    """
+    if not 0.0 < variance < math.inf:
+        return Estimate(name, value, unit, None, UNHEARD)
+    return Estimate(name, value, unit, math.sqrt(variance), freedom=freedom)

@@ -51,8 +51,10 @@ class Autoregression:
 
     def autocovariance(self, n_lags: int) -> Array:
         """Autocovariance at lags 0 to ``n_lags - 1``."""
-        result = np.zeros(n_lags)
         order = self.weights.size
+        if n_lags <= order:
+            return self.lags[:n_lags].copy()
+        result = np.zeros(n_lags)
         result[: order + 1] = self.lags[: order + 1]
         if order:
             # Beyond its order the model continues its autocovariance by its own recursion.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.estimate import Estimate, Reading, first_order
 from flightid.uncertainty.quantiles import half_width
 from flightid.uncertainty.uneven import turned
 
@@ -46,8 +46,8 @@ class UncertainRoot:
         """A number that moves with (real, imaginary) as `slope` says."""
         if value is None or self.covariance is None:
             return Estimate(name, value, unit, None, self.reason)
-        variance = max(float(slope @ self.covariance @ slope), 0.0)
-        return Estimate(name, value, unit, math.sqrt(variance), freedom=self.freedom)
+        variance = float(slope @ self.covariance @ slope)
+        return first_order(name, value, unit, variance, self.freedom)
 
     def _outward(self) -> Array:
         """Derivative of |s| by (real, imaginary)."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.sampled.discrete_modes import discrete_modes, zero_note
 from flightid.responses.pair import quotient_unit
-from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.estimate import Estimate, Reading, first_order
 from flightid.uncertainty.roots import UncertainRoot
 
 Array = NDArray[np.float64]
@@ -225,8 +225,7 @@ def propagated(
         reason = NO_FIRST_ORDER if gradient is None else NO_ERRORS
         return Estimate(name, value, unit, None, reason, status="derived")
     variance = float(gradient @ errors.covariance @ gradient)
-    stderr = max(variance, 0.0) ** 0.5
-    return Estimate(name, value, unit, stderr, freedom=errors.degrees, status="derived")
+    return derived(first_order(name, value, unit, variance, errors.degrees))
 
 
 def fitted_gains(model: PolynomialModel, degrees: float) -> dict[str, Estimate]:

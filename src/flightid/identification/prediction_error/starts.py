@@ -131,7 +131,7 @@ def _reduced(long_a: Array, long_b: Array, nb: int, nf: int) -> tuple[Array, Arr
         response = lfilter(long_b, long_a, pulse)
     size = np.max(np.abs(response))
     if nb == 0 or not np.isfinite(size) or size == 0.0 or abs(response[-1]) > 0.5 * size:
-        return long_b[:nb], np.zeros(nf)
+        return np.pad(long_b[:nb], (0, max(nb - len(long_b), 0))), np.zeros(nf)
     return _steiglitz_mcbride(response, pulse[None], [length], [nb], nf, [0])
 
 

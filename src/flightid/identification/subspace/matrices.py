@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
+from flightid.errors import FitError
 from flightid.identification.subspace.data import SubspaceData
 from flightid.models.innovations.prediction import free_motion
 from flightid.models.sampled.recursion import run_recursion, spectral_radius
@@ -96,6 +97,12 @@ def feedthrough(
         columns[first : first + n] = free_motion(closed, c, count)
         rows.append(columns.reshape(columns.shape[0], -1))
         targets.append((y - c @ run_recursion(closed, k @ y)).ravel())
+    if not all(np.all(np.isfinite(each)) for each in (*rows, *targets)):
+        raise FitError(
+            "a subspace model's predictions run away over the records",
+            found=f"order {n}, predictor poles up to {np.abs(np.linalg.eigvals(closed)).max():.3g}",
+            action="choose another order, or look for outliers and unlike scales in the records",
+        )
     found = np.linalg.lstsq(np.hstack(rows).T, np.concatenate(targets), rcond=None)[0]
     d = found[n * m : n_free].reshape(p, m) if direct else np.zeros((p, m))
     return found[: n * m].reshape(n, m), d

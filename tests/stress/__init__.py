@@ -1,0 +1,1 @@
+"""Random structures, records and options: every end is a result or a typed error."""
