@@ -288,6 +288,20 @@ def test_command_designs_and_exports(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "Go or no-go" in files[2].read_text()
 
 
+def test_parameters_for_a_flight_count_the_loops_that_stay_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    open_loop = [*COMMAND[:9], "--axis", "11"]
+    sizes = []
+    for name in ("", "a.param"):
+        options = ["--param", str(tmp_path / name)] if name else []
+        assert run([*open_loop, *options, "--json"]) == 0
+        shown = capsys.readouterr()
+        sizes.append(json.loads(shown.out)["axes"][0]["peak_control"])
+    assert "Loops kept on: arducopter pitch, P 0.135, angle gain 4.5 1/s" in shown.err
+    assert sizes[1] > 5.0 * sizes[0]
+
+
 def test_command_writes_what_px4_can_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "wing.params"
     base = ["design", "sweep", *COMMAND[2:-2], "--params", str(file)]

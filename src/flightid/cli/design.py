@@ -24,6 +24,10 @@ KINDS = (
     "noise",
     "multisine",
 )
+MIXER_ROLL = 10
+MIXER_AXES = {MIXER_ROLL: "roll", 11: "pitch", 12: "yaw"}
+"""SID_AXIS that inject at the mixer, behind the controllers."""
+DEFAULT_LOOP_HZ = 400.0
 FILE = click.Path(dir_okay=False, path_type=Path)
 
 
@@ -39,6 +43,11 @@ def _fields() -> dict[str, type[Options]]:
 @click.option("--csv", "csv_file", type=FILE, help="Write the samples to this file.")
 @click.option("--param", type=FILE, help="Write ArduPilot parameters (kind ardupilot_chirp).")
 @click.option("--params", type=FILE, help="Write PX4 parameters: logging, and what it can inject.")
+@click.option(
+    "--log",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Flight whose autopilot keeps its loops on meanwhile; with --param alone: its defaults.",
+)
 @click.option("--fixed-wing", is_flag=True, help="With --params: a fixed wing sweeps the band.")
 @click.option("--html", type=FILE, help="Write a page with pictures to this file.")
 @json_option
@@ -47,6 +56,7 @@ def command(
     csv_file: Path | None,
     param: Path | None,
     params: Path | None,
+    log: Path | None,
     fixed_wing: bool,
     html: Path | None,
     as_json: bool,
@@ -61,6 +71,8 @@ def command(
     if param is not None and kind != "ardupilot_chirp":
         raise click.UsageError("--param needs the kind ardupilot_chirp")
     of_design, guess, limits = parted(options, _fields())
+    if log is not None or param is not None:
+        guess = _with_loops(guess, of_design.get("axis", MIXER_ROLL), log)
     plan = excitation.plan(
         kind, excitation.RateAxis(**guess), limits=excitation.Limits(**limits), **of_design
     )
@@ -75,6 +87,26 @@ def command(
     if html is not None:
         note(f"Wrote {_write_page(plan, html)}")
     leave_by_verdict(plan.findings)
+
+
+def _with_loops(guess: dict[str, Any], sid_axis: int, log: Path | None) -> dict[str, Any]:
+    """The guess under the loops that the autopilot keeps on while the mixer is swept.
+
+    They work against what is injected: without them amplitudes come out many times too small.
+    """
+    from flightid import axis_loop, read_log
+    from flightid.control.autopilots import axis_loop_of
+
+    axis = MIXER_AXES.get(sid_axis)
+    if axis is None or {"rate_feedback", "attitude_feedback_per_s"} & guess.keys():
+        return guess
+    own = None if log is None else axis_loop_of(read_log(log), axis)
+    loop = own or axis_loop("arducopter", axis, loop_rate_hz=DEFAULT_LOOP_HZ)
+    p, angle = loop.values["p"], loop.angle_gain_1_s
+    whose = "as flown" if own else "by default; --log FLIGHT takes what flew"
+    note(f"Loops kept on: {loop.autopilot} {axis}, P {p:.4g}, angle gain {angle:.4g} 1/s, {whose}")
+    sign = 1.0 if guess["gain"] > 0.0 else -1.0
+    return guess | {"rate_feedback": sign * p, "attitude_feedback_per_s": angle}
 
 
 def _write_px4(plan: Plan, path: Path, fixed_wing: bool) -> Path:
