@@ -148,6 +148,7 @@ def problem_of(
         noise_limit,
         paths.loop.inner,
         paths.loop.time_scale,
+        paths.integral_ratio(need.integral_factor),
     )
 
 

@@ -82,6 +82,17 @@ class ControllerPaths:
             high.append(most)
         return np.array(low), np.array(high)
 
+    def integral_ratio(self, factor: float | None) -> float:
+        """Largest I over P, 1/s: a factor over that of the autopilot's defaults, or as flown."""
+        known, names = self.loop.ranges, self.loop.names
+        if factor is None or not {"p", "i"} <= names.keys() & self.loop.values.keys():
+            return float(np.inf)
+        usual = [known[names[role]].default if names[role] in known else 0.0 for role in "pi"]
+        flown = [self.loop.values[role] for role in "pi"]
+        if min(usual) <= 0.0:
+            return float(np.inf)
+        return max(factor * usual[1] / usual[0], flown[1] / flown[0] if flown[0] > 0.0 else 0.0)
+
     def gains_of(self, loop: AxisLoop) -> Array:
         """Values of the gains that move."""
         inner = [loop.values[role] for role in self.roles if role in RATE_ROLES]

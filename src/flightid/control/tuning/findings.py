@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from flightid.control.autopilots import AxisLoop
 from flightid.control.margins.findings import COHERENCE
 from flightid.control.tuning.axis_tuning import AxisResult
+from flightid.control.tuning.gain_search import INTEGRAL
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.worst_case import least_share
 from flightid.conventions import Light
@@ -23,6 +24,7 @@ ADVICE = {
     "stability": "no gains in the ranges hold every plant: identify better, or widen the ranges",
     "identified band": "sweep to higher frequencies, or lower band_factor knowingly",
     "output noise": "lower the derivative filter, find the vibration, or allow more noise",
+    "ratio of I": "take preset firm, or a larger integral_factor, knowingly",
     "target": "lower the target, or make actuators and filters faster",
     "margin": "identify the delay better or make it shorter (filters, loop rate, motors)",
 }
@@ -98,7 +100,8 @@ def remarks(
             f"{np.count_nonzero(~held)} of {len(held)} plants are unstable with the flown gains",
             "the spread is wider than what flew: identify better",
         )
-    at_limits = [c.name for c in changes if c.at_limit]
+    tied = flown.names.get("i") if INTEGRAL in result.found.binding else None
+    at_limits = [c.name for c in changes if c.at_limit or c.name == tied]
     if result.found.exists and len(at_limits) == len(changes):
         yield Finding(
             "gains-at-limits",

@@ -37,6 +37,7 @@ PENALTY = 50.0
 """Loss of merit for a violated limit, in e-folds of the objective."""
 LARGEST_TD_S, TIME_SCALE_S = 0.5, 0.1
 TINY_GAIN = 1e-9
+INTEGRAL = "ratio of I to P"
 EDGE = 0.02
 """Slack below which a requirement binds."""
 
@@ -115,10 +116,12 @@ class _Space:
     low: Array
     high: Array
     slower: float
+    integral_ratio: float
 
     @classmethod
     def of(cls, problem: LoopProblem) -> _Space:
-        return cls(problem.kinds, problem.low, problem.high, problem.time_scale)
+        scale, ratio = problem.time_scale, problem.integral_ratio
+        return cls(problem.kinds, problem.low, problem.high, scale, ratio)
 
     @property
     def _lead(self) -> float:
@@ -142,7 +145,7 @@ class _Space:
         )
         times = self.slower * times_i, self.slower * times_d
         p, ti, td, a = map(np.ravel, np.meshgrid(gains, *times, angles))
-        made = {"P": p, "I": p / ti, "D": p * td, "A": a}
+        made = {"P": p, "I": p * np.minimum(1.0 / ti, self.integral_ratio), "D": p * td, "A": a}
         table = np.column_stack([made[kind] for kind in self.kinds])
         inside = np.all((table >= self.low) & (table <= self.high), axis=1)
         # Ranges that fit no such ratio still hold their own corners.
@@ -173,8 +176,9 @@ class _Space:
 
     def bounds(self) -> tuple[Array, Array]:
         """Lowest and highest point."""
+        ratio = np.array([1e-3, 1e2]) / self.slower
         given = {
-            "I": np.log(np.array([1e-3, 1e2]) / self.slower),
+            "I": np.log([ratio[0], np.clip(self.integral_ratio, 2.0 * ratio[0], ratio[1])]),
             "D": np.array([0.0, LARGEST_TD_S / TIME_SCALE_S]),
         }
         given |= {kind: np.log(self._range(kind)) for kind in "PA" if kind in self.kinds}
@@ -358,4 +362,7 @@ def _report(problem: LoopProblem, gains: Array) -> GainSearchResult:
         if value >= high * (1.0 - 1e-3) or (kind == "P" and value <= low * (1.0 + 1e-3))
     )
     slack = {name: float(each) for name, each in least.items()}
+    known = dict(zip(problem.kinds, gains, strict=True))
+    if "I" in known and known["I"] >= problem.integral_ratio * known["P"] * (1.0 - 1e-3):
+        binding += (INTEGRAL,)
     return GainSearchResult(gains, exists, (*binding, *at_range), slack)

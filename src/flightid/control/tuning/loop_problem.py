@@ -170,6 +170,8 @@ class LoopProblem:
         What the innermost loop is called.
     time_scale : float
         Of the loop's dynamics over those of a vehicle's rate loop.
+    integral_ratio : float
+        Largest I over P, 1/s.
     """
 
     plants: Plants
@@ -183,6 +185,7 @@ class LoopProblem:
     noise_limit: float | None = None
     inner: str = "rate loop"
     time_scale: float = 1.0
+    integral_ratio: float = float("inf")
 
     def with_plants(self, plants: Plants) -> LoopProblem:
         """The same requirements on other plants, at their frequencies."""

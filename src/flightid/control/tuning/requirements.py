@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+import tomllib
+from dataclasses import asdict, dataclass, fields
+from functools import cache
+from importlib.resources import files
 
 from flightid.options import Options, option
 
+PRESETS = ("gentle", "balanced", "firm")
 OBJECTIVES = ("disturbance", "crossover", "disturbance_bandwidth")
 
 
@@ -42,6 +46,11 @@ class TuningRequirements(Options):
         Least phase margin of the angle loop; its gain margin and peak are those of the rate loop.
     angle_crossover_rad_s : float or None
         Target: least crossover of the angle loop, rad/s.
+    integral_factor : float or None
+        Largest ratio of I to P, over that of the autopilot's defaults or over nothing where the
+        flown gains have a larger one; without it I grows until a margin stops it.
+    preset : {"gentle", "balanced", "firm"}
+        Values of `presets.toml` for all of these that are left as usual.
     objective : {"disturbance", "crossover", "disturbance_bandwidth"}
         What is made as good as the limits allow: the rate that a step of disturbance at the
         output leaves (root of its square integrated over time), the rate loop's crossover, or the
@@ -92,9 +101,22 @@ class TuningRequirements(Options):
     angle_crossover_rad_s: float | None = option(
         None, unit="rad/s", above=0.0, doc="Target: least crossover of the angle loop."
     )
+    integral_factor: float | None = option(
+        2.0, above=0.0, doc="Largest ratio of I to P over that of the autopilot's defaults."
+    )
+    preset: str = option(
+        "balanced", choices=PRESETS, doc="Values for all requirements that are left as usual."
+    )
     objective: str = option(
         "disturbance", choices=OBJECTIVES, doc="What is made as good as the limits allow."
     )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        usual = {field.name: field.default for field in fields(self)}
+        for name, value in _presets()[self.preset].items():
+            if getattr(self, name) == usual[name]:
+                object.__setattr__(self, name, value)
 
     @property
     def has_target(self) -> bool:
@@ -111,3 +133,10 @@ class TuningRequirements(Options):
     def to_dict(self) -> dict[str, object]:
         """Plain values with a ``schema`` key."""
         return {"schema": "flightid.tuning_requirements/1", **asdict(self)}
+
+
+@cache
+def _presets() -> dict[str, dict[str, float]]:
+    """Requirements by preset and name, as data."""
+    text = files("flightid.control.tuning").joinpath("presets.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
