@@ -298,6 +298,29 @@ def test_the_highest_crossing_counts_for_the_band() -> None:
     assert np.isnan(found[2])
 
 
+def test_a_preset_moves_what_is_left_as_usual() -> None:
+    gentle = TuningRequirements(preset="gentle", gain_margin_db=7.0)
+    assert (gentle.phase_margin_deg, gentle.gain_margin_db) == (60.0, 7.0)
+    assert TuningRequirements(preset="balanced") == TuningRequirements()
+    factors = [TuningRequirements(preset=p).integral_factor for p in ("gentle", "balanced", "firm")]
+    assert factors == sorted(factors)
+    with pytest.raises(OptionError, match="preset is not known"):
+        TuningRequirements(preset="brave")
+
+
+def test_the_integral_keeps_the_ratio_of_the_autopilot(fit: fid.Fit) -> None:
+    options = {"gains": FLOWN, "draws": 8, "angle_loop": False}
+    ratios = []
+    for factor in (1.0, 3.0, None):
+        need = dataclasses.replace(NEED, integral_factor=factor)
+        design = fid.tune_pid(fit, requirements=need, **options)
+        ratios.append(design.gains["ATC_RAT_RLL_I"] / design.gains["ATC_RAT_RLL_P"])
+    # ArduCopter's defaults have I = P.
+    assert_close(ratios[0], 1.0, rtol=1e-3, why="four digits of a gain")
+    assert_close(ratios[1], 3.0, rtol=1e-3, why="four digits of a gain")
+    assert ratios[2] > 3.5
+
+
 def test_statements_about_content() -> None:
     assert_close(content_of_worst(59) ** 59, 0.05, rtol=1e-12, why="Wilks")
     assert_close(least_share(59, 59), content_of_worst(59), rtol=1e-9, why="all of them good")

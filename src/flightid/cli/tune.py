@@ -81,10 +81,12 @@ def command(
 
         result = run_study(files[0], output=output, log=log, tune=asked)
         tuning, report = result.tuning, result.output / "report.html"
+        refused = [f"{each.message} ({each.action})" for each in result.faults]
     else:
-        tuning = _of_models(files, log, TuneSettings().changed(asked))
+        tuning, refused = _of_models(files, log, TuneSettings().changed(asked)), []
     if tuning is None:
-        raise click.ClickException("there is no model of a rate that can be tuned")
+        nothing = "there is no model of a rate that can be tuned"
+        raise click.ClickException("; ".join(refused) or nothing)
     if as_json:
         emit_values(tuning.to_dict())
     else:

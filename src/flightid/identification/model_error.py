@@ -60,18 +60,17 @@ class ModelErrorBound:
         return usable_band(self.omega_rad_s, -self.bound, -SHOWN)
 
     def at(self, omega_rad_s: Array) -> Array:
-        """Bound at any frequency: beyond the band it grows with the distance from it.
+        """Bound at any frequency: above the band it grows with frequency, below it stays.
 
         An error of dynamics that are missing grows with the frequency beyond the band that shows
-        it, as that of a lag does.
+        it, as that of a lag does; slow dynamics that are missing, as damping, lead the loop.
         """
         omega = np.asarray(omega_rad_s, dtype=np.float64)
         band = self.band_rad_s
         if band is None:
             return np.full(omega.shape, MOST)
         inside = np.interp(np.log(np.clip(omega, *band)), np.log(self.omega_rad_s), self.bound)
-        beyond = np.maximum(omega / band[1], band[0] / omega)
-        return np.asarray(np.minimum(inside * np.maximum(beyond, 1.0), MOST))
+        return np.asarray(np.minimum(inside * np.maximum(omega / band[1], 1.0), MOST))
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, four digits."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
-from flightid.identification.model_error import SHOWN, ModelErrorBound
+from flightid.identification.model_error import MOST, SHOWN, ModelErrorBound
 
 Band = tuple[float, float]
 Array = NDArray[np.float64]
@@ -77,6 +77,7 @@ def perturbed(
     count: int,
     *,
     turn: float,
+    size: float = 1.0,
 ) -> Complex:
     """Factors 1 + Δ of plants with |Δ| at the bound, each in a direction of its own.
 
@@ -89,6 +90,8 @@ def perturbed(
         Number of plants; the first is the estimate, whose factor is one.
     turn : float
         Share of a turn that all directions are moved by.
+    size : float
+        Multiple of the bound.
 
     Returns
     -------
@@ -107,6 +110,7 @@ def perturbed(
             if known is not None:
                 # Pairs turn at rates of their own, so that all combinations come about.
                 shares = turn + GOLDEN * (1.0 + np.sqrt(2.0) * place) * np.arange(1, count)
-                made[1:, i, j] += np.exp(2j * np.pi * shares)[:, None] * known.at(omega_rad_s)
+                directions = np.exp(2j * np.pi * shares)[:, None]
+                made[1:, i, j] += directions * np.minimum(size * known.at(omega_rad_s), MOST)
             place += 1
     return made

@@ -39,6 +39,8 @@ from flightid.version import VERSION
 CHANNELS = {"roll": ("tau_phi", "p"), "pitch": ("tau_theta", "q"), "yaw": ("tau_psi", "r")}
 """Command and rate of each axis, as channel maps and library models name them."""
 DRAWS, SHOWN = 300, 60
+SEARCHED_SIZE = 1.25
+"""Errors of structure in the search over those that judge it, whose directions it has not met."""
 ANSWER_S = 0.15
 """Time from a step of output in which a vehicle has turned the right way."""
 
@@ -212,16 +214,17 @@ def make_setting(
         _require_right_way(searched.systems[0], searched, outputs)
     judged = sampled((evidence.estimate, *evidence.fresh))
 
-    def plants(found: SampledPlants, points: int, turn: float) -> PlantSet:
+    def plants(found: SampledPlants, points: int, turn: float, size: float) -> PlantSet:
         def factors(omega: np.ndarray) -> np.ndarray:
-            return perturbed(evidence.errors, outputs, inputs, omega, len(found), turn=turn)
+            asked = {"turn": turn, "size": size}
+            return perturbed(evidence.errors, outputs, inputs, omega, len(found), **asked)
 
         return PlantSet.of(found, points, loops, gyro, factors)
 
     return Setting(
         evidence,
-        plants(searched, SEARCH_POINTS, 0.0),
-        plants(judged, JUDGED_POINTS, 0.5),
+        plants(searched, SEARCH_POINTS, 0.0, SEARCHED_SIZE),
+        plants(judged, JUDGED_POINTS, 0.5, 1.0),
         gyro,
         with_angle,
         requirements,
