@@ -25,9 +25,12 @@ Array = NDArray[np.float64]
 Stream = tuple[Array, Array]
 AXES = ("p", "q", "r")
 ANGLES = ("phi", "theta", "psi")
-WINDOW_S, SAMPLES_IN_WINDOW, MOST_WINDOWS = 0.3, 5, 5000
+WINDOW_S, SAMPLES_IN_WINDOW, MOST_WINDOWS = 0.3, 10, 5000
+FEWEST_WINDOWS = 25
 CORRELATION = 0.9
 TOLERANCE = 0.05
+DEVIATIONS = 3.0
+"""Standard errors of the factor, by the noise between the streams, that are allowed for."""
 LEAST_RATE = 0.02
 """Spread of a rate, in what its stream counts, below which nothing turns."""
 
@@ -46,6 +49,8 @@ class ScaleCheck:
         Spread of the second over that of the first.
     correlation : float
         Noise moves the factor by no more than this lacks of one.
+    n_windows : int
+        Windows behind it: few of them scatter the factor too.
     """
 
     quantity: str
@@ -53,11 +58,14 @@ class ScaleCheck:
     second: str
     factor: float
     correlation: float
+    n_windows: int
 
     @property
     def finding(self) -> Finding | None:
         """Red where the factor cannot be one; None where it can."""
-        least, most = self.factor * abs(self.correlation), self.factor / abs(self.correlation)
+        certain = abs(self.correlation)
+        scatter = 1.0 + DEVIATIONS * np.sqrt(max(0.0, 1.0 - certain**2) / self.n_windows)
+        least, most = self.factor * certain / scatter, self.factor / certain * scatter
         if self.correlation > 0.0 and least <= 1.0 + TOLERANCE and most >= 1.0 - TOLERANCE:
             return None
         sign = "-" if self.correlation < 0.0 else ""
@@ -127,7 +135,7 @@ def _edges(streams: list[Stream], span_s: tuple[float, float] | None) -> Array |
     slowest = max(float(np.median(np.diff(time_s))) for time_s, _ in streams)
     window = max(WINDOW_S, SAMPLES_IN_WINDOW * slowest)
     count = min(MOST_WINDOWS, int((stop - start) / window)) if stop > start else 0
-    if count < SAMPLES_IN_WINDOW**2:
+    if count < FEWEST_WINDOWS:
         return None
     return np.asarray(start + window * np.arange(count + 1), dtype=np.float64)
 
@@ -181,4 +189,4 @@ def _check(
     found = spread_ratio(turns[1], turns[0])
     if found is None or abs(found[1]) < CORRELATION:
         return None
-    return ScaleCheck(quantity, first, second, *found)
+    return ScaleCheck(quantity, first, second, *found, turns[0].size)

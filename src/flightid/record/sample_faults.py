@@ -138,7 +138,7 @@ def _spikes(name: str, stamps: Array, values: Array, unit: str) -> SampleFault |
     others = max(float(np.max(np.delete(away, at))), 1e-3 * float(np.min(away[at])))
     deviations = float(np.sqrt(np.min(away[at]) * others)) / spread if spread > 0.0 else FAR
     action = (
-        f"bridge them where they are read: [conditioning] outliers = {{ deviations = "
+        f"bridge them where they are read: [[conditioning]] outliers = {{ deviations = "
         f"{deviations:.0f} }} in a study, conditioning.remove_outliers in Python"
     )
     return _fault(name, stamps, at, ("spikes", light, said, action))
