@@ -72,7 +72,7 @@ def _autoregression(rows: Sequence[Array]) -> tuple[Array, int]:
 
 
 def _autocovariance(row: Array) -> Array:
-    return np.array([row[: len(row) - lag] @ row[lag:] for lag in range(ORDER + 1)])
+    return np.array([row[: max(len(row) - lag, 0)] @ row[lag:] for lag in range(ORDER + 1)])
 
 
 def is_white(residuals: Sequence[Array]) -> bool:
