@@ -164,3 +164,10 @@ def test_errors_of_terms_that_are_not_there_over_300_runs() -> None:
     rates = {share: float(np.mean(found)) for share, found in missed.items()}
     assert 0.03 < rates[0.5] < 0.07, rates
     assert rates[0.0] > 0.3, rates
+
+
+def test_many_samples_are_clustered_before_terms_are_chosen() -> None:
+    vectors = np.random.default_rng(0).standard_normal((60_000, 2))
+    model = fid.NarxStructure(("u",), "y", 1, 1)
+    assert len(candidate_terms(model, vectors).radial) <= 334
+    assert len(candidate_terms(model, vectors[:300]).radial) == 300

@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement, product
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,11 @@ from flightid.models.narx.terms import Term, product_term
 
 Array = NDArray[np.float64]
 MAXIMUM_CANDIDATES = 50_000
+MOST_PRODUCTS, FEWEST_CENTRES = 20_000_000, 100
+"""Samples times centres from which on clusters stand for the samples, and fewest of those."""
+CLUSTERED = 20_000
+"""Most samples that the clusters are made of, evenly over the records."""
+ITERATIONS, SPREAD_OUT = 10, 200
 
 
 @dataclass(frozen=True)
@@ -87,11 +93,7 @@ def _centres(model: NarxStructure, regressors: Array) -> Array:
     if model.kernel is None:
         return np.empty((0, dimension))
     if model.candidates == "kmeans":
-        if model.n_candidates >= len(regressors):
-            return regressors
-        generator = np.random.default_rng(model.seed)
-        centres, label = kmeans2(regressors, model.n_candidates, minit="++", rng=generator)
-        return np.ascontiguousarray(centres[np.unique(label)])
+        return _clusters(regressors, model.n_candidates, model.seed)
     if model.candidates == "grid":
         _require_few(
             model.n_candidates**dimension, "grid centres", "use data points, or fewer levels"
@@ -99,4 +101,27 @@ def _centres(model: NarxStructure, regressors: Array) -> Array:
         low, high = regressors.min(axis=0), regressors.max(axis=0)
         levels = [np.linspace(a, b, model.n_candidates) for a, b in zip(low, high, strict=True)]
         return np.array(list(product(*levels)), dtype=np.float64)
-    return regressors
+    return _clusters(regressors, most_centres(len(regressors)), model.seed)
+
+
+def most_centres(n_samples: int) -> int:
+    """Centres up to which the choice of terms takes time in proportion to the samples.
+
+    Example
+    -------
+    >>> most_centres(4000), most_centres(10_000), most_centres(1_000_000)
+    (5000, 2000, 100)
+    """
+    return max(MOST_PRODUCTS // n_samples, FEWEST_CENTRES)
+
+
+def _clusters(regressors: Array, count: int, seed: int) -> Array:
+    """The regressors themselves where they are no more, else centres of their clusters."""
+    if count >= len(regressors):
+        return regressors
+    some = regressors[:: -(-len(regressors) // max(CLUSTERED, 10 * count))]
+    generator = np.random.default_rng(seed)
+    # Spread-out first centres take a time with the square of their number.
+    first: Literal["++", "points"] = "++" if count <= SPREAD_OUT else "points"
+    centres, label = kmeans2(some, count, iter=ITERATIONS, minit=first, rng=generator)
+    return np.ascontiguousarray(centres[np.unique(label)])

@@ -36,7 +36,8 @@ class NarxStructure(Options):
         Width in deviations: ``"beta"``, ``"matlab_spread"`` (β = spread/0.8326) or ``"sigma"``
         (β = √2 σ).
     candidates : str
-        Centres to choose from: ``"data"`` every training sample, ``"kmeans"`` or ``"grid"``.
+        Centres to choose from: ``"data"`` every training sample, or clusters of them beyond some
+        4,500, ``"kmeans"`` or ``"grid"``.
     n_candidates : int
         Clusters, or levels of the grid along each regressor.
     seed : int
