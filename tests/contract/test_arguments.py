@@ -205,7 +205,7 @@ FIELDS_OF_THEIR_OWN = {
     ("FittedRecord", "reference_shift"): "estimates by input",
     ("Inspection", "bands"): "one usable band an axis",
     ("Plan", "windows_s"): "the window lengths that a plan asks for",
-    ("Record", "dataset"): "the xarray.Dataset inside",
+    ("Record", "dataset"): "the same as an xarray.Dataset",
     ("StateSpaceModel", "biases"): "key of a model file",
     ("StateSpaceModel", "initial"): "key of a model file",
 }

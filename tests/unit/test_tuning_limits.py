@@ -6,9 +6,10 @@ import re
 
 import numpy as np
 
-from flightid.control.tuning.limits import ANGLE, RATE, WHOLE, limits
+from flightid.control.tuning.limits import ANGLE, WHOLE, limits
 from flightid.control.tuning.requirements import TuningRequirements
 
+RATE = "rate loop"
 ASKED = TuningRequirements(
     phase_margin_deg=41.0,
     gain_margin_db=7.0,

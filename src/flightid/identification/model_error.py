@@ -28,6 +28,8 @@ REACH = 0.25 * np.log(2.0)
 FEWEST = 2
 ALIKE = 2.0
 """Neighbouring estimates that share their windows count as one."""
+TRACE = 1e-9
+"""Share of an output that is left of it where the model leaves nothing."""
 MOST = 0.9
 """Growth ends here: a model that nothing shows is not known to 5 dB upwards and 20 dB down."""
 
@@ -171,11 +173,17 @@ def _of_records(
 
 
 def _left_over(model: Model, item: FittedRecord, filtered: bool) -> Record:
-    """Measured minus a free run of the model."""
+    """Measured minus a free run of the model, and a trace of what was measured.
+
+    Exact data leave nothing, of which no response can be estimated.
+    """
     if not filtered:
-        return item.residual_record()
+        left = item.residual_record()
+        traces = {name: TRACE * item.measured[name][-left.n_samples :] for name in left.outputs}
+        return left.replace({name: left[name] + trace for name, trace in traces.items()})
     run = simulate(model, item.measured)
-    return item.measured.replace({name: item.measured[name] - run[name] for name in item.outputs})
+    whole = {name: item.measured[name] for name in item.outputs}
+    return item.measured.replace({n: (1.0 + TRACE) * y - run[n] for n, y in whole.items()})
 
 
 def _response(records: Sequence[Record], model: Model) -> FrequencyResponse:

@@ -8,7 +8,6 @@ from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from flightid.errors import FitError, OptionError
 from flightid.identification.local_minimum import LocalMinimum
@@ -99,6 +98,8 @@ def draw_starts(free: Sequence[Parameter], starts: int, seed: int) -> Array:
     own = np.array([[parameter.value or 0.0 for parameter in free]])
     if starts == 1 or not free:
         return own
+    from scipy.stats import qmc  # noqa: PLC0415  # a second that commands without a search do not need
+
     shares = qmc.LatinHypercube(d=len(free), rng=np.random.default_rng(seed)).random(starts - 1)
     reach = np.where(np.arange(1, starts) < _MANY, _NEAR, _WIDE)
     columns = [_spread(parameter, shares[:, k], reach) for k, parameter in enumerate(free)]

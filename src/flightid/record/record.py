@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike
 
 from flightid.conventions import Role
@@ -16,10 +15,9 @@ from flightid.record.hold import InputHold, InputShape, Loop
 from flightid.record.samples import LabelledSamples
 from flightid.record.unit_change import in_units
 from flightid.record.validation import (
-    TIME,
     inside_span,
-    labelled_variable,
-    labelled_variables,
+    labelled_samples,
+    own_samples,
     require_period,
     unknown_channel,
 )
@@ -37,9 +35,10 @@ class Record(LabelledSamples, Result, schema="flightid.record/1"):
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        Data variables along the dimension ``time_s`` with attributes ``unit``, ``role``, ``note``.
-        Use `Record.from_arrays` rather than this.
+    time_s : ndarray, shape (n_samples,)
+        Uniform stamps, s.
+    samples : mapping of Channel to ndarray, shape (n_samples,)
+        Kept as they are and made read-only; `Record.from_arrays` copies.
 
     Raises
     ------
@@ -113,10 +112,9 @@ class Record(LabelledSamples, Result, schema="flightid.record/1"):
             Role.EXCITATION: excitations or {},
             Role.OTHER: others or {},
         }
-        variables = labelled_variables(groups, stamps, units or {}, notes or {}, trim or {})
-        dataset = xr.Dataset(variables, coords={TIME: stamps})
+        samples = labelled_samples(groups, stamps, units or {}, notes or {}, trim or {})
         known = InputShape(hold, period_s, loop)
-        made = cls(dataset, name=name, trim=trim, history=history, input_shape=known)
+        made = cls(stamps, samples, name=name, trim=trim, history=history, input_shape=known)
         require_period([made[name] for name in made.inputs], made.sample_time_s, period_s)
         return made
 
@@ -155,20 +153,20 @@ class Record(LabelledSamples, Result, schema="flightid.record/1"):
         for label in given:
             if label not in {channel.name for channel in kept}:
                 raise unknown_channel(label, [channel.name for channel in kept])
-        variables = {
-            channel.name: labelled_variable(
-                channel,
-                given[channel.name] if channel.name in given else self[channel.name],
-                stamps,
-            )
-            for channel in kept
-        }
+        # Arrays of a record are read-only, so copies share what they do not exchange.
+        columns = {}
+        for channel in kept:
+            key = channel.name
+            whole = key in given or time_s is not None
+            value = given[key] if key in given else self[key]
+            columns[channel] = own_samples(channel, value, stamps) if whole else self[key]
         done = () if step is None else (Step(step.operation, step.options, VERSION),)
         values = self._trim if trim is None else trim
         made = Record(
-            xr.Dataset(variables, coords={TIME: stamps}),
+            stamps,
+            columns,
             name=self._name if name is None else name,
-            trim={key: value for key, value in values.items() if key in variables},
+            trim={key: values[key] for key in values if key in {each.name for each in kept}},
             history=(*self._history, *done),
         )
         bases = self._sample_time_s, made.sample_time_s

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from flightid.conventions import Role
@@ -14,11 +14,13 @@ from flightid.record.history import Step
 from flightid.record.hold import InputHold, InputShape
 from flightid.record.validation import (
     TIME,
-    channels_of,
     require_finite,
     uniform_sample_time,
     unknown_channel,
 )
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class LabelledSamples:
@@ -26,8 +28,10 @@ class LabelledSamples:
 
     Parameters
     ----------
-    dataset : xarray.Dataset
-        Data variables along the dimension ``time_s`` with attributes ``unit``, ``role``, ``note``.
+    time_s : ndarray, shape (n_samples,)
+        Uniform stamps, s.
+    samples : mapping of Channel to ndarray, shape (n_samples,)
+        Kept as they are and made read-only: copy before, where the caller keeps them.
 
     Raises
     ------
@@ -36,26 +40,28 @@ class LabelledSamples:
     """
 
     __slots__ = (
-        "_channels", "_dataset", "_history", "_input_shape", "_name", "_sample_time_s", "_trim",
+        "_channels", "_history", "_input_shape", "_name", "_sample_time_s", "_samples", "_time_s",
+        "_trim",
     )  # fmt: skip
 
     def __init__(
         self,
-        dataset: xr.Dataset,
+        time_s: NDArray[np.float64],
+        samples: Mapping[Channel, NDArray[np.float64]],
         *,
         name: str = "record",
         trim: Mapping[str, float] | None = None,
         history: Iterable[Step] = (),
         input_shape: InputShape | None = None,
     ) -> None:
-        self._sample_time_s = uniform_sample_time(np.asarray(dataset[TIME].values))
-        self._channels = channels_of(dataset)
-        for key in self._channels:
-            require_finite(key, np.asarray(dataset[key].values))
-        frozen = dataset.copy(deep=True)
-        for variable in frozen.variables.values():
-            variable.values.flags.writeable = False
-        self._dataset = frozen
+        self._sample_time_s = uniform_sample_time(time_s)
+        self._channels = {channel.name: channel for channel in samples}
+        self._samples = {channel.name: values for channel, values in samples.items()}
+        for key, values in self._samples.items():
+            require_finite(key, values)
+            values.flags.writeable = False
+        time_s.flags.writeable = False
+        self._time_s = time_s
         self._name = name
         self._trim = dict(trim or {})
         self._history = tuple(history)
@@ -68,18 +74,24 @@ class LabelledSamples:
 
     @property
     def dataset(self) -> xr.Dataset:
-        """The data as an `xarray.Dataset`; its arrays are read-only."""
-        return self._dataset
+        """The data as an `xarray.Dataset`, with unit, role and note as attributes; read-only."""
+        import xarray as xr  # noqa: PLC0415  # half a second that few commands need
+
+        variables = {
+            key: (TIME, self._samples[key], {"unit": c.unit, "role": str(c.role), "note": c.note})
+            for key, c in self._channels.items()
+        }
+        return xr.Dataset(variables, coords={TIME: self._time_s})
 
     @property
     def time_s(self) -> NDArray[np.float64]:
         """Time stamps, s, shape (n_samples,)."""
-        return np.asarray(self._dataset[TIME].values)
+        return self._time_s
 
     @property
     def n_samples(self) -> int:
         """Number of samples."""
-        return int(self._dataset.sizes[TIME])
+        return int(self._time_s.size)
 
     @property
     def sample_time_s(self) -> float:
@@ -159,7 +171,7 @@ class LabelledSamples:
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         """Samples of a channel, read-only, shape (n_samples,), in the channel's unit."""
         self._require(name)
-        return np.asarray(self._dataset[name].values)
+        return self._samples[name]
 
     def __contains__(self, name: object) -> bool:
         """Tell whether a channel of this name exists."""

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 import numpy as np
-import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.conventions import Role
@@ -22,13 +20,11 @@ FEWEST_COMPARED = 8
 TIME = "time_s"
 """Name of the time dimension and coordinate of a record."""
 
-Variable = tuple[tuple[str], NDArray[np.float64], dict[str, str]]
 
-
-def labelled_variable(
+def own_samples(
     channel: Channel, samples: ArrayLike, time_s: NDArray[np.float64]
-) -> Variable:
-    """Samples of a channel as an xarray variable, copied; refused where they do not fit."""
+) -> NDArray[np.float64]:
+    """Samples of a channel, copied; refused where they do not fit."""
     if channel.name == TIME:
         raise DataError(
             "a channel has the name of the time base", found=TIME, needed="another name"
@@ -40,44 +36,30 @@ def labelled_variable(
             found=f"shape {values.shape}",
             needed=f"shape {time_s.shape}, one-dimensional",
         )
-    attributes = {"unit": channel.unit, "role": str(channel.role), "note": channel.note}
-    return (TIME,), values, attributes
+    return values
 
 
-def labelled_variables(
+def labelled_samples(
     groups: Mapping[Role, Mapping[str, ArrayLike]],
     time_s: NDArray[np.float64],
     units: Mapping[str, str],
     notes: Mapping[str, str],
     trim: Mapping[str, float],
-) -> dict[str, Any]:
-    """Variables by channel name; refused where a channel has two roles or a label no channel."""
-    variables: dict[str, Any] = {}
+) -> dict[Channel, NDArray[np.float64]]:
+    """Samples by channel; refused where a channel has two roles or a label no channel."""
+    found: dict[str, tuple[Channel, NDArray[np.float64]]] = {}
     for role, group in groups.items():
         for key, samples in group.items():
-            if key in variables:
+            if key in found:
                 raise OptionError(
                     "a channel is named twice", found=key, needed="one role for each channel"
                 )
             channel = Channel(key, units.get(key, DIMENSIONLESS), role, notes.get(key, ""))
-            variables[key] = labelled_variable(channel, samples, time_s)
+            found[key] = channel, own_samples(channel, samples, time_s)
     for label in (*units, *trim, *notes):
-        if label not in variables:
-            raise unknown_channel(label, variables)
-    return variables
-
-
-def channels_of(dataset: xr.Dataset) -> dict[str, Channel]:
-    """Channels by name, from the attributes of a dataset's variables."""
-    return {
-        str(key): Channel(
-            str(key),
-            str(variable.attrs.get("unit", DIMENSIONLESS)),
-            Role(variable.attrs.get("role", Role.OTHER)),
-            str(variable.attrs.get("note", "")),
-        )
-        for key, variable in dataset.data_vars.items()
-    }
+        if label not in found:
+            raise unknown_channel(label, found)
+    return dict(found.values())
 
 
 def inside_span(

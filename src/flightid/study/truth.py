@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binom
+from scipy.special import bdtrc
 
 from flightid.conventions import Light
 from flightid.findings import Finding
@@ -99,7 +99,7 @@ def recovered(inside: NDArray[np.bool_]) -> Finding:
     message = f"{inside.size - missed} of {inside.size} true values lie inside their 95 % intervals"
     if missed == 0:
         return Finding("truth-recovered", Light.GREEN, message + ".")
-    chance = float(binom.sf(missed - 1, inside.size, 0.05))
+    chance = float(bdtrc(missed - 1, inside.size, 0.05))
     message += f"; honest intervals miss as many in {100 * chance:.2g} % of flights."
     if chance > UNLIKELY:
         return Finding("truth-recovered", Light.GREEN, message)

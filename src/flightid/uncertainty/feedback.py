@@ -16,7 +16,8 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, stats
+from scipy import linalg
+from scipy.special import fdtrc
 
 from flightid.errors import OptionError
 from flightid.record.hold import LOOPS, Loop
@@ -221,7 +222,7 @@ def _shares(
         whole = max(float(fresh[:, k] @ fresh[:, k]), tiny)
         share = max(0.0, 1.0 - float(rest[:, k] @ rest[:, k]) / whole)
         f = share / n_moved / max((1.0 - share) / free, tiny)
-        found.append((share, float(stats.f.sf(f, n_moved, free))))
+        found.append((share, float(fdtrc(n_moved, free, f))))
     return found
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy.special import chdtrc, fdtrc
 
 Array = NDArray[np.float64]
 LEAST_INFORMATION = 1e-6
@@ -114,9 +114,7 @@ def chance_alike(flights: Sequence[RecordParts], freedom: float) -> float | None
     # The level of the noise is an estimate too, and of as much freedom.
     share = max(square, 0.0) / degrees
     return float(
-        stats.f.sf(share, degrees, freedom)
-        if np.isfinite(freedom)
-        else stats.chi2.sf(share * degrees, degrees)
+        fdtrc(degrees, freedom, share) if np.isfinite(freedom) else chdtrc(degrees, share * degrees)
     )
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft, linalg, signal, stats
+from scipy import fft, linalg, signal
+from scipy.special import bdtr, chdtrc
 
 from flightid.errors import DataError, OptionError, ShapeError
 from flightid.uncertainty.quantiles import half_width
@@ -177,7 +178,7 @@ def white_portmanteau(values: Array, n_samples: int, fitted: int) -> tuple[float
     weights = 1.0 / (n_samples - np.arange(1, values.size + 1))
     statistic = float(n_samples * (n_samples + 2) * (values**2 @ weights))
     degrees = values.size - fitted
-    return statistic, degrees, float(stats.chi2.sf(statistic, degrees))
+    return statistic, degrees, float(chdtrc(degrees, statistic))
 
 
 def independence_portmanteau(
@@ -220,7 +221,7 @@ def independence_portmanteau(
     along = directions[:, kept].T @ values
     statistic = float(n_samples * np.sum(along**2 / spread[kept]))
     degrees = int(np.count_nonzero(kept)) - fitted
-    return statistic, degrees, float(stats.chi2.sf(statistic, max(degrees, 1)))
+    return statistic, degrees, float(chdtrc(max(degrees, 1), statistic))
 
 
 def pointwise_factor() -> float:
@@ -252,7 +253,7 @@ def exceedance_limit(n_lags: int) -> int:
     >>> exceedance_limit(25), exceedance_limit(51)
     (3, 5)
     """
-    return int(stats.binom.ppf(LEVEL, n_lags, 1.0 - LEVEL))
+    return int(np.searchsorted(bdtr(np.arange(n_lags + 1), n_lags, 1.0 - LEVEL), LEVEL))
 
 
 def _power(series: Series) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from scipy.stats import beta
+from scipy.special import betaincinv
 
 from flightid.errors import OptionError
 
@@ -78,7 +78,7 @@ def least_share(good: int, count: int, confidence: float = CONFIDENCE) -> float:
         raise OptionError("counts do not fit", found=f"{good} of {count}", needed="0 to all")
     if good == 0:
         return 0.0
-    return float(beta.ppf(1.0 - confidence, good, count - good + 1))
+    return float(betaincinv(good, count - good + 1, 1.0 - confidence))
 
 
 def _require(count: int, confidence: float) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from flightid.errors import DataError, OptionError
 from flightid.identification.advice.delays import InputDelay, find_delays
@@ -278,7 +278,7 @@ def _ends(values: Array, covariance: Array, count: int) -> bool:
     last = max(values.size // LAST, 1)
     tail = values[-last:]
     statistic = float(tail @ np.linalg.pinv(covariance[-last:, -last:], hermitian=True) @ tail)
-    return float(chi2.sf(statistic, last)) >= (1.0 - LEVEL) / count
+    return float(chdtrc(last, statistic)) >= (1.0 - LEVEL) / count
 
 
 def _require(names: tuple[str, ...], n_lags: int, negative_lags: int, kernel: str | None) -> None:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
@@ -193,7 +193,7 @@ def state_noise(
     left = _variances([each[:, ORDER:] for each in ahead]) / _variances(tails)
     oscillates = any(np.any(np.abs(np.imag(np.linalg.eigvals(a))) > 0.0) for a, _ in placed)
     return StateNoise(
-        float(chi2.sf(gain, n * p)), float(bic), crossed(sensors), bool(oscillates), left
+        float(chdtrc(n * p, max(gain, 0.0))), float(bic), crossed(sensors), bool(oscillates), left
     )
 
 

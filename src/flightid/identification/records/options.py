@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from flightid.errors import OptionError, UnknownNameError
 from flightid.options import Options, option
@@ -70,8 +71,12 @@ class RecordOptions(Options):
         if np.isinf(self.limit):
             return 1.0
         k = self.limit
-        inside = float(norm.cdf(k) - norm.cdf(-k))
-        return inside - 2.0 * k * float(norm.pdf(k)) + k**2 * (1.0 - inside)
+        inside = float(ndtr(k) - ndtr(-k))
+        return (
+            inside
+            - 2.0 * k * math.exp(-0.5 * k**2) / math.sqrt(2.0 * math.pi)
+            + k**2 * (1.0 - inside)
+        )
 
 
 def chosen(freed: Freedom, names: Sequence[str], subject: str) -> list[int]:

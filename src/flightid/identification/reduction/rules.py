@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
@@ -80,7 +80,7 @@ class ReductionLimits(Options):
         limit = self.maximum_total_cost_rise_percent / 100.0 * start
         if not explained:
             return limit
-        together = chi2.ppf(EXPLAINED_LEVEL, len(explained)) / chi2.ppf(EXPLAINED_LEVEL, 1)
+        together = chdtri(len(explained), 1.0 - EXPLAINED_LEVEL) / chdtri(1, 1.0 - EXPLAINED_LEVEL)
         return max(limit, float(together * np.mean(explained)))
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-import xarray as xr
 
 from flightid.errors import FileFormatError
 from flightid.record.formats.columns import ColumnTable, require_readable_size
@@ -32,6 +31,8 @@ def read_columns(path: Path, *, classic: bool) -> ColumnTable:
     FileFormatError
         The file is damaged, absurdly large or points to other files.
     """
+    import xarray as xr  # noqa: PLC0415  # half a second that other formats do not need
+
     if not classic:
         with plain_datasets(path) as datasets:
             for dataset in datasets.values():

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import signal, stats
+from scipy import signal
+from scipy.special import chdtri
 
 from flightid.conventions import Light
 from flightid.errors import OptionError
@@ -224,8 +225,8 @@ def _with_bounds(response: FrequencyResponse) -> tuple[NDArray[np.float64], ...]
     """Auto-spectra with their 95 % intervals, each shape (n_out, n_f)."""
     density = np.asarray(response.output_spectrum, dtype=np.float64)
     degrees = 2.0 * response.n_independent[:, 0, :] / overlap_factor(shifts_of(OVERLAP)) ** 2
-    low = density * degrees / stats.chi2.ppf(0.5 + 0.5 * LEVEL, degrees)
-    high = density * degrees / stats.chi2.ppf(0.5 - 0.5 * LEVEL, degrees)
+    low = density * degrees / chdtri(degrees, 0.5 - 0.5 * LEVEL)
+    high = density * degrees / chdtri(degrees, 0.5 + 0.5 * LEVEL)
     return density, low, high
 
 
