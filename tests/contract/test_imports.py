@@ -15,6 +15,7 @@ BASE = {
     "option_forms",
     "options",
     "progress",
+    "reading",
     "result",
     "surface",
     "table",

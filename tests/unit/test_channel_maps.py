@@ -165,7 +165,7 @@ def test_a_unit_of_another_dimension_is_refused(tmp_path: Path) -> None:
 def test_a_file_that_is_no_map_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "bad.toml"
     path.write_text(text)
-    with pytest.raises(FileFormatError, match="is not a channel map"):
+    with pytest.raises(FileFormatError, match=r"(is not|a) channel map"):
         channel_map(path)
 
 

@@ -41,11 +41,11 @@ def test_text_json_and_html_of_an_earlier_run(
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ("{", "not a results file"),
+        ("{", "a results file is no JSON"),
         ("[]", "needed schema"),
         (json.dumps({"schema": SCHEMA}), "not a report"),
         (json.dumps({"schema": SCHEMA, "report": {"schema": "flightid.document/1"}}), "KeyError"),
-        ("[" * 100_000, "not a results file"),
+        ("[" * 100_000, "a results file is no JSON"),
     ],
 )
 def test_a_file_that_is_no_result_is_named(

@@ -73,7 +73,7 @@ def test_what_holds_no_model_is_refused_with_a_way_on(saved: Path, tmp_path: Pat
     with pytest.raises(ModelError, match=r"holds no fitted model.*flightid.study/1.*models folder"):
         fid.load_model(tmp_path / "results.json")
     (tmp_path / "results.json").write_text("{")
-    with pytest.raises(FileFormatError, match="this is no JSON"):
+    with pytest.raises(FileFormatError, match="a saved fit is no JSON"):
         fid.load_model(tmp_path / "results.json")
 
 

@@ -234,7 +234,7 @@ def test_files_from_strangers_are_refused_in_words(tmp_path: Path) -> None:
     for suffix in ("mat", "json", "npz"):
         path = tmp_path / f"bad.{suffix}"
         path.write_bytes(b"\x00\x01 not this")
-        with pytest.raises(FileFormatError, match="not what its name says"):
+        with pytest.raises(FileFormatError, match=r"(is not a|no JSON)"):
             fid.read_system(path)
     (tmp_path / "list.json").write_text("[1]")
     with pytest.raises(ModelError, match="holds no table"):
@@ -245,5 +245,5 @@ def test_files_from_strangers_are_refused_in_words(tmp_path: Path) -> None:
     big = tmp_path / "big.json"
     with big.open("wb") as file:
         file.truncate(MAXIMUM_BYTES + 1)
-    with pytest.raises(FileFormatError, match="larger than a linear system"):
+    with pytest.raises(FileFormatError, match="longer than such a file can be"):
         fid.read_system(big)

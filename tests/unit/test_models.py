@@ -223,13 +223,13 @@ def test_files_are_read_as_data(tmp_path: Path) -> None:
     with pytest.raises(OptionError, match="written for one vehicle"):
         fid.load_model(str(path), axis="roll")
     path.write_bytes(b"\xff\xfe")
-    with pytest.raises(FileFormatError, match="is not text"):
+    with pytest.raises(FileFormatError, match="is no TOML in UTF-8"):
         fid.load_model(path)
     path.write_text("[" * 5000)
-    with pytest.raises(FileFormatError, match="is not TOML"):
+    with pytest.raises(FileFormatError, match="is no TOML"):
         fid.load_model(path)
     path.write_bytes(b"#" * ((1 << 20) + 1))
-    with pytest.raises(FileFormatError, match="larger than a model can be"):
+    with pytest.raises(FileFormatError, match="longer than such a file can be"):
         fid.load_model(path)
     with pytest.raises(UnknownNameError, match="no such library model"):
         fid.load_model("no_such_model")

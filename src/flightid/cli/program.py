@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pkgutil
 import traceback
 from collections.abc import Sequence
@@ -87,9 +88,19 @@ class Verbs(click.Group):
 @click.version_option(VERSION, prog_name="flightid")
 @click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
 @click.option("--quiet", is_flag=True, help="Show no progress.")
+@click.option(
+    "--memory",
+    type=click.IntRange(min=1),
+    metavar="MIB",
+    help="What one file may take in memory, MiB; default: FLIGHTID_MEMORY_MIB, else 2048.",
+)
 @click.pass_context
-def program(ctx: click.Context, quiet: bool) -> None:
+def program(ctx: click.Context, quiet: bool, memory: int | None) -> None:
     """Turn flight logs and rig records into validated flight-dynamics models."""
+    if memory is not None:
+        from flightid.reading import VARIABLE
+
+        os.environ[VARIABLE] = str(memory)
     if not quiet:
         from flightid.cli.bar import bar_display
         from flightid.progress import shown_by
@@ -122,7 +133,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return Exit.INTERRUPTED
     except BrokenPipeError:
         return Exit.DONE
-    except (FlightidError, OSError) as error:
+    except (FlightidError, OSError, MemoryError) as error:
         _explain(error, given)
         return Exit.UNUSABLE
     except Exception as error:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -130,9 +129,12 @@ def _is_study(files: tuple[Path, ...]) -> bool:
     if len(files) > 1 or files[0].is_dir() or files[0].suffix == ".json":
         return False
     # A file that is no TOML is told as a study that cannot be read.
+    from flightid.errors import FlightidError
+    from flightid.reading import read_toml
+
     try:
-        content = tomllib.loads(files[0].read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError):
+        content = read_toml(files[0], "the file")
+    except FlightidError:
         return True
     return "estimated" not in content and "kind" not in content
 

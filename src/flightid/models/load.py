@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from importlib.resources import files
 from pathlib import Path
 
-from flightid.errors import FileFormatError, ModelError, OptionError, UnknownNameError
+from flightid.errors import ModelError, OptionError, UnknownNameError
 from flightid.models.kinds import GreyBoxModel, model_from_description
 from flightid.models.model import Model
 from flightid.models.saved_files import model_in_json, only_model
 from flightid.models.state_space.model import StateSpaceModel
 from flightid.models.transfer.model import TransferFunctionModel
+from flightid.reading import parse_toml, read_toml
 
-MAXIMUM_BYTES = 1 << 20
 _LIBRARY_NAME = re.compile(r"[a-z0-9_]+")
 _DEFAULT_AXIS = "roll"
 
@@ -83,7 +82,7 @@ def load_model(path: str | Path, *, axis: str | None = None) -> Model:
     if name not in library_names() and Path(path).is_dir():
         return load_model(only_model(Path(path)), axis=axis)
     if isinstance(path, Path) or name.endswith(".toml"):
-        return _build(_parse(_read(Path(path)), name), axis, name)
+        return _build(read_toml(Path(path), "a model file"), axis, name)
     if not _LIBRARY_NAME.fullmatch(name):
         raise UnknownNameError(
             "there is no such library model",
@@ -100,7 +99,7 @@ def load_model(path: str | Path, *, axis: str | None = None) -> Model:
             needed=f"a .toml file, or one of {', '.join(library_names())}",
         )
     text = (files("flightid.models") / "library" / f"{name}.toml").read_text(encoding="utf-8")
-    return _build(_parse(text, name), axis, name)
+    return _build(parse_toml(text, "a model file", name), axis, name)
 
 
 def load_structure(source: str | Path, *, axis: str | None = None) -> GreyBoxModel:
@@ -119,32 +118,6 @@ def load_structure(source: str | Path, *, axis: str | None = None) -> GreyBoxMod
             needed="kind 'transfer' or 'state-space'",
         )
     return model
-
-
-def _read(path: Path) -> str:
-    with path.open("rb") as file:
-        content = file.read(MAXIMUM_BYTES + 1)
-    if len(content) > MAXIMUM_BYTES:
-        raise FileFormatError(
-            "a model file is larger than a model can be",
-            found=f"{path} with more than {MAXIMUM_BYTES} bytes",
-            needed="a TOML file below 1 MiB",
-        )
-    try:
-        return content.decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise FileFormatError(
-            "a model file is not text", found=f"{path}: {error}", needed="TOML in UTF-8"
-        ) from error
-
-
-def _parse(text: str, name: str) -> dict[str, object]:
-    try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise FileFormatError(
-            "a model file is not TOML", found=f"{name}: {error}", needed="TOML"
-        ) from error
 
 
 def _build(content: dict[str, object], axis: str | None, name: str) -> Model:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
-from flightid.errors import FileFormatError, ModelError
+from flightid.errors import ModelError
+from flightid.reading import bounded_bytes, parse_json
 
 MODELS = "models"
 """Folder of a study's results that holds its models."""
@@ -62,12 +62,7 @@ def model_in_json(path: Path) -> dict[str, object]:
     ModelError
         It holds no fit.
     """
-    if path.stat().st_size > MAXIMUM_JSON:
-        raise FileFormatError("a JSON file is larger than a fit can be", found=str(path))
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise FileFormatError("this is no JSON", found=f"{path}: {error}") from error
+    content = parse_json(bounded_bytes(path, MAXIMUM_JSON), "a saved fit", path.name)
     schema = content.get("schema") if isinstance(content, dict) else None
     fit = content["fit"] if schema == FITS[1] else content
     model = fit.get("model") if schema in FITS and isinstance(fit, dict) else None

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Role
-from flightid.errors import DataError, FileFormatError
+from flightid.errors import DataError, FileFormatError, FlightidError
+from flightid.reading import parse_json
 from flightid.record.channel import Channel
 from flightid.record.display import plain_step
 from flightid.record.history import Step
@@ -142,7 +143,7 @@ def from_text(text: str, file_name: str) -> list[RecordLabels]:
         The text is no JSON, of another schema, or lacks a part.
     """
     try:
-        content = json.loads(text)
+        content = parse_json(text, "the text of the labels", file_name)
         if content["schema"] != SCHEMA:
             raise FileFormatError(
                 f"{file_name} was written with another schema",
@@ -151,7 +152,9 @@ def from_text(text: str, file_name: str) -> list[RecordLabels]:
                 action="read it with the version of flightid that wrote it",
             )
         return [_record_labels(item) for item in content["records"]]
-    except (KeyError, TypeError, AttributeError, json.JSONDecodeError, RecursionError) as error:
+    except FlightidError:
+        raise
+    except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
         raise FileFormatError(
             f"the labels in {file_name} are damaged",
             found=f"{type(error).__name__}: {error}",

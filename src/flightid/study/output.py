@@ -11,6 +11,7 @@ from pathlib import Path
 
 from flightid.errors import FileFormatError, StudyError
 from flightid.files import sha256_of_file
+from flightid.reading import bounded_bytes, memory_budget, parse_json
 from flightid.report.content import Document
 from flightid.report.json import from_dict
 
@@ -18,6 +19,8 @@ RESULTS = "results.json"
 WRITTEN = ".written.json"
 """What a run wrote, so that the next one removes that and nothing else."""
 SCHEMA = "flightid.study/1"
+GROWTH = 16
+"""What JSON takes in memory, by its length in the file."""
 
 
 @contextmanager
@@ -100,8 +103,9 @@ def _written(folder: Path) -> dict[str, str] | None:
 
 def _read_json(path: Path) -> object:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = bounded_bytes(path, memory_budget() // GROWTH)
+        return parse_json(content, "a results file", path.name)
+    except (OSError, FileFormatError):
         return None
 
 
@@ -155,10 +159,8 @@ def read_report(path: Path) -> Document:
         The file holds no results of a study.
     """
     results = path / RESULTS if path.is_dir() else path
-    try:
-        values = json.loads(results.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError) as error:
-        raise FileFormatError("not a results file", found=f"{results}: {error}") from error
+    content = bounded_bytes(results, memory_budget() // GROWTH)
+    values = parse_json(content, "a results file", results.name)
     if not isinstance(values, dict) or values.get("schema") != SCHEMA:
         raise FileFormatError("not a results file", found=str(results), needed=f"schema {SCHEMA}")
     report = values.get("report")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from flightid.errors import StudyError
 from flightid.identification import Fit
+from flightid.reading import read_toml
 from flightid.study.reading import TableReader
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
@@ -57,8 +57,8 @@ def read_published(path: Path) -> PublishedFigures:
         The file cannot be read, a key is unknown, or a figure is no number.
     """
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+        content = read_toml(path, "a file of published figures", StudyError)
+    except OSError as error:
         raise StudyError(
             "a file of published figures cannot be read",
             found=f"{path.name}: {error}",

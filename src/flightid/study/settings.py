@@ -6,7 +6,6 @@ are relative to the file.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -14,6 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from flightid.errors import StudyError
+from flightid.reading import read_toml
 from flightid.record import InputShape
 from flightid.study.conditioning import Conditioning, read_conditioning, require_records
 from flightid.study.error_list import ErrorList
@@ -29,7 +29,6 @@ from flightid.study.response_settings import ResponseSettings, read_response
 from flightid.study.tuning import TuneSettings, read_tune
 from flightid.study.uses_settings import UsesSettings, read_uses
 
-MAXIMUM_BYTES = 1 << 20
 Value = TypeVar("Value")
 
 
@@ -143,7 +142,7 @@ def read_settings(path: Path) -> Settings:
         to a segment that is not there; the message names the place, and all places where there
         are several.
     """
-    root, folder = TableReader(_parsed(path), TOP), path.parent
+    root, folder = TableReader(read_toml(path, "the study file", StudyError), TOP), path.parent
     collected = ErrorList()
     tables = partial(collected.read, root.tables, [])
     words = collected.read(_words, ("", "", ""), root)
@@ -258,17 +257,6 @@ def _over(common: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any
         if isinstance(value, dict) and isinstance(values.get(key), dict):
             joined[key] = {**value, **values[key]}
     return joined
-
-
-def _parsed(path: Path) -> dict[str, Any]:
-    if path.stat().st_size > MAXIMUM_BYTES:
-        raise StudyError(
-            "the study file is too long", found=f"{path.stat().st_size} bytes", needed="1 MiB"
-        )
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise StudyError("the study file is no TOML", found=str(error) or "deep nesting") from error
 
 
 def _source(root: TableReader, folder: Path) -> tuple[Path | None, FlightPlan | None]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
@@ -14,10 +13,10 @@ from numpy.typing import NDArray
 
 from flightid.dynamics.handling_qualities.rating_charts import Limits, RatingChart, Region
 from flightid.errors import FileFormatError, OptionError, UnknownNameError
+from flightid.reading import read_toml
 from flightid.table import Column, Table
 
 OWN_FILES = ("rating_charts_ads33.toml", "rating_charts_mil.toml")
-LARGEST_FILE = 1 << 20
 """Bytes; a chart file is a page or two."""
 Document = Mapping[str, Any]
 
@@ -96,10 +95,8 @@ def _own() -> dict[str, Document]:
 
 def _read(path: Path) -> dict[str, Document]:
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise _fault(path, f"{path.stat().st_size} bytes")
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
+        document = read_toml(path, "a file of rating charts")
+    except OSError as error:
         raise _fault(path, str(error)) from error
     found: dict[str, Document] = {}
     for chart in _tables(path, document.get("chart")):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -11,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from flightid.conventions import Role
-from flightid.errors import DataError, FileFormatError, UnknownNameError
+from flightid.errors import DataError, FileFormatError, FlightidError, UnknownNameError
+from flightid.reading import DOCUMENT_BYTES, bounded_bytes, parse_toml
 from flightid.record.hold import HOLDS, InputHold, require_hold
 
 # Kind of log and vehicle -> map.
@@ -204,9 +204,9 @@ def channel_map(name: str | Path) -> ChannelMap:
     """
     shipped = files("flightid.logs").joinpath("channels")
     if str(name) in DEFAULTS.values():
-        text = shipped.joinpath(f"{name}.toml").read_text(encoding="utf-8")
+        text: bytes | str = shipped.joinpath(f"{name}.toml").read_text(encoding="utf-8")
     elif Path(name).is_file():
-        text = Path(name).read_text(encoding="utf-8")
+        text = bounded_bytes(Path(name), DOCUMENT_BYTES)
     else:
         raise UnknownNameError(
             "there is no such channel map",
@@ -215,16 +215,18 @@ def channel_map(name: str | Path) -> ChannelMap:
         )
     try:
         return _parse(text)
-    except (tomllib.TOMLDecodeError, KeyError, TypeError, ValueError, AttributeError) as error:
+    except FlightidError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise FileFormatError(
             f"{name} is not a channel map", found=f"{type(error).__name__}: {error}"
         ) from error
 
 
 @cache
-def _parse(text: str) -> ChannelMap:
+def _parse(text: bytes | str) -> ChannelMap:
     """The map that a text says: kept by the text, for a file may be edited while we run."""
-    content = tomllib.loads(text)
+    content = parse_toml(text, "a channel map", "the file")
     channels = tuple(_channel(name, item) for name, item in content["channels"].items())
     hold = content.get("hold")
     known = None if hold is None else require_hold(hold, HOLDS)

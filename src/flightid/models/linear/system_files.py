@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import loadmat, savemat
 
-from flightid.errors import FileFormatError, ModelError
+from flightid.errors import ModelError
 from flightid.files import as_path, write_atomically
 from flightid.models.linear.description import system_from_table
 from flightid.models.linear.linear_system import LinearSystem
+from flightid.reading import bounded_bytes, decoding, parse_json, require_memory
+from flightid.record.formats.matlab_bytes import inflated
 
 FORMATS = (".mat", ".json", ".npz")
 MAXIMUM_BYTES = 64 << 20
@@ -116,26 +119,10 @@ def read_system(path: str | Path) -> LinearSystem:
         raise ModelError(
             "a linear system is not read from this", found=str(path), needed=", ".join(FORMATS)
         )
-    with place.open("rb") as file:
-        content = file.read(MAXIMUM_BYTES + 1)
-    if len(content) > MAXIMUM_BYTES:
-        raise FileFormatError(
-            "a file is larger than a linear system can be",
-            found=f"{path} with more than {MAXIMUM_BYTES} bytes",
-            needed="below 64 MiB",
-        )
+    content = bounded_bytes(place, MAXIMUM_BYTES)
     read = {".json": _from_json, ".npz": _from_npz, ".mat": _from_mat}[suffix]
-    try:
+    with decoding(place.name, f"a {suffix} file as write_system makes it", "write it again"):
         table = read(content)
-    except ModelError:
-        raise
-    except Exception as error:
-        # Readers of damaged archives raise whatever their parts raise.
-        raise FileFormatError(
-            "a file is not what its name says",
-            found=f"{path}: {type(error).__name__}: {error}"[:300],
-            needed=f"{suffix} as write_system makes it",
-        ) from error
     return system_from_table(table)
 
 
@@ -161,7 +148,7 @@ def _npz(system: LinearSystem, extra: Mapping[str, object]) -> bytes:
 
 
 def _from_json(content: bytes) -> dict[str, object]:
-    table = json.loads(content.decode("utf-8"))
+    table = parse_json(content, "a linear system", "the file")
     if not isinstance(table, dict):
         raise ModelError("the file holds no table", found=type(table).__name__)
     table.pop("parameters", None)
@@ -169,8 +156,10 @@ def _from_json(content: bytes) -> dict[str, object]:
 
 
 def _from_npz(content: bytes) -> dict[str, object]:
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        require_memory("the file", sum(each.file_size for each in archive.infolist()))
     with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-        words = json.loads(str(arrays["description"]))
+        words = parse_json(str(arrays["description"]), "the description", "the file")
         numbers = {key: arrays[key].tolist() for key in (*_MATRICES, "delays_s")}
     words.pop("parameters", None)
     return {**words, **numbers}
@@ -209,7 +198,7 @@ def _save_mat(system: LinearSystem, extra: Mapping[str, object], path: Path) -> 
 
 
 def _from_mat(content: bytes) -> dict[str, object]:
-    found = loadmat(io.BytesIO(content))  # type: ignore[arg-type] # its stub knows paths alone
+    found = loadmat(inflated("the file", content))  # type: ignore[arg-type] # its stub knows paths alone
     missing = {"A", "B", "C", "D", "inputs", "outputs"} - set(found)
     if missing:
         raise ModelError("the file lacks variables", found=", ".join(sorted(missing)))

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, FileFormatError, UnitError, UnknownNameError
+from flightid.reading import require_memory
 from flightid.units import canonical
 
-MAXIMUM_BYTES = 4 << 30
-"""Largest amount of samples that is read into memory at once, bytes; guards against files that
-declare absurd sizes."""
+VALUE_BYTES = 3 * 8
+"""What a sample takes on its way into a record: as it was read, as a double, in the record."""
 HEADING = re.compile(r"^(?P<name>.*\S)\s*\[(?P<unit>[^\[\]]*)\]$")
 
 
@@ -94,15 +94,9 @@ def require_readable_size(path: Path, n_values: int) -> None:
     Raises
     ------
     FileFormatError
-        The declared size is above `MAXIMUM_BYTES`.
+        They take more than the memory budget.
     """
-    if n_values * 8 > MAXIMUM_BYTES:
-        raise FileFormatError(
-            f"{path.name} declares more samples than are read at once",
-            found=f"{n_values} values",
-            needed=f"at most {MAXIMUM_BYTES // 8}",
-            action="split the file, or check that it is not damaged",
-        )
+    require_memory(path.name, n_values * VALUE_BYTES)
 
 
 def is_unit(text: str) -> bool:

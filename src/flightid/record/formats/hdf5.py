@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import FileFormatError
-from flightid.record.formats.columns import require_readable_size
+from flightid.reading import decoding, require_memory
+from flightid.record.formats.columns import VALUE_BYTES
 
 MAXIMUM_OBJECTS = 100_000
+DEEPEST = 16
+WHOLE = "a whole HDF5 file"
 
 
 @contextmanager
@@ -26,19 +30,14 @@ def plain_datasets(path: Path) -> Iterator[Mapping[str, h5py.Dataset]]:
     FileFormatError
         The file is damaged, or holds too many objects or samples.
     """
-    try:
+    with decoding(path.name, WHOLE):
         file = h5py.File(path, "r")
-    except OSError as error:
-        raise FileFormatError(
-            f"{path.name} is not a whole HDF5 file",
-            found=str(error),
-            action="write or copy it again",
-        ) from error
     with file:
         datasets: dict[str, h5py.Dataset] = {}
-        _walk(path, file, "", datasets, depth=0)
-        # Each dataset alone is bounded when it is read; together they must fit as well.
-        require_readable_size(path, sum(int(dataset.size or 0) for dataset in datasets.values()))
+        with decoding(path.name, WHOLE):
+            _walk(path, file, "", datasets, seen={_place(file)})
+            # What is declared may have no samples behind it: fill values take no room in a file.
+            require_memory(path.name, sum(map(_declared_bytes, datasets.values())))
         yield datasets
 
 
@@ -57,29 +56,40 @@ def read_dataset(path: Path, dataset: h5py.Dataset) -> NDArray[Any]:
             needed="a file that holds its own samples",
             action="copy the data into one file",
         )
-    require_readable_size(path, int(dataset.size or 0))
-    try:
+    with decoding(path.name, WHOLE):
         return np.asarray(dataset[()])
-    except OSError as error:
-        raise FileFormatError(
-            f"{dataset.name} of {path.name} cannot be read", found=str(error)
-        ) from error
+
+
+def _declared_bytes(dataset: h5py.Dataset) -> int:
+    """What a dataset takes once it is read, and what one block of its storage takes."""
+    width = int(dataset.id.get_type().get_size())
+    count = int(dataset.id.get_space().get_simple_extent_npoints())
+    return count * max(width, VALUE_BYTES) + prod(dataset.chunks or ()) * width
+
+
+def _place(group: h5py.Group) -> int:
+    """Where a group stands in its file, whatever names lead to it."""
+    return int(h5py.h5o.get_info(group.id).addr)
 
 
 def _walk(
-    path: Path, group: h5py.Group, prefix: str, found: dict[str, h5py.Dataset], depth: int
+    path: Path, group: h5py.Group, prefix: str, found: dict[str, h5py.Dataset], seen: set[int]
 ) -> None:
+    """Add the datasets below a group; a group that several names lead to is entered once."""
     for key in group:
         link = group.get(key, getlink=True)
         if key.startswith("#") or not isinstance(link, h5py.HardLink):
             continue
-        if len(found) > MAXIMUM_OBJECTS or depth > 16:
+        if len(found) + len(seen) > MAXIMUM_OBJECTS or prefix.count("/") > DEEPEST:
             raise FileFormatError(
                 f"{path.name} holds too many or too deeply nested objects",
-                needed=f"at most {MAXIMUM_OBJECTS}, 16 deep",
+                needed=f"at most {MAXIMUM_OBJECTS}, {DEEPEST} deep",
             )
         item = group.get(key)
         if isinstance(item, h5py.Group):
-            _walk(path, item, f"{prefix}{key}/", found, depth + 1)
+            place = _place(item)
+            if place not in seen:
+                seen.add(place)
+                _walk(path, item, f"{prefix}{key}/", found, seen)
         elif isinstance(item, h5py.Dataset):
             found[f"{prefix}{key}"] = item

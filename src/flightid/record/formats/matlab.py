@@ -15,8 +15,10 @@ import scipy.io
 from numpy.typing import NDArray
 
 from flightid.errors import FileFormatError
-from flightid.record.formats.columns import ColumnTable, require_readable_size
+from flightid.reading import bounded_bytes, decoding, memory_budget
+from flightid.record.formats.columns import ColumnTable
 from flightid.record.formats.hdf5 import plain_datasets, read_dataset
+from flightid.record.formats.matlab_bytes import inflated
 
 NUMERIC = {
     *("double", "single", "logical"),
@@ -37,25 +39,12 @@ def read_columns(path: Path) -> ColumnTable:
     FileFormatError
         The file is damaged, absurdly large, or holds no numeric array.
     """
-    try:
-        inside = scipy.io.whosmat(path)
+    plain: Any = inflated(path.name, bounded_bytes(path, memory_budget()))
+    with decoding(path.name, "a whole MATLAB file", "save it again with save -v7"):
+        inside = scipy.io.whosmat(plain)
         wanted = [name for name, _, kind in inside if kind in NUMERIC or kind == "struct"]
-        require_readable_size(
-            path,
-            sum(int(np.prod(shape, dtype=float)) for name, shape, _ in inside if name in wanted),
-        )
         # Structures come as plain record arrays and objects are not asked for: nothing is called.
-        content = scipy.io.loadmat(path, variable_names=wanted, struct_as_record=True)
-    except FileFormatError:
-        raise
-    # SciPy's reader has no error of its own: a damaged file raises whatever its decoder met.
-    except Exception as error:
-        raise FileFormatError(
-            f"{path.name} is not a whole MATLAB file",
-            found=f"{type(error).__name__}: {error}",
-            needed="level 5 to 7.3",
-            action="save it again with save -v7",
-        ) from error
+        content = scipy.io.loadmat(plain, variable_names=wanted, struct_as_record=True)
     columns: dict[str, NDArray[Any]] = {}
     for name in wanted:
         _add(columns, name, content.get(name))
@@ -78,7 +67,9 @@ def read_hdf5_columns(path: Path) -> ColumnTable:
     columns: dict[str, NDArray[Any]] = {}
     with plain_datasets(path) as datasets:
         for key, dataset in datasets.items():
-            if _is_numeric(dataset):
+            with decoding(path.name, "a whole MATLAB file"):
+                is_numeric = _is_numeric(dataset)
+            if is_numeric:
                 # MATLAB writes column-major arrays, so HDF5 shows them transposed.
                 _add(columns, key.replace("/", "."), read_dataset(path, dataset).T)
     return _table(path, columns)

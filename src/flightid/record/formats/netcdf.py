@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from flightid.errors import FileFormatError
+from flightid.reading import decoding
 from flightid.record.formats.columns import ColumnTable, require_readable_size
 from flightid.record.formats.hdf5 import plain_datasets, read_dataset
 
@@ -37,18 +38,11 @@ def read_columns(path: Path, *, classic: bool) -> ColumnTable:
         with plain_datasets(path) as datasets:
             for dataset in datasets.values():
                 _require_own_storage(path, dataset)
-    try:
-        source = xr.open_dataset(
-            path, engine="scipy" if classic else "h5netcdf", decode_times=False
-        )
-    # The two engines raise whatever their decoders met in a damaged file.
-    except Exception as error:
-        raise FileFormatError(
-            f"{path.name} is not a whole netCDF file",
-            found=f"{type(error).__name__}: {error}",
-            action="write or copy it again",
-        ) from error
-    with source:
+    engine = "scipy" if classic else "h5netcdf"
+    with (
+        decoding(path.name, "a whole netCDF file"),
+        xr.open_dataset(path, engine=engine, decode_times=False) as source,
+    ):
         flat = {str(key): item for key, item in source.variables.items() if item.ndim == 1}
         require_readable_size(path, sum(item.size for item in flat.values()))
         values = {key: np.asarray(item.values) for key, item in flat.items()}
@@ -68,7 +62,8 @@ def read_labels(path: Path) -> str | None:
         dataset = next(iter(datasets.values()), None)
         if dataset is None:
             return None
-        value = dataset.file.attrs.get(LABELS_KEY)
+        with decoding(path.name, "a whole netCDF file"):
+            value = dataset.file.attrs.get(LABELS_KEY)
     return value if isinstance(value, str) else None
 
 

@@ -10,7 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from flightid.errors import FileFormatError
+from flightid.errors import DataError, FileFormatError
+from flightid.reading import decoding
 from flightid.record.formats.columns import (
     ColumnTable,
     require_distinct,
@@ -20,6 +21,14 @@ from flightid.record.formats.columns import (
 
 LABELS_KEY = b"flightid"
 UNIT_KEYS = (b"unit", b"units")
+WHOLE = "a whole Parquet file"
+PLAIN_TYPES = (
+    pa.types.is_integer,
+    pa.types.is_floating,
+    pa.types.is_boolean,
+    pa.types.is_timestamp,
+    pa.types.is_dictionary,
+)
 
 
 def read_columns(path: Path, *, has_labels: bool = False) -> ColumnTable:
@@ -46,7 +55,7 @@ def read_columns(path: Path, *, has_labels: bool = False) -> ColumnTable:
         metadata = file.schema_arrow.field(heading).metadata or {}
         for key in UNIT_KEYS:
             if key in metadata:
-                units[name] = metadata[key].decode()
+                units[name] = metadata[key].decode("utf-8", "replace")
     return ColumnTable(
         path,
         dict.fromkeys(names, file.metadata.num_rows),
@@ -58,31 +67,39 @@ def read_columns(path: Path, *, has_labels: bool = False) -> ColumnTable:
 def read_labels(path: Path) -> str | None:
     """The labels that flightid stored in a Parquet file; None in a file of another writer."""
     metadata = _open(path).schema_arrow.metadata or {}
-    return metadata[LABELS_KEY].decode() if LABELS_KEY in metadata else None
+    return metadata[LABELS_KEY].decode("utf-8", "replace") if LABELS_KEY in metadata else None
 
 
 def _open(path: Path) -> pq.ParquetFile:
-    try:
-        file = pq.ParquetFile(path)
-    except (pa.ArrowException, OSError) as error:
-        raise FileFormatError(
-            f"{path.name} is not a whole Parquet file",
-            found=str(error).strip().split("\n")[0],
-            action="write or copy it again",
-        ) from error
+    with decoding(path.name, WHOLE):
+        schema = pq.read_schema(path)
+        # One text of a megabyte may stand in a million rows: kept once, numbered.
+        texts = [each.name for each in schema if pa.types.is_string(each.type)]
+        file = pq.ParquetFile(path, read_dictionary=texts)
+    if not file.metadata.num_rows:
+        raise FileFormatError(f"{path.name} holds no row", needed="rows of numbers")
     require_readable_size(path, file.metadata.num_rows * max(1, file.metadata.num_columns))
     return file
 
 
 def _column(path: Path, file: pq.ParquetFile, name: str) -> NDArray[Any]:
-    try:
+    kind = file.schema_arrow.field(name).type
+    # A list or a text of any length may stand in each row: one value of bounded width is a cell.
+    if not any(is_plain(kind) for is_plain in PLAIN_TYPES):
+        raise DataError(
+            f"column {name!r} of {path.name} does not hold real numbers",
+            found=f"type {kind}",
+            needed="numbers, times or text",
+            action="leave the column out, or write it as numbers",
+        )
+    with decoding(path.name, WHOLE):
         column = file.read(columns=[name]).column(name)
-    except (pa.ArrowException, OSError) as error:
-        raise FileFormatError(
-            f"column {name!r} of {path.name} cannot be read", found=str(error).strip()
-        ) from error
-    if pa.types.is_timestamp(column.type):
-        # Exact in integers; a double of seconds since 1970 would round to 0.2 µs.
-        stamps = column.cast(pa.timestamp("ns")).to_numpy().astype("datetime64[ns]")
-        return np.asarray((stamps - stamps[0]) / np.timedelta64(1, "s"))
-    return np.asarray(column.to_numpy())
+        if pa.types.is_timestamp(column.type):
+            # Exact in integers; a double of seconds since 1970 would round to 0.2 µs.
+            stamps = column.cast(pa.timestamp("ns")).to_numpy().astype("datetime64[ns]")
+            return np.asarray((stamps - stamps[0]) / np.timedelta64(1, "s"))
+        if pa.types.is_dictionary(column.type):
+            texts = column.unify_dictionaries().combine_chunks()
+            known = texts.dictionary.to_numpy(zero_copy_only=False)
+            return np.asarray(known[texts.indices.fill_null(0).to_numpy(zero_copy_only=False)])
+        return np.asarray(column.to_numpy())
