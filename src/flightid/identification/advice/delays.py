@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise, product
+from itertools import pairwise
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
@@ -31,11 +32,15 @@ AROUND = 4
 """Delays on either side of the first scan's that the second tries."""
 ROUNDS = 8
 """Of the Steiglitz-McBride iteration."""
+SETTLED = 0.1
+"""Change of twice the log likelihood below which that iteration ends."""
 LONG = 40
 MOST_SAMPLES = 20_000
 """The second scan takes the first records up to so many samples."""
 UNCERTAIN = 10.0
 """Difference of twice the log likelihood above which a delay is refused: odds of 1 to 150."""
+HOPELESS = 20.0 * UNCERTAIN
+"""Such a difference beyond which no delay further away is tried."""
 WIDE = 2
 """Most samples between the ends of a range for its best value to be told."""
 
@@ -107,10 +112,14 @@ def find_delays(data: SampledChannels, largest: int) -> list[InputDelay]:
         low = max(0, first[place] - AROUND)
         tried = range(low, min(first[place] + AROUND, scan.largest) + 1)
         skip = max([*first, tried[-1]]) + max(POLES)
-        costs = {
-            delay: _cost(whitened, [*first[:place], delay, *first[place + 1 :]], skip)
-            for delay in tried
-        }
+        costs: dict[int, float] = {}
+        for way in (range(first[place], tried[-1] + 1), range(first[place] - 1, low - 1, -1)):
+            poles = [np.ones(1)] * len(POLES)
+            for delay in way:
+                delays = [*first[:place], delay, *first[place + 1 :]]
+                costs[delay], poles = _cost(whitened, delays, skip, poles)
+                if costs[delay] > min(costs.values()) + HOPELESS:
+                    break
         least = min(costs.values())
         first[place] = min(costs, key=lambda delay: costs[delay])
         alike = [delay for delay, cost in costs.items() if cost <= least + UNCERTAIN]
@@ -171,13 +180,17 @@ class _ArxScan:
         triangle = np.asarray(np.linalg.qr(np.take(self.triangle, order, axis=1), mode="r"))
         rest = triangle[len(others) :, len(others) :]
         found = []
-        past = [n for n in PAST if n <= self.past] or [self.past]
-        for n_a, n_b, delay in product(past, WINDOW, range(self.largest + 1)):
-            if delay + n_b > self.span:
-                continue
-            first = self.past + delay
-            columns = [*range(n_a), *range(first, first + n_b), -1]
-            found.append((_criterion(_left(rest, columns), self.n_rows, n_a + n_b), delay))
+        for n_a in [n for n in PAST if n <= self.past] or [self.past]:
+            # Below the first rows is what so many past outputs leave of the input's lags.
+            left = rest[n_a:, self.past :]
+            for n_b in WINDOW:
+                windows = sliding_window_view(left[:, :-1], n_b, axis=1).transpose(1, 0, 2)
+                windows = windows[: self.largest + 1]
+                target = np.broadcast_to(left[:, -1:], (*windows.shape[:2], 1))
+                both = np.concatenate([windows, target], axis=2)
+                squares = np.asarray(np.linalg.qr(both, mode="r"))[:, -1, -1] ** 2
+                best = int(np.argmin(squares))
+                found.append((_criterion(squares[best], self.n_rows, n_a + n_b), best))
         return min(found)[1]
 
 
@@ -233,14 +246,25 @@ def _whitened(data: _Signals) -> _Signals:
     return data.filtered(np.concatenate([[1.0], made.shortest[:long]]), np.ones(1))
 
 
-def _cost(data: _Signals, delays: Sequence[int], skip: int) -> float:
-    """Smallest criterion of output-error structures with one denominator and these delays."""
-    return min(_output_error(data, delays, order, skip) for order in POLES)
+def _cost(
+    data: _Signals, delays: Sequence[int], skip: int, starts: Sequence[Array]
+) -> tuple[float, list[Array]]:
+    """Smallest criterion of output-error structures with one denominator and these delays.
+
+    Also the denominators, from which the search at a neighbouring delay begins.
+    """
+    found = [
+        _output_error(data, delays, order, skip, start)
+        for order, start in zip(POLES, starts, strict=True)
+    ]
+    return min(cost for cost, _ in found), [below for _, below in found]
 
 
-def _output_error(data: _Signals, delays: Sequence[int], order: int, skip: int) -> float:
+def _output_error(
+    data: _Signals, delays: Sequence[int], order: int, skip: int, below: Array
+) -> tuple[float, Array]:
     m = len(delays)
-    below, criterion = np.ones(1), np.inf
+    criterion = np.inf
     for _ in range(ROUNDS):
         flat = data.filtered(np.ones(1), below)
         if not np.all(np.isfinite(flat.output)):
@@ -249,6 +273,8 @@ def _output_error(data: _Signals, delays: Sequence[int], order: int, skip: int) 
             flat.output, flat.inputs, flat.lengths, order, [order] * m, list(delays), skip
         )
         # Started from whatever state: only a simulation from rest would have to know it.
-        criterion = _criterion(made.sum_of_squares, made.n_rows, made.theta.size)
+        before, criterion = criterion, _criterion(made.sum_of_squares, made.n_rows, made.theta.size)
+        if abs(criterion - before) < SETTLED:
+            break
         below = reflected(np.concatenate([[1.0], made.shortest[:order]]))
-    return criterion
+    return criterion, below

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +36,9 @@ OUTLASTS = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
+class ImpulseResponse(
+    Result, schema="flightid.impulse_response/1", untold={"channels": "time histories"}
+):
     """Response of one output to a pulse of one sample on each input.
 
     Attributes
@@ -53,8 +56,8 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
         Regularisation.
     n_samples : int
         Samples that were fitted.
-    acts_after : mapping of str to InputDelay
-        Samples until each input acts, from structures with every delay (`advice/delays.py`).
+    channels : SampledChannels
+        What was fitted, means removed: delays are told from it when they are first asked for.
     units : mapping of str to str
     fitted_lags : int
         Lags that were fitted: more than those asked for, where the response outlasts them.
@@ -75,10 +78,16 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
     sample_time_s: float
     kernel: str | None
     n_samples: int
-    acts_after: Mapping[str, InputDelay]
+    channels: SampledChannels
     units: Mapping[str, str] = field(default_factory=dict)
     fitted_lags: int = 0
     reason: str = ""
+
+    @cached_property
+    def acts_after(self) -> dict[str, InputDelay]:
+        """Samples until each input acts, from structures with every delay."""
+        longest = max(int(self.lags[-1]), 0)
+        return dict(zip(self.inputs, find_delays(self.channels, longest), strict=True))
 
     @property
     def delays(self) -> dict[str, int | None]:
@@ -139,7 +148,7 @@ class ImpulseResponse(Result, schema="flightid.impulse_response/1"):
         return Table(repr(self), columns, tuple(rows), tuple(filter(None, notes)))
 
     def _computed(self) -> dict[str, object]:
-        return {"stderr": self.stderr}
+        return {"stderr": self.stderr, "acts_after": self.acts_after}
 
     def __repr__(self) -> str:
         """Channels, lags and delays on one line."""
@@ -240,7 +249,7 @@ def impulse_response(
         data.sample_time_s,
         kernel,
         rows,
-        dict(zip(names, find_delays(whole, n_lags - 1), strict=True)),
+        whole,
         data.units,
         fitted,
         "" if ended else OUTLASTS.format(fitted),

@@ -152,6 +152,8 @@ def reflected(polynomial: Array) -> Array:
     >>> reflected(np.array([1.0, -2.0])).round(2)
     array([ 1. , -0.5])
     """
+    if _stable(polynomial):
+        return polynomial
     roots = np.roots(polynomial)
     size = np.abs(roots)
     if not np.any(size >= 1.0):
@@ -159,3 +161,16 @@ def reflected(polynomial: Array) -> Array:
     inside = np.where(size >= 1.0, roots / np.maximum(size, 1.0) ** 2 * (1 - 1e-3), roots)
     tail = np.zeros(polynomial.size - 1 - roots.size)
     return np.concatenate([np.asarray(np.real(np.poly(inside))), tail])
+
+
+def _stable(polynomial: Array) -> bool:
+    """Whether all roots are inside the unit circle (Schur and Cohn's reflections)."""
+    rest: list[float] = (polynomial / polynomial[0]).tolist()
+    while len(rest) > 1:
+        last = rest[-1]
+        if not abs(last) < 1.0:
+            return False
+        turned = rest[::-1]
+        rest = [(a - last * b) / (1.0 - last * last) for a, b in zip(rest, turned, strict=True)]
+        rest.pop()
+    return True
