@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from tests.closeness import assert_close
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 
@@ -110,10 +111,8 @@ def test_the_unstable_helicopter_is_found_and_beats_its_rival(tmp_path: Path) ->
     assert (tmp_path / "ah64-output" / "report.html").stat().st_size > 100_000
 
 
-def test_the_dryer_script_checks_a_record_of_the_same_format(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    # A stand-in with the noise-free output-error model whose coefficients the script expects.
+def test_the_dryer_study_prints_published_values_beside_ours(tmp_path: Path) -> None:
+    # A stand-in with the noise-free output-error model whose coefficients the study expects.
     truth = fid.PolynomialModel(
         ("u",), "y", 0.08, b=[[0.06296, 0.05397]], f=[[1, -1.24108, 0.36682]], nk=(3,)
     )
@@ -123,18 +122,37 @@ def test_the_dryer_script_checks_a_record_of_the_same_format(
         np.arange(1000) * 0.08, inputs={"u": u - 5.0}, outputs={"y": np.zeros(1000)}
     )
     y = 4.9 + truth.simulate(record) + 0.01 * generator.standard_normal(1000)
-    np.savetxt(tmp_path / "dryer.dat", np.column_stack([u, y]))
-    monkeypatch.chdir(tmp_path)
-    script = EXAMPLES / "dryer" / "analyse.py"
-    code, said = _in_this_process(script, "dryer.dat", capsys=capsys)
-    assert code == 0
-    lines = said.splitlines()
-    place = next(i for i, line in enumerate(lines) if line.startswith("OE: loss"))
-    for line in lines[place + 1 : place + 5]:
-        name, value, _, expected = line.replace("(", "").split()[:4]
-        assert abs(float(value) - float(expected.rstrip(","))) < 0.05, name
-    assert "nk = 3" in said
-    assert _in_this_process(script, capsys=capsys)[0] == 1
+    for file in (EXAMPLES / "dryer").glob("*.toml"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    rows = np.column_stack([u, y])
+    np.savetxt(tmp_path / "dryer.csv", rows, "%.9g", ",", header="voltage,temperature", comments="")
+    study = fid.run_study(tmp_path / "study.toml")
+    delay, oe, *_, subspace = study.identified
+    assert delay.fit.structure.nk == (3,)
+    for name, value in oe.settings.published.value.items():
+        assert abs(oe.fit.parameters[name].value - value) < 0.05, name
+    assert len(subspace.settings.published.singular_values) == 6
+    report = (study.output / "report.txt").read_text("utf-8")
+    assert report.count("Published figures beside ours") == 4
+    assert report.count("Loss ") == 3
+    assert "Singular values " in report
+
+
+def test_the_dryer_record_gives_the_published_values(shared_data: Path, tmp_path: Path) -> None:
+    for file in (EXAMPLES / "dryer").glob("*.toml"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    rows = (shared_data / "records" / "dryer.csv").read_text("utf-8").split("\n", 1)[1]
+    (tmp_path / "dryer.csv").write_text("voltage,temperature\n" + rows, encoding="utf-8")
+    study = fid.run_study(tmp_path / "study.toml")
+    _, *published, subspace = study.identified
+    for item in published:
+        figures, fit = item.settings.published, item.fit
+        for name, value in figures.value.items():
+            assert abs(fit.parameters[name].value - value) < 6e-5, (item.name, name)
+        assert_close(fit.details.criteria.loss, figures.loss, rtol=1e-4, why="printed digits")
+    wanted = subspace.settings.published.singular_values
+    found = subspace.fit.details.order.singular_values[: len(wanted)]
+    assert_close(found, wanted, atol=6e-5, why="printed digits")
 
 
 @pytest.mark.nightly

@@ -9,7 +9,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification import Fit, Reduction
 from flightid.identification.prediction.request import FREE_RUN
-from flightid.models import GreyBoxModel
+from flightid.models import Model
 from flightid.responses import CoherentPairs, FrequencyResponse
 from flightid.study.model_settings import ModelSettings
 from flightid.study.structures import Choice, goal_findings
@@ -60,7 +60,7 @@ class ModelResults:
         By record, none of which the fit has seen; side by side where there are rivals.
     spectra : SpectrumComparison or None
         Of the first record of the responses, measured and in free run.
-    reference : TransferFunctionModel, StateSpaceModel or None
+    reference : Model or None
         Model that stands beside the estimates.
     reduction_judged : tuple of Finding
         Whether the reduced model predicts unseen records as the full one does.
@@ -73,7 +73,7 @@ class ModelResults:
     tests: ResidualTests | None = None
     verifications: Mapping[str, Verification | Comparison] = field(default_factory=dict)
     spectra: SpectrumComparison | None = None
-    reference: GreyBoxModel | None = None
+    reference: Model | None = None
     reduction_judged: tuple[Finding, ...] = ()
 
     @property

@@ -96,6 +96,8 @@ def _parts(item: ModelResults, truth: Truth | None) -> Iterator[Section]:
         yield section_of("Residual tests", _tests, item.tests)
     if fit is not None and isinstance(fit.model, StateSpaceModel):
         yield section_of("Modes and derivatives", _physics, item, fit)
+    elif fit is not None and item.reference is not None:
+        yield section_of("Modes beside the reference's", _beside, item, fit)
     for name, verification in item.verifications.items():
         yield section_of(f"Prediction of “{name}”", verification_blocks, verification)
     if item.spectra is not None:

@@ -140,8 +140,6 @@ def read_model(
         raise reader.error(
             "joint", "is missing", found="none", needed="records beside those of the responses"
         )
-    reference = reader.maybe(reader.text, "reference")
-    published = reader.maybe(reader.text, "published")
     made = ModelSettings(
         reader.text("name"),
         _placed(folder, template),
@@ -159,8 +157,7 @@ def read_model(
         _rivals(reader, folder),
         *((reader.names("keep", ()), reader.names("drop", ())) if reduced else ((), ())),
         condition=reader.maybe(reader.text, "condition"),
-        reference=None if reference is None else _placed(folder, reference),
-        published=None if published is None else read_published(folder / published),
+        **_beside(reader, folder),
         values_from=_values_from(reader),
         reduce=reader.flag("reduce", True) if reduced else False,
     )
@@ -187,6 +184,7 @@ def _without_equations(
         replace(check, without_equations=True),
         rivals=_rivals(reader, folder),
         condition=reader.maybe(reader.text, "condition"),
+        **_beside(reader, folder),
         structure=structure,
     )
     reader.finish()
@@ -203,6 +201,16 @@ def _band(reader: TableReader, response: ResponseSettings | None) -> tuple[float
     if band is not None and not 0 < band[0] < band[1]:
         raise reader.error("band_rad_s", "does not fit", found=band, needed="positive frequencies")
     return band
+
+
+def _beside(reader: TableReader, folder: Path) -> dict[str, Any]:
+    """What stands beside the estimates: a model, and printed figures."""
+    reference = reader.maybe(reader.text, "reference")
+    published = reader.maybe(reader.text, "published")
+    return {
+        "reference": None if reference is None else _placed(folder, reference),
+        "published": None if published is None else read_published(folder / published),
+    }
 
 
 def _rivals(reader: TableReader, folder: Path) -> dict[str, str]:

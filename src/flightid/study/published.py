@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from flightid.errors import StudyError
-from flightid.identification import Fit
+from flightid.identification import Fit, PolynomialDetails, SubspaceDetails
 from flightid.reading import read_toml
 from flightid.study.reading import TableReader
 from flightid.table import Cell, Column, Table
@@ -28,6 +28,10 @@ class PublishedFigures:
         Percent of the value.
     average_cost : float or None
         Of all responses.
+    loss : float or None
+        Of a model without equations.
+    singular_values : tuple of float
+        Of a subspace estimate, the largest first.
 
     Example
     -------
@@ -40,6 +44,8 @@ class PublishedFigures:
     cramer_rao_percent: Mapping[str, float]
     insensitivity_percent: Mapping[str, float]
     average_cost: float | None = None
+    loss: float | None = None
+    singular_values: tuple[float, ...] = ()
 
 
 def read_published(path: Path) -> PublishedFigures:
@@ -48,8 +54,9 @@ def read_published(path: Path) -> PublishedFigures:
     Parameters
     ----------
     path : Path
-        Keys ``source`` and ``average_cost``; tables ``[value]``, ``[cramer_rao_percent]`` and
-        ``[insensitivity_percent]`` of numbers by parameter; each may be left out but the first.
+        Keys ``source``, ``average_cost``, ``loss`` and ``singular_values``; tables ``[value]``,
+        ``[cramer_rao_percent]`` and ``[insensitivity_percent]`` of numbers by parameter; each may
+        be left out but the first.
 
     Raises
     ------
@@ -71,6 +78,8 @@ def read_published(path: Path) -> PublishedFigures:
         _numbers(reader, "cramer_rao_percent"),
         _numbers(reader, "insensitivity_percent"),
         reader.maybe(reader.positive, "average_cost"),
+        reader.maybe(reader.positive, "loss"),
+        reader.numbers("singular_values", ()),
     )
     reader.finish()
     return made
@@ -118,10 +127,20 @@ def published_table(published: PublishedFigures, fit: Fit) -> Table:
     notes = [f"Published: {published.source}."]
     if published.average_cost is not None and fit.responses:
         notes.append(f"Average cost {fit.average_cost:.3g}; published {published.average_cost:g}.")
+    if published.loss is not None and isinstance(fit.details, PolynomialDetails):
+        notes.append(f"Loss {fit.details.criteria.loss:.5g}; published {published.loss:g}.")
+    if published.singular_values and isinstance(fit.details, SubspaceDetails):
+        sizes = published.singular_values
+        ours = fit.details.order.singular_values[: len(sizes)]
+        notes.append(f"Singular values {_listed(ours)}; published {_listed(sizes)}.")
     if absent:
         notes.append(f"Published, and not in this model: {', '.join(absent)}.")
     made = Table("Published figures beside ours", tuple(columns), tuple(rows), tuple(notes))
     return made.without_empty_columns()
+
+
+def _listed(values: Iterable[float]) -> str:
+    return ", ".join(f"{value:.6g}" for value in values)
 
 
 def _value(parameter: Estimate) -> float | None:

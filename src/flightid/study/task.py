@@ -25,7 +25,7 @@ class Task:
         Channels that the model takes from its records: of the outputs those that are asked for.
     model : TransferFunctionModel, StateSpaceModel or None
         Equations and start values, overrides applied; None for a structure without equations.
-    reference : TransferFunctionModel, StateSpaceModel or None
+    reference : Model or None
         Model that stands beside the estimates.
     rivals : mapping of str to Model
         Models to verify side by side with the fit, by name; those of the study itself are not
@@ -36,7 +36,7 @@ class Task:
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     model: GreyBoxModel | None = None
-    reference: GreyBoxModel | None = None
+    reference: Model | None = None
     rivals: Mapping[str, Model] = field(default_factory=dict)
 
 
@@ -70,7 +70,8 @@ def load_task(settings: ModelSettings, others: tuple[str, ...] = ()) -> Task:
     structure = settings.structure
     if structure is not None or settings.template is None:
         inputs, outputs = (structure.inputs, structure.outputs) if structure else ((), ())
-        return Task(settings, inputs, outputs, rivals=rivals)
+        theirs = None if settings.reference is None else load_model(source_of(settings.reference))
+        return Task(settings, inputs, outputs, reference=theirs, rivals=rivals)
     model = load_structure(source_of(settings.template), axis=settings.axis)
     parameters = model.parameters
     for name, given in settings.parameters.items():

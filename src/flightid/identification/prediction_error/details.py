@@ -42,6 +42,8 @@ class PolynomialDetails(Details):
         By output: one step ahead and free run on the records of the fit.
     equation : str
         The model in samples.
+    transfer : tuple of str
+        Its transfer functions in factors of z.
 
     Example
     -------
@@ -67,6 +69,7 @@ class PolynomialDetails(Details):
     criteria: Criteria
     scores: Mapping[str, tuple[FitScore, FitScore]]
     equation: str
+    transfer: tuple[str, ...] = ()
 
     @property
     def modes(self) -> tuple[FittedRoot, ...]:
@@ -88,6 +91,7 @@ class PolynomialDetails(Details):
         scores = [score for pair in self.scores.values() for score in pair]
         return (
             self.equation,
+            *self.transfer,
             *(f"fit {s.fit_percent:.2f} % ({s.predictor}), rms {s.rms:.4g}" for s in scores),
             str(self.criteria),
             f"initial state: {structure.initial_state}; offsets taken off: {structure.offsets}",
@@ -105,6 +109,7 @@ class PolynomialDetails(Details):
         """Plain values."""
         return {
             "equation": self.equation,
+            "transfer": list(self.transfer),
             "roots": [root.to_dict() for root in self.roots],
             "gains": {name: p.to_dict() for name, p in self.gains.items()},
             "criteria": self.criteria.to_dict(),

@@ -277,6 +277,7 @@ def _assemble(
             criteria(squares, n_counted, structure.n_parameters),
             {structure.output: _scores(structure, runs, data, counted)},
             model.difference_equation(),
+            model.factored(),
             spent=spent(structure),
         ),
     )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from flightid.identification.prediction_error.details import PolynomialDetails
 from flightid.identification.subspace.order import OrderChoice
+from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate
 
 
@@ -45,6 +46,10 @@ class SubspaceDetails(PolynomialDetails):
         """Natural frequencies, dampings and steady gains: entries of the matrices mean nothing."""
         found = [each for root in self.modes for each in (root.natural_frequency, root.damping)]
         return (*(each for each in found if each is not None), *self.gains.values())
+
+    def tables(self) -> tuple[Table, ...]:
+        """Poles and zeros, and the candidate orders with their singular values."""
+        return (*super().tables(), self.order.summary())
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""

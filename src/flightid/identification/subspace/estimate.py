@@ -73,7 +73,8 @@ def decompose(structure: SubspaceStructure, data: SubspaceData) -> Subspace:
         vectors, values = np.asarray(shaped), np.asarray(correlations)
     else:
         vectors, values = _left(future if structure.method == "moesp" else past)
-    scale = 1.0 / data.scales[0] if len(data.scales) == 1 else 1.0
+    # In the unit of one output; several outputs have none in common.
+    scale = float(data.scales[0]) if len(data.scales) == 1 else 1.0
     shown = values if structure.method == "cva" else values * scale
     gamma = vectors * np.sqrt(values)
     return Subspace(shown, correlations, horizon, packed.n_columns, gamma, None, packed)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.models.polynomial.polynomials import Polynomials
 from flightid.models.sampled.discrete_modes import discrete_modes, zero_note
@@ -44,6 +45,40 @@ def _polynomial(row: object, delay: int) -> str:
     return text or "0"
 
 
+def factored(model: Polynomials, input: str) -> str:
+    """The transfer function from an input in factors of z, powers of z that both have left out.
+
+    Example
+    -------
+    >>> from flightid.models import PolynomialModel
+    >>> factored(PolynomialModel(("u",), "y", 0.1, a=[1, -0.5], b=[[2.0, 1.0]], nk=(1,)), "u")
+    'y/u = 2 (z + 0.5) / z (z - 0.5)'
+    """
+    above, below = model.transfer(input)
+    first = int(np.argmax(above != 0.0))
+    zeros, poles = (np.roots(np.trim_zeros(row)).astype(complex) for row in (above, below))
+    # z^-n beside monic polynomials of the degrees of both: what is left is a power of z.
+    power = poles.size - zeros.size - first
+    upper = f"{above[first]:.5g} {_powers(power)}{_factors(zeros)}".strip()
+    lower = f"{_powers(-power)}{_factors(poles)}".strip()
+    return f"{model.output}/{input} = {upper} / {lower or 1}"
+
+
+def _powers(power: int) -> str:
+    return "" if power <= 0 else f"z{'' if power == 1 else f'^{power}'} "
+
+
+def _factors(roots: NDArray[np.complex128]) -> str:
+    """Real roots, and pairs as ``(z² + b z + c)``."""
+    said = [f"(z{_term(-root.real, '').rstrip()})" for root in roots if root.imag == 0.0]
+    said += [
+        f"(z²{_term(-2.0 * root.real, 'z')}{_term(abs(root) ** 2, '').rstrip()})"
+        for root in roots
+        if root.imag > 0.0
+    ]
+    return " ".join(said)
+
+
 def roots_table(model: Polynomials) -> Table:
     """Poles and zeros of each response with natural frequency, damping and what to know."""
     columns = (
@@ -69,6 +104,7 @@ def roots_table(model: Polynomials) -> Table:
         )
     notes = (
         difference_equation(model),
+        *(factored(model, name) for name in model.inputs),
         "steady gains: "
         + ", ".join(
             f"{name} {'none (integrator)' if gain is None else f'{gain:.5g}'}"

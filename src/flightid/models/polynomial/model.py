@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Self
 
 from flightid.models.polynomial.description import model_from_table, model_to_table
-from flightid.models.polynomial.display import difference_equation, roots_table
+from flightid.models.polynomial.display import difference_equation, factored, roots_table
 from flightid.models.polynomial.makers import StructureMakers
 from flightid.models.polynomial.polynomials import Array, Polynomials
 from flightid.models.polynomial.prediction import forced_run
@@ -72,6 +72,10 @@ class PolynomialModel(Polynomials, StructureMakers, TableView):
     def difference_equation(self) -> str:
         """The model as an equation in samples, for ARX and ARMAX; else in polynomials."""
         return difference_equation(self)
+
+    def factored(self) -> tuple[str, ...]:
+        """Its transfer functions in factors of z."""
+        return tuple(factored(self, name) for name in self.inputs)
 
     def summary(self) -> Table:
         """Table of poles and zeros with natural frequencies and dampings."""
