@@ -60,6 +60,7 @@ def flight(seed: int, noise_share: float = NOISE) -> fid.Record:
         inputs={"lat": sweep()["lat"]},
         outputs={"p": clean + noise},
         units={"p": "rad/s"},
+        hold="first",
     )
 
 

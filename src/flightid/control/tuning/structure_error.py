@@ -81,6 +81,9 @@ def perturbed(
 ) -> Complex:
     """Factors 1 + Δ of plants with |Δ| at the bound, each in a direction of its own.
 
+    Below the band Δ turns to the real axis in proportion to frequency: the response of a vehicle
+    and of its model is real at zero frequency, so no error goes on turning the phase down to it.
+
     Parameters
     ----------
     errors : mapping of str to ModelErrorBound
@@ -110,7 +113,10 @@ def perturbed(
             if known is not None:
                 # Pairs turn at rates of their own, so that all combinations come about.
                 shares = turn + GOLDEN * (1.0 + np.sqrt(2.0) * place) * np.arange(1, count)
-                directions = np.exp(2j * np.pi * shares)[:, None]
+                angle = 2.0 * np.pi * shares[:, None]
+                band = known.band_rad_s
+                aside = 1.0 if band is None else np.minimum(omega_rad_s / band[0], 1.0)
+                directions = np.cos(angle) + 1j * np.sin(angle) * aside
                 made[1:, i, j] += directions * np.minimum(size * known.at(omega_rad_s), MOST)
             place += 1
     return made

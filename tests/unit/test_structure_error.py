@@ -1,0 +1,30 @@
+"""Plants moved by the error of a model: as far as it was, and real at zero frequency."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flightid.control.tuning.structure_error import perturbed
+from flightid.identification.model_error import ModelErrorBound
+from tests.closeness import assert_close
+
+SHOWN = ModelErrorBound(np.geomspace(1.0, 100.0, 41), np.full(41, 0.3))
+
+
+def moved(omega: list[float], count: int = 60) -> np.ndarray:
+    factors = perturbed({"p/u": SHOWN}, ["p"], ["u"], np.array(omega), count, turn=0.1)
+    return factors[:, 0, 0] - 1.0
+
+
+def test_in_the_band_plants_lie_on_the_circle_of_the_bound() -> None:
+    found = moved([1.0, 10.0, 100.0])
+    assert_close(np.abs(found[1:]), 0.3, rtol=1e-12, why="the bound in every direction")
+    assert np.all(found[0] == 0.0), "the estimate stands first"
+    assert np.ptp(np.angle(found[1:, 0])) > 6.0, "all the way round"
+
+
+def test_below_the_band_errors_turn_to_the_real_axis_as_a_lag_does() -> None:
+    found = moved([1.0, 0.1, 0.001])[1:]
+    assert_close(found[:, 1].imag, 0.1 * found[:, 0].imag, rtol=1e-9, why="in proportion")
+    assert_close(found[:, 1].real, found[:, 0].real, rtol=1e-9, why="the gain's error stays")
+    assert np.max(np.abs(found[:, 2].imag)) < 1e-3 * 0.3
