@@ -11,7 +11,7 @@ FUZZ_RUNS ?= 1000000
 # Rewritten asserts are kept between runs, whatever the shell says of byte code.
 PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
-.PHONY: demo test test-slow test-nightly docs fuzz bench lint hooks format stubs develop wheel constraints clean help
+.PHONY: demo test test-slow test-nightly docs fuzz same-wheel bench lint hooks format stubs develop wheel constraints clean help
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/ —/'
@@ -68,6 +68,12 @@ docs: wheel  ## build the documentation site into build/site, warnings as errors
 
 bench: wheel  ## speed against peers, same data, one run
 	$(BIN)/python -m benchmarks
+
+same-wheel:  ## build the wheel twice and compare the bytes
+	rm -rf build/twice && SOURCE_DATE_EPOCH=315532800 $(BIN)/maturin build --release --quiet --out build/twice/a
+	touch crates/python/src/lib.rs
+	SOURCE_DATE_EPOCH=315532800 $(BIN)/maturin build --release --quiet --out build/twice/b
+	for wheel in build/twice/a/*.whl; do cmp $$wheel build/twice/b/$$(basename $$wheel) || exit 1; done
 
 fuzz:  ## throw damaged logs, formulas and models at their readers (needs a nightly toolchain and cargo-fuzz)
 	cd fuzz && for target in dataflash ulog expression model; do \

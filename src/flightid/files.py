@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import secrets
+import time
 from collections.abc import Callable
 from pathlib import Path
 
 from flightid.errors import OptionError
 
 BLOCK_BYTES = 1 << 20
+STALE_S = 3600.0
 
 
 def as_path(path: object) -> Path:
@@ -64,6 +67,7 @@ def write_atomically(path: str | Path, content: bytes | str | Callable[[Path], o
     ('{}', ['result.json'])
     """
     final = as_path(path)
+    _remove_stale(final)
     # The suffix stays last: writers of other libraries choose their format by it.
     temporary = final.with_name(f".{final.stem}.{secrets.token_hex(6)}.part{final.suffix}")
     try:
@@ -71,12 +75,15 @@ def write_atomically(path: str | Path, content: bytes | str | Callable[[Path], o
             content(temporary)
         else:
             temporary.write_bytes(content.encode() if isinstance(content, str) else content)
-        _flush(temporary)
+        # Power may go at any line. The bytes reach the disk before the name does: a journal may
+        # write the rename first, and `path` would then name an empty file. After the rename the
+        # folder is flushed, so that who is told "written" finds it after the next start.
+        flush(temporary)
         temporary.replace(final)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
-    _flush(final.parent)
+    flush(final.parent)
     return final
 
 
@@ -112,7 +119,21 @@ def sha256_of_file(path: str | Path) -> str:
     return digest.hexdigest()
 
 
-def _flush(path: Path) -> None:
+def _remove_stale(final: Path) -> None:
+    """Remove what killed writers of the same file left; a living one takes less than an hour."""
+    pattern = re.compile(
+        rf"\.{re.escape(final.stem)}\.[0-9a-f]{{12}}\.part{re.escape(final.suffix)}"
+    )
+    try:
+        for entry in os.scandir(final.parent):
+            is_ours = pattern.fullmatch(entry.name) and entry.is_file(follow_symlinks=False)
+            if is_ours and time.time() - entry.stat(follow_symlinks=False).st_mtime > STALE_S:
+                Path(entry.path).unlink(missing_ok=True)
+    except OSError:
+        return  # What cannot be tidied stays; the writing itself says what is wrong.
+
+
+def flush(path: Path) -> None:
     """Bring a file, or the names in a folder, to the disk."""
     if path.is_dir() and os.name == "nt":
         return  # Windows has no handle for a folder; its rename is durable by itself.

@@ -105,3 +105,19 @@ def test_hooks_call_tools_that_make_installs() -> None:
         for file in FILES_OF_OURS.findall(" ".join(rest)):
             assert (ROOT / file).is_file(), hook["id"]
     assert hooks["commit-subject"]["stages"] == ["commit-msg"]
+
+
+def test_licences_of_others_are_listed_and_allowed() -> None:
+    page = (ROOT / "THIRD_PARTY.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| ([\w.-]+) \| [\w.]+ \| (.+) \|$", page, re.MULTILINE)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    wanted = {re.split(r"[<>=\[]", line)[0] for line in project["dependencies"]}
+    manifests = ROOT.glob("crates/*/Cargo.toml")
+    crates = [tomllib.loads(path.read_text(encoding="utf-8"))["dependencies"] for path in manifests]
+    wanted |= {name for table in crates for name in table if not name.startswith("flightid")}
+    assert wanted <= {name for name, _ in rows}
+    allowed = tomllib.loads((ROOT / "deny.toml").read_text(encoding="utf-8"))["licenses"]["allow"]
+    linked = page[: page.index("## Packages")]
+    for name, licence in re.findall(r"^\| ([\w.-]+) \| [\w.]+ \| (.+) \|$", linked, re.MULTILINE):
+        if name != "name":
+            assert set(re.split(r" OR |/| AND ", licence.strip())) <= {*allowed}, name

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import time
 from pathlib import Path
 
 import pytest
 
-from flightid.files import sha256_of_file, write_atomically
+from flightid.files import STALE_S, sha256_of_file, write_atomically
 
 
 @pytest.mark.parametrize("content", [b"abc", "abc", lambda path: path.write_bytes(b"abc")])
@@ -49,3 +51,14 @@ def test_hash_of_a_file_longer_than_a_block(tmp_path: Path) -> None:
     content = bytes(range(256)) * 5000
     (tmp_path / "long").write_bytes(content)
     assert sha256_of_file(tmp_path / "long") == hashlib.sha256(content).hexdigest()
+
+
+def test_what_killed_writers_left_goes_and_nothing_else(tmp_path: Path) -> None:
+    stale, young = (tmp_path / f".a.{mark}.part.csv" for mark in ("0123456789ab", "1123456789ab"))
+    other = tmp_path / ".a.mine.part.csv"
+    for path in (stale, young, other):
+        path.touch()
+    for path in (stale, other):
+        os.utime(path, (0.0, time.time() - 2.0 * STALE_S))
+    write_atomically(tmp_path / "a.csv", b"x")
+    assert sorted(tmp_path.iterdir()) == sorted([young, other, tmp_path / "a.csv"])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import socket
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ import pytest
 import flightid as fid
 from flightid.cli.program import run
 from flightid.errors import DataError, OptionError, UnknownNameError
-from flightid.simulation.realtime import UdpLink, fly_in_real_time
+from flightid.simulation.realtime import MOST_A_FRAME, UdpLink, fly_in_real_time
 from flightid.simulation.stepper import Stepper
 from tests.closeness import assert_close
 
@@ -178,3 +180,62 @@ def test_fly_from_the_command_line(tmp_path, capsys) -> None:
                               (["--send", "nowhere"], "is not HOST:PORT")):  # fmt: skip
         assert run(["fly", "short_period", *wrong]) == 2
         assert words_said in capsys.readouterr().err
+
+
+def test_the_first_sound_sender_is_the_pilot_and_a_frame_takes_a_bounded_count() -> None:
+    with UdpLink(["u"], listen=("127.0.0.1", 0)) as link:
+        pilot, other = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+        with pilot, other:
+            there = ("127.0.0.1", link.port)
+            other.sendto(b"nonsense", there)
+            pilot.sendto(b'{"u": 0.5}', there)
+            other.sendto(b'{"u": 9.0}', there)
+            assert link.pilot(0.0, {}) == {"u": 0.5}
+            assert link.rejected == 2
+            for _ in range(2 * MOST_A_FRAME):
+                other.sendto(b'{"u": 9.0}', there)
+            pilot.sendto(b'{"u": 0.25}', there)
+            pilot.sendto(b'{"u": 1e7}', there)
+            assert link.pilot(0.1, {}) == {"u": 0.25}
+            assert link.rejected == 3
+            for _ in range(3 * MOST_A_FRAME):
+                pilot.sendto(b"nonsense", there)
+            link.pilot(0.2, {})
+            assert link.rejected <= 3 + MOST_A_FRAME
+
+
+FLOOD = """
+import socket, sys, time
+out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+there, sent, begun = ("127.0.0.1", int(sys.argv[1])), 0, time.monotonic()
+while (gone := time.monotonic() - begun) < float(sys.argv[2]):
+    for _ in range(200):
+        out.sendto(b'{"u": 9.0}', there)
+    sent += 200
+    time.sleep(max(0.0, sent / 1e5 - gone))
+"""
+
+
+def _flooded(at_the_link: bool) -> tuple[fid.Record, int, float]:
+    """Ten seconds at 400 frames/s while 10⁵ datagrams/s arrive at the link, or beside it."""
+    with (
+        UdpLink(["u"], listen=("127.0.0.1", 0)) as link,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as pilot,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as beside,
+    ):
+        beside.bind(("127.0.0.1", 0))
+        pilot.sendto(b'{"u": 0.5}', ("127.0.0.1", link.port))
+        port = link.port if at_the_link else beside.getsockname()[1]
+        flood = subprocess.Popen([sys.executable, "-c", FLOOD, str(port), "10"])
+        session = fly_in_real_time(Stepper(SYSTEM, 1.0 / 400.0), link.pilot, duration_s=10.0)
+        flood.wait()
+    return session.record, session.late_frames, session.worst_late_s
+
+
+@pytest.mark.nightly
+def test_400_frames_a_second_stay_on_time_in_a_flood() -> None:
+    _, usual, _ = _flooded(at_the_link=False)
+    record, late, worst_s = _flooded(at_the_link=True)
+    assert (record["u"] == 0.5).all()
+    assert late < 2 * usual + 0.05 * record.n_samples
+    assert worst_s < 0.25

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import json
+import os
+import platform
 from pathlib import Path
 
 import pytest
 
 from flightid.errors import StudyError
-from flightid.study.output import SCHEMA, WRITTEN, require_replaceable, whole_folder
+from flightid.study.output import SCHEMA, WRITTEN, clear_stale, require_replaceable, whole_folder
+from flightid.study.owner import OWNER
 
 
 def _write_results(folder: Path, mark: str) -> None:
@@ -130,3 +133,39 @@ def test_a_result_that_does_not_list_its_files_is_left_alone(tmp_path: Path) -> 
     (tmp_path / "out" / WRITTEN).unlink()
     with pytest.raises(StudyError, match="holds something else"), whole_folder(tmp_path / "out"):
         pass
+
+
+def _left(parent: Path, end: str, mark: str, process: int | None) -> Path:
+    folder = parent / f".out.{end}"
+    folder.mkdir()
+    _write_results(folder, mark)
+    if process is not None:
+        note = {"machine": platform.node(), "process": process}
+        (folder / OWNER).write_text(json.dumps(note))
+    return folder
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows cannot say whether a process lives")
+def test_the_next_run_clears_what_a_killed_one_left(tmp_path: Path) -> None:
+    _left(tmp_path, "0123456789ab.part", "half", 2**22 + 1)
+    living = _left(tmp_path, "1123456789ab.part", "half", os.getpid())
+    young = _left(tmp_path, "2123456789ab.part", "half", None)
+    foreign = tmp_path / ".out.mine.part"
+    foreign.mkdir()
+    clear_stale(tmp_path / "out")
+    assert sorted(tmp_path.iterdir()) == sorted([living, young, foreign])
+
+
+def test_a_folder_put_aside_gets_its_name_back_or_hands_over(tmp_path: Path) -> None:
+    final = tmp_path / "out"
+    _left(tmp_path, "0123456789ab.old", "first", None)
+    clear_stale(final)
+    assert json.loads((final / "results.json").read_text())["mark"] == "first"
+    aside = _left(tmp_path, "1123456789ab.old", "older", None)
+    (aside / "notes.txt").write_text("mine")
+    with whole_folder(tmp_path / "else"):
+        pass
+    clear_stale(final)
+    assert not aside.exists()
+    assert (final / "notes.txt").read_text() == "mine"
+    assert json.loads((final / "results.json").read_text())["mark"] == "first"

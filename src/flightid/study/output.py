@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import secrets
 import shutil
 from collections.abc import Iterable, Iterator
@@ -10,10 +11,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from flightid.errors import FileFormatError, StudyError
-from flightid.files import sha256_of_file
+from flightid.files import flush, sha256_of_file
 from flightid.reading import bounded_bytes, memory_budget, parse_json
 from flightid.report.content import Document
 from flightid.report.json import from_dict
+from flightid.study.owner import OWNER, is_owned, mark_owner
 
 RESULTS = "results.json"
 WRITTEN = ".written.json"
@@ -48,18 +50,52 @@ def whole_folder(final: Path, inputs: Iterable[Path] = ()) -> Iterator[Path]:
     StudyError
         `final` holds something that no study wrote, or what this one reads.
     """
+    clear_stale(final)
     require_replaceable(final, inputs)
     final.parent.mkdir(parents=True, exist_ok=True)
     temporary = final.with_name(f".{final.name}.{secrets.token_hex(6)}.part")
     temporary.mkdir()
     try:
+        mark_owner(temporary)
         yield temporary
+        (temporary / OWNER).unlink()
         written = {name: sha256_of_file(file) for name, file in _files(temporary).items()}
         (temporary / WRITTEN).write_text(json.dumps(written, indent=1), encoding="utf-8")
+        # Power may go at any line. Files and names of the new folder are on the disk before it has
+        # its name, so `final` is the old one or the whole new one, or, between the two renames of
+        # `_exchange`, absent beside an `.old` folder that the next run puts back. The parent is
+        # flushed before the old folder goes: it must not be gone while the new name is not there.
+        for entry in (*_files(temporary).values(), *_folders(temporary)):
+            flush(entry)
         _exchange(temporary, final)
     except BaseException:
         shutil.rmtree(temporary, ignore_errors=True)
         raise
+
+
+def clear_stale(final: Path) -> None:
+    """Put right what a killed run left beside a folder; what a living run holds is left alone.
+
+    An `.old` folder without a `final` is the earlier result: it gets its name back. One beside a
+    `final` still holds what was to be handed over. A `.part` folder is half a result, and goes.
+    """
+    pattern = re.compile(rf"\.{re.escape(final.name)}\.[0-9a-f]{{12}}\.(part|old)")
+    beside = final.parent.iterdir() if final.parent.is_dir() else ()
+    for folder in sorted(beside, key=_age):
+        kind = pattern.fullmatch(folder.name)
+        if kind is None or folder.is_symlink() or not folder.is_dir() or is_owned(folder):
+            continue
+        if kind[1] == "old" and not final.exists():
+            folder.replace(final)
+            continue
+        if kind[1] == "old":
+            _hand_over(folder, final)
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _age(path: Path) -> float:
+    """Seconds, negative for the newest, which has the best claim to a name."""
+    return -path.lstat().st_mtime
 
 
 def require_replaceable(final: Path, inputs: Iterable[Path] = ()) -> None:
@@ -118,6 +154,7 @@ def _exchange(temporary: Path, final: Path) -> None:
     """Put the new folder in the place of the old; the old one returns if that fails."""
     if not final.exists():
         temporary.replace(final)
+        flush(final.parent)
         return
     aside = final.with_name(f".{final.name}.{secrets.token_hex(6)}.old")
     final.replace(aside)
@@ -126,6 +163,7 @@ def _exchange(temporary: Path, final: Path) -> None:
     except BaseException:
         aside.replace(final)
         raise
+    flush(final.parent)
     _hand_over(aside, final)
     shutil.rmtree(aside, ignore_errors=True)
 
@@ -143,6 +181,11 @@ def _hand_over(aside: Path, final: Path) -> None:
             target = final / Path(name).with_name(f"{file.stem}.kept{copy}{file.suffix}")
         target.parent.mkdir(parents=True, exist_ok=True)
         file.replace(target)
+        flush(target.parent)
+
+
+def _folders(folder: Path) -> list[Path]:
+    return [folder, *(entry for entry in folder.rglob("*") if entry.is_dir())]
 
 
 def read_report(path: Path) -> Document:
