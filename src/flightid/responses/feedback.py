@@ -5,17 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.record.hold import common_loop
 from flightid.record.repeats import found_period
+from flightid.responses.response import FrequencyResponse
 from flightid.responses.windows.samples import Samples
+from flightid.uncertainty.fed_noise import fed_noise_spectrum
 from flightid.uncertainty.feedback import FeedbackTest, declared_loop, find_feedback
 
 SAMPLES_A_CYCLE = 8.0
 """Samples kept in a cycle of the highest frequency of interest."""
+SAMPLES_FOR_BIAS = 16.0
+"""As many for the size of a bias: what is fed back within one seems the vehicle's own."""
 MAXIMUM_SAMPLES = 20000
 """Of all records together."""
 
@@ -43,8 +48,7 @@ def feedback_of(
     known = loop or common_loop([each.input_shape for each in records])
     if known is not None:
         return declared_loop(known)
-    step = max(1, int(2.0 * np.pi / (SAMPLES_A_CYCLE * omega_max * samples.sample_time_s)))
-    most = MAXIMUM_SAMPLES // len(samples.records)
+    step, most = _thinning(len(samples.records), omega_max, samples.sample_time_s)
     inputs, outputs = samples.part("inputs"), samples.part("outputs")
     return find_feedback(
         [rows[:, ::step][:, :most] for rows in inputs],
@@ -52,6 +56,54 @@ def feedback_of(
         samples.inputs,
         repeats=all(found_period(rows) is not None for rows in inputs),
     )
+
+
+def _thinning(
+    n_records: int, omega_max: float, sample_time_s: float, kept: float = SAMPLES_A_CYCLE
+) -> tuple[int, int]:
+    """Samples to a step, and most of them in a record."""
+    step = max(1, int(2.0 * np.pi / (kept * omega_max * sample_time_s)))
+    return step, MAXIMUM_SAMPLES // n_records
+
+
+def feedback_bias(response: FrequencyResponse) -> NDArray[np.complex128] | None:
+    """Bias of a direct estimate that noise makes by way of a closed loop, (n_out, n_in, n_f).
+
+    ``Φ_uu⁻¹ Φ_uv``: the inputs' spectrum, and that of the inputs with the noise of the outputs.
+
+    Parameters
+    ----------
+    response : FrequencyResponse
+
+    Returns
+    -------
+    ndarray of complex or None
+        None where no loop is known to be closed, the records are gone or too short, or inputs that
+        the estimate was conditioned on were left out.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., section 13.4; Pintelon & Schoukens, 2nd ed., §2.6.4.
+    """
+    linear, spectrum = response.linear, response.input_spectrum
+    if linear is None or spectrum is None or not (response.loop and response.loop.is_closed):
+        return None
+    if len(linear.places[1]) != len(linear.inputs):
+        return None
+    order = np.argsort(linear.places[1])
+    n_records, highest = len(linear.input_records), float(response.omega_rad_s[-1])
+    step, most = _thinning(n_records, highest, linear.sample_time_s, SAMPLES_FOR_BIAS)
+    fed = fed_noise_spectrum(
+        [rows[:, ::step][:, :most] for rows in linear.input_records],
+        [rows[:, ::step][:, :most] for rows in linear.output_records],
+        step * linear.sample_time_s,
+        response.omega_rad_s,
+    )
+    if fed is None:
+        return None
+    inputs = spectrum[np.ix_(order, order)].transpose(2, 0, 1)
+    bias = np.linalg.solve(inputs, fed).transpose(2, 1, 0)
+    return np.asarray(bias[:, linear.places[1]])
 
 
 def feedback_findings(test: FeedbackTest) -> tuple[Finding, ...]:

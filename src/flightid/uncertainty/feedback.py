@@ -162,7 +162,7 @@ def find_feedback(
     if repeats:
         return FeedbackTest("open", "repeats")
     n_in, n_out = len(names), len(outputs[0])
-    order = min(LARGEST_ORDER, sum(u.shape[1] for u in inputs) // _needed(n_in, n_out))
+    order = min(LARGEST_ORDER, usable_order(inputs, n_out))
     pairs = [(u, y) for u, y in zip(inputs, outputs, strict=True) if _room(u, order) > 0]
     free = sum(_room(u, order) for u, _ in pairs) - n_in * order - LAGS * n_out
     if order < 1 or free < FEWEST_FREE:
@@ -180,9 +180,9 @@ def find_feedback(
     return FeedbackTest(loop, "test", p_value, names[place], share)
 
 
-def _needed(n_in: int, n_out: int) -> int:
-    """Samples for one more past sample of each channel."""
-    return SAMPLES_PER_NUMBER * (n_in + n_out)
+def usable_order(inputs: Sequence[Array], n_out: int) -> int:
+    """Past samples of every channel that all records together allow."""
+    return sum(int(u.shape[1]) for u in inputs) // (SAMPLES_PER_NUMBER * (len(inputs[0]) + n_out))
 
 
 def _room(inputs: Array, order: int) -> int:

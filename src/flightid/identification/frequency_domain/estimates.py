@@ -52,6 +52,8 @@ class Statistics:
         Why there are no intervals though errors are known; empty where there are.
     agreement : Agreement or None
         Of records and of their halves.
+    bias : ndarray, shape (n,), or None
+        Of the estimates in `names` for the bias of the points, which their bars hold.
     """
 
     parameters: Mapping[str, Estimate]
@@ -62,6 +64,7 @@ class Statistics:
     outputs_apart: bool
     withheld: str = ""
     agreement: Agreement | None = None
+    bias: Array | None = None
 
 
 def statistics(
@@ -73,11 +76,13 @@ def statistics(
     sensitivity: Array | None,
     withheld: str = "",
     compare: Compare | None = None,
+    bias: Array | None = None,
 ) -> Statistics:
     """Standard errors, bounds and correlations at the end of a search.
 
     `withheld` says why there shall be no intervals, though errors of the data are known; `compare`
-    looks at parts of them.
+    looks at parts of them. `bias` of the points, in the order of `ErrorModel.propagated`, moves the
+    estimates; their covariance takes the square of that move, so that bars hold it.
 
     Raises
     ------
@@ -89,7 +94,7 @@ def statistics(
     names = tuple(p.name for p, keep in zip(free, inner, strict=True) if keep)
     jacobian = end.jacobian[:, inner]
     require_identifiable(names, jacobian)
-    covariance, freedom, agreement = None, None, None
+    covariance, freedom, agreement, moved = None, None, None, None
     if sensitivity is not None and names and not withheld:
         gain = estimator_gain(jacobian, sensitivity)
         if compare is None:
@@ -98,6 +103,9 @@ def statistics(
             agreed = compare(gain, inner)
             covariance, agreement = agreed.covariance, agreed.agreement
             freedom = agreed.freedom if agreement.freedom is not None else None
+        if bias is not None:
+            moved = -gain @ bias
+            covariance = covariance + np.outer(moved, moved)
     weighted = coherence_jacobian(fitted, selected)[:, inner]
     correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
     parameters = fitted_parameters(fitted, names, covariance, weighted, freedom, withheld=withheld)
@@ -111,6 +119,7 @@ def statistics(
         errors.outputs_apart,
         withheld,
         agreement,
+        moved,
     )
 
 

@@ -34,6 +34,7 @@ from flightid.identification.frequency_domain.error_model import (
 )
 from flightid.identification.frequency_domain.estimates import Statistics, statistics
 from flightid.identification.frequency_domain.estimator_bias import Correction
+from flightid.identification.frequency_domain.feedback_findings import judge_feedback, points_of
 from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.response_parts import PartComparison
@@ -47,6 +48,7 @@ from flightid.identification.frequency_domain.without_bias import far_from_best,
 from flightid.identification.multistart import DenseEnd, cluster, local_minima
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
+from flightid.responses.feedback import feedback_bias
 from flightid.units import require_match
 from flightid.version import VERSION
 
@@ -111,7 +113,9 @@ def _fit_selected(
         sensitivity=sensitivity,
         withheld=withheld,
         compare=compare,
+        bias=points_of(feedback_bias(data), errors),
     )
+    setup += judge_feedback(found)
     responses = compare_responses(fitted, selected)
     curves = [response_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
     noise = noise_costs(selected, curves, by_noise)

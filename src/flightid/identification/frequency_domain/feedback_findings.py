@@ -1,0 +1,50 @@
+"""What a closed loop makes of a direct estimate's parameters: which of them, and by how much."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.identification.frequency_domain.error_model import ErrorModel
+from flightid.identification.frequency_domain.estimates import Statistics
+
+Array = NDArray[np.float64]
+LARGE, RULING = 0.5, 2.0
+"""Bias over the standard error without it from which a parameter is named, and from which red."""
+
+
+def points_of(bias: NDArray[np.complex128] | None, errors: ErrorModel) -> Array | None:
+    """Bias of the fitted points, in the order of `ErrorModel.propagated`."""
+    if bias is None or not errors.runs or errors.known is None:
+        return None
+    parts = []
+    for run in errors.runs:
+        points = run.points
+        block = bias[points.output][np.ix_(points.inputs, points.frequencies)].ravel()
+        parts.append(np.concatenate([block.real, block.imag])[run.kept])
+    return np.concatenate(parts)
+
+
+def judge_feedback(found: Statistics) -> list[Finding]:
+    """Name the parameters that noise bends by way of a closed loop."""
+    if found.bias is None or found.covariance is None:
+        return []
+    variance = np.diag(found.covariance) - found.bias**2
+    shares = np.abs(found.bias) / np.sqrt(np.maximum(variance, np.finfo(float).tiny))
+    order = [int(k) for k in np.argsort(-shares) if shares[k] >= LARGE]
+    if not order:
+        return []
+    named = ", ".join(
+        f"{found.names[k]} {found.bias[k]:+.3g} ({shares[k]:.2g} standard errors)" for k in order
+    )
+    return [
+        Finding(
+            "loop-bias",
+            Light.RED if shares[order[0]] >= RULING else Light.AMBER,
+            f"the closed loop brings output noise to the inputs, which moves {named}; "
+            "the bars hold such a move, the values do not",
+            "log the injected signal and use estimator='instrument', or fly with the loop open",
+        )
+    ]

@@ -1,0 +1,54 @@
+"""The bias that a closed loop brings into a direct estimate, beside what it is in theory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import flightid as fid
+from flightid.uncertainty.fed_noise import fed_noise_spectrum
+from tests.strangers import closed_loops
+
+POLE, GAIN, FED = 0.9, 0.5, -0.3
+
+
+def _loop(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """y = G u + v with G = 0.5 z⁻¹/(1 − 0.9 z⁻¹), v = e/(1 − 0.9 z⁻¹) and u = r − 0.3 z⁻¹ y."""
+    fresh, e = np.random.default_rng(3).standard_normal((2, n))
+    u, y = np.zeros(n), np.zeros(n)
+    for k in range(1, n):
+        u[k] = fresh[k] + FED * y[k - 1]
+        y[k] = POLE * y[k - 1] + GAIN * u[k - 1] + e[k]
+    return u, y
+
+
+def test_the_spectrum_of_fed_noise_is_that_of_the_loop() -> None:
+    u, y = _loop(60_000)
+    omega = np.array([0.1, 0.5, 1.5])
+    found = fed_noise_spectrum([u[None]], [y[None]], 1.0, omega)
+    turn = np.exp(-1j * omega)
+    noise = 1.0 / (1.0 - POLE * turn)
+    response = GAIN * turn * noise
+    reached = FED * turn * noise / (1.0 - FED * turn * response)
+    truth = 2.0 * reached.conj() * noise
+    assert found is not None
+    assert np.all(np.abs(found[:, 0, 0] / truth - 1.0) < 0.1)
+
+
+def test_an_open_loop_feeds_nothing() -> None:
+    u, e = np.random.default_rng(0).standard_normal((2, 4000))
+    y = lfilter([0.0, GAIN], [1.0, -POLE], u) + e
+    found = fed_noise_spectrum([u[None]], [y[None]], 1.0, np.array([0.5]))
+    assert found is not None
+    assert not np.any(found)
+
+
+@pytest.mark.parametrize("feedback", [0.0, closed_loops.PILOT])
+def test_a_fit_names_what_the_pilot_bends(feedback: float) -> None:
+    flown = closed_loops.record(1, feedback=feedback)
+    response = fid.estimate_response(flown, band_rad_s=(0.5, 10.0), n_omega=40)
+    fit = fid.identify(closed_loops.model(), response)
+    named = [each.message for each in fit.findings if each.code == "loop-bias"]
+    assert len(named) == (feedback > 0.0)
+    assert all("Zw" in message and "Lp" not in message for message in named)
