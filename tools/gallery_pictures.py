@@ -40,7 +40,7 @@ COMMANDS = {
     "twin_rotor_linear": ("fly.py records", "-m flightid --quiet run study.toml --output out"),
     "twin_rotor_rbf": ("fly.py records", "-m flightid --quiet run study.toml --output out"),
     "r50": ("fly.py", "-m flightid --quiet run study.toml --output out"),
-    "ah64": ("identify.py --short --output out",),
+    "ah64": ("fly.py", "-m flightid --quiet run study.toml --output out"),
     "quadrotor_grey_box": ("study.py short 0 out",),
 }
 SHOTS = (
@@ -50,7 +50,7 @@ SHOTS = (
     Shot("narx-prediction.png", "twin_rotor_rbf", "3-2-1-1: measured, and predicted"),
     Shot("r50-response.png", "r50", "p to lat: instrument estimate"),
     Shot("r50-modes.png", "r50", "Eigenvalues with 95 % regions, beside"),
-    Shot("ah64-modes.png", "ah64", "Eigenvalues of the identified and of the flown vehicle"),
+    Shot("ah64-modes.png", "ah64", "Eigenvalues with 95 % regions, beside"),
     Shot("ah64-reduction.png", "ah64", "Average cost, and the worst insensitivity"),
     Shot("grey-box-intervals.png", "quadrotor_grey_box", "Estimates with 95 % intervals"),
     Shot("grey-box-prediction.png", "quadrotor_grey_box", "tau_phi doublet: measured"),

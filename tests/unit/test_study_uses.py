@@ -130,9 +130,44 @@ def test_exports_loops_and_conditions_stand_in_the_report(study: fid.Study) -> N
     assert list(uses["loops"]) == ["Rate feedback"]
 
 
+def test_a_controller_of_blocks_and_its_qualities_are_stages(
+    folder: Path, study: fid.Study
+) -> None:
+    gain = '[{ kind = "gain", inputs = "p", outputs = "tau_phi", value = [[-0.02]] }]'
+    text = STUDY.replace("gains = { tau_phi = { p = 0.02 } }", f"block = {gain}")
+    text += '[handling_qualities]\nsources = ["fit", "response", "loop"]\n'
+    text += '[handling_qualities.axes]\nroll = ["p", "tau_phi"]\n'
+    (folder / "blocks.toml").write_text(text, encoding="utf-8")
+    cache: dict[str, object] = {}
+    made = fid.run_study(folder / "blocks.toml", output=folder / "blocks", cache=cache)
+    ((_, closed),), ((_, gains),) = made.uses.loops, study.uses.loops
+    assert list(map(str, closed.poles)) == list(map(str, gains.poles))
+    assert set(made.qualities) == {"Roll, slow", "Roll, fast", "Rate feedback"}
+    again = fid.run_study(folder / "blocks.toml", output=folder / "blocks", cache=cache)
+    assert not again.carried_out
+    assert {"loop: Rate feedback", "handling qualities: Roll, slow"} <= set(again.from_cache)
+    (folder / "blocks.toml").write_text(text.replace("-0.02", "-0.03"), encoding="utf-8")
+    turned = fid.run_study(folder / "blocks.toml", output=folder / "blocks", cache=cache)
+    assert set(turned.carried_out) == {
+        "loop: Rate feedback",
+        "handling qualities: Rate feedback",
+    }
+
+
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
+        (
+            "gains = { tau_phi = { p = 0.02 } }",
+            'block = [{ kind = "luck" }]',
+            "one of complementary",
+        ),
+        ("gains = { tau_phi = { p = 0.02 } }", 'block = [{ kind = "delay" }]', "keys do not fit"),
+        (
+            "draws = 20",
+            'block = [{ kind = "delay", inputs = "p", outputs = "p_f", delay_s = 0.1 }]',
+            "beside blocks",
+        ),
         ('path = "roll.c"', 'path = "../roll.c"', "a name without a folder"),
         ('model = "Roll, slow"\npath', 'model = "Roll"\npath', "there is no such model to use"),
         ("gains = { tau_phi = { p = 0.02 } }", "", "gains is missing"),

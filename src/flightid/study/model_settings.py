@@ -9,6 +9,7 @@ from typing import Any
 
 from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
 from flightid.study.published import PublishedFigures, read_published
+from flightid.study.qualities_settings import read_cases
 from flightid.study.reading import TableReader
 from flightid.study.response_settings import ResponseSettings, read_response
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings, read_structure
@@ -59,6 +60,8 @@ class ModelSettings:
         Flight condition, where the study compares several.
     values_from : mapping of str to tuple of str
         Parameters that start at another model's estimates, by the name of that model.
+    qualities : mapping of str to str
+        Case of the standard of handling qualities, where it differs from the study's.
     reduce : bool
         Whether the reduction that the study asks for is meant for this model.
     reference : str or None
@@ -88,6 +91,7 @@ class ModelSettings:
     condition: str | None = None
     reference: str | None = None
     values_from: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    qualities: Mapping[str, str] = field(default_factory=dict)
     reduce: bool = True
     published: PublishedFigures | None = None
     structure: StructureSettings | None = None
@@ -159,6 +163,7 @@ def read_model(
         condition=reader.maybe(reader.text, "condition"),
         **_beside(reader, folder),
         values_from=_values_from(reader),
+        qualities=read_cases(reader.table("qualities")),
         reduce=reader.flag("reduce", True) if reduced else False,
     )
     reader.finish()

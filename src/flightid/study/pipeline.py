@@ -14,7 +14,7 @@ from flightid.study.evidence import examined
 from flightid.study.identified import ModelFits, ModelResults
 from flightid.study.model_settings import UNBROKEN
 from flightid.study.reducing import ReduceSettings
-from flightid.study.stage_runner import StageResult, StageRunner
+from flightid.study.stage_runner import StageResult, StageRunner, digest
 from flightid.study.stages import (
     check,
     chosen_by,
@@ -55,11 +55,11 @@ class Part:
 def identify_models(
     tasks: Sequence[Task],
     records: Records,
-    inspection: Inspection | None,
+    inspection: StageResult[Inspection] | None,
     reducing: ReduceSettings | None,
     runner: StageRunner,
     advance: Callable[..., None],
-) -> tuple[tuple[ModelResults, ...], dict[str, StageResult[ModelFits]]]:
+) -> tuple[StageResult[ModelResults], ...]:
     """Carry every model through its stages.
 
     All fits come first: models may be rivals of each other in the verification.
@@ -69,7 +69,7 @@ def identify_models(
     tasks : sequence of Task
     records : mapping of str to StageResult list of Record
         By name, which may stand for all manoeuvres of a file.
-    inspection : Inspection or None
+    inspection : StageResult Inspection or None
         Of the log that they come from.
     reducing : ReduceSettings or None
     runner : StageRunner
@@ -78,8 +78,8 @@ def identify_models(
 
     Returns
     -------
-    tuple of ModelResults, and dict of str to StageResult ModelFits
-        What was found, and the fits with their keys by name of the model.
+    tuple of StageResult ModelResults
+        What was found, with the hash of the fit and of all that was examined of it.
     """
     parts: list[Part] = []
     for asked in tasks:
@@ -91,9 +91,13 @@ def identify_models(
     fitted = {part.task.settings.name: part.fitted for part in parts}
     found = []
     for part in parts:
-        found.append(_examined(_examine(part, records, fitted, runner), inspection))
+        before = len(runner.keys)
+        item = _examine(part, records, fitted, runner)
+        key = digest((part.fitted.key, runner.keys[before:], inspection))
+        seen = None if inspection is None else inspection.value
+        found.append(StageResult(_examined(item, seen), key))
         advance()
-    return tuple(found), fitted
+    return tuple(found)
 
 
 def start_from(task: Task, earlier: Sequence[Part]) -> Task:

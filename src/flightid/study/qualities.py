@@ -1,130 +1,27 @@
-"""What a study file may say about handling qualities, and the stage that reads them off fits."""
+"""The stages of a study that read handling qualities off fits and what stands beside them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from flightid.dynamics.handling_qualities.handling_qualities import (
-    ATTITUDES,
-    VEHICLES,
     HandlingQualities,
     handling_qualities,
 )
 from flightid.errors import StudyError
+from flightid.identification.uncertain_of import uncertain_of
+from flightid.responses import FrequencyResponse
 from flightid.study.faults import Faults
-from flightid.study.reading import TableReader
+from flightid.study.qualities_settings import QualitiesSettings
+from flightid.study.stage_runner import StageResult, StageRunner, digest
 
 if TYPE_CHECKING:
-    from flightid.identification import Fit
+    from flightid.control.closed_loop.result import ClosedLoop
     from flightid.study.identified import ModelResults
     from flightid.study.task import Task
-
-BAND_RAD_S = (0.1, 100.0)
-CONDITIONS: dict[str, dict[str, tuple[str, ...]]] = {
-    "rotorcraft": {
-        "speed": ("hover", "forward"),
-        "task": ("other", "tracking"),
-        "attention": ("full", "divided"),
-    },
-    "aeroplane": {
-        "category": ("A", "B", "C"),
-        "aircraft_class": ("I", "II", "II-L", "II-C", "III", "IV"),
-    },
-}
-"""Cases of the standards by vehicle, the usual one first."""
-
-
-@dataclass(frozen=True)
-class QualitiesSettings:
-    """How handling qualities are read; see `flightid.handling_qualities`.
-
-    Attributes
-    ----------
-    axes : mapping of str to tuple of str, or None
-        Output and control by axis; None: by their usual names.
-    signs : mapping of str to int
-        −1 for an axis whose control pulls the other way.
-    vehicle, response_type : str
-    band_rad_s : tuple of float
-    conditions : mapping of str to str
-        Case of the standard.
-    n_alpha : float or None
-        g/rad.
-    charts : Path or None
-        File of charts in place of ours.
-    """
-
-    axes: Mapping[str, tuple[str, str]] | None = None
-    signs: Mapping[str, int] = field(default_factory=dict)
-    vehicle: str = "rotorcraft"
-    response_type: str = "rate"
-    band_rad_s: tuple[float, float] = BAND_RAD_S
-    conditions: Mapping[str, str] = field(default_factory=dict)
-    n_alpha: float | None = None
-    charts: Path | None = None
-
-
-def read_qualities(reader: TableReader, folder: Path) -> QualitiesSettings:
-    """Read the table ``[handling_qualities]``.
-
-    Parameters
-    ----------
-    reader : TableReader
-    folder : Path
-        Of the study file.
-
-    Raises
-    ------
-    StudyError
-        A key is unknown, or a value does not fit.
-    """
-    vehicle = reader.choice("vehicle", VEHICLES, VEHICLES[0])
-    conditions = {
-        name: reader.choice(name, words, words[0]) for name, words in CONDITIONS[vehicle].items()
-    }
-    band = reader.maybe(reader.interval, "band_rad_s") or BAND_RAD_S
-    if band[0] <= 0.0:
-        raise reader.error("band_rad_s", "does not fit", found=band, needed="positive frequencies")
-    charts = reader.maybe(reader.text, "charts")
-    made = QualitiesSettings(
-        reader.maybe(lambda key: _axes(reader.table(key)), "axes"),
-        _signs(reader.table("signs")),
-        vehicle,
-        reader.choice("response_type", ("rate", "attitude"), "rate"),
-        band,
-        conditions,
-        reader.maybe(reader.positive, "n_alpha") if vehicle == "aeroplane" else None,
-        None if charts is None else folder / charts,
-    )
-    reader.finish()
-    return made
-
-
-def _axes(reader: TableReader) -> dict[str, tuple[str, str]]:
-    found = {}
-    for axis in ATTITUDES:
-        pair = reader.maybe(reader.names, axis)
-        if pair is not None and len(pair) != 2:
-            raise reader.error(axis, "does not fit", found=pair, needed="an output and a control")
-        if pair is not None:
-            found[axis] = (pair[0], pair[1])
-    reader.finish()
-    return found
-
-
-def _signs(reader: TableReader) -> dict[str, int]:
-    found = {}
-    for axis in ATTITUDES:
-        sign = reader.maybe(reader.number, axis)
-        if sign is not None and abs(sign) != 1.0:
-            raise reader.error(axis, "does not fit", found=sign, needed="1 or -1")
-        if sign is not None:
-            found[axis] = int(sign)
-    reader.finish()
-    return found
+    from flightid.study.uses_settings import LoopSettings
 
 
 def require_pairs(tasks: Iterable[Task], settings: QualitiesSettings) -> None:
@@ -152,42 +49,69 @@ def require_pairs(tasks: Iterable[Task], settings: QualitiesSettings) -> None:
 
 
 def rate_models(
-    identified: Iterable[ModelResults], settings: QualitiesSettings, faults: Faults
+    identified: Iterable[StageResult[ModelResults]],
+    loops: Iterable[tuple[LoopSettings, ClosedLoop]],
+    settings: QualitiesSettings,
+    faults: Faults,
+    runner: StageRunner,
 ) -> dict[str, HandlingQualities]:
-    """Handling qualities of every fit, by the name of its model.
+    """Handling qualities of every fit and of what the study rates beside it, by name.
 
     Parameters
     ----------
-    identified : iterable of ModelResults
+    identified : iterable of StageResult ModelResults
+    loops : iterable of (LoopSettings, ClosedLoop)
+        Closed around them.
     settings : QualitiesSettings
     faults : Faults
         Takes what cannot be rated.
+    runner : StageRunner
 
     Returns
     -------
     dict of str to HandlingQualities
     """
     found = {}
-    for item in identified:
+    keys = {}
+    for each in identified:
+        item = each.value
+        keys[item.name] = each.key
         if item.fit is None or item.settings.structure is not None:
             continue
-        name = item.settings.name
-        rated = faults.spare(f"handling qualities of “{name}”", _rated, None, item.fit, settings)
-        if rated is not None:
-            found[name] = rated
-    return found
+        asked = replace(settings, conditions={**settings.conditions, **item.settings.qualities})
+        beside = {"fit": item.fit, "reference": item.reference, "response": item.response}
+        for kind, source in beside.items():
+            if kind in settings.sources and source is not None:
+                name = item.name if kind == "fit" else f"{item.name}, {kind}"
+                known: StageResult[Any] = StageResult(source, f"{kind} of {each.key}")
+                found[name] = faults.spare(
+                    f"handling qualities of “{name}”", _staged, None, name, known, asked, runner
+                )
+    for loop, closed in loops if "loop" in settings.sources else ():
+        known = StageResult(closed.uncertain, digest((loop, keys[loop.model])))
+        found[loop.name] = faults.spare(
+            loop.name, _staged, None, loop.name, known, settings, runner
+        )
+    return {name: rated for name, rated in found.items() if rated is not None}
 
 
-def _rated(fit: Fit, settings: QualitiesSettings) -> HandlingQualities:
-    model, axes = fit.model, settings.axes
+def _staged(
+    name: str, source: StageResult[Any], settings: QualitiesSettings, runner: StageRunner
+) -> HandlingQualities:
+    return runner.stage(f"handling qualities: {name}", _rated, source, settings).value
+
+
+def _rated(source: Any, settings: QualitiesSettings) -> HandlingQualities:  # noqa: ANN401
+    axes = settings.axes
     if axes is not None:
+        model = uncertain_of(source).value if not isinstance(source, FrequencyResponse) else source
         axes = {
             axis: pair
             for axis, pair in axes.items()
             if pair[0] in model.outputs and pair[1] in model.inputs
         }
     return handling_qualities(
-        fit,
+        source,
         axes=axes,
         signs=settings.signs,
         vehicle=settings.vehicle,

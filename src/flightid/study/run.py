@@ -8,6 +8,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+from flightid.control.tuning.result import Tuning
 from flightid.files import sha256_of_file
 from flightid.progress import progress
 from flightid.report.html import to_html
@@ -108,24 +109,25 @@ def _run(
     with whole_folder(final) as folder, progress(3 + 3 * len(tasks), source.stem) as advance:
         taken = take(settings, tasks, None if log is None else Path(log), folder, runner)
         advance(2)
-        identified, _ = identify_models(
+        staged = identify_models(
             tasks, taken.records, taken.inspection, settings.reduce, runner, advance
         )
         wanted = _tuning(settings.tune, tune)
-        flown = None if taken.log is None else taken.log.value
         files = {item.name: sha256_of_file(item) for item in (source, *taken.files)}
         faults = Faults()
         tuning = None
         if wanted is not None:
-            tuning = faults.spare("tuning", tune_models, None, identified, flown, wanted)
-        qualities = {} if rated is None else rate_models(identified, rated, faults)
-        uses = use_models(identified, settings.uses, folder, faults)
+            tuning = faults.spare("tuning", _tuned, None, runner, staged, taken.log, wanted)
+        uses = use_models(staged, settings.uses, folder, faults, runner)
+        qualities = {}
+        if rated is not None:
+            qualities = rate_models(staged, uses.loops, rated, faults, runner)
         study = Study(
             settings,
             final,
-            taken.inspection,
+            None if taken.inspection is None else taken.inspection.value,
             {str(each.name): each for group in taken.records.values() for each in group.value},
-            identified,
+            tuple(each.value for each in staged),
             taken.truth,
             files,
             tuning,
@@ -139,6 +141,11 @@ def _run(
         _write(study, folder)
         advance()
     return study
+
+
+def _tuned(runner: StageRunner, *inputs: object) -> Tuning | None:
+    """Gains, as a stage."""
+    return runner.stage("tuning", tune_models, *inputs).value
 
 
 def _paths(settings: object) -> Iterator[Path]:

@@ -20,7 +20,7 @@ from flightid.study.error_list import ErrorList
 from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
 from flightid.study.flight import FlightPlan, read_flight
 from flightid.study.model_settings import ModelSettings, read_model
-from flightid.study.qualities import QualitiesSettings, read_qualities
+from flightid.study.qualities_settings import QualitiesSettings, read_qualities
 from flightid.study.reading import TOP, TableReader
 from flightid.study.record_files import UNKNOWN, RecordFile, read_record_file, read_shape
 from flightid.study.reducing import ReduceSettings, read_reduce

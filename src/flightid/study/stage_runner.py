@@ -62,6 +62,7 @@ class StageRunner:
         self._cache = {} if cache is None else cache
         self.carried_out: list[str] = []
         self.from_cache: list[str] = []
+        self.keys: list[str] = []
 
     def stage(self, name: str, work: Callable[..., Value], *inputs: Any) -> StageResult[Value]:  # noqa: ANN401
         """Result of a stage.
@@ -82,6 +83,7 @@ class StageRunner:
         """
         # What it is carried out for is no part of the key: two models may share a response.
         key = digest((VERSION, work.__module__, work.__qualname__, inputs))
+        self.keys.append(key)
         if key in self._cache:
             self.from_cache.append(name)
         else:

@@ -37,7 +37,7 @@ class StudyRecords:
         ConditionalSpectra, by name, which may stand for all manoeuvres of a file.
     files : tuple of Path
         What was read.
-    inspection : Inspection or None
+    inspection : StageResult Inspection or None
     truth : Truth or None
     log : StageResult Log or None
     checks : mapping of str to KinematicConsistency
@@ -46,7 +46,7 @@ class StudyRecords:
 
     records: Mapping[str, StageResult[list[Record]]]
     files: tuple[Path, ...]
-    inspection: Inspection | None = None
+    inspection: StageResult[Inspection] | None = None
     truth: Truth | None = None
     log: StageResult[Log] | None = None
     checks: Mapping[str, KinematicConsistency] = field(default_factory=dict)
@@ -103,7 +103,7 @@ def take(
         for segment in settings.segments
         if segment.name in needed
     }
-    inspection = runner.stage("inspection", inspect_log, opened).value
+    inspection = runner.stage("inspection", inspect_log, opened)
     made = _conditioned(cut, settings, runner, checks)
     return StudyRecords(made, (flown,), inspection, truth, opened, checks)
 

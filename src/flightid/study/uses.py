@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 from flightid.control.closed_loop.close_loop import close_loop
 from flightid.control.closed_loop.result import ClosedLoop
@@ -21,6 +22,8 @@ from flightid.models import GreyBoxModel, write_model
 from flightid.models.saved_files import MODELS
 from flightid.study.faults import Faults
 from flightid.study.identified import ModelResults
+from flightid.study.loop_blocks import made_block
+from flightid.study.stage_runner import StageResult, StageRunner
 from flightid.study.uses_settings import (
     ExportSettings,
     LoopSettings,
@@ -28,6 +31,7 @@ from flightid.study.uses_settings import (
     UsesSettings,
 )
 
+Item = TypeVar("Item")
 EXPORTS = "export"
 """Folders of the output."""
 
@@ -65,30 +69,42 @@ class Uses:
 
 
 def use_models(
-    identified: Sequence[ModelResults], settings: UsesSettings, folder: Path, faults: Faults
+    identified: Sequence[StageResult[ModelResults]],
+    settings: UsesSettings,
+    folder: Path,
+    faults: Faults,
+    runner: StageRunner,
 ) -> Uses:
     """Write every fitted model, and do with them what the study asks.
 
     Parameters
     ----------
-    identified : sequence of ModelResults
+    identified : sequence of StageResult ModelResults
     settings : UsesSettings
     folder : Path
         Output of the study.
     faults : Faults
         Takes what fails: a model that was left out, or that does not fit its use.
+    runner : StageRunner
     """
-    fits = {item.name: item.fit for item in identified if item.fit is not None}
+    items = [each.value for each in identified]
+    fits = {item.name: item.fit for item in items if item.fit is not None}
+    staged = {
+        each.value.name: StageResult(each.value.fit, each.key)
+        for each in identified
+        if each.value.fit is not None
+    }
     files: dict[str, str] = {}
     files = faults.spare("the model files", _written, files, fits, folder)
-    conditions = faults.spare("the flight conditions", _conditions, None, identified)
+    conditions = faults.spare("the flight conditions", _conditions, None, items)
     rotor = None
     if settings.rotor is not None:
         rotor = faults.spare("rotor physics", _rotor, None, fits, settings.rotor)
     loops = [
         (loop, closed)
         for loop in settings.loops
-        if (closed := faults.spare(f"loop “{loop.name}”", _closed, None, fits, loop)) is not None
+        if (closed := faults.spare(f"loop “{loop.name}”", _closed, None, staged, loop, runner))
+        is not None
     ]
     exported = [
         made
@@ -110,11 +126,16 @@ def _rotor(fits: Mapping[str, Fit], asked: RotorSettings) -> RotorPhysics:
     )
 
 
-def _closed(fits: Mapping[str, Fit], loop: LoopSettings) -> ClosedLoop:
-    fit = _fit(fits, loop.model)
+def _closed(
+    fits: Mapping[str, StageResult[Fit]], loop: LoopSettings, runner: StageRunner
+) -> ClosedLoop:
+    return runner.stage(f"loop: {loop.name}", _around, _fit(fits, loop.model), loop).value
+
+
+def _around(fit: Fit, loop: LoopSettings) -> ClosedLoop:
     return close_loop(
         fit,
-        loop.gains,
+        loop.gains or list(map(made_block, loop.blocks)),
         outside=loop.outside,
         draws=loop.draws,
         seed=loop.seed,
@@ -131,7 +152,7 @@ def _exported(fits: Mapping[str, Fit], asked: ExportSettings, folder: Path) -> E
     return replace(made, files=tuple(path.relative_to(folder) for path in made.files))
 
 
-def _fit(fits: Mapping[str, Fit], name: str) -> Fit:
+def _fit(fits: Mapping[str, Item], name: str) -> Item:
     if name not in fits:
         raise StudyError(
             f"model {name!r} cannot be used: it was left out",

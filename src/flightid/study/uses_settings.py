@@ -8,6 +8,7 @@ from typing import Any
 
 from flightid.control.closed_loop.close_loop import DRAWS
 from flightid.errors import StudyError
+from flightid.study.loop_blocks import made_block
 from flightid.study.reading import TableReader
 
 
@@ -64,7 +65,9 @@ class LoopSettings:
         Title in the report.
     model : str
     gains : mapping of str to mapping of str to float
-        Negative feedback by input and output.
+        Negative feedback by input and output; empty where the controller is made of blocks.
+    blocks : tuple of mapping
+        Blocks of the controller: ``kind``, a function of `flightid.loops`, and its arguments.
     band_rad_s : tuple of float or None
         Where margins are looked for.
     outside : tuple of str
@@ -76,6 +79,7 @@ class LoopSettings:
     name: str
     model: str
     gains: Mapping[str, Mapping[str, float]]
+    blocks: tuple[Mapping[str, Any], ...] = ()
     band_rad_s: tuple[float, float] | None = None
     outside: tuple[str, ...] = ()
     draws: int = DRAWS
@@ -169,12 +173,19 @@ def _loop(reader: TableReader) -> LoopSettings:
     for name, row in reader.values("gains").items():
         of_input = gains.table(name)
         by_input[name] = {output: of_input.number(output) for output in dict(row)}
-    if not by_input:
-        raise reader.error("gains", "is missing", found="none", needed="gains by input and output")
+    blocks = tuple(each.rest() for each in reader.tables("block"))
+    for each in blocks:
+        made_block(each)
+    if bool(by_input) == bool(blocks):
+        needed = "gains by input and output, or [[loop.block]]s"
+        problem = "stands beside blocks" if blocks else "is missing"
+        found = "both" if blocks else "none"
+        raise reader.error("gains", problem, found=found, needed=needed)
     made = LoopSettings(
         reader.text("name"),
         reader.text("model"),
         by_input,
+        blocks,
         reader.maybe(reader.interval, "band_rad_s"),
         reader.names("outside", ()),
         reader.integer("draws", DRAWS, minimum=1),
