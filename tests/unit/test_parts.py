@@ -83,6 +83,16 @@ def test_records_that_differ_carry_the_scatter_and_students_freedom() -> None:
     assert agreement_check(two.agreement).light is Light.RED
 
 
+def test_halves_that_differ_by_little_are_amber_with_the_wider_interval() -> None:
+    noise, apart = np.array([0.01, 0.02]), np.array([0.1, 0.02])
+    found = Agreement(1, 1e-9, None, noise, apart)
+    near = agreement_check(found, np.array([-5.0, 0.001]))
+    assert near.light is Light.AMBER
+    assert "up to 10 times and to ±3.9 %" in near.what
+    assert agreement_check(found, np.array([-0.5, 1.0])).light is Light.RED
+    assert agreement_check(found).light is Light.RED
+
+
 def test_one_record_says_that_it_cannot_know() -> None:
     found = agreement_check(Agreement(1, 0.5, None, np.ones(1)))
     assert found.light is Light.GREEN

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flightid.conventions import Light
 from flightid.evidence.data_checks import (
     loop_check,
@@ -84,6 +87,8 @@ class FitFacts:
         The caller's word.
     agreement : Agreement or None
         Of parts of the data, where they were compared.
+    values : ndarray or None
+        Estimates, in its order.
     """
 
     data: Sequence[FrequencyResponse | Record]
@@ -95,6 +100,7 @@ class FitFacts:
     signs: Mapping[str, tuple[int, float, tuple[float, float] | None, str]]
     loop: Loop | None = None
     agreement: Agreement | None = None
+    values: NDArray[np.float64] | None = None
 
 
 def gather_evidence(made: FitFacts) -> Evidence:
@@ -118,7 +124,7 @@ def gather_evidence(made: FitFacts) -> Evidence:
         loop = loop_of_records(tuple(records), made.inputs, made.outputs)
     checks += [] if loop is None else [loop]
     if made.agreement is not None:
-        checks.append(agreement_check(made.agreement))
+        checks.append(agreement_check(made.agreement, made.values))
     if made.signs:
         checks.append(declared_signs(made.signs))
     checks = _with_findings(checks, made)

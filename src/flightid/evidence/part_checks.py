@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flightid.conventions import Light
 from flightid.evidence.evidence import AGREEMENT, Check
 from flightid.uncertainty.agreement import FEWEST_RECORDS, Agreement
+from flightid.uncertainty.foretold import MATERIAL_PERCENT
 
 ONE = "One record does not tell how far flights differ: what is known is of that flight alone"
 HALVES_ACTION = (
@@ -19,11 +23,19 @@ RECORDS_ACTION = (
 )
 
 
-def agreement_check(found: Agreement) -> Check:
+def agreement_check(found: Agreement, values: NDArray[np.float64] | None = None) -> Check:
     """The light of a comparison.
 
-    Red where halves of a record differ, or two records do. Amber where three or more records
-    differ: their scatter tells how well the mean of such vehicles is known.
+    Red where halves of a record differ, or two records do, unless the intervals, widened by that,
+    still lie within `MATERIAL_PERCENT` of the estimates: a quiet record tells halves apart that
+    are alike for every use. Amber where three or more records differ: their scatter tells how
+    well the mean of such vehicles is known.
+
+    Parameters
+    ----------
+    found : Agreement
+    values : ndarray, optional
+        Estimates, in the order of its standard errors.
 
     Example
     -------
@@ -34,10 +46,11 @@ def agreement_check(found: Agreement) -> Check:
     >>> check.limit
     'One record does not tell how far flights differ: what is known is of that flight alone'
     """
-    return replace(_compared(found), limit="" if found.n_records > 1 else ONE)
+    apart = None if values is None else found.apart_percent(values)
+    return replace(_compared(found, apart), limit="" if found.n_records > 1 else ONE)
 
 
-def _compared(found: Agreement) -> Check:
+def _compared(found: Agreement, apart: float | None) -> Check:
     if not found.tested:
         what = (
             "parts of the data cannot be compared: no two hold the same frequencies and parameters"
@@ -46,16 +59,19 @@ def _compared(found: Agreement) -> Check:
     several = found.n_records > 1
     widened = ""
     if found.factor > 1.0:
-        apart = "intervals are widened by how far they lie apart"
-        widened = f"; {apart}, up to {found.factor:.2g} times"
+        reach = "" if apart is None or found.agree else f" and to ±{apart:.2g} %"
+        how = "intervals are widened by how far they lie apart"
+        widened = f"; {how}, up to {found.factor:.2g} times{reach}"
     if found.agree:
         return Check(AGREEMENT, Light.GREEN, _alike(found) + widened)
     if found.halves_differ:
         whose = "a record" if several else "the record"
         what = f"halves of {whose} differ by more than noise (p = {found.halves:.2g}){widened}"
-        return Check(AGREEMENT, Light.RED, what, HALVES_ACTION)
+        small = apart is not None and apart < MATERIAL_PERCENT
+        return Check(AGREEMENT, Light.AMBER if small else Light.RED, what, HALVES_ACTION)
     what = f"{found.n_records} records differ by more than noise (p = {found.records:.2g}){widened}"
-    light = Light.AMBER if found.n_records >= FEWEST_RECORDS else Light.RED
+    known = found.n_records >= FEWEST_RECORDS or (apart is not None and apart < MATERIAL_PERCENT)
+    light = Light.AMBER if known else Light.RED
     return Check(AGREEMENT, light, what, RECORDS_ACTION)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flightid.evidence import Evidence, gather_evidence
 from flightid.evidence.gather import FitFacts
@@ -44,8 +45,20 @@ def evidence_of(fit: Fit, data: Sequence[Any], loop: Loop | None = None) -> Evid
             _signs(asked, fit.parameters) if isinstance(asked, Parameters) else {},
             loop,
             fit.agreement,
+            _compared(fit),
         )
     )
+
+
+def _compared(fit: Fit) -> NDArray[np.float64] | None:
+    """Estimates whose parts were compared; None where it is not known which those are."""
+    if fit.agreement is None:
+        return None
+    free = tuple(name for name, each in fit.parameters.items() if each.status == "free")
+    for names in (fit.names, free):
+        if len(names) == fit.agreement.by_noise.size:
+            return np.array([fit.parameters[name].value for name in names])
+    return None
 
 
 def _span(response: FittedResponse) -> Span:

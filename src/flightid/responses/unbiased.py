@@ -90,7 +90,8 @@ def unbiased(response: FrequencyResponse, *, refined: bool = False) -> Frequency
     before, columns = response.omega_rad_s, linear.places[1]
     omega = _refined(before, pilots, columns) if refined else before
     spread = _between(before, omega)
-    seen = linear.functional()(_stacked([each.outputs for each in pilots]))
+    # Linear in changes of the outputs alone: windows keep the shares that the measured ones gave.
+    left = linear.functional()(_residuals(linear, pilots))
     own = np.stack([each.frequency_response(omega)[columns] for each in pilots])
     kept = {
         name: getattr(response, name) @ spread
@@ -100,7 +101,7 @@ def unbiased(response: FrequencyResponse, *, refined: bool = False) -> Frequency
         response,
         **kept,
         omega_rad_s=omega,
-        response=own + (response.response - seen) @ spread,
+        response=own + left @ spread,
         input_spectrum=None,
         cross_spectrum=None,
         output_spectrum=None,
@@ -140,6 +141,12 @@ def _stacked(outputs: Sequence[tuple[Real, ...]]) -> list[Real]:
     return [np.stack(each) for each in zip(*outputs, strict=True)]
 
 
+def _residuals(linear: LinearEstimate, pilots: Sequence[Pilot]) -> list[Real]:
+    """Of each record, what the pilots leave of all outputs."""
+    modelled = _stacked([each.outputs for each in pilots])
+    return [y - model for y, model in zip(linear.output_records, modelled, strict=True)]
+
+
 def _errors(
     response: FrequencyResponse,
     linear: LinearEstimate,
@@ -149,8 +156,7 @@ def _errors(
 ) -> Real:
     """Covariance of the difference, shaped as by `CovarianceSource.covariance`."""
     columns = linear.places[1]
-    modelled = _stacked([each.outputs for each in pilots])
-    residuals = [y - model for y, model in zip(linear.output_records, modelled, strict=True)]
+    residuals = _residuals(linear, pilots)
     highest = BEYOND_BAND * linear.pilots.highest_rad_s
     spent = np.array([len(each.covariance) for each in pilots])
     source = linear.errors_with(mean_spectrum(residuals, linear.sample_time_s, highest, spent))

@@ -73,6 +73,26 @@ class Agreement:
             return 1.0
         return float(max(1.0, np.max(self.by_scatter / self.by_noise, initial=1.0)))
 
+    def apart_percent(self, values: Array) -> float | None:
+        """How far the parts lie apart: 95 % half-width by scatter over the estimate, in percent.
+
+        The largest among estimates that noise alone tells from zero, and whose bar the scatter at
+        least doubles; None where no scatter is carried on.
+
+        Example
+        -------
+        >>> apart = Agreement(1, 1e-6, None, np.array([0.01, 0.01]), np.array([0.05, 0.01]))
+        >>> round(apart.apart_percent(np.array([-5.0, 1.0])), 2)
+        1.96
+        """
+        if self.by_scatter is None:
+            return None
+        size = np.maximum(np.abs(values), np.finfo(float).tiny)
+        told = size > half_width() * self.by_noise
+        doubled = self.by_scatter > 2.0 * self.by_noise
+        shares = 100.0 * half_width() * self.by_scatter / size
+        return float(np.max(shares, where=told & doubled, initial=0.0))
+
     def of(self, count: int) -> Agreement:
         """The same of the first parameters alone."""
         return Agreement(
