@@ -17,9 +17,11 @@ from flightid.cli.program import run
 from flightid.errors import ModelError, OptionError, UnknownNameError
 from flightid.excitation import Limits, ParameterFile, Plan, RateAxis
 from flightid.excitation.design import KINDS
+from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.plot.excitation import excitation_history, excitation_spectrum, plan_spectrum
 from tests.closeness import assert_close
 from tests.examples import examples
+from tests.ulog_builder import UlogBuilder
 
 AXIS = RateAxis(
     gain=40.0, time_constant_s=0.2, delay_s=0.01, rate_feedback=0.1, attitude_feedback_per_s=4.0
@@ -300,6 +302,63 @@ def test_parameters_for_a_flight_count_the_loops_that_stay_on(
         sizes.append(json.loads(shown.out)["axes"][0]["peak_control"])
     assert "Loops kept on: arducopter pitch, P 0.135, angle gain 4.5 1/s" in shown.err
     assert sizes[1] > 5.0 * sizes[0]
+
+
+def flown(folder: Path, **parameters: float) -> Path:
+    """A log that holds an autopilot's parameters and little else."""
+    writer = DataflashWriter()
+    writer.message(10_000_000, "ArduCopter V4.6.0 (test)")
+    for name, value in parameters.items():
+        writer.parameter(name, value)
+    return writer.write(folder / "flown.bin")
+
+
+def test_parameters_of_a_log_are_taken_back_by_a_second_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = {"ATC_RAT_RLL_I": 0.226, "ATC_RATE_FF_ENAB": 0.0, "SID_AXIS": 0.0}
+    before["LOG_BITMASK"] = 176126.0
+    file = tmp_path / "sid.param"
+    base = [*COMMAND[:-1], "10", "--param", str(file)]
+    assert run([*base, "--log", str(flown(tmp_path, **before))]) == 0
+    undone = (tmp_path / "sid.rollback.param").read_text().splitlines()[1:]
+    back = {name: float(value) for name, value in (line.split(",") for line in undone)}
+    assert back.pop("ATC_RAT_RLL_I") == pytest.approx(0.226, rel=1e-7)  # single precision
+    assert back == {"ATC_RATE_FF_ENAB": 0.0, "LOG_BITMASK": 176126.0, "SID_AXIS": 0.0}
+    assert "LOG_BITMASK,176127" in file.read_text()
+    assert "restore 0.226 after" in file.read_text()
+    swept = flown(tmp_path, **{**before, "ATC_RAT_RLL_I": 0.0})
+    capsys.readouterr()
+    assert run([*base, "--log", str(swept)]) == 2
+    assert "is there with other values" in capsys.readouterr().err
+    assert run(base) == 0
+    assert "No file takes it back: give --log" in capsys.readouterr().err
+
+
+def test_settings_for_one_autopilot_refuse_the_log_of_another(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    px4 = tmp_path / "px4.ulg"
+    px4.write_bytes(bytes(UlogBuilder()))
+    file = tmp_path / "s.param"
+    assert run([*COMMAND, "--param", str(file), "--log", str(px4)]) == 2
+    assert "needed a log of ardupilot, copter" in capsys.readouterr().err
+    quad = flown(tmp_path)
+    sweep = ["design", "sweep", *COMMAND[2:-2], "--params", f"{file}s", "--log", str(quad)]
+    assert run(sweep) == 2
+    assert "needed a log of px4, copter" in capsys.readouterr().err
+    assert not list(tmp_path.glob("*.param*"))
+
+
+def test_a_sweep_is_not_told_to_become_one() -> None:
+    short = excitation.plan("sweep", AXIS, band_rad_s=(1.0, 60.0), amplitude=0.05)
+    (said,) = _findings(short, "design-coverage")
+    assert "[amber]" in said
+    assert "lengthen the record" in said
+    longer = excitation.plan(
+        "sweep", AXIS, band_rad_s=(1.0, 60.0), amplitude=0.05, duration_s=120.0
+    )
+    assert "[green]" in _findings(longer, "design-coverage")[0]
 
 
 def test_command_writes_what_px4_can_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,6 +12,7 @@ from flightid.cli.output import emit, json_option, leave_by_verdict, note
 
 if TYPE_CHECKING:
     from flightid.excitation import Plan
+    from flightid.logs import Log
     from flightid.options import Options
 
 KINDS = (
@@ -46,7 +47,8 @@ def _fields() -> dict[str, type[Options]]:
 @click.option(
     "--log",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    help="Flight whose autopilot keeps its loops on meanwhile; with --param alone: its defaults.",
+    help="Flight whose autopilot keeps its loops on meanwhile; with --param alone: its defaults. "
+    "With --param: also the file that takes every change back.",
 )
 @click.option("--fixed-wing", is_flag=True, help="With --params: a fixed wing sweeps the band.")
 @click.option("--html", type=FILE, help="Write a page with pictures to this file.")
@@ -71,8 +73,9 @@ def command(
     if param is not None and kind != "ardupilot_chirp":
         raise click.UsageError("--param needs the kind ardupilot_chirp")
     of_design, guess, limits = parted(options, _fields())
-    if log is not None or param is not None:
-        guess = _with_loops(guess, of_design.get("axis", MIXER_ROLL), log)
+    flown = None if log is None else _flown(log, kind, params is not None, fixed_wing)
+    if flown is not None or param is not None:
+        guess = _with_loops(guess, of_design.get("axis", MIXER_ROLL), flown)
     plan = excitation.plan(
         kind, excitation.RateAxis(**guess), limits=excitation.Limits(**limits), **of_design
     )
@@ -80,8 +83,7 @@ def command(
     if csv_file is not None:
         note(f"Wrote {excitation.write_csv(plan.excitation, csv_file)}")
     if param is not None:
-        made = excitation.ardupilot_parameters(plan.excitation)
-        note(f"Wrote {made.write(param)}")
+        _write_ardupilot(plan, param, flown)
     if params is not None:
         note(f"Wrote {_write_px4(plan, params, fixed_wing)}")
     if html is not None:
@@ -89,18 +91,74 @@ def command(
     leave_by_verdict(plan.findings)
 
 
-def _with_loops(guess: dict[str, Any], sid_axis: int, log: Path | None) -> dict[str, Any]:
+def _flown(path: Path, kind: str, for_px4: bool, fixed_wing: bool) -> Log:
+    """The log, if its autopilot can fly what is designed.
+
+    Raises
+    ------
+    OptionError
+        Another autopilot's log, or another vehicle's, than the settings are for.
+    """
+    from flightid import read_log
+    from flightid.errors import OptionError
+
+    flown = read_log(path)
+    wanted = [("ardupilot", "copter")] if kind == "ardupilot_chirp" else []
+    wanted += [("px4", "plane" if fixed_wing else "copter")] if for_px4 else []
+    for autopilot, vehicle in wanted:
+        if flown.kind != autopilot or flown.vehicle not in (vehicle, None):
+            raise OptionError(
+                "the log comes from an autopilot that cannot fly this design",
+                found=f"{path.name}: {flown.firmware or flown.kind}, {flown.vehicle or 'vehicle'}",
+                needed=f"a log of {autopilot}, {vehicle}",
+                action="give a flight of the vehicle that is to fly it; for PX4 --params, for a "
+                "fixed wing --fixed-wing",
+            )
+    return flown
+
+
+def _write_ardupilot(plan: Plan, path: Path, flown: Log | None) -> None:
+    """The settings, and before them the file that takes them back where a log gives the values.
+
+    Raises
+    ------
+    OptionError
+        Another way back is there already: it may be the only record of what the vehicle flew.
+    """
+    from flightid.control.autopilots.parameter_files import ROLLBACK
+    from flightid.errors import OptionError
+    from flightid.excitation import ardupilot_parameters
+
+    current = None if flown is None else flown.parameters
+    made = ardupilot_parameters(plan.excitation, current=current)
+    if current is not None:
+        undo = made.rollback(current)
+        back = path.with_name(path.stem + ROLLBACK + path.suffix)
+        if back.exists() and back.read_text(encoding="utf-8") != undo.to_text():
+            raise OptionError(
+                "the file that takes the settings back is there with other values",
+                found=back,
+                needed="none, or the same values",
+                action="keep it, and name another --param file",
+            )
+        note(f"Wrote {undo.write(back)}")
+    note(f"Wrote {made.write(path)}")
+    if current is None:
+        note("No file takes it back: give --log FLIGHT, whose values are restored")
+
+
+def _with_loops(guess: dict[str, Any], sid_axis: int, flown: Log | None) -> dict[str, Any]:
     """The guess under the loops that the autopilot keeps on while the mixer is swept.
 
     They work against what is injected: without them amplitudes come out many times too small.
     """
-    from flightid import axis_loop, read_log
+    from flightid import axis_loop
     from flightid.control.autopilots import axis_loop_of
 
     axis = MIXER_AXES.get(sid_axis)
     if axis is None or {"rate_feedback", "attitude_feedback_per_s"} & guess.keys():
         return guess
-    own = None if log is None else axis_loop_of(read_log(log), axis)
+    own = None if flown is None else axis_loop_of(flown, axis)
     loop = own or axis_loop("arducopter", axis, loop_rate_hz=DEFAULT_LOOP_HZ)
     p, angle = loop.values["p"], loop.angle_gain_1_s
     whose = "as flown" if own else "by default; --log FLIGHT takes what flew"

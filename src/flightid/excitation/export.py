@@ -63,7 +63,10 @@ class ParameterFile:
         """Content of the file: ``.param`` (ArduPilot) or ``.params`` (QGroundControl)."""
         lines = [f"# {note}" for note in self.notes]
         if self.autopilot == "ardupilot":
-            lines += [f"{name},{value:.7g}" for name, value in self.values.items()]
+            lines += [
+                f"{name},{value}" if isinstance(value, int) else f"{name},{value:.9g}"
+                for name, value in self.values.items()
+            ]
         else:
             lines += ["#", "# Vehicle-Id Component-Id Name Value Type"]
             lines += [
@@ -106,8 +109,25 @@ class ParameterFile:
         ------
         UnknownNameError
             A present value is not given; restoring a guess would be worse than none.
+
+        Notes
+        -----
+        ArduPilot hides the settings of its sweep while SID_AXIS is 0. They do nothing then, so
+        that SID_AXIS alone takes them back.
+
+        Example
+        -------
+        >>> swept = ParameterFile("ardupilot", {"SID_AXIS": 10, "SID_MAGNITUDE": 0.1})
+        >>> dict(swept.rollback({"SID_AXIS": 0.0}).values)
+        {'SID_AXIS': 0}
         """
-        missing = [name for name in self.values if name not in current]
+        idle = current.get("SID_AXIS") == 0
+        restored = {
+            name: value
+            for name, value in self.values.items()
+            if name in current or not (idle and name.startswith("SID_"))
+        }
+        missing = [name for name in restored if name not in current]
         if missing:
             raise UnknownNameError(
                 "present values are needed to undo the settings",
@@ -116,7 +136,7 @@ class ParameterFile:
             )
         before = {
             name: type(value)(current[name]) if isinstance(value, int) else float(current[name])
-            for name, value in self.values.items()
+            for name, value in restored.items()
         }
         return ParameterFile(self.autopilot, before, ("Undoes the identification settings.",))
 
@@ -136,7 +156,8 @@ def ardupilot_parameters(
     integrator_off : bool
         For a mixer axis, zero the integrator of that rate loop, which otherwise fights the dwell.
     current : mapping of str to float, optional
-        Parameters as they are on the vehicle: then the fast attitude bit is added to LOG_BITMASK.
+        Parameters as they are on the vehicle: then the fast attitude bit is added to LOG_BITMASK,
+        and the notes name the values to restore.
 
     Raises
     ------
@@ -154,7 +175,7 @@ def ardupilot_parameters(
     >>> chirp = ardupilot_chirp(magnitude=0.15, start_hz=0.05, stop_hz=5.0, record_s=130.0,
     ...                         fade_in_s=5.0, fade_out_s=5.0, axis=11)
     >>> ardupilot_parameters(chirp).values["ATC_RAT_PIT_I"]
-    0
+    0.0
     """
     if chirp.kind != "ardupilot_chirp":
         raise OptionError(
@@ -178,15 +199,20 @@ def ardupilot_parameters(
     _require_ranges(settings)
     axis = int(settings["SID_AXIS"])
     values: dict[str, float | int] = {}
+    before = {} if current is None else current
     scale = "as a share of full scale" if chirp.unit == "1" else f"in {chirp.unit}"
     notes = [f"System identification, SID_AXIS {axis}, magnitude {scale}."]
     if axis in MIXER_AXES:
         values["ATC_RATE_FF_ENAB"] = 0
-        notes.append("ATC_RATE_FF_ENAB,0 keeps command shaping out of the swept axis: restore 1.")
+        shaped = f"{before.get('ATC_RATE_FF_ENAB', 1):g}"
+        notes.append(
+            f"ATC_RATE_FF_ENAB,0 keeps command shaping out of the swept axis: restore {shaped}."
+        )
     if axis in ARDUPILOT_RATE_AXES and integrator_off:
         integrator = f"ATC_RAT_{ARDUPILOT_RATE_AXES[axis]}_I"
-        values[integrator] = 0
-        notes.append(f"{integrator},0 is for the sweep only: restore its value after the flight.")
+        values[integrator] = 0.0
+        own = f"{before[integrator]:.7g}" if integrator in before else "its value"
+        notes.append(f"{integrator},0 is for the sweep only: restore {own} after the flight.")
     notes.append(_logging_note(values, current))
     return ParameterFile("ardupilot", {**values, **settings}, tuple(notes))
 
@@ -315,7 +341,8 @@ def _logging_note(values: dict[str, float | int], current: Mapping[str, float] |
     """Add the fast attitude bit where the present bits are known; say what to do otherwise."""
     if current is not None and "LOG_BITMASK" in current:
         values["LOG_BITMASK"] = int(current["LOG_BITMASK"]) | 1
-        return "LOG_BITMASK has ATTITUDE_FAST set: restore the old value after the flight."
+        old = int(current["LOG_BITMASK"])
+        return f"LOG_BITMASK has ATTITUDE_FAST set: restore {old} after the flight."
     return "Set bit 0 (ATTITUDE_FAST) of LOG_BITMASK, or responses end at a few hertz."
 
 

@@ -132,8 +132,15 @@ def _coverage(plan: Plan) -> Iterator[Finding]:
             "design-coverage",
             light,
             f"{name} has power within 20 dB of its peak in {share:.0f} % of the band",
-            "" if light is Light.GREEN else "choose a sweep or multisine over this very band",
+            "" if light is Light.GREEN else _fuller(plan.excitation),
         )
+
+
+def _fuller(excitation: Excitation) -> str:
+    """How to put power where the band has none."""
+    if excitation.kind in ("sweep", "ardupilot_chirp", "multisine"):
+        return "lengthen the record, or narrow the band"
+    return "choose a sweep or multisine over this very band"
 
 
 def _cross_coherence(plan: Plan) -> Iterator[Finding]:
