@@ -58,6 +58,8 @@ def read(response: fid.FrequencyResponse) -> dict[str, Any]:
     found: dict[str, Any] = {name: getattr(margins, name) for name in READ}
     found["disturbance bandwidth"] = rejection.bandwidth
     found["disturbance peak"] = rejection.peak
+    disk = fid.disk_margin(response, controller=lambda s: 0.25 * controller(s))
+    found |= {"disk margin": disk.alpha, "disk frequency": disk.frequency}
     try:
         handling = fid.attitude_bandwidth(response, "u", "p", band_rad_s=BAND, output_is="rate")
     except fid.FlightidError:

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from flightid.plot.fit import EstimateBar, parameter_intervals
 from flightid.plot.frequency_response import Curve, bode
 from flightid.plot.record import Panel, Trace, thinned, time_histories
+from flightid.responses.response_band import TAKEN_OUT, ResponseIntervals
 from tests.closeness import assert_close
 
 OMEGA = np.geomspace(0.5, 50, 40)
@@ -88,3 +89,31 @@ def test_parameter_intervals_are_relative_and_mark_the_truth() -> None:
     assert_close(estimates.error_x.array, [20.0, 50.0], atol=1e-9, why="to the far edge")
     assert_close(estimates.error_x.arrayminus, [10.0, 50.0], atol=1e-9, why="to the near edge")
     assert list(truth.y) == ["K"]
+
+
+def test_intervals_are_drawn_about_their_own_centre() -> None:
+    response = np.full(OMEGA.size, 2.0 + 0.0j)
+    wide = np.stack([np.full(OMEGA.size, 3.0), np.full(OMEGA.size, 5.0)])
+    turned = np.full(OMEGA.size, 2.0 * np.pi)
+    intervals = ResponseIntervals(
+        OMEGA, 2.0 * response, wide, np.stack([turned - 0.1, turned + 0.1]), TAKEN_OUT
+    )
+    made = bode([_curve("measured", response, intervals=intervals)])
+    gains = [each for each in made.data if each.yaxis == "y"]
+    phases = [each for each in made.data if each.yaxis == "y2"]
+    centre = [each.y for each in gains if each.name == "measured, leakage taken out"]
+    assert_close(
+        np.array(centre),
+        np.full((1, OMEGA.size), 20 * np.log10(4.0)),
+        rtol=1e-12,
+        why="same arithmetic",
+    )
+    assert_close(
+        max(each.y.max() for each in gains), 20 * np.log10(5.0), rtol=1e-12, why="same arithmetic"
+    )
+    assert_close(
+        max(each.y.max() for each in phases),
+        np.degrees(0.1),
+        rtol=1e-9,
+        why="a whole turn is taken off",
+    )

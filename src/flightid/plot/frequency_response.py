@@ -1,4 +1,4 @@
-"""Bode plots of estimated responses, with coherence and bands of random error, and of models."""
+"""Bode plots of estimated responses, with coherence and bands of their errors, and of models."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.plot import look
+from flightid.responses.response_band import TAKEN_OUT, ResponseIntervals
 from flightid.uncertainty.quantiles import half_width
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +35,8 @@ class Curve:
         Coherence; shown below where any curve has it.
     random_error : ndarray, shape (n_freqs,), optional
         Normalised 1 σ random error; shown as a 95 % band.
+    intervals : ResponseIntervals, optional
+        Shown as the band in its place.
 
     Example
     -------
@@ -46,6 +51,7 @@ class Curve:
     dash: str = "solid"
     coherence: NDArray[np.float64] | None = None
     random_error: NDArray[np.float64] | None = None
+    intervals: ResponseIntervals | None = None
 
 
 def bode(curves: Sequence[Curve], *, unit: str = "", minimum_coherence: float = 0.6) -> go.Figure:
@@ -118,24 +124,49 @@ def _line(curve: Curve, values: NDArray[np.float64], *, legend: bool) -> go.Scat
 
 def _add_gain(made: go.Figure, curve: Curve) -> None:
     magnitude = np.abs(curve.response)
-    if curve.random_error is not None:
+    low, high = 0.0 * magnitude, magnitude
+    if curve.intervals is not None:
+        low, high = curve.intervals.gain
+    elif curve.random_error is not None:
         wide = half_width() * curve.random_error
-        # A lower edge at or below zero gain has no decibels; it is drawn 40 dB down.
-        edges = (_decibel(magnitude * np.maximum(1 - wide, 0.01)), _decibel(magnitude * (1 + wide)))
-        made.add_traces(
-            look.band(curve.name, curve.omega_rad_s, *edges, colour=curve.colour), rows=1, cols=1
-        )
+        low, high = magnitude * (1 - wide), magnitude * (1 + wide)
+    # A lower edge at or below zero gain has no decibels; it is drawn 40 dB down.
+    _add_band(made, curve, (_decibel(np.maximum(low, 0.01 * magnitude)), _decibel(high)), 1)
     made.add_trace(_line(curve, _decibel(magnitude), legend=True), row=1, col=1)
+    if curve.intervals is not None:
+        _add_centre(made, curve, _decibel(np.abs(curve.intervals.centre)), 1)
 
 
 def _add_phase(made: go.Figure, curve: Curve, phase_deg: NDArray[np.float64]) -> None:
-    if curve.random_error is not None:
+    low, high = phase_deg, phase_deg
+    if curve.intervals is not None:
+        low, high = np.degrees(curve.intervals.phase_rad)
+        turns = 360.0 * np.round((phase_deg - 0.5 * (low + high)) / 360.0)
+        low, high = low + turns, high + turns
+    elif curve.random_error is not None:
         wide = np.minimum(np.degrees(half_width() * curve.random_error), 180.0)
-        edges = (phase_deg - wide, phase_deg + wide)
-        made.add_traces(
-            look.band(curve.name, curve.omega_rad_s, *edges, colour=curve.colour), rows=2, cols=1
-        )
+        low, high = phase_deg - wide, phase_deg + wide
+    _add_band(made, curve, (low, high), 2)
     made.add_trace(_line(curve, phase_deg, legend=False), row=2, col=1)
+    if curve.intervals is not None:
+        _add_centre(made, curve, 0.5 * (low + high), 2)
+
+
+def _add_centre(made: go.Figure, curve: Curve, values: Array, row: int) -> None:
+    """What the band stands about, where leakage and resolution were taken out."""
+    assert curve.intervals is not None
+    if curve.intervals.reason == TAKEN_OUT:
+        name = f"{curve.name}, leakage taken out"
+        drawn = look.line(
+            name, curve.omega_rad_s, values, colour=look.RIVAL, dash="dot", legend=row == 1
+        )
+        made.add_trace(drawn, row=row, col=1)
+
+
+def _add_band(made: go.Figure, curve: Curve, edges: tuple[Array, Array], row: int) -> None:
+    if curve.intervals is not None or curve.random_error is not None:
+        drawn = look.band(curve.name, curve.omega_rad_s, *edges, colour=curve.colour)
+        made.add_traces(drawn, rows=row, cols=1)
 
 
 def _decibel(magnitude: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ import plotly.graph_objects as go
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
 from flightid.responses import FrequencyResponse
+from flightid.responses.response_band import response_band
 
 
 def response_figure(
@@ -17,7 +18,7 @@ def response_figure(
     *,
     minimum_coherence: float = 0.6,
 ) -> go.Figure:
-    """Draw measured responses over frequency, with 95 % bands of the random error.
+    """Draw measured responses over frequency, with 95 % bands (`response_band`).
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ def response_figure(
             look.MEASURED if len(drawn) == 1 else look.SERIES[index % len(look.SERIES)],
             look.DASHES[index % len(look.DASHES)],
             pair.coherence,
-            pair.random_error,
+            intervals=response_band(response, pair.input, pair.output),
         )
         for index, pair in enumerate(drawn)
     ]

@@ -8,6 +8,7 @@ from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
 from flightid.report.content import Figure
 from flightid.report.figures import figure_block
+from flightid.responses.response_band import response_band
 from flightid.study.estimate_tables import WORDS
 
 if TYPE_CHECKING:
@@ -52,11 +53,11 @@ def _figure(item: ModelResults, name: str, truth: Truth | None) -> Figure:
                 colour=look.MEASURED if number == 0 else look.SERIES[number],
                 dash="solid" if number == 0 else "dash",
                 coherence=pair.coherence,
-                random_error=pair.random_error if number == 0 else None,
+                intervals=None if number else response_band(response, source, output),
             )
         )
     omega, fit = curves[0].omega_rad_s, item.fit
-    shown = f"{output} to {source}: {curves[0].name} with its 95 % band of random error"
+    shown = f"{output} to {source}: {curves[0].name} with its 95 % band"
     exact = None
     # A NARX model has no frequency response, and inputs without coherence are in no model.
     if fit is not None and source in fit.model.inputs and hasattr(fit.model, "frequency_response"):

@@ -142,8 +142,8 @@ def disturbance_rejection(
     Assumes
     -------
     A linear loop. The peak of a noisy measurement is biased upwards: it is the highest of many
-    points. The resolution of windows moves the bandwidth of a measurement, by half a standard error
-    in simulated flights of a minute. Intervals are carried by first order.
+    points. Leakage and resolution are taken out of a response that was estimated from records, not
+    of one from a file or arithmetic. Intervals are carried by first order.
 
     Reference
     ---------

@@ -22,6 +22,7 @@ from flightid.identification.uncertain_of import uncertain_of
 from flightid.responses import FrequencyResponse
 from flightid.responses.arithmetic import Known
 from flightid.responses.errors.random_error import Points, combined
+from flightid.responses.unbiased import unbiased
 from flightid.uncertainty.uncertain import Uncertain
 
 Array = NDArray[np.float64]
@@ -107,7 +108,10 @@ def read_loops(
     if band_rad_s is not None and not 0.0 < band_rad_s[0] < band_rad_s[1] < np.inf:
         raise OptionError("band_rad_s has no meaning", found=band_rad_s, needed="0 < low < high")
     measured = isinstance(source, FrequencyResponse)
-    uncertain = _unweighed(source) if measured else uncertain_of(source)
+    if isinstance(source, FrequencyResponse):
+        uncertain = _unweighed(_without_leakage(source))
+    else:
+        uncertain = uncertain_of(source)
     thing = uncertain.value
     if not measured and not isinstance(thing, ResponseSource):
         raise ModelError(
@@ -146,6 +150,18 @@ def read_loops(
 
         closed = closed_count(one_loop, whole_grid(one_loop, roots, band_rad_s), count)
     return MatrixLoop(names, uncertain, omega, of, count, measured, closed)
+
+
+def _without_leakage(response: FrequencyResponse) -> FrequencyResponse:
+    """What was measured less what windows blur, as far as that can be foretold.
+
+    Of several outputs the errors stay those of the estimate, which know what outputs share.
+    """
+    alone = len(response.outputs) == 1
+    clean = unbiased(response, refined=alone)
+    if clean is None or alone:
+        return clean or response
+    return replace(response, response=clean.response, linear=None)
 
 
 def _determinant(loops: Complex) -> Complex:
