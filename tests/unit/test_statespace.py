@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 import flightid as fid
 from flightid.errors import DataError, FitError, ModelError, SingularError, UnknownNameError
 from flightid.models.language import symbolic
+from flightid.models.language.dimensions import require_balance
 from flightid.models.state_space.model import StateSpaceModel
 from tests.closeness import assert_close
 from tests.examples import examples
@@ -278,3 +279,22 @@ def test_outputs_that_no_fitted_response_needs_may_be_missing() -> None:
     start = model.with_fixed(**{name: model.parameters[name].value for name in others})
     fit = fid.identify(start.with_values({"Zw": -0.3, "Zcol": -4.0}), data)
     assert_close(fit.parameters["Zw"].value, -0.122571, rtol=1e-6, why="without noise")
+
+
+@pytest.mark.parametrize(
+    ("inertia", "moment", "same"),
+    [
+        ("slug*ft^2", "ft*lbf", True),
+        ("kg*m^2", "N*m", True),
+        ("slug*ft^2", "N*m", False),
+        ("kg*m^2", "ft*lbf", False),
+    ],
+)
+def test_named_units_balance_by_their_base_units(inertia: str, moment: str, same: bool) -> None:
+    units = {"I": inertia, "M": moment, "q'": "rad/s^2"}
+    if same:
+        require_balance("I*q'", "M", units, subject="equation of q")
+        require_balance("sin(I*q'/M)", "1", units, subject="a sine")
+    else:
+        with pytest.raises(ModelError, match="different units on its sides"):
+            require_balance("I*q'", "M", units, subject="equation of q")

@@ -31,10 +31,9 @@ SMALLEST_DELAY_S = 0.002
 COHERENT = 0.6
 NOISY = 0.03
 """Random error at a crossing beyond which intervals of a reading cover less than they say."""
-LEADING_DEG = 10.0
-"""Phase at the beginning of the band above which a control may have the other sign."""
 LATE = "begin the band lower: the phase has passed −135° where it begins; or turn the sign"
 NO_FALL = "widen the band; take the attitude, or say that it is a rate, with its sign"
+NO_LEAD = "above its unstable pair the phase never passes −135°: close an inner loop first"
 AMBIGUOUS = 3.0
 """Width of all places where noise may put a passage, over that of its interval of first order."""
 MOST_POINTS = 160
@@ -86,11 +85,13 @@ def attitude_bandwidth(
 
     Assumes
     -------
-    A phase that begins between −270° and 90°. Intervals of first order, from the covariance of
-    parameters or of the measured response: biased where coherence is low near ω_180 or its double,
-    and after arithmetic by what windows blur; before it `without_bias` takes that out. Where noise
-    may move a passage to another place there is no interval.
-    Of several passages through −180° the first counts, which noise makes earlier.
+    A band that reaches above slow modes and begins before delay has cost 105°: the sign and the
+    branch of the phase are read near crossover, against the phase that the gain asks for.
+    Intervals of first order, from the covariance of parameters or of the measured response:
+    biased where coherence is low near ω_180 or its double, and after arithmetic by what windows
+    blur; before it `without_bias` takes that out. Where noise may move a passage to another place
+    there is no interval. Of several passages through −180° above unstable modes the first counts,
+    which noise makes earlier.
 
     Reference
     ---------
@@ -127,7 +128,7 @@ def attitude_bandwidth(
             f"{outputs}/{inputs} has no bandwidth in the band",
             found=f"phase from {curve.degrees[0]:.0f}° to {curve.degrees[-1]:.0f}°",
             needed="a phase that passes −135° and −180°",
-            action=LATE if curve.degrees[0] <= PHASE_MARGIN_DEG - 180.0 else NO_FALL,
+            action=_next(curve),
         )
     errors = _errors(data, pair, values)
     nonlinear = _is_nonlinear(values)
@@ -137,6 +138,12 @@ def attitude_bandwidth(
         *source_findings(data),
     )
     return AttitudeBandwidth(outputs, inputs, response_type, errors, curve, nonlinear, findings)
+
+
+def _next(curve: GainPhaseCurve) -> str:
+    if curve.branch.above and not curve.branch.reversed:
+        return NO_LEAD
+    return LATE if curve.degrees[0] <= PHASE_MARGIN_DEG - 180.0 else NO_FALL
 
 
 def _pair(output: str, control: str, band: tuple[float, float], output_is: str, sign: int) -> Pair:
@@ -232,8 +239,8 @@ def _judge(
 ) -> tuple[Finding, ...]:
     crossing, margin, gain, delay, slope = values
     found = []
-    if curve.degrees[0] > LEADING_DEG:
-        text = f"the phase begins at {curve.degrees[0]:.0f}°, ahead of the control"
+    if curve.branch.reversed:
+        text = f"the phase lies {curve.branch.lead:.0f}° ahead of what the gain asks for"
         action = "turn the sign if the control pulls the other way; begin the band above slow modes"
         found.append(Finding("sign-doubtful", Light.AMBER, text, action))
     if np.isnan(gain):

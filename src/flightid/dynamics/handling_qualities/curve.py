@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from flightid.dynamics.handling_qualities.branch import Branch, branch_of
 from flightid.errors import DataError, UnknownNameError
 from flightid.models import LinearSystem, StateSpaceModel, TransferFunctionModel
 from flightid.models.model import linear_system
@@ -62,16 +63,20 @@ class GainPhaseCurve:
     Attributes
     ----------
     omega, decibels, degrees : ndarray, shape (n,)
-        rad/s, dB, and unwrapped degrees on the branch on which an integrator lies at −90°.
+        rad/s, dB, and unwrapped degrees on the branch on which an integrator lies at −90° near
+        crossover.
     exact : callable, or None
         A model's response at one frequency; None joins measured points by straight lines over log
         frequency.
+    branch : Branch
+        Sign of the control, and where the unstable pairs of the band end.
     """
 
     omega: Array
     decibels: Array
     degrees: Array
     exact: Callable[[float], complex] | None
+    branch: Branch
 
     @classmethod
     def of(cls, thing: object, pair: Pair, smoother: Array | None = None) -> GainPhaseCurve:
@@ -113,10 +118,11 @@ class GainPhaseCurve:
             )
         decibels = 20.0 * np.log10(np.abs(values))
         degrees = np.degrees(np.unwrap(np.angle(values)))
-        degrees -= 360.0 * np.ceil((degrees[0] - 90.0) / 360.0)
+        branch = branch_of(omega, decibels, degrees)
+        degrees += branch.turn
         if smoother is not None:
             decibels, degrees = smoother @ decibels, smoother @ degrees
-        return cls(omega, decibels, degrees, exact)
+        return cls(omega, decibels, degrees, exact, branch)
 
     def at(self, omega: float) -> tuple[float, float]:
         """Decibels and degrees at one frequency: of a model exactly, else between neighbours."""
@@ -131,14 +137,15 @@ class GainPhaseCurve:
         return float(20.0 * np.log10(abs(value))), angle + 360.0 * turns
 
     def falls_through(self, level: float) -> float | None:
-        """Lowest frequency at which the phase falls through a level."""
+        """Lowest frequency above unstable pairs at which the phase falls through a level."""
         places = self.falls(level)
         return None if not len(places) else self._between(int(places[0]), 1, level)
 
     def falls(self, level: float) -> NDArray[np.intp]:
-        """Grid points after which the phase falls through a level."""
+        """Grid points above unstable pairs after which the phase falls through a level."""
         high = self.degrees - level
-        return np.flatnonzero((high[:-1] > 0.0) & (high[1:] <= 0.0))
+        beyond = self.omega[:-1] >= self.branch.above
+        return np.flatnonzero((high[:-1] > 0.0) & (high[1:] <= 0.0) & beyond)
 
     def above(self, limit: float, margin_db: float) -> float | None:
         """Highest frequency below a limit at which the gain is still a margin above that there."""

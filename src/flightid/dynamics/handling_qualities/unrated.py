@@ -141,7 +141,8 @@ def with_found_sign(
     if other is not None and not _doubtful(other):
         text = f"{axis}: the control pulls the other way, by the phase of its response: taken so"
         action = f"signs: {{'{axis}': 1}} or -1 tells it, in a study [handling_qualities.signs]"
-        return other, (Finding("sign-found", Light.GREEN, text, action),)
+        light = Light.AMBER if other.curve.branch.above else Light.GREEN
+        return other, (Finding("sign-found", light, text, action),)
     if first is None:
         assert failure is not None
         raise failure

@@ -6,6 +6,7 @@ not: an angle in degrees clashes with one in radians and may not stand inside a 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Mapping
 from itertools import combinations, product
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from flightid import _native
 from flightid.errors import ModelError, UnitError
-from flightid.units import canonical, exponents
+from flightid.units import canonical, exponents, si_base
 
 if TYPE_CHECKING:
     from flightid.models.language.tables import TableFunction
@@ -192,7 +193,8 @@ def _combine(kind: str, inner: list[Powers | None], numbers: list[float | None])
         first, second = inner
         known = first is not None and second is not None
         sign = 1.0 if kind == "multiply" else -1.0
-        return _product(first or {}, second or {}, sign) if known else None
+        found = _product(first or {}, second or {}, sign)
+        return None if not known else {} if _same(found, {}) else found
     if kind != "sign" and inner[0]:
         raise _ClashError(f"takes {kind} of {_shown(inner[0])!r}, which is neither '1' nor 'rad'")
     return {}
@@ -227,7 +229,20 @@ def _product(first: Powers, second: Powers, sign: float) -> Powers:
 
 
 def _same(first: Powers, second: Powers) -> bool:
-    return not _product(first, second, -1.0)
+    """Whether two units are one: lbf is slug ft/s², but a foot is no metre.
+
+    Example
+    -------
+    >>> _same(exponents("lbf"), exponents("slug*ft/s^2")), _same(exponents("ft"), exponents("m"))
+    (True, False)
+    """
+    rest = _product(first, second, -1.0)
+    logarithm, powers = 0.0, Powers()
+    for name, power in rest.items():
+        factor, base = si_base(name)
+        logarithm += power * math.log(factor)
+        powers = _product(powers, base, power)
+    return abs(logarithm) < _SAME and not set(powers) - {"radian"}
 
 
 def _in_words_of(powers: Powers, units: Iterable[str]) -> str:
