@@ -81,7 +81,7 @@ def test_advice_on_a_good_record():
     assert _codes(advice) == {"delay"}
     assert "excitation order 50" in repr(advice)
     assert advice.to_dict()["schema"] == "flightid.advice/1"
-    assert "Loop open: past noise of the outputs" in advice.summary().to_text()
+    assert "No loop seen: past noise of the outputs" in advice.summary().to_text()
 
 
 def test_advice_sees_poor_related_silent_and_fast_channels():

@@ -74,7 +74,7 @@ def test_residual_tests_on_demand(
     shown = capsys.readouterr().out
     assert "Verification(" in shown
     assert "ResidualTests(1 output, 1 input" in shown
-    assert "loop open: " in shown
+    assert "no loop seen: " in shown
     assert "Residual tests" in page.read_text()
     run([*options, "--json"])
     plain = json.loads(capsys.readouterr().out)

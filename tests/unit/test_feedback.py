@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import signal
 
 import flightid as fid
+from flightid.conventions import Light
 from flightid.errors import OptionError
+from flightid.evidence.data_checks import loop_check
 from flightid.responses.store import from_xarray, to_xarray
 from flightid.uncertainty.feedback import LEVEL, FeedbackTest, find_feedback
 from tests.feedback_flights import DT, flight
@@ -102,3 +105,37 @@ def test_an_instrument_needs_no_open_loop() -> None:
     assert response.loop is not None
     assert response.loop.source == "instrument"
     assert not response.loop.is_closed
+
+
+def test_a_controller_that_answers_within_the_sample_is_not_called_open() -> None:
+    noise = signal.lfilter([1.0], [1.0, -0.8], np.random.default_rng(0).standard_normal(1000))
+    u, y = np.zeros(1000), np.zeros(1000)
+    for k in range(2, 1000):
+        y[k] = 1.6 * y[k - 1] - 0.7 * y[k - 2] + 0.06 * u[k - 1] + 0.04 * u[k - 2] + noise[k]
+        u[k] = -0.8 * y[k] - 0.5 * (y[k] - y[k - 1])
+    record = fid.Record.from_arrays(np.arange(1000) * DT, inputs={"u": u}, outputs={"y": y})
+    found = fid.feedback_test(record)
+    assert (found.loop, found.source, found.is_function_of_outputs) == (
+        "unknown", "same sample", True,
+    )  # fmt: skip
+    fit = fid.identify(fid.PolynomialModel.arx(("u",), "y", na=2, nb=2, nk=0), record)
+    loop = fit.evidence.check("loop")
+    assert loop is not None
+    assert loop.light is Light.RED
+    # The vehicle's own feedthrough looks alike, but leaves more that moves the input.
+    rng = np.random.default_rng(1)
+    u = rng.standard_normal(1000)
+    y = np.convolve(u, [0.5, 0.3])[:1000] + 0.3 * rng.standard_normal(1000)
+    at_once = find_feedback([u[None]], [y[None]], ["u"])
+    assert (at_once.loop, at_once.is_function_of_outputs) == ("unknown", False)
+    assert loop_check(at_once).light is Light.UNKNOWN
+
+
+def test_a_constant_input_holds_no_noise() -> None:
+    u, y = flight("white", n=1000, seed=3)
+    still = np.full(1000, 283.194)
+    record = fid.Record.from_arrays(
+        np.arange(1000) * DT, inputs={"u": u, "T": still}, outputs={"y": y}
+    )
+    found = fid.feedback_test(record)
+    assert (found.loop, found.input) == ("open", "u")

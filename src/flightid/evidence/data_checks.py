@@ -29,6 +29,10 @@ CLOSED_ACTION = (
     "use the injected excitation as instrument, a method with a noise model, or fly with the loop "
     "open; loop='open' overrides where you know it"
 )
+UNKNOWN_ACTION = (
+    "declare loop='open' where no controller moved the inputs; with one, loop='closed', and use "
+    "the injected excitation as instrument"
+)
 
 
 def loop_check(test: FeedbackTest) -> Check:
@@ -41,8 +45,10 @@ def loop_check(test: FeedbackTest) -> Check:
     """
     if test.is_closed:
         return Check(LOOP, Light.AMBER, str(test), CLOSED_ACTION)
+    if test.is_function_of_outputs:
+        return Check(LOOP, Light.RED, str(test), UNKNOWN_ACTION)
     if test.loop == "unknown" and test.source != "instrument":
-        return Check(LOOP, Light.UNKNOWN, str(test), "declare loop='open' or 'closed'")
+        return Check(LOOP, Light.UNKNOWN, str(test), UNKNOWN_ACTION)
     return Check(LOOP, Light.GREEN, str(test))
 
 
@@ -80,7 +86,7 @@ def loop_of_responses(responses: Sequence[FrequencyResponse]) -> Check | None:
     if not known or len(known) < len(tests):
         return None
     checks = [loop_check(test) for test in known]
-    order = (Light.AMBER, Light.UNKNOWN, Light.GREEN)
+    order = (Light.RED, Light.AMBER, Light.UNKNOWN, Light.GREEN)
     return min(checks, key=lambda check: order.index(check.light))
 
 

@@ -44,8 +44,8 @@ def feedback_test(
 
     Assumes
     -------
-    A loop that acts at least one sample late. Feedback within the same sample is not seen: it
-    cannot be told from direct feedthrough.
+    Feedback within the same sample cannot be told from direct feedthrough: where input and output
+    go together within it, the loop is "unknown".
 
     Reference
     ---------

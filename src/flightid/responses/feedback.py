@@ -55,6 +55,7 @@ def feedback_of(
         [rows[:, ::step][:, :most] for rows in outputs],
         samples.inputs,
         repeats=all(found_period(rows) is not None for rows in inputs),
+        unthinned=([rows[:, :most] for rows in inputs], [rows[:, :most] for rows in outputs]),
     )
 
 

@@ -6,12 +6,17 @@ many lags has not died out. What is new in an input is what its own past does no
 noise that explains a share of what is new says that a loop is closed. Either of the two being white
 is enough for the F distribution, so neither a poor model of the outputs nor a held, swept or
 two-level input raises false alarms. An input that repeats exactly cannot hold any noise.
+
+A controller that answers within the sample hides its noise: the model of the outputs takes u(t) for
+their cause. So what is new in an input is also held against the outputs of its own sample. Where
+they go together, a vehicle that answers at once and a controller that does look the same, and the
+loop is not known.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -20,7 +25,7 @@ from scipy import linalg
 from scipy.special import fdtrc
 
 from flightid.errors import OptionError
-from flightid.record.hold import LOOPS, Loop
+from flightid.record.hold import LOOPS
 
 Array = NDArray[np.float64]
 LEVEL = 0.01
@@ -33,6 +38,8 @@ SAMPLES_PER_NUMBER = 10
 FEWEST_FREE = 30
 SMALLEST_NOISE = 1e-8
 """Share of an output's power below which its noise is rounding, or cannot bias anything."""
+NEARLY = 0.999
+"""Share of what is new in an input from which outputs leave nothing else that moves it."""
 RIDGE = 1e-11
 """Added to columns of unit length: noise 110 dB below each channel."""
 
@@ -44,16 +51,18 @@ class FeedbackTest:
     Attributes
     ----------
     loop : {"open", "closed", "unknown"}
-    source : {"test", "declared", "repeats", "instrument", "no noise", "too short"}
+    source : {"test", "declared", "repeats", "instrument", "no noise", "same sample", "too short"}
         How it is known: the test of past noise; the user's word; inputs that repeat exactly, or
         outputs without noise, which feed nothing back; an estimate by way of an excitation, which a
-        closed loop does not bias; records too short to tell.
+        closed loop does not bias. Or why it is not: input and output go together within a sample;
+        records too short to tell.
     p_value : float or None
         Chance of so large a share with the loop open, over all inputs; None without a test.
     input : str or None
         Input that past noise explains most.
     share : float or None
-        Share of what is new in it that past noise explains.
+        Share of what is new in it that past noise explains, or with source "same sample" the
+        outputs up to its own sample.
     lags : int
         Past samples of noise that were asked.
 
@@ -75,21 +84,31 @@ class FeedbackTest:
         """Whether estimates from these inputs straight to outputs are biased."""
         return self.loop == "closed" and self.source != "instrument"
 
+    @property
+    def is_function_of_outputs(self) -> bool:
+        """Whether outputs leave nothing else that moves an input: a model may be a controller."""
+        return self.source == "same sample" and (self.share or 0.0) >= NEARLY
+
     def __str__(self) -> str:
         """What is known and how, in a sentence."""
         words = {
             "declared": f"loop {self.loop}, as declared",
             "repeats": "loop open: the inputs repeat exactly, so nothing is fed back",
+            "same sample": (
+                f"whether a loop is closed cannot be told: outputs up to the same sample explain "
+                f"{_percent(self.share)} % of what is new in input {self.input}, as a controller "
+                "without delay or a vehicle that answers at once would"
+            ),
             "instrument": "estimated by way of the excitation, which a closed loop does not bias",
-            "no noise": "loop open: the outputs hold no noise that could be fed back",
+            "no noise": "no loop seen: the outputs hold no noise that could be fed back",
             "too short": "whether a loop is closed cannot be told: the records are too short",
         }
         if self.source in words:
             return words[self.source]
+        said = "loop closed" if self.loop == "closed" else "no loop seen"
         return (
-            f"loop {self.loop}: past noise of the outputs explains "
-            f"{100.0 * (self.share or 0.0):.3g} % of what is new in input {self.input} "
-            f"(p = {self.p_value:.2g})"
+            f"{said}: past noise of the outputs explains {_percent(self.share)} % of what is new "
+            f"in input {self.input} (p = {self.p_value:.2g})"
         )
 
     def to_dict(self) -> dict[str, object]:
@@ -102,6 +121,11 @@ class FeedbackTest:
             "share": self.share,
             "lags": self.lags,
         }
+
+
+def _percent(share: float | None) -> str:
+    """A share in percent, cut so that only all of it reads 100."""
+    return f"{np.floor(1e4 * (share or 0.0)) / 100.0:.4g}"
 
 
 def declared_loop(loop: str) -> FeedbackTest:
@@ -124,6 +148,7 @@ def find_feedback(
     names: Sequence[str],
     *,
     repeats: bool = False,
+    unthinned: tuple[Sequence[Array], Sequence[Array]] | None = None,
 ) -> FeedbackTest:
     """Test records for a closed loop.
 
@@ -135,11 +160,15 @@ def find_feedback(
         Of the inputs.
     repeats : bool
         The inputs of every record repeat exactly.
+    unthinned : tuple of two sequences of ndarray, optional
+        Inputs and outputs at the records' own samples, where those given are thinned: what an input
+        does between two kept samples looks like an answer within one.
 
     Returns
     -------
     FeedbackTest
-        Feedback within the same sample is not seen: it cannot be told from direct feedthrough.
+        Feedback within the same sample cannot be told from direct feedthrough: where input and
+        output go together within it, the loop is "unknown". Inputs that do not change are left out.
 
     Reference
     ---------
@@ -161,6 +190,11 @@ def find_feedback(
     """
     if repeats:
         return FeedbackTest("open", "repeats")
+    moves = np.any([np.ptp(rows, axis=1) > 0.0 for rows in inputs], axis=0)
+    if not np.any(moves):
+        return FeedbackTest("open", "repeats")
+    whole = [rows[moves] for rows in (unthinned[0] if unthinned else inputs)]
+    inputs, names = [rows[moves] for rows in inputs], tuple(np.asarray(names)[moves].tolist())
     n_in, n_out = len(names), len(outputs[0])
     order = min(LARGEST_ORDER, usable_order(inputs, n_out))
     pairs = [(u, y) for u, y in zip(inputs, outputs, strict=True) if _room(u, order) > 0]
@@ -170,14 +204,23 @@ def find_feedback(
     noise = _noise(pairs, order)
     power = sum(np.sum(y**2, axis=1) for _, y in pairs)
     noisy = sum(np.sum(e**2, axis=1) for e in noise) > SMALLEST_NOISE * power
-    if not np.any(noisy):
-        return FeedbackTest("open", "no noise")
-    found = _shares(pairs, [e[noisy] for e in noise], order)
+    past_noise = FeedbackTest("open", "no noise")
+    if np.any(noisy):
+        past_noise = _worst(_shares(pairs, [e[noisy] for e in noise], order), names, "test")
+    if past_noise.p_value is not None and past_noise.p_value < LEVEL:
+        return replace(past_noise, loop="closed")
+    own = list(zip(whole, unthinned[1] if unthinned else outputs, strict=True))
+    at_once = _worst(_shares_at_once(own, order), names, "same sample")
+    if at_once.p_value is not None and at_once.p_value < LEVEL:
+        return replace(at_once, loop="unknown")
+    return past_noise
+
+
+def _worst(found: Sequence[tuple[float, float]], names: Sequence[str], source: str) -> FeedbackTest:
+    """The input that outputs move most surely, its probability that of so many inputs."""
     place = int(np.argmin([p for _, p in found]))
     share, p_value = found[place]
-    p_value = min(1.0, n_in * p_value)
-    loop: Loop = "closed" if p_value < LEVEL else "open"
-    return FeedbackTest(loop, "test", p_value, names[place], share)
+    return FeedbackTest("open", source, min(1.0, len(names) * p_value), names[place], share)
 
 
 def usable_order(inputs: Sequence[Array], n_out: int) -> int:
@@ -224,6 +267,34 @@ def _shares(
         f = share / n_moved / max((1.0 - share) / free, tiny)
         found.append((share, float(fdtrc(n_moved, free, f))))
     return found
+
+
+def _shares_at_once(pairs: Sequence[tuple[Array, Array]], order: int) -> list[tuple[float, float]]:
+    """By input: share of what its past leaves that outputs up to its sample explain, and F's p.
+
+    The probability is that of the outputs of the same sample alone.
+    """
+    lags = range(1, order + 1)
+    pairs = [pair for pair in pairs if pair[0].shape[1] > order]
+    own = np.vstack([past(u, order, lags) for u, _ in pairs])
+    both = np.hstack([own, np.vstack([past(y, order, lags) for _, y in pairs])])
+    now_in, now_out = (np.vstack([rows[k][:, order:].T for rows in pairs]) for k in (0, 1))
+    n_in = now_in.shape[1]
+    fresh = np.sum(_left(own, now_in) ** 2, axis=0)
+    left = _left(both, np.hstack([now_in, now_out]))
+    seen = np.sum(left[:, n_in:] ** 2, axis=0) > SMALLEST_NOISE * np.sum(now_out**2, axis=0)
+    before, now = left[:, :n_in], left[:, n_in:][:, seen]
+    free = len(own) - both.shape[1] - now.shape[1]
+    if free < FEWEST_FREE or not now.shape[1]:
+        return [(0.0, 1.0)] * n_in
+    rest = np.sum(_left(now, before) ** 2, axis=0)
+    gain = np.sum(before**2, axis=0) - rest
+    tiny = np.finfo(float).tiny
+    f = np.maximum(gain, 0.0) / now.shape[1] / np.maximum(rest / free, tiny)
+    is_new = fresh > SMALLEST_NOISE * np.sum(now_in**2, axis=0)
+    chance = np.where(is_new, fdtrc(now.shape[1], free, f), 1.0)
+    shares = np.maximum(0.0, 1.0 - rest / np.maximum(fresh, tiny))
+    return list(zip(shares.tolist(), chance.tolist(), strict=True))
 
 
 def _left(known: Array, targets: Array) -> Array:

@@ -13,6 +13,7 @@ from flightid.control.tuning.structure_error import Band, errors_of, identified_
 from flightid.conventions import Light
 from flightid.dynamics.continuous import to_continuous
 from flightid.errors import DataError, FlightidError
+from flightid.evidence.evidence import LOOP
 from flightid.findings import Finding
 from flightid.identification.model_error import ModelErrorBound
 from flightid.identification.uncertain_of import evidence_behind, uncertain_of
@@ -174,6 +175,14 @@ def _refusals(
         yield _red("the fit", examined.verdict)
     else:
         yield from _first_red("the fit", source)
+        loop = None if examined is None else examined.check(LOOP)
+        if loop is not None and loop.light is Light.UNKNOWN:
+            yield DataError(
+                "whether a loop was closed is not known, so no gains are made from the fit",
+                found=loop.what,
+                needed="a declared loop",
+                action=loop.action,
+            )
     for each in _listed(verification):
         yield from _first_red("the verification", each)
     left = [
