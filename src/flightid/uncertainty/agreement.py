@@ -82,8 +82,8 @@ class Agreement:
         Example
         -------
         >>> apart = Agreement(1, 1e-6, None, np.array([0.01, 0.01]), np.array([0.05, 0.01]))
-        >>> round(apart.apart_percent(np.array([-5.0, 1.0])), 2)
-        1.96
+        >>> round(apart.apart_percent(np.array([-5.0, 1.0])), 1)
+        2.0
         """
         if self.by_scatter is None:
             return None
