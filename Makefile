@@ -11,7 +11,7 @@ FUZZ_RUNS ?= 1000000
 # Rewritten asserts are kept between runs, whatever the shell says of byte code.
 PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
-.PHONY: demo test test-slow test-nightly docs fuzz same-wheel bench lint hooks format stubs develop wheel constraints clean help
+.PHONY: demo test test-slow test-nightly docs fuzz fuzz-files same-wheel bench lint hooks format stubs develop wheel constraints clean help
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/ —/'
@@ -75,7 +75,10 @@ same-wheel:  ## build the wheel twice and compare the bytes
 	SOURCE_DATE_EPOCH=315532800 $(BIN)/maturin build --release --quiet --out build/twice/b
 	for wheel in build/twice/a/*.whl; do cmp $$wheel build/twice/b/$$(basename $$wheel) || exit 1; done
 
-fuzz:  ## throw damaged logs, formulas and models at their readers (needs a nightly toolchain and cargo-fuzz)
+fuzz-files: develop  ## throw damaged files at the Python readers, in children with limits
+	$(BIN)/python -m tests.fuzz --runs $(FUZZ_RUNS) --keep build/fuzz
+
+fuzz: fuzz-files  ## and damaged logs, formulas and models at the native ones (nightly toolchain, cargo-fuzz)
 	cd fuzz && for target in dataflash ulog expression model; do \
 	  mkdir -p corpus/$$target seeds/$$target && cargo +nightly fuzz run -s none $$target \
 	    corpus/$$target seeds/$$target -- -runs=$(FUZZ_RUNS) -max_len=4096 || exit 1; done

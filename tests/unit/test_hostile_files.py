@@ -134,6 +134,32 @@ def test_the_budget_is_stated_and_settable(monkeypatch: pytest.MonkeyPatch) -> N
             memory_budget()
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_csv_as_the_world_writes_it(tmp_path: Path, encoding: str) -> None:
+    text = (
+        '# from a logger\n"time";"p; left [deg/s]";day\n'
+        "0;0,5;2024-05-01T10:00:00\n1;1,5;2024-05-01T10:00:01\n2;-2,5e0;2024-05-01T10:00:02\n"
+    )
+    (tmp_path / "a.csv").write_bytes(text.encode(encoding))
+    (record,) = fid.read_records(tmp_path / "a.csv")
+    assert record["p; left"].tolist() == [0.5, 1.5, -2.5]
+    assert record.unit("p; left") == "deg/s"
+    assert record["day"].tolist() == [0.0, 1.0, 2.0]
+
+
+def test_a_heading_without_end_is_refused_and_many_columns_are_read(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("a" * (2 << 20) + ",b\n1,2\n")
+    with pytest.raises(FileFormatError, match=r"line 1 of a\.csv is longer than a row can be"):
+        fid.read_records(tmp_path / "a.csv")
+    names = [f"c{index}" for index in range(20_000)]
+    rows = [",".join(["time", *names]), *(",".join([str(k)] * 20_001) for k in range(2))]
+    (tmp_path / "b.csv").write_text("\n".join(rows))
+    begun = time.process_time()
+    (record,) = fid.read_records(tmp_path / "b.csv", outputs=names[:3])
+    assert record.n_samples == 2
+    assert time.process_time() - begun < SECONDS
+
+
 DOCUMENTS = {
     "brackets": "x = " + "[" * 100_000,
     "tables": "x = " + "{a=" * 100_000,

@@ -19,6 +19,8 @@ from flightid.conventions import Light
 from flightid.errors import FileFormatError
 from flightid.files import write_atomically
 from flightid.findings import Finding
+from flightid.reading import decoding
+from flightid.record.formats.hdf5 import plain_datasets
 from flightid.record.history import Step
 from flightid.record.hold import InputShape
 from flightid.responses.errors.random_error import StoredCovariance
@@ -158,14 +160,11 @@ def read_response(path: str | Path) -> FrequencyResponse:
     FileFormatError
         The file is not netCDF, or holds no frequency response.
     """
-    try:
-        with xr.open_dataset(path, engine="h5netcdf") as dataset:
+    source = Path(path)
+    with plain_datasets(source), decoding(source.name, "a netCDF file of a frequency response"):
+        with xr.open_dataset(source, engine="h5netcdf") as dataset:
             loaded = dataset.load()
-    except (OSError, ValueError) as error:
-        if isinstance(error, FileNotFoundError):
-            raise
-        raise FileFormatError("not a netCDF file", found=str(path), needed=SCHEMA) from error
-    return from_xarray(loaded)
+        return from_xarray(loaded)
 
 
 def _array(dataset: xr.Dataset, name: str) -> Any:  # noqa: ANN401

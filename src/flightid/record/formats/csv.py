@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import codecs
+import csv
+import re
 from pathlib import Path
 
 import pyarrow as pa
 from pyarrow import csv as pa_csv
 
 from flightid.errors import FileFormatError
+from flightid.files import BLOCK_BYTES
 from flightid.record.formats.columns import (
     ColumnTable,
     is_unit,
@@ -15,8 +19,11 @@ from flightid.record.formats.columns import (
     require_readable_size,
     split_headings,
 )
+from flightid.record.formats.parquet import plain_values
 
 DELIMITERS = (",", ";", "\t")
+LONGEST_LINE = 1 << 20
+QUOTED = re.compile(r'"[^"]*"')
 
 
 def read_columns(path: Path) -> ColumnTable:
@@ -24,30 +31,32 @@ def read_columns(path: Path) -> ColumnTable:
 
     Lines that begin with ``#`` may stand above the headings. The delimiter is the one that the
     heading row holds: comma, semicolon or tab. Beside the latter two a comma may be the decimal
-    point. Numbers are read to the last bit.
+    point. Quotes may hold delimiters; dates (2024-05-01T10:00:00) become s from the first row.
+    Numbers are read to the last bit.
 
     Parameters
     ----------
     path : Path
-        The file, UTF-8.
+        The file, UTF-8, or UTF-16 with its mark.
 
     Raises
     ------
     FileFormatError
-        Not UTF-8, no heading row, no numbers, two delimiters, ragged rows, repeated names.
+        Another encoding, no heading row, a line above 1 MiB, no numbers, two delimiters, ragged
+        rows, repeated names, more cells than the memory budget holds.
     """
-    headings, second, delimiter = _first_rows(path)
+    encoding = _encoding(path)
+    headings, second, delimiter, lines = _first_rows(path, encoding)
     names, units = split_headings(headings)
     require_distinct(path, names)
     has_unit_row = not units and _is_unit_row(second)
     if has_unit_row:
         units = {name: text for name, text in zip(names, second, strict=False) if text}
-    # A byte makes at most one cell of a column.
-    require_readable_size(path, path.stat().st_size)
-    skipped = _rows_to_skip(path, 2 if has_unit_row else 1)
-    table = _read(path, names, skipped, delimiter, ".")
+    require_readable_size(path, _most_cells(path, delimiter.encode()))
+    skipped = lines[1] if has_unit_row else lines[0]
+    table = _read(path, names, skipped, delimiter, ".", encoding)
     if delimiter != "," and _has_decimal_commas(table):
-        table = _read(path, names, skipped, delimiter, ",")
+        table = _read(path, names, skipped, delimiter, ",", encoding)
     if not table.num_rows:
         raise FileFormatError(
             f"{path.name} holds headings only", needed="rows of numbers below the headings"
@@ -55,21 +64,23 @@ def read_columns(path: Path) -> ColumnTable:
     return ColumnTable(
         path,
         dict.fromkeys(names, table.num_rows),
-        lambda name: table.column(name).to_numpy(),
+        lambda name: plain_values(table.column(name)),
         units,
     )
 
 
 def _read(
-    path: Path, names: list[str], skipped: int, delimiter: str, decimal_point: str
+    path: Path, names: list[str], skipped: int, delimiter: str, point: str, encoding: str
 ) -> pa.Table:
     try:
         # Arrow rounds decimal text correctly, refuses ragged rows, and reads in parallel.
         return pa_csv.read_csv(
             path,
-            read_options=pa_csv.ReadOptions(skip_rows=skipped, column_names=names),
+            read_options=pa_csv.ReadOptions(
+                skip_rows=skipped, column_names=names, encoding=encoding
+            ),
             parse_options=pa_csv.ParseOptions(delimiter=delimiter),
-            convert_options=pa_csv.ConvertOptions(decimal_point=decimal_point),
+            convert_options=pa_csv.ConvertOptions(decimal_point=point),
         )
     except pa.ArrowException as error:
         raise FileFormatError(
@@ -93,21 +104,46 @@ def _has_decimal_commas(table: pa.Table) -> bool:
     )
 
 
-def _first_rows(path: Path) -> tuple[list[str], list[str], str]:
-    """Cells of the heading row and of the row below it, and the delimiter."""
+def _most_cells(path: Path, delimiter: bytes) -> int:
+    """Every cell ends with a delimiter or a line; those inside quotes are counted too."""
+    cells = 1
+    with path.open("rb") as stream:
+        while block := stream.read(BLOCK_BYTES):
+            cells += block.count(delimiter) + max(block.count(b"\n"), block.count(b"\r"))
+    return cells
+
+
+def _encoding(path: Path) -> str:
+    with path.open("rb") as stream:
+        mark = stream.read(2)
+    return "utf-16" if mark in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8"
+
+
+def _first_rows(path: Path, encoding: str) -> tuple[list[str], list[str], str, list[int]]:
+    """Cells of the heading row and of the row below it, the delimiter, where both stand."""
     rows: list[str] = []
+    lines: list[int] = []
+    number = 0
     try:
-        with path.open(encoding="utf-8-sig") as stream:
-            while len(rows) < 2 and (line := stream.readline(1 << 20)):
+        with path.open(encoding="utf-8-sig" if encoding == "utf-8" else encoding) as stream:
+            while len(rows) < 2 and (line := stream.readline(LONGEST_LINE)):
+                number += 1
+                if len(line) == LONGEST_LINE:
+                    raise FileFormatError(
+                        f"line {number} of {path.name} is longer than a row can be",
+                        needed=f"at most {LONGEST_LINE} characters",
+                    )
                 if line.strip() and not line.startswith("#"):
                     rows.append(line.rstrip("\r\n"))
-    except UnicodeDecodeError as error:
+                    lines.append(number)
+    except UnicodeError as error:
         raise FileFormatError(
-            f"{path.name} is not text", found=str(error), needed="UTF-8"
+            f"{path.name} is not text", found=str(error), needed="UTF-8 or UTF-16"
         ) from error
     if not rows:
         raise FileFormatError(f"{path.name} holds no row", needed="a heading row and numbers")
-    present = [mark for mark in DELIMITERS if mark in rows[0]]
+    bare = QUOTED.sub("", rows[0])
+    present = [mark for mark in DELIMITERS if mark in bare]
     if len(present) > 1:
         raise FileFormatError(
             f"the heading row of {path.name} holds several delimiters",
@@ -124,11 +160,12 @@ def _first_rows(path: Path) -> tuple[list[str], list[str], str]:
             needed="names of the columns in the first row",
             action="add a row of names; no column is guessed",
         )
-    return headings, _cells(rows[1], delimiter) if len(rows) > 1 else [], delimiter
+    return headings, _cells(rows[1], delimiter) if len(rows) > 1 else [], delimiter, lines
 
 
 def _cells(row: str, delimiter: str) -> list[str]:
-    return [cell.strip().strip('"') for cell in row.split(delimiter)]
+    cells = next(csv.reader([row], delimiter=delimiter, skipinitialspace=True), [])
+    return [cell.strip() for cell in cells]
 
 
 def _is_number(text: str) -> bool:
@@ -144,14 +181,3 @@ def _is_unit_row(cells: list[str]) -> bool:
     stated = [cell.strip("[]()") for cell in cells if cell]
     named = [cell for cell in stated if not _is_number(cell) and cell != "-"]
     return bool(named) and all(is_unit(cell) for cell in stated)
-
-
-def _rows_to_skip(path: Path, n_rows: int) -> int:
-    """Lines up to and including the first `n_rows` that are neither empty nor a comment."""
-    with path.open(encoding="utf-8-sig") as stream:
-        for number, line in enumerate(stream, start=1):
-            if line.strip() and not line.startswith("#"):
-                n_rows -= 1
-            if n_rows == 0:
-                return number
-    return 0

@@ -18,6 +18,7 @@ WIDTHS = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 1
 """Bytes of one number by storage type; numbers become doubles."""
 ELEMENT_BYTES = 256
 """What a decoder makes of one array, however empty."""
+LAST_CLASS = 17
 DEEPEST = 32
 
 
@@ -107,6 +108,9 @@ class _Elements:
         else:
             first, following = at + 8, at + 8 + size + (-size % 8)
             is_cut = first + size > len(view)
+        if kind not in WIDTHS and kind not in (MATRIX, COMPRESSED):
+            # SciPy looks an unknown type up beyond the end of its table: the process ends.
+            raise self.fault(f"an element of type {kind}")
         if is_cut:
             raise self.fault(f"an element of {size} bytes where {len(view) - at} are left")
         return kind, first, first + size, following
@@ -126,6 +130,8 @@ class _Elements:
         self.take(ELEMENT_BYTES)
         _, flags, _, at = self.tag(view, 0)
         kind = struct.unpack_from(f"{self.order}I", view, flags)[0] & 0xFF
+        if not 1 <= kind <= LAST_CLASS:
+            raise self.fault(f"an array of class {kind}")
         _, first, last, at = self.tag(view, at)
         shape = struct.unpack_from(f"{self.order}{(last - first) // 4}i", view, first)
         if len(shape) < 2 or min(shape) < 0:

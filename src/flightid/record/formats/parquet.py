@@ -94,12 +94,17 @@ def _column(path: Path, file: pq.ParquetFile, name: str) -> NDArray[Any]:
         )
     with decoding(path.name, WHOLE):
         column = file.read(columns=[name]).column(name)
-        if pa.types.is_timestamp(column.type):
-            # Exact in integers; a double of seconds since 1970 would round to 0.2 µs.
-            stamps = column.cast(pa.timestamp("ns")).to_numpy().astype("datetime64[ns]")
-            return np.asarray((stamps - stamps[0]) / np.timedelta64(1, "s"))
         if pa.types.is_dictionary(column.type):
             texts = column.unify_dictionaries().combine_chunks()
             known = texts.dictionary.to_numpy(zero_copy_only=False)
             return np.asarray(known[texts.indices.fill_null(0).to_numpy(zero_copy_only=False)])
+        return plain_values(column)
+
+
+def plain_values(column: pa.ChunkedArray) -> NDArray[Any]:
+    """Values of a column; times become s from the first of them."""
+    if not pa.types.is_timestamp(column.type):
         return np.asarray(column.to_numpy())
+    # Exact in integers; a double of seconds since 1970 would round to 0.2 µs.
+    stamps = column.cast(pa.timestamp("ns")).to_numpy().astype("datetime64[ns]")
+    return np.asarray((stamps - stamps[0]) / np.timedelta64(1, "s"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 from enum import StrEnum
 from pathlib import Path
 
@@ -59,6 +60,12 @@ def file_format(path: Path) -> FileFormat:
     return found
 
 
+def _is_text(head: bytes) -> bool:
+    return head[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) or (
+        bool(head) and b"\x00" not in head
+    )
+
+
 def _by_content(head: bytes, suffix: str) -> FileFormat | None:
     hdf5 = FileFormat.MATLAB_HDF5 if suffix == ".mat" else FileFormat.NETCDF
     # Level 5 MATLAB files begin with a text and end their header with a byte-order mark.
@@ -68,6 +75,6 @@ def _by_content(head: bytes, suffix: str) -> FileFormat | None:
         (head[:8] == HDF5_SIGNATURE, hdf5),
         (head[512:520] == HDF5_SIGNATURE, FileFormat.MATLAB_HDF5),
         (head[:6] == b"MATLAB" or head[126:128] in (b"IM", b"MI"), FileFormat.MATLAB),
-        (suffix in TEXT_SUFFIXES and bool(head) and b"\x00" not in head, FileFormat.CSV),
+        (suffix in TEXT_SUFFIXES and _is_text(head), FileFormat.CSV),
     )
     return next((kind for is_met, kind in signs if is_met), None)
