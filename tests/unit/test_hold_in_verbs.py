@@ -61,7 +61,9 @@ def test_a_response_carries_the_hold_to_the_fit() -> None:
     fit = fid.identify(MODEL, silent)
     assert fit.provenance["inputs"] == {"hold": "band_limited", "hold_from": "assumed"}
     (said,) = _said(fit)
-    assert said.startswith("inputs were taken as smooth between samples, for no record says; steps")
+    # A wrong hold leaves far more than noise: without bars, other holds have no scale.
+    assert said.startswith("inputs taken as smooth between samples; the record does not say")
+    assert fit.covariance is None
     assert not _said(fid.identify(MODEL, silent, correct_bias=False))
 
 

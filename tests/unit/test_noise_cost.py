@@ -19,7 +19,9 @@ def test_a_cost_that_noise_explains_is_green_and_one_that_it_does_not_is_not() -
     assert _found(140.0, NoiseCost(20.0, 5.0)).light is Light.RED
     assert _found(42.0, NoiseCost(5.0, 2.0)).light is Light.AMBER
     assert "random errors explain 5" in _found(42.0, NoiseCost(5.0, 2.0)).message
-    assert _found(10.0, NoiseCost(0.1, 0.01)).light is Light.GREEN
+    assert _found(10.0, NoiseCost(4.0, 1.5)).light is Light.GREEN
+    assert _found(10.0, NoiseCost(0.1, 0.01)).light is Light.AMBER  # its bars are not shown
+    assert _found(42.0, NoiseCost(0.1, 0.01)).light is Light.RED
     assert _found(42.0, None).light is Light.GREEN
 
 
@@ -29,6 +31,32 @@ def test_a_single_response_is_judged_beside_its_own_noise() -> None:
     assert codes == ["cost"]
     said = judge_cost({"p/a": 10.0, "q/a": 180.0}, 95.0, noise)
     assert [each.message for each in said if each.code == "cost-response"] == ["q/a: cost 180"]
+
+
+def test_a_structure_that_misses_far_more_than_noise_has_no_intervals() -> None:
+    truth = fid.load_model("rate_first_order").with_values({"Lp": -5.0, "Ltphi": 150.0})
+    omega = np.geomspace(0.5, 20.0, 40)
+    exact = truth.frequency_response(omega)
+
+    def fitted(mode: float) -> fid.Fit:
+        errors = 0.02 * np.random.default_rng(1).standard_normal((2, *exact.shape))
+        data = fid.FrequencyResponse.from_values(
+            omega,
+            exact
+            * (1.0 + mode / (1.0 + 0.4j * omega / 8.0 - (omega / 8.0) ** 2))
+            * (1.0 + errors[0] + 1j * errors[1]),
+            inputs=truth.inputs,
+            outputs=truth.outputs,
+            units=truth.units,
+            random_error=np.full((1, 1, 40), 0.02),
+        )
+        return fid.identify(truth, data, correct_bias=False)
+
+    assert fitted(0.0).parameters["Lp"].interval95 is not None
+    bare = fitted(0.5)
+    assert bare.parameters["Ltphi"].interval95 is None
+    assert "misses far more" in bare.parameters["Ltphi"].reason
+    assert bare.evidence.light is Light.RED
 
 
 def test_costs_of_independent_errors_have_the_mean_that_is_foretold() -> None:

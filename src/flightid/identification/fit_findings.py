@@ -32,6 +32,12 @@ MISFIT_GUIDE = 25.0
 """Half of what is nearly indistinguishable, where noise explains none of it."""
 MISFIT_RATIO = 2.0
 """Times what noise explains: its own size is an estimate."""
+FAR_RATIO = 100.0
+"""Times what noise explains from which a misfit that is seen makes the fit red."""
+CERTAIN_RATIO = 4.0
+"""Times what noise explains from which no interval by noise holds: its bars are half too short."""
+CERTAIN = 1e-6
+"""Chance of such a cost by noise below which the structure is at fault."""
 CHANCE = 0.01
 """Share of flights of a model that is right whose noise costs more than noise explains."""
 
@@ -55,11 +61,15 @@ class NoiseCost:
 
     def explains(self, cost: float) -> bool:
         """Whether chance gives as large a cost in more than one of a hundred flights."""
+        return self.chance(cost) > CHANCE
+
+    def chance(self, cost: float) -> float:
+        """Share of flights of a model that is right whose noise costs as much or more."""
         if not (self.mean > 0.0 and self.deviation > 0.0):
-            return False
+            return 0.0
         # A sum of squares of few independent parts: chi-square of the same mean and variance.
         scale = self.deviation**2 / (2.0 * self.mean)
-        return float(chdtrc(self.mean / scale, cost / scale)) > CHANCE
+        return float(chdtrc(self.mean / scale, cost / scale))
 
 
 def judge_cost(
@@ -76,7 +86,7 @@ def judge_cost(
         By response, where errors are known.
     """
     known = noise or {}
-    found = [_judge_average(average, _averaged(known))]
+    found = [_judge_average(average, _averaged(known), withheld=bool(why_misfit(average, known)))]
     for name, cost in costs.items():
         explained = name in known and known[name].explains(cost)
         if len(costs) > 1 and cost > SINGLE_COST_GUIDE and not explained:
@@ -84,6 +94,38 @@ def judge_cost(
             action = "narrow its band to where it is coherent, or leave it out"
             found.append(Finding("cost-response", light, f"{name}: cost {cost:.0f}", action))
     return found
+
+
+def why_misfit(average: float, noise: Mapping[str, NoiseCost]) -> str:
+    """Why intervals by noise do not hold where the model misses far more; empty where they do.
+
+    Parameters
+    ----------
+    average : float
+        Of the costs.
+    noise : mapping of str to NoiseCost
+        By response; empty where errors are not known.
+
+    Assumes
+    -------
+    Misfit moves estimates as noise of its size would (Birge (1932), Physical Review 40, p. 207):
+    from `CERTAIN_RATIO` on bars would have to be twice as long. A misfit keeps its sign over a
+    band, so that the truth may lie much further off: bars are withheld, not stretched.
+
+    Example
+    -------
+    >>> why_misfit(1.2, {"p/a": NoiseCost(1.0, 0.2)})
+    ''
+    >>> why_misfit(50.0, {"p/a": NoiseCost(0.2, 0.04)})
+    'the model misses far more of the response (average cost 50) than random errors explain (0.2)'
+    """
+    known = _averaged(noise)
+    if known is None or average <= CERTAIN_RATIO * known.mean or known.chance(average) > CERTAIN:
+        return ""
+    return (
+        f"the model misses far more of the response (average cost {average:.3g}) than random "
+        f"errors explain ({known.mean:.3g})"
+    )
 
 
 def _averaged(noise: Mapping[str, NoiseCost]) -> NoiseCost | None:
@@ -94,7 +136,7 @@ def _averaged(noise: Mapping[str, NoiseCost]) -> NoiseCost | None:
     return NoiseCost(float(np.mean(means)), float(np.mean(deviations)))
 
 
-def _judge_average(average: float, noise: NoiseCost | None) -> Finding:
+def _judge_average(average: float, noise: NoiseCost | None, *, withheld: bool) -> Finding:
     if noise is not None and noise.explains(average):
         what = f"average cost {average:.3g}, as much as random errors alone give"
         return Finding("cost", Light.GREEN, f"{what} ({noise.mean:.3g})")
@@ -106,13 +148,15 @@ def _judge_average(average: float, noise: NoiseCost | None) -> Finding:
             "do not use its numbers, whose intervals assume that the structure holds: add "
             "missing dynamics, narrow the band, or look for a wrong sign or unit",
         )
-    if noise is not None and average > MISFIT_RATIO * noise.mean + MISFIT_GUIDE:
+    seen = noise is not None and average > MISFIT_RATIO * noise.mean + MISFIT_GUIDE
+    if noise is not None and (seen or withheld):
+        words = "the model misses what the data show"
         return Finding(
             "cost",
-            Light.AMBER,
-            f"average cost {average:.3g}, of which random errors explain {noise.mean:.3g}: the "
-            "model misses what the data show",
-            "look for the responses that stand out, more starts, or missing dynamics",
+            Light.RED if seen and average > FAR_RATIO * noise.mean else Light.AMBER,
+            f"average cost {average:.3g}, of which random errors explain {noise.mean:.3g}: {words}"
+            + (", so there are no intervals" if withheld else ""),
+            "look for missing dynamics, a wrong hold, responses that stand out, more starts",
         )
     if average <= EXCELLENT_COST:
         words = f"average cost {average:.3g}, nearly indistinguishable"

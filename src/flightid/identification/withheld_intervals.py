@@ -5,7 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flightid.identification.fit import Fit
-from flightid.identification.fit_findings import UNKNOWN
+from flightid.identification.fit_findings import UNKNOWN, judge_parameters
+
+_OF_INTERVALS = {
+    "residuals-coloured",
+    "intervals-by-output",
+    "intervals-approximate",
+    "at-bound",
+    "insensitive",
+    "cramer-rao",
+}
+"""Findings on intervals, and those on parameters, which are judged again without."""
 
 
 def without_intervals(fit: Fit, reason: str) -> Fit:
@@ -28,7 +38,10 @@ def without_intervals(fit: Fit, reason: str) -> Fit:
     }
     # What parts say of each other stays, what their scatter does to bars goes with the bars.
     agreement = fit.agreement and replace(fit.agreement, by_scatter=None, freedom=None)
-    findings = tuple(each for each in fit.findings if each.code != "residuals-coloured")
+    findings = (
+        *(each for each in fit.findings if each.code not in _OF_INTERVALS),
+        *judge_parameters(bare),
+    )
     return replace(
         fit,
         parameters=bare,

@@ -23,6 +23,7 @@ from flightid.identification.fit_findings import (
     judge_intervals,
     judge_parameters,
     judge_search,
+    why_misfit,
 )
 from flightid.identification.fitted_response import FittedResponse
 from flightid.identification.frequency_domain.bias_objective import Curves, Objective
@@ -46,6 +47,7 @@ from flightid.identification.frequency_domain.selection import (
 from flightid.identification.frequency_domain.setup_checks import check_setup
 from flightid.identification.frequency_domain.without_bias import far_from_best, take_out
 from flightid.identification.multistart import DenseEnd, cluster, local_minima
+from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
 from flightid.responses.feedback import feedback_bias
@@ -120,7 +122,9 @@ def _fit_selected(
     curves = [response_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
     noise = noise_costs(selected, curves, by_noise)
     fit = _assemble(fitted, options, data, groups, responses, found, setup, noise)
-    return replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
+    fit = replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
+    reason = "" if withheld else why_misfit(fit.average_cost, noise)
+    return without_intervals(fit, reason) if reason else fit
 
 
 def select_by(

@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError, FlightidError
 from flightid.identification.fit import Fit
-from flightid.identification.fit_findings import NoiseCost, judge_cost, judge_intervals, rivals
+from flightid.identification.fit_findings import (
+    NoiseCost,
+    judge_cost,
+    judge_intervals,
+    rivals,
+    why_misfit,
+)
 from flightid.identification.frequency_domain.bias_findings import BiasOutcome, sizes
 from flightid.identification.frequency_domain.bias_objective import Objective
 from flightid.identification.frequency_domain.bias_rounds import iterate
@@ -124,7 +130,8 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
         points.errors,
     )
     fit = _with_responses(fit, response, made.points, noise, made.outcome.provenance(options.hold))
-    return without_intervals(fit, made.outcome.withheld) if made.outcome.withheld else fit
+    reason = made.outcome.withheld or why_misfit(fit.average_cost, noise)
+    return without_intervals(fit, reason) if reason else fit
 
 
 def _divided(data: Sequence[object]) -> tuple[FrequencyResponse, list[Record]]:
