@@ -17,6 +17,7 @@ from flightid.control.tuning.gain_search import steps as search_steps
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopProblem, Plants
+from flightid.control.tuning.margins_beyond import MarginBeyond, margins_beyond
 from flightid.control.tuning.promises import Promise, promises
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.sampled_plants import (
@@ -117,6 +118,8 @@ class AxisResult:
         Which of them the flown gains hold stable, the estimate first; None where none flew.
     problem : LoopProblem
         With the fresh plants.
+    beyond : tuple of MarginBeyond
+        Margins that are read above the identified band.
     """
 
     found: GainSearchResult
@@ -125,6 +128,7 @@ class AxisResult:
     met: NDArray[np.bool_]
     flown_stable: NDArray[np.bool_] | None
     problem: LoopProblem
+    beyond: tuple[MarginBeyond, ...] = ()
 
 
 def problem_of(
@@ -197,8 +201,11 @@ def tune_axis(
     # What flew had the other axes' flown gains around it, not those that they are given here.
     fresh_flown = replace(fresh, plants=setting.judged.axis(place, flown, gyro))
     old = fresh_flown.judge(before[None]) if flown[place].has_flown else None
-    made, met = promises(fresh, paths.gains_of(loop), old)
-    return AxisResult(found, loop, made, met, None if old is None else old.stable[0], fresh)
+    gains = paths.gains_of(loop)
+    made, met = promises(fresh, gains, old)
+    held = None if old is None else old.stable[0]
+    beyond = margins_beyond(fresh, gains, setting.evidence.band_rad_s)
+    return AxisResult(found, loop, made, met, held, fresh, beyond)
 
 
 def axis_steps(setting: Setting, loop: AxisLoop) -> int:

@@ -25,6 +25,7 @@ from flightid.control.tuning.controller_paths import ControllerPaths, has_angle_
 from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
 from flightid.control.tuning.findings import low_coherence, remarks, verdict
 from flightid.control.tuning.flown_gains import Gains, flown_loop
+from flightid.control.tuning.margins_beyond import beyond_findings
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import response_bands
@@ -273,6 +274,7 @@ def design_of(
             verdict(result, known),
             *remarks(result, flown, changes, stages, couplings),
             *low_coherence(result, setting.coherence_of(place)),
+            *beyond_findings(result.beyond, setting.evidence.band_rad_s),
             *setting.evidence.findings,
         ),
         {
