@@ -17,6 +17,8 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.conventions import Light
+from flightid.findings import worst
 from tests.closeness import assert_close
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
@@ -106,6 +108,8 @@ def test_the_dryer_study_prints_published_values_beside_ours(tmp_path: Path) -> 
     y = 4.9 + truth.simulate(record) + 0.01 * generator.standard_normal(1000)
     for file in (EXAMPLES / "dryer").glob("*.toml"):
         (tmp_path / file.name).write_bytes(file.read_bytes())
+    with (tmp_path / "study.toml").open("a", encoding="utf-8") as text:
+        text.write('[tune]\ncontroller = "pi"\ndraws = 10\naccept_red = true\n')
     rows = np.column_stack([u, y])
     np.savetxt(tmp_path / "dryer.csv", rows, "%.9g", ",", header="voltage,temperature", comments="")
     study = fid.run_study(tmp_path / "study.toml")
@@ -115,6 +119,11 @@ def test_the_dryer_study_prints_published_values_beside_ours(tmp_path: Path) -> 
         assert abs(oe.fit.parameters[name].value - value) < 0.05, name
     assert len(subspace.settings.published.singular_values) == 6
     report = (study.output / "report.txt").read_text("utf-8")
+    assert (study.output / "controller.toml").exists() is (
+        worst(study.tuning.findings) is not Light.RED
+    )
+    assert "controller of the controller" in report
+    assert "gyro of the tuning" not in report
     assert report.count("Published figures beside ours") == 4
     assert report.count("Loss ") == 3
     assert "Singular values " in report
@@ -159,7 +168,9 @@ def test_the_unstable_helicopter_is_found_by_a_study_file_alone(tmp_path: Path) 
     inside = re.search(r"(\d+) of (\d+) true values lie inside", run.stdout)
     assert inside is not None
     assert int(inside.group(1)) >= 0.88 * int(inside.group(2)) > 30
-    assert re.search(r"“?Six degrees of freedom”? better in [678], worse in 0", run.stdout)
+    judged = " ".join(run.stdout.split())
+    assert len(re.findall(r"Six degrees of freedom is better \(", judged)) >= 6
+    assert "full_envelope.toml is better" not in judged
     assert "0 of 20 drawn vehicles are unstable" in run.stdout
     read = _bandwidths(tmp_path / "out")
     ours, flown = (read[f"Six degrees of freedom{of}"]["roll"] for of in ("", ", reference"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import subprocess
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -176,7 +177,11 @@ def test_a_command_ends_in_gains_and_code(
         assert run([*said, "100", "--draws", "20", "--write", str(tmp_path / name)]) == 0
         assert "worst" in capsys.readouterr().out
         assert (tmp_path / name).exists()
-    assert "ideal = {" in (tmp_path / "gains.toml").read_text()
+    (written,) = tomllib.loads((tmp_path / "gains.toml").read_text())["controller"]
+    assert_close(written["ideal"]["K"], written["Kp"], rtol=1e-12, why="the same gain")
+    two = _tuned(controller="pi", controller_rate_hz=50.0)
+    (slow,) = tomllib.loads(two.write(tmp_path / "pi.toml")[0].read_text())["controller"]
+    assert_close(slow["series"]["K"], slow["Kp"], rtol=1e-12, why="PI: one form as the other")
 
 
 def _fit() -> fid.Fit:

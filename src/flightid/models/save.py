@@ -88,8 +88,11 @@ def toml_value(value: object) -> str:
     """A value of a TOML file; a table stands in one line."""
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, int | float):
-        return repr(value)
+    if isinstance(value, int):
+        return repr(int(value))
+    if isinstance(value, float):
+        # NumPy's numbers are floats that spell themselves otherwise.
+        return repr(float(value))
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, Mapping):

@@ -24,6 +24,7 @@ from flightid.study.faults import section_of, whole_section
 from flightid.study.model_section import model_section
 from flightid.study.results import StudyResults
 from flightid.study.truth import recovered
+from flightid.study.tuning import AUTOPILOT_ONLY
 from flightid.table import Cell, Column, Table
 from flightid.version import VERSION
 
@@ -271,7 +272,13 @@ def _options(study: StudyResults) -> dict[str, Cell]:
     options |= _told("verification", settings.check)
     if settings.tune is not None:
         options |= _told("tuning", settings.tune.requirements)
-        options |= _told("tuning", settings.tune.options)
+        own = settings.tune.controller
+        told = _told("tuning", settings.tune.options)
+        if own is not None:
+            unknown = [f"{name} of the tuning" for name in AUTOPILOT_ONLY]
+            told = {name: value for name, value in told.items() if name not in unknown}
+            told |= _told("controller", own)
+        options |= told
     if settings.reduce is not None:
         options |= {
             name.replace("_", " "): value for name, value in vars(settings.reduce.limits).items()

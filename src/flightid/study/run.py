@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from flightid.control.tuning.result import Tuning
+from flightid.conventions import Light
 from flightid.files import sha256_of_file
+from flightid.findings import worst
 from flightid.progress import progress
 from flightid.report.html import to_html
 from flightid.report.text import to_text
@@ -118,6 +120,8 @@ def _run(
         tuning = None
         if wanted is not None:
             tuning = faults.spare("tuning", _tuned, None, runner, staged, taken.log, wanted)
+        if tuning is not None and tuning.plain and worst(tuning.findings) is not Light.RED:
+            faults.spare("the controller file", _write_gains, None, tuning, folder)
         uses = use_models(staged, settings.uses, folder, faults, runner)
         qualities = {}
         if rated is not None:
@@ -146,6 +150,11 @@ def _run(
 def _tuned(runner: StageRunner, *inputs: object) -> Tuning | None:
     """Gains, as a stage."""
     return runner.stage("tuning", tune_models, *inputs).value
+
+
+def _write_gains(tuning: Tuning, folder: Path) -> None:
+    """Gains of controllers of their own, beside the models."""
+    tuning.write(folder / "controller.toml")
 
 
 def _paths(settings: object) -> Iterator[Path]:

@@ -122,7 +122,7 @@ def gather(
     uncertain: Uncertain[Any] = uncertain_of(source)
     errors = errors_of(source)
     band = identified_band(source, errors, pairs, band_rad_s)
-    refusals = [*_refusals(source, uncertain, verification, nominal=nominal)]
+    refusals = [*_refusals(source, uncertain, pairs, verification, nominal=nominal)]
     if band is None and needs_band:
         refusals.append(no_band(errors, pairs))
     findings = [_accepted(each, accept_red=accept_red) for each in refusals]
@@ -165,6 +165,7 @@ def _accepted(refusal: DataError, *, accept_red: bool) -> Finding:
 def _refusals(
     source: object,
     uncertain: Uncertain[Any],
+    pairs: Sequence[str],
     verification: Verdicts | Iterable[Verdicts] | None,
     *,
     nominal: bool,
@@ -172,7 +173,7 @@ def _refusals(
     """What forbids gains, the worst first."""
     examined = evidence_behind(source)
     if examined is not None and examined.verdict.light is Light.RED:
-        yield _red("the fit", examined.verdict)
+        yield _red(f"the fit of {' and '.join(pairs)}", examined.verdict)
     else:
         yield from _first_red("the fit", source)
         loop = None if examined is None else examined.check(LOOP)

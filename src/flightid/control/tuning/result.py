@@ -176,6 +176,11 @@ class Tuning(Result, schema="flightid.tuning/1"):
         note = "Gains and phases that all outputs may gain or lose at once, each for itself."
         return Table("Coupled axes closed together", columns, rows, (note,))
 
+    @property
+    def plain(self) -> bool:
+        """Whether gains are there, of controllers of their own and of no autopilot."""
+        return self.exists and all(design.plain is not None for design in self.designs)
+
     def write(
         self, path: str | Path, *, overwrite: bool = False, accept_red: bool = False
     ) -> tuple[Path, ...]:
