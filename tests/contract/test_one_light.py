@@ -100,7 +100,7 @@ def test_gains_show_the_light_of_their_fit_and_are_refused_on_red(study: fid.Stu
     assert told.light is verdict.light
     assert verdict.message in told.message
     bad = fit.evidence.with_checks([fid.Check("residuals", Light.RED, "nothing explained")])
-    with pytest.raises(DataError, match="the fit of .* is red"):
+    with pytest.raises(DataError, match=r"the fit of .* is red"):
         fid.tune_pid(dataclasses.replace(fit, evidence=bad), gains=gains, draws=20)
 
 
