@@ -44,7 +44,7 @@ def judge_feedback(found: Statistics) -> list[Finding]:
             "loop-bias",
             Light.RED if shares[order[0]] >= RULING else Light.AMBER,
             f"the closed loop brings output noise to the inputs, which moves {named}; "
-            "the bars hold such a move, the values do not",
+            "bars are widened by such a move, values are not corrected",
             "log the injected signal and use estimator='instrument', or fly with the loop open",
         )
     ]
