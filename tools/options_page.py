@@ -28,6 +28,7 @@ from flightid.record.options import ChannelOptions, ReadOptions
 from flightid.responses.options import ResponseOptions
 from flightid.simulation.options import SimulationOptions
 from flightid.study.fit_settings import VerifySettings
+from flightid.study.proposal.options import ProposalOptions
 from flightid.study.response_settings import ResponseSettings
 from flightid.validation.verification.options import VerifyOptions
 from flightid.vehicles.pilot_inputs import StickOptions
@@ -67,6 +68,7 @@ def sections() -> dict[str, type[Options]]:
         "Reading tables": ReadOptions,
         "Part of a log or record": PartOptions,
         "Channels": ChannelOptions,
+        "Studies of a log or records (run, new, tune)": ProposalOptions,
         "[response] of a study": ResponseSettings,
         "[verify] of a study": VerifySettings,
     }

@@ -30,6 +30,7 @@ from tests.contract.test_arguments import DICTIONARY, WORD_OF
 
 # What a command is told beside the options of its verb: its name, and the one thing it means.
 OF_COMMANDS = {
+    "all": "everything, not one screen of it",
     "against": "another model beside the one on trial",
     "axis": "roll, pitch or yaw, or an autopilot's number of it",
     "csv": "file of samples",
@@ -75,6 +76,7 @@ OF_COMMANDS = {
     "style": "words of a cockpit",
     "substeps": "Runge-Kutta steps in a sample",
     "trim": "operating point",
+    "tune": "gains at the end",
     "tunable": "parameters that can be changed",
     "unpacked": "a page without compression",
     "validation": "records that a fit has not seen",
@@ -187,13 +189,13 @@ def test_commands_with_options_of_fields_read_them_all() -> None:
     """No option of a verb is written by hand: the commands of verbs with fields read the fields."""
     reading = {name for name, found in _commands() if isinstance(found, OptionsCommand)}
     assert reading == {
-        "consistency", "design", "identify", "polynomial", "response", "simulate model", "tune",
-        "verify",
+        "consistency", "design", "identify", "new", "polynomial", "response", "run",
+        "simulate model", "tune", "verify",
     }  # fmt: skip
     for name, found in _commands():
         if isinstance(found, OptionsCommand):
             by_hand = {param.name for param in found.params} & FIELDS
-            assert by_hand <= {"axis", "kind", "method"}, (name, by_hand)
+            assert by_hand <= {"axis", "kind", "method", "model"}, (name, by_hand)
 
 
 def test_a_word_of_the_dictionary_has_one_name_in_all_places() -> None:

@@ -63,7 +63,7 @@ def _bandwidths(output: Path) -> dict[str, dict[str, float]]:
 @pytest.mark.parametrize("name", ["study.toml", "advised.toml"])
 def test_the_rig_studies_find_the_truth(name: str, tmp_path: Path) -> None:
     study = EXAMPLES / "quadrotor_rig" / name
-    run = _run(FLIGHTID, "--quiet", "run", str(study), "--output", "out", folder=tmp_path)
+    run = _run(FLIGHTID, "--quiet", "run", str(study), "--all", "--output", "out", folder=tmp_path)
     # Exit code 1 would be a red verdict: too many true values outside their intervals, say.
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
     assert {path.name for path in (tmp_path / "out").iterdir()} >= {
@@ -152,7 +152,9 @@ def test_the_unstable_helicopter_is_found_by_a_study_file_alone(tmp_path: Path) 
     for name in (*files, "full_envelope.toml"):
         (tmp_path / name).write_text((EXAMPLES / "ah64" / name).read_text(encoding="utf-8"))
     assert _script(tmp_path / "fly.py", folder=tmp_path).returncode == 0
-    run = _run(FLIGHTID, "--quiet", "run", "study.toml", "--output", "out", folder=tmp_path)
+    run = _run(
+        FLIGHTID, "--quiet", "run", "study.toml", "--all", "--output", "out", folder=tmp_path
+    )
     # The heave model without inflow, offered first, is a wrong one: red, and so is the study.
     assert run.returncode == 1, run.stdout[-3000:] + run.stderr[-3000:]
     assert [line.split(":")[0] for line in run.stdout.split("Result")[1].splitlines()
@@ -183,7 +185,9 @@ def test_the_grey_boxes_are_found_by_a_study_file_alone(tmp_path: Path) -> None:
         if item.suffix in (".py", ".toml"):
             (tmp_path / item.name).write_text(item.read_text(encoding="utf-8"))
     assert _script(tmp_path / "fly.py", folder=tmp_path).returncode == 0
-    run = _run(FLIGHTID, "--quiet", "run", "study.toml", "--output", "out", folder=tmp_path)
+    run = _run(
+        FLIGHTID, "--quiet", "run", "study.toml", "--all", "--output", "out", folder=tmp_path
+    )
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
     assert re.search(r"[78] of 8 true values lie inside", run.stdout)
 
@@ -193,7 +197,9 @@ def test_the_r50_is_found_by_a_study_file_alone(tmp_path: Path) -> None:
     for name in ("fly.py", "flights.py", "study.toml", *PUBLISHED):
         (tmp_path / name).write_text((EXAMPLES / "r50" / name).read_text(encoding="utf-8"))
     assert _script(tmp_path / "fly.py", folder=tmp_path).returncode == 0
-    run = _run(FLIGHTID, "--quiet", "run", "study.toml", "--output", "out", folder=tmp_path)
+    run = _run(
+        FLIGHTID, "--quiet", "run", "study.toml", "--all", "--output", "out", folder=tmp_path
+    )
     # Red is the vehicle alone: a growing phugoid, and gain margins below the guide.
     assert run.returncode == 1, run.stdout[-3000:] + run.stderr[-3000:]
     red = re.findall(r"^\[red\] +(.*)", run.stdout, re.MULTILINE)
@@ -329,7 +335,9 @@ def test_noise_trains_a_narx_model_of_the_rig_better_than_two_levels(tmp_path: P
     folder = EXAMPLES / "twin_rotor_rbf"
     assert _script(folder / "fly.py", "records", folder=tmp_path).returncode == 0
     (tmp_path / "study.toml").write_bytes((folder / "study.toml").read_bytes())
-    run = _run(FLIGHTID, "--quiet", "run", "study.toml", "--output", "out", folder=tmp_path)
+    run = _run(
+        FLIGHTID, "--quiet", "run", "study.toml", "--all", "--output", "out", folder=tmp_path
+    )
     # Red, and rightly: the two-level training fails on other amplitudes.
     assert run.returncode == 1, run.stderr[-3000:]
     results = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))

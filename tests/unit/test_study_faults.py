@@ -92,7 +92,7 @@ def test_a_picture_that_fails_costs_its_section_alone(
     monkeypatch.setattr(document, "parameter_intervals", broken)
     monkeypatch.setattr(model_section, "modes_blocks", broken)
     monkeypatch.setattr(document, "closed_loop_section", broken)
-    assert command(["--quiet", "run", str(folder / "study.toml")]) == 1
+    assert command(["--quiet", "run", str(folder / "study.toml"), "--all"]) == 1
     text = capsys.readouterr().out
     for name in ("“Result”", "“Modes and derivatives”", "“Damper”"):
         assert f"{name} could not be made: ZeroDivisionError: a planted fault" in text

@@ -18,16 +18,17 @@ from flightid.surface import speaking
 from flightid.version import VERSION
 
 ORDER = (
+    "run",
+    "tune",
     "inspect",
+    "new",
     "design",
     "response",
     "identify",
     "verify",
     "modes",
-    "tune",
     "simulate",
     "report",
-    "run",
 )
 """Verbs in the order of the work, as help lists them; others follow in alphabetical order."""
 NOT_VERBS = frozenset(
@@ -38,6 +39,7 @@ NOT_VERBS = frozenset(
         "output",
         "pairs",
         "program",
+        "proposals",
         "records",
         "sources",
         "wording",

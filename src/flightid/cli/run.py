@@ -1,16 +1,24 @@
-"""``flightid run``: a study file from end to end."""
+"""``flightid run``: a log, records or a study file from end to end."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from flightid.cli.output import emit_values, json_option, leave_by_verdict, note
+from flightid.cli.option_fields import OptionsCommand, parted
+from flightid.cli.output import json_option, leave_by_verdict
+from flightid.cli.proposals import of_data, show_study, taken_study
+from flightid.cli.records import FILES
 
 
-@click.command()
-@click.argument("study", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.command(
+    cls=OptionsCommand,
+    fields_of=of_data,
+    short_help="From a log, records or a study file to models and a report.",
+)
+@click.argument("files", nargs=-1, required=True, metavar="LOG | RECORDS... | STUDY", type=FILES)
 @click.option(
     "--output",
     type=click.Path(file_okay=False, path_type=Path),
@@ -21,21 +29,30 @@ from flightid.cli.output import emit_values, json_option, leave_by_verdict, note
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     help="Log to read instead of the one that the study names.",
 )
+@click.option("--all", "whole", is_flag=True, help="Print the whole report, not one screen of it.")
 @json_option
-def command(study: Path, output: Path | None, log: Path | None, as_json: bool) -> None:
-    """Run a study: log, records, responses, models, verification, report.
+def command(
+    files: tuple[Path, ...],
+    output: Path | None,
+    log: Path | None,
+    whole: bool,
+    as_json: bool,
+    **options: Any,  # noqa: ANN401 — read from the fields
+) -> None:
+    """Identify models from LOG or RECORDS, or carry out STUDY: verification and report with them.
+
+    Without a study file axes, sweeps, bands, template, estimator and verification come from the
+    log, inputs, outputs and structure from the records. The study that was used is written beside
+    the results, <log>-study.toml; to run that gives the same numbers.
 
     Writes report.html, report.txt and results.json to the output folder, all or nothing;
     of an earlier run's output only what that run wrote goes.
     docs/study.md describes the study file.
     """
-    from flightid.report.text import to_text
     from flightid.study import run_study
 
-    result = run_study(study, output=output, log=log)
-    if as_json:
-        emit_values(result.to_dict())
-    else:
-        click.echo(to_text(result.document), nl=False)
-    note(f"Wrote {result.output / 'report.html'}")
+    (asked,) = parted(options, of_data())
+    study, folder = taken_study(files, output, log, asked)
+    result = run_study(study, output=folder, log=log)
+    show_study(result, whole=whole, as_json=as_json)
     leave_by_verdict(result.findings)

@@ -1,4 +1,4 @@
-"""``flightid tune``: gains of an autopilot from the models of a study."""
+"""``flightid tune``: gains of an autopilot from a log, a study or models."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import emit_values, json_option, leave_by_verdict, level_option, note
+from flightid.cli.proposals import of_data, show_answer, taken_study
 
 if TYPE_CHECKING:
     from flightid.control.tuning.result import Tuning
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 def _fields() -> dict[str, type[Options]]:
     from flightid.study.tuning import KINDS
 
-    return dict(zip(("requirements", "tuning", "a controller"), KINDS, strict=True))
+    return dict(zip(("requirements", "tuning", "a controller"), KINDS, strict=True)) | of_data()
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
@@ -28,7 +29,7 @@ def _fields() -> dict[str, type[Options]]:
     "files",
     nargs=-1,
     required=True,
-    metavar="STUDY | MODEL...",
+    metavar="LOG | RECORDS... | STUDY | MODEL...",
     type=click.Path(exists=True, path_type=Path),
 )
 @click.option(
@@ -48,6 +49,7 @@ def _fields() -> dict[str, type[Options]]:
     help="Parameter file to write, for example gains.param; every step with its way back.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace parameter files that exist.")
+@click.option("--all", "whole", is_flag=True, help="Print every table, not one screen of them.")
 @level_option
 @json_option
 def command(
@@ -56,11 +58,15 @@ def command(
     output: Path | None,
     target: Path | None,
     overwrite: bool,
+    whole: bool,
     level: float | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
-    """Run STUDY, or take fitted MODELs, and tune the autopilot that the log was flown with.
+    """Tune the autopilot that LOG was flown with, from the log alone, a STUDY or fitted MODELs.
+
+    Of a LOG, or of RECORDS of a rig, the study that they ask for is written beside the results
+    first, as `flightid run` does.
 
     With --controller it is a PID of its own around each loop, and no log is needed; --write takes
     gains.toml then, or gains.c for code.
@@ -73,36 +79,36 @@ def command(
     """
     from flightid.study.tuning import TuneSettings
 
-    report = None
-    asked = {name: each for part in parted(options, _fields()) for name, each in part.items()}
-    if _is_study(files):
+    study = None
+    *parts, data = parted(options, _fields())
+    asked = {name: each for part in parts for name, each in part.items()}
+    if _holds_models(files):
+        for name in data:
+            raise click.UsageError(f"--{name} belongs to a log or records")
+        tuning, refused = _of_models(files, log, TuneSettings().changed(asked)), []
+    else:
         from flightid.study import run_study
 
-        result = run_study(files[0], output=output, log=log, tune=asked)
-        tuning, report = result.tuning, result.output / "report.html"
-        refused = [f"{each.message} ({each.action})" for each in result.faults]
-    else:
-        tuning, refused = _of_models(files, log, TuneSettings().changed(asked)), []
+        of_log = options.get("controller") is None
+        path, folder = taken_study(files, output, log, data, tune=of_log)
+        study = run_study(path, output=folder, log=log, tune=asked)
+        tuning = study.tuning
+        refused = [f"{each.message} ({each.action})" for each in study.faults]
     if tuning is None:
         nothing = "there is no model of a rate that can be tuned"
         raise click.ClickException("; ".join(refused) or nothing)
     if as_json:
         emit_values(tuning.to_dict())
-    else:
-        click.echo(str(tuning.summary()))
-        at = {} if level is None else {"level": level}
-        for design in tuning.designs:
-            if design.plain and design.exists:
-                click.echo(f"\n{design.plain.form_table()}")
-            click.echo(f"\n{design.promise_table(**at)}")
-        if tuning.together:
-            click.echo(f"\n{tuning.together_table()}")
-    if report is not None:
-        note(f"Wrote {report}")
+    elif study is None or whole or level is not None:
+        _show(tuning, level)
+    if study is not None:
+        note(f"Wrote {study.output / 'report.html'}")
     if target is not None and tuning.exists:
         accepted = bool(options.get("accept_red"))
         for path in _written(tuning, target, overwrite, accepted):
             note(f"Wrote {path}")
+    if study is not None and not as_json:
+        show_answer(study)
     leave_by_verdict(tuning.findings)
 
 
@@ -124,9 +130,11 @@ def _written(tuning: Tuning, target: Path, overwrite: bool, accept_red: bool) ->
     return [path for each in made for path in each.files]
 
 
-def _is_study(files: tuple[Path, ...]) -> bool:
-    """Whether a study is meant: one file, with the table that every study has."""
-    if len(files) > 1 or files[0].is_dir() or files[0].suffix == ".json":
+def _holds_models(files: tuple[Path, ...]) -> bool:
+    """Whether models are meant: folders, JSON of fits, TOML with what every model file has."""
+    if any(file.is_dir() or file.suffix == ".json" for file in files):
+        return True
+    if any(file.suffix != ".toml" for file in files):
         return False
     # A file that is no TOML is told as a study that cannot be read.
     from flightid.errors import FlightidError
@@ -135,8 +143,20 @@ def _is_study(files: tuple[Path, ...]) -> bool:
     try:
         content = read_toml(files[0], "the file")
     except FlightidError:
-        return True
-    return "estimated" not in content and "kind" not in content
+        return len(files) > 1
+    return len(files) > 1 or "estimated" in content or "kind" in content
+
+
+def _show(tuning: Tuning, level: float | None) -> None:
+    """Every table of the gains."""
+    click.echo(str(tuning.summary()))
+    at = {} if level is None else {"level": level}
+    for design in tuning.designs:
+        if design.plain and design.exists:
+            click.echo(f"\n{design.plain.form_table()}")
+        click.echo(f"\n{design.promise_table(**at)}")
+    if tuning.together:
+        click.echo(f"\n{tuning.together_table()}")
 
 
 def _of_models(files: tuple[Path, ...], log: Path | None, settings: TuneSettings) -> Tuning | None:

@@ -123,6 +123,15 @@ class Inspection(Result, schema="flightid.inspection/1"):
                 said.append(fill(advice, WIDTH, initial_indent="  ", subsequent_indent="        "))
         return "\n\n".join(["\n".join(said), *(t.to_text() for t in self.tables()[1:])])
 
+    def in_short(self) -> str:
+        """The flight in a line, what each axis supports, what moved it, what was at a limit."""
+        head = (
+            f"{self.name}: {self.firmware or self.kind}, {self.duration_s:.1f} s, "
+            f"{self.phases.airborne_s:.1f} s of them airborne"
+        )
+        tables = (self._axes(), self._excitations(), self._saturations(), self._skews())
+        return "\n\n".join([head, *(each.to_text() for each in tables if each.rows)])
+
     def _axes(self) -> Table:
         columns = (
             Column("axis"),

@@ -9,17 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flightid.conventions import Light
-from flightid.findings import Finding, worst
+from flightid.findings import Finding
 from flightid.options import Options
 from flightid.plot.consistency import consistency
 from flightid.plot.fit import EstimateBar, parameter_intervals
+from flightid.plot.tuning import time_responses
 from flightid.report.blocks import provenance, result_blocks
 from flightid.report.closed_loop import closed_loop_section
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.handling_qualities import handling_qualities_blocks
 from flightid.report.tuning import tuning_section
-from flightid.study.estimate_tables import model_table, structure_words
+from flightid.study.answer import answer_of, in_short
+from flightid.study.estimate_tables import model_table
 from flightid.study.faults import section_of, whole_section
 from flightid.study.model_section import model_section
 from flightid.study.results import StudyResults
@@ -162,11 +164,15 @@ def _inside(parameter: Estimate, true_value: float | None) -> bool | None:
 
 
 def _result(study: StudyResults) -> Iterator[Block]:
+    answer = answer_of(study)
+    yield Lights(answer.findings, repeats=True)
+    yield from map(TableBlock, answer.tables)
+    yield from _picture(study)
     if study.settings.notes:
         yield Paragraph(study.settings.notes)
     if study.faults:
         yield Lights(study.faults)
-    yield Lights(tuple(map(_in_short, study.identified)), repeats=True)
+    yield Lights(tuple(map(in_short, study.identified)), repeats=True)
     # A tied parameter follows another: it would count the same miss twice.
     inside = [
         _inside(parameter, true)
@@ -183,15 +189,12 @@ def _result(study: StudyResults) -> Iterator[Block]:
     yield from _interval_figure(study)
 
 
-def _in_short(item: ModelResults) -> Finding:
-    """One line about a model: the light of its evidence, and the first reason for it."""
-    if item.fit is None:
-        return Finding("model", worst(item.findings), f"{item.name}: {item.left_out[0].message}")
-    verdict = item.fit.evidence.verdict
-    first = f"{item.name}: average cost {item.fit.average_cost:.3g}"
-    if item.settings.structure is not None:
-        first = f"{item.name}: {structure_words(item.fit)}"
-    return Finding("model", verdict.light, f"{first}; {verdict.message}", verdict.action)
+def _picture(study: StudyResults) -> Iterator[Block]:
+    """What new gains do beside the flown ones, of the first axis that has any."""
+    designs = () if study.tuning is None else study.tuning.designs
+    for design in [each for each in designs if each.exists][:1]:
+        shown = f"New gains of {design.axis} beside the flown; shaded: all that the data allow."
+        yield figure_block(time_responses(design), shown)
 
 
 def _source_blocks(study: StudyResults) -> Iterator[Block]:

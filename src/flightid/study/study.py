@@ -8,6 +8,7 @@ from functools import cached_property
 from flightid.findings import Finding
 from flightid.report.content import Document
 from flightid.report.json import to_dict
+from flightid.study.answer import short_document
 from flightid.study.document import parameter_table, study_document
 from flightid.study.estimate_tables import model_table
 from flightid.study.results import StudyResults
@@ -29,6 +30,11 @@ class Study(StudyResults):
     def document(self) -> Document:
         """The report as a content tree."""
         return study_document(self)
+
+    @cached_property
+    def short(self) -> Document:
+        """One screen of it: a line a model, gains, and the answer last."""
+        return short_document(self, self.document)
 
     @property
     def findings(self) -> tuple[Finding, ...]:

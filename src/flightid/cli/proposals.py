@@ -1,0 +1,107 @@
+"""The study of a log or of records that a command takes in place of a study file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from flightid.cli.output import Exit, emit_values, note
+
+if TYPE_CHECKING:
+    from flightid.options import Options
+    from flightid.study import Study
+    from flightid.study.proposal import Proposal
+
+
+def of_data() -> dict[str, type[Options]]:
+    """Options of a study that is written for data."""
+    from flightid.study.proposal.options import ProposalOptions
+
+    return {"a log or records": ProposalOptions}
+
+
+def study_path(files: Sequence[Path], output: Path | None = None) -> Path:
+    """Where the study of data is written: beside its results, or else beside the data."""
+    folder = files[0].parent if output is None else output.parent
+    return folder / f"{files[0].stem}-study.toml"
+
+
+def propose(files: Sequence[Path], target: Path, **asked: Any) -> Proposal:  # noqa: ANN401
+    """The study of data, for a place; see `flightid.study.proposal.propose_study`."""
+    from flightid.progress import progress
+    from flightid.study.proposal import propose_study
+
+    with progress(None, f"looking at {files[0].name}"):
+        return propose_study(files, folder=target.parent, **asked)
+
+
+def is_study(files: Sequence[Path]) -> bool:
+    """Whether a study is meant: one file in TOML."""
+    return len(files) == 1 and files[0].suffix == ".toml"
+
+
+def taken_study(
+    files: Sequence[Path],
+    output: Path | None,
+    log: Path | None,
+    asked: Mapping[str, Any],
+    *,
+    tune: bool = False,
+) -> tuple[Path, Path | None]:
+    """The study that was named, or the one that data ask for, written beside its results.
+
+    Where the data carry no model, what is there is said, and the command ends.
+
+    Returns
+    -------
+    tuple of Path, and Path or None
+        The study, and the folder of its results.
+
+    Raises
+    ------
+    click.UsageError
+        An option of studies for data, or the other way round.
+    """
+    if is_study(files):
+        for name in ("model", "inputs", "outputs"):
+            if asked.get(name):
+                raise click.UsageError(
+                    f"--{name} belongs to a log or records; a study says its own"
+                )
+        return files[0], output
+    if log is not None:
+        raise click.UsageError("--log belongs to a study, and there is none")
+    target = study_path(files, output)
+    made = propose(files, target, **asked, tune=tune)
+    if not made.models:
+        click.echo(made.refusal())
+        click.get_current_context().exit(Exit.RED)
+    made.write(target)
+    note(f"Wrote {target}")
+    for finding in made.findings:
+        note(f"{finding.light}: {finding.message}")
+    return target, output or target.with_name(f"{files[0].stem}-output")
+
+
+def show_study(result: Study, *, whole: bool, as_json: bool) -> None:
+    """Print a study: one screen with the answer last, the whole report, or JSON."""
+    from flightid.report.text import to_text
+
+    if as_json:
+        emit_values(result.to_dict())
+    elif whole:
+        click.echo(to_text(result.document), nl=False)
+    # Before the answer, which is to stand where eyes are.
+    note(f"Wrote {result.output / 'report.html'}")
+    if not (as_json or whole):
+        show_answer(result)
+
+
+def show_answer(result: Study) -> None:
+    """Print one screen of a study, its verdict and the next step last."""
+    from flightid.report.text import to_text
+
+    click.echo(to_text(result.short), nl=False)

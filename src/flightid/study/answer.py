@@ -1,0 +1,192 @@
+"""What a reader came for: a study in one sentence, the numbers to use, and what is next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from flightid.conventions import Light
+from flightid.findings import Finding, counted, worst
+from flightid.report.content import Document, Lights, Section, TableBlock
+from flightid.study.estimate_tables import structure_words
+from flightid.study.faults import CODE
+from flightid.table import Cell, Column, Table
+
+if TYPE_CHECKING:
+    from flightid.control.tuning.pid_design import PidDesign
+    from flightid.study.identified import ModelResults
+    from flightid.study.results import StudyResults
+
+MARGINS = {"phase margin": "deg", "gain margin": "dB"}
+
+
+@dataclass(frozen=True)
+class StudyAnswer:
+    """The answer of a study.
+
+    Attributes
+    ----------
+    findings : tuple of Finding
+        One for the models, one for gains where any were asked for; each says what to do next.
+    tables : tuple of Table
+        Gains and their margins, where there are any.
+    """
+
+    findings: tuple[Finding, ...]
+    tables: tuple[Table, ...] = ()
+
+
+def answer_of(study: StudyResults) -> StudyAnswer:
+    """Say in a sentence each what the models are worth, and the gains.
+
+    Parameters
+    ----------
+    study : StudyResults
+    """
+    findings = [_models(study)]
+    tuning = study.tuning
+    if tuning is None:
+        return StudyAnswer(tuple(findings))
+    findings.append(_gains(tuning.designs, tuning.findings))
+    made = tuple(design for design in tuning.designs if design.exists)
+    return StudyAnswer(tuple(findings), (_gain_table(made), _margin_table(made)) if made else ())
+
+
+def in_short(item: ModelResults) -> Finding:
+    """One line about a model: the light of its evidence, and the first reason for it."""
+    if item.fit is None:
+        return Finding("model", worst(item.findings), f"{item.name}: {item.left_out[0].message}")
+    verdict = item.fit.evidence.verdict
+    first = f"{item.name}: average cost {item.fit.average_cost:.3g}"
+    if item.settings.structure is not None:
+        first = f"{item.name}: {structure_words(item.fit)}"
+    return Finding("model", verdict.light, f"{first}; {verdict.message}", verdict.action)
+
+
+def short_document(study: StudyResults, document: Document) -> Document:
+    """A report of one screen: models, gains and, last, the answer with what is next.
+
+    Parameters
+    ----------
+    study : StudyResults
+    document : Document
+        The whole report, whose verdicts count.
+    """
+    answer = answer_of(study)
+    models = Lights(tuple(map(in_short, study.identified)), repeats=True)
+    faults = (Lights(study.faults),) if study.faults else ()
+    tables = tuple(map(TableBlock, answer.tables))
+    sections = (
+        Section("Models", (models, *faults)),
+        *((Section("Gains", tables),) if tables else ()),
+        Section(
+            f"Answer: {document.verdict} ({document.tally})",
+            (Lights(answer.findings, repeats=True),),
+        ),
+    )
+    return Document(document.title, document.subtitle, sections)
+
+
+def _models(study: StudyResults) -> Finding:
+    """What the models are worth together."""
+    lights = [in_short(item) for item in study.identified]
+    if not lights:
+        return Finding("answer", Light.UNKNOWN, "no model was asked for")
+    light = worst(lights)
+    bad = [each for each in lights if each.light is Light.RED]
+    n, first = len(lights), next(each for each in lights if each.light is light)
+    unseen = [
+        value
+        for item in study.identified
+        for run in item.on_unseen.values()
+        for value in run.fit_percent.values()
+    ]
+    said = (
+        f"{counted(n, 'model')} to use" if not bad else f"{len(bad)} of {n} models not to be used"
+    )
+    if unseen and not bad:
+        ends = dict.fromkeys(f"{value:.3g}" for value in (min(unseen), max(unseen)))
+        what = f"{'it predicts' if n == 1 else 'they predict'} {' to '.join(ends)} %"
+        said += f": {what} of motion that no fit has seen"
+    elif bad:
+        named = (
+            item.name for each, item in zip(lights, study.identified, strict=True) if each in bad
+        )
+        said += f", for the reasons named with them: {', '.join(named)}"
+    if light is Light.AMBER:
+        said += "; the doubts stand with them above"
+    return Finding("answer", light, said, first.action if bad else _next(study))
+
+
+def _next(study: StudyResults) -> str:
+    """What to do with models that serve."""
+    if study.tuning is not None or any(each.code == CODE for each in study.faults):
+        return ""
+    source = next((name for name in study.files if name.endswith(".toml")), "STUDY")
+    if study.inspection is not None:
+        return f"for gains: flightid tune {source}"
+    return f"for gains of a PID: flightid tune {source} --controller pi_d"
+
+
+def _gains(designs: tuple[PidDesign, ...], findings: tuple[Finding, ...]) -> Finding:
+    """Whether there are gains, and what they promise or what is in the way."""
+    none = [design for design in designs if not design.exists]
+    red = [each for each in findings if each.light is Light.RED]
+    if none or red:
+        reasons = [f"{each.axis}: {', '.join(each.binding)}" for each in none]
+        first = red[0] if red else None
+        said = "; ".join([*reasons, *([first.message] if first else [])])
+        action = first.action if first else "relax what cannot be met, or identify better"
+        return Finding("gains", Light.RED, f"no gains to fly: {said}", action)
+    least = [
+        each.worst
+        for design in designs
+        for each in design.promises
+        if each.name == "phase margin" and each.worst is not None
+    ]
+    promise = f" keep at least {min(least):.0f}° of phase margin" if least else " keep their limits"
+    steps = max(len(design.stages) for design in designs)
+    axes = ", ".join(design.axis for design in designs)
+    way = "--write gains.param writes them; " + (
+        f"fly step 1 of {steps}, log, and look again" if steps > 1 else "fly them, and log"
+    )
+    message = f"gains of {axes}{promise} at the worst vehicle that the data allow"
+    return Finding("gains", worst(findings) if findings else Light.GREEN, message, way)
+
+
+def _gain_table(designs: tuple[PidDesign, ...]) -> Table:
+    columns = (
+        Column("axis"), Column("parameter"), Column("flown"), Column("new"),
+        Column("ratio", digits=3), Column("first step"),
+    )  # fmt: skip
+    rows: list[tuple[Cell, ...]] = [
+        (
+            design.axis, change.name, change.flown, change.new, change.ratio,
+            design.stages[0].gains.get(change.name) if len(design.stages) > 1 else None,
+        )
+        for design in designs
+        for change in design.changes
+    ]  # fmt: skip
+    return Table("Gains to fly", columns, tuple(rows)).without_empty_columns()
+
+
+def _margin_table(designs: tuple[PidDesign, ...]) -> Table:
+    columns = [Column("axis"), Column("loop")]
+    for name, unit in MARGINS.items():
+        columns += [Column(name, unit, 3), Column(f"{name} as flown", unit, 3)]
+    rows: list[tuple[Cell, ...]] = []
+    for design in designs:
+        for loop in dict.fromkeys(each.loop for each in design.promises):
+            cells: list[Cell] = []
+            for name in MARGINS:
+                found = [e for e in design.promises if (e.loop, e.name) == (loop, name)]
+                cells += [found[0].worst, found[0].flown_worst] if found else [None, None]
+            if any(cell is not None for cell in cells):
+                rows.append((design.axis, loop, *cells))
+    asked = designs[0].requirements
+    note = (
+        f"Required: {asked.phase_margin_deg:g} deg ({asked.angle_phase_margin_deg:g} deg of the "
+        f"angle loop) and {asked.gain_margin_db:g} dB."
+    )
+    title = "Margins of the worst vehicle that the data allow"
+    return Table(title, tuple(columns), tuple(rows), (note,)).without_empty_columns()

@@ -1,0 +1,100 @@
+"""Which columns of rig records drive and which answer: by role, by name, by unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flightid.conventions import Role
+from flightid.errors import StudyError, UnknownNameError
+from flightid.record import Record
+
+DRIVES = re.compile(
+    r"u\d*|inputs?\d*|in\d*|.*(command|cmd|voltage|volt|current|throttle|pwm|duty|stick|torque|force"
+    r"|aileron|elevator|rudder|collective|tau_).*",
+    re.IGNORECASE,
+)
+ANSWERS = re.compile(
+    r"y\d*|outputs?\d*|out\d*|[pqr]|phi|theta|psi|.*(angle|rate|speed|velocity|position|height"
+    r"|altitude|pitch|roll|yaw|temperature|accel).*",
+    re.IGNORECASE,
+)
+DRIVING_UNITS = frozenset({"V", "A", "%", "us", "N", "N*m", "W"})
+ANSWERING_UNITS = frozenset(
+    {"rad", "deg", "rad/s", "deg/s", "rad/s^2", "m", "m/s", "m/s^2", "g", "K", "degC", "1/min"}
+)
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Inputs and outputs of records.
+
+    Attributes
+    ----------
+    inputs, outputs : tuple of str
+    said : tuple of str
+        How they were told, in words.
+    """
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    said: tuple[str, ...]
+
+
+def columns_of(
+    records: Sequence[Record], inputs: tuple[str, ...], outputs: tuple[str, ...]
+) -> Columns:
+    """Tell the inputs and outputs that all records have.
+
+    What is named goes first; then roles that a file holds, words in the names of columns, units.
+
+    Raises
+    ------
+    UnknownNameError
+        A column that was named is not there.
+    StudyError
+        Nothing tells which column drives or which answers.
+    """
+    first = records[0]
+    shared = [name for name in first.channels if all(name in record for record in records)]
+    for name in (*inputs, *outputs):
+        if name not in shared:
+            raise UnknownNameError(
+                "the records have no such column", found=name, needed=", ".join(shared)
+            )
+    drives, how_in = _told(first, shared, Role.INPUT, inputs, outputs)
+    answers, how_out = _told(first, shared, Role.OUTPUT, outputs, inputs)
+    for role, found in (("inputs", drives), ("outputs", answers)):
+        if not found:
+            columns = ", ".join(f"{name} [{first.unit(name) or '?'}]" for name in shared)
+            raise StudyError(
+                f"the columns do not tell which are {role}",
+                found=columns or "no column that all records have",
+                needed=f"{role} by name",
+                action=f"name them: --{role} {shared[0] if shared else 'NAME'}",
+            )
+    left = [name for name in shared if name not in (*drives, *answers)]
+    said = [f"Inputs {', '.join(drives)} ({how_in}), outputs {', '.join(answers)} ({how_out})"]
+    said += [f"Not used: {', '.join(left)}"] if left else []
+    return Columns(drives, answers, tuple(said))
+
+
+def _told(
+    record: Record, names: Sequence[str], role: Role, given: tuple[str, ...], taken: tuple[str, ...]
+) -> tuple[tuple[str, ...], str]:
+    """Columns of a role, and what told them."""
+    if given:
+        return given, "as named"
+    free = [name for name in names if name not in taken]
+    words, units = (DRIVES, DRIVING_UNITS) if role is Role.INPUT else (ANSWERS, ANSWERING_UNITS)
+    ways = {
+        "by their roles in the file": [n for n in free if record.channels[n].role is role],
+        "by their names": [n for n in free if words.fullmatch(n)],
+        "by their units": [n for n in free if record.unit(n) in units],
+        "as what is left": free if taken and len(free) == 1 else [],
+    }
+    for how, found in ways.items():
+        if found:
+            return tuple(found), how
+    return (), ""

@@ -1,0 +1,232 @@
+"""A study file for rig records: inputs and outputs by column, structures by free run."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flightid.conventions import Light
+from flightid.errors import FlightidError, StudyError
+from flightid.findings import Finding
+from flightid.models.save import toml_value
+from flightid.record import Record, read_records
+from flightid.study.proposal.columns import Columns, columns_of
+from flightid.study.proposal.proposal import Proposal
+from flightid.validation import scan_orders
+
+KINDS = ("arx", "armax", "oe")
+ORDERS = {"na": (1, 2, 3, 4), "nb": (1, 2, 3), "nc": (1, 2), "nf": (1, 2, 3, 4), "nk": (1, 2, 3)}
+USED = {"arx": ("na", "nb", "nk"), "armax": ("na", "nb", "nc", "nk"), "oe": ("nb", "nf", "nk")}
+"""Orders that are tried: two modes with their delays; a scan says where its edge is the best."""
+FITTED, CHOSEN, ALONE = 0.6, 1.0, (0.5, 0.75)
+"""Part of a record that is fitted, the rest ranks structures; and where it also has to verify."""
+CYCLES, SAMPLES_PER_CYCLE = 10.0, 10.0
+"""What a response needs: cycles of its lowest frequency in a record, samples of its highest."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Records in which the same inputs moved: the longest is fitted, the others verify."""
+
+    inputs: tuple[str, ...]
+    paths: tuple[Path, ...]
+    records: tuple[Record, ...]
+
+
+def study_of_records(
+    paths: Sequence[Path],
+    folder: Path,
+    *,
+    model: str | None,
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+) -> Proposal:
+    """Study file for records.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        One manoeuvre each.
+    folder : Path
+        Of the study file.
+    model : str or None
+        Equations in place of a structure that is looked for.
+    inputs, outputs : tuple of str
+        Columns, where their names do not tell.
+
+    Raises
+    ------
+    StudyError
+        A file holds several manoeuvres, or no column can be told for an input or output.
+    """
+    read = [(path, _one(path)) for path in paths]
+    columns = columns_of([record for _, record in read], inputs, outputs)
+    groups, missed = _groups(read, columns)
+    body: list[str] = []
+    names: list[str] = []
+    for group in groups:
+        segments = _segments(group)
+        body += [
+            line for name, path, span in segments.all for line in _record(name, path, span, folder)
+        ]
+        for output in columns.outputs if model is None else columns.outputs[:1]:
+            name = (
+                f"{output} from {' and '.join(group.inputs)}" if model is None else Path(model).stem
+            )
+            try:
+                body += list(_model(name, group, segments, output, model))
+            except FlightidError as error:
+                missed.append(Finding("no-model", Light.RED, f"{name}: no model, {error}"))
+                continue
+            names.append(name)
+    head = _head(paths, columns, missed)
+    return Proposal((*head, *body), tuple(names), tuple(missed))
+
+
+def _one(path: Path) -> Record:
+    """The record of a file."""
+    found = read_records(path)
+    if len(found) != 1:
+        raise StudyError(
+            f"{path.name} holds several manoeuvres",
+            found=f"{len(found)} of them",
+            needed="one a file",
+            action="write a study that names them (docs/study.md, manoeuvre), or mend its gaps",
+        )
+    return found[0]
+
+
+def _groups(
+    read: Sequence[tuple[Path, Record]], columns: Columns
+) -> tuple[list[_Group], list[Finding]]:
+    """Records by the inputs that move in them, the longest of each first."""
+    by_inputs: dict[tuple[str, ...], list[tuple[Path, Record]]] = {}
+    missed = []
+    for path, record in read:
+        moving = tuple(name for name in columns.inputs if np.ptp(record[name]) > 0.0)
+        if not moving:
+            missed.append(
+                Finding(
+                    "no-model", Light.RED,
+                    f"{path.name}: no model, none of {', '.join(columns.inputs)} moves in it",
+                    "record a manoeuvre that moves an input: flightid design plans one",
+                )
+            )  # fmt: skip
+            continue
+        by_inputs.setdefault(moving, []).append((path, record))
+    groups = []
+    for moving, members in by_inputs.items():
+        members.sort(key=lambda each: -each[1].n_samples)
+        groups.append(_Group(moving, *zip(*members, strict=True)))
+    return groups, missed
+
+
+@dataclass(frozen=True)
+class _Segments:
+    """Names of what is fitted, what ranks structures and what verifies; all with file and span."""
+
+    all: tuple[tuple[str, Path, tuple[float, float] | None], ...]
+    fitted: str
+    choice: str
+    unseen: tuple[str, ...]
+    spans: tuple[tuple[float, float], tuple[float, float]]
+
+
+def _segments(group: _Group) -> _Segments:
+    first, record = group.paths[0], group.records[0]
+    start, stop = float(record.time_s[0]), float(record.time_s[-1])
+    alone = len(group.paths) == 1
+    cuts = ALONE if alone else (FITTED, CHOSEN)
+    edges = [start, *(_round(start + cut * (stop - start)) for cut in cuts), stop]
+    name = first.stem
+    parts = [
+        (f"{name}, fitted", first, (edges[0], edges[1])),
+        (f"{name}, choice", first, (edges[1], edges[2])),
+    ]
+    rest = [(path.stem, path, None) for path in group.paths[1:]]
+    unseen = [(f"{name}, unseen", first, (edges[2], edges[3]))] if alone else rest
+    return _Segments(
+        (*parts, *unseen), parts[0][0], parts[1][0],
+        tuple(each[0] for each in unseen), (parts[0][2], parts[1][2]),
+    )  # fmt: skip
+
+
+def _record(name: str, path: Path, span: tuple[float, float] | None, folder: Path) -> Iterator[str]:
+    yield from ("", "[[record]]", f"name = {toml_value(name)}")
+    yield f"path = {toml_value(Path(os.path.relpath(path, folder)).as_posix())}"
+    if span is not None:
+        yield f"span_s = {toml_value(list(span))}"
+
+
+def _model(
+    name: str, group: _Group, segments: _Segments, output: str, model: str | None
+) -> Iterator[str]:
+    lines = [f"identify = {toml_value(segments.fitted)}"]
+    lines += [f"verify = {toml_value(list(segments.unseen))}"]
+    if model is not None:
+        template = [f"template = {toml_value(model)}", 'fit = { method = "output_error" }']
+        return iter(["", "[[model]]", f"name = {toml_value(name)}", *template, *lines])
+    record = group.records[0]
+    kind, found = _structure(record, group.inputs, output, segments)
+    span_s = record.duration_s * FITTED
+    low = CYCLES * math.tau / span_s
+    high = math.tau * record.sample_rate_hz / SAMPLES_PER_CYCLE
+    orders = [f"{order} = {toml_value(list(ORDERS[order]))}" for order in USED[kind]]
+    coherent = (
+        (f"band_rad_s = {toml_value([_round(low), _round(high)])}",) if high > 2 * low else ()
+    )
+    return iter(
+        [
+            "", "[[model]]", f"name = {toml_value(name)}",
+            f"# Error of free runs on what was not fitted: {found}.",
+            f"structure = {toml_value(kind)}",
+            f"inputs = {toml_value(list(group.inputs))}", f"outputs = {toml_value(output)}",
+            *lines, f"select = {toml_value(segments.choice)}", *coherent, *orders,
+        ]
+    )  # fmt: skip
+
+
+def _structure(
+    record: Record, inputs: tuple[str, ...], output: str, segments: _Segments
+) -> tuple[str, str]:
+    """The structure whose best orders run freely with the least error, and what each reached."""
+    seen, unseen = (
+        record.select([*inputs, output]).with_roles(
+            **dict.fromkeys(inputs, "input"), **{output: "output"}
+        ).segment(*span)
+        for span in segments.spans
+    )  # fmt: skip
+    reached: dict[str, float] = {}
+    for kind in KINDS:
+        tried: dict[str, Any] = {order: ORDERS[order] for order in USED[kind]}
+        scan = scan_orders(seen, unseen, inputs=inputs, outputs=output, kind=kind, **tried)
+        best = scan.trials[0].free_run_rms
+        if best is not None:
+            reached[kind] = best
+    if not reached:
+        raise StudyError("no structure runs freely", needed="a record that moves the output")
+    said = ", ".join(f"{kind} {value:.3g}" for kind, value in reached.items())
+    return min(reached, key=lambda kind: reached[kind]), f"{said} {record.unit(output)}".rstrip()
+
+
+def _head(paths: Sequence[Path], columns: Columns, missed: Sequence[Finding]) -> list[str]:
+    files = ", ".join(path.name for path in paths)
+    return [
+        f"# Study of {files}.",
+        "# docs/study.md describes every key; `flightid run` of this file gives the same numbers.",
+        *(f"# {said}." for said in columns.said),
+        *(f"# Left out: {finding.message}." for finding in missed),
+        "", "[study]", f"title = {toml_value(f'Models of {paths[0].stem}')}",
+        f"aircraft = {toml_value(f'records {files}')}",
+        "", "[verify]", "residual_tests = true",
+    ]  # fmt: skip
+
+
+def _round(value: float) -> float:
+    return float(f"{value:.4g}")

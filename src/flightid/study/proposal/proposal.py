@@ -1,0 +1,107 @@
+"""The noun: a study file that was written for data, and what was left out of it."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from textwrap import wrap
+
+from flightid.conventions import Light
+from flightid.errors import StudyError
+from flightid.files import write_atomically
+from flightid.findings import Finding
+from flightid.inspection import Inspection
+
+WIDTH = 100
+STAMP = "# Written by flightid, which replaces this file as long as nobody changes it: "
+"""Begins the last line, with the hash of the lines above it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proposal:
+    """A study file for data that have none.
+
+    Attributes
+    ----------
+    lines : tuple of str
+        The study file; paths in it are relative to the folder that it was written for.
+    models : tuple of str
+        Names of the models that it identifies; empty where the data carry none.
+    findings : tuple of Finding
+        What cannot be identified from these data, why, and what to do.
+    inspection : Inspection or None
+        Of the log; None where records come from files.
+    """
+
+    lines: tuple[str, ...]
+    models: tuple[str, ...]
+    findings: tuple[Finding, ...] = ()
+    inspection: Inspection | None = None
+
+    @property
+    def text(self) -> str:
+        """The study file, with a stamp that tells whether anyone changed it."""
+        body = "\n".join(self.lines) + "\n"
+        return f"{body}{STAMP}{_hash(body)}\n"
+
+    def refusal(self) -> str:
+        """That there is no model and why, what the data show all the same, and what to do, last."""
+        said = ["No model can be identified from these data."]
+        reasons: dict[str, list[str]] = {}
+        for finding in self.findings:
+            what, _, why = finding.message.partition(": no model, ")
+            reasons.setdefault(why, []).append(what)
+        for why, parts in reasons.items():
+            said += _wrapped(f"- {', '.join(parts)}: {why}")
+        actions = [finding.action for finding in self.findings if finding.action]
+        if self.inspection is not None:
+            said += ["", self.inspection.in_short()]
+            actions += [each.action for each in self.inspection.findings if each.action]
+        said += ["", "What to do, the first first"]
+        said += [line for each in dict.fromkeys(actions) for line in _wrapped(f"- {each}")]
+        return "\n".join(said)
+
+    def write(self, path: str | Path) -> Path:
+        """Write the study file; one that was changed by hand is never replaced.
+
+        Raises
+        ------
+        StudyError
+            The data carry no model, or the file there was changed by hand.
+        OSError
+            The file cannot be written.
+        """
+        file = Path(path)
+        if not self.models:
+            first = next((f for f in self.findings if f.light is Light.RED), None)
+            raise StudyError(
+                "these data carry no model, so no study is written",
+                found="nothing to identify" if first is None else first.message,
+                action="" if first is None else first.action,
+            )
+        if file.exists() and not _is_untouched(file):
+            raise StudyError(
+                "a study of that name is there, and it is not as flightid wrote it",
+                found=str(file),
+                needed="a name that is free",
+                action=f"run that study (flightid run {file.name}), or move it away",
+            )
+        return write_atomically(file, self.text)
+
+
+def _wrapped(text: str) -> list[str]:
+    return wrap(text, WIDTH, subsequent_indent="  ")
+
+
+def _hash(body: str) -> str:
+    return hashlib.sha256(body.encode()).hexdigest()[:16]
+
+
+def _is_untouched(file: Path) -> bool:
+    """Whether a file is as some proposal wrote it."""
+    try:
+        body, stamp, told = file.read_text(encoding="utf-8").rpartition(STAMP)
+    except UnicodeDecodeError:
+        return False
+    return bool(stamp) and told.strip() == _hash(body)

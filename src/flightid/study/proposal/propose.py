@@ -1,0 +1,63 @@
+"""The verb: a study file for a log, or for records from files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from flightid.errors import OptionError
+from flightid.logs import is_log
+from flightid.study.proposal.of_log import study_of_log
+from flightid.study.proposal.of_records import study_of_records
+from flightid.study.proposal.proposal import Proposal
+
+
+def propose_study(
+    files: Sequence[str | Path],
+    *,
+    folder: str | Path,
+    model: str | None = None,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    tune: bool = False,
+) -> Proposal:
+    """Write the study that data ask for: what was flown says what can be identified, and how.
+
+    Parameters
+    ----------
+    files : sequence of str or Path
+        One log, or records in CSV, Parquet, MATLAB or netCDF.
+    folder : str or Path
+        Folder of the study file; paths in it are relative to that.
+    model : str, optional
+        Library model or model file in place of the usual one; for records, a model with equations
+        in place of a structure that is looked for.
+    inputs, outputs : sequence of str
+        Columns of records, where their names do not tell.
+    tune : bool
+        Let the study end in gains of the autopilot that flew.
+
+    Returns
+    -------
+    Proposal
+
+    Raises
+    ------
+    OptionError
+        Several logs, or a log among records, or columns named for a log.
+    FlightidError
+        A file cannot be read.
+    """
+    paths = [Path(file) for file in files]
+    logs = [path for path in paths if is_log(path)]
+    if not logs:
+        return study_of_records(
+            paths, Path(folder), model=model, inputs=tuple(inputs), outputs=tuple(outputs)
+        )
+    if len(paths) > 1 or inputs or outputs:
+        raise OptionError(
+            "a log is taken alone, and its channels have names",
+            found=", ".join(path.name for path in paths),
+            needed="one log without inputs= and outputs=, or records from files",
+        )
+    return study_of_log(logs[0], Path(folder), model=model, tune=tune)

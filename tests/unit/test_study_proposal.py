@@ -1,0 +1,78 @@
+"""Studies that are written for data: what is in them, and that nobody's own study is replaced."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flightid import Record, run_study
+from flightid.cli.program import run
+from flightid.errors import StudyError, UnknownNameError
+from flightid.study.proposal import Proposal, propose_study
+from flightid.study.proposal.columns import columns_of
+
+
+def _rig(folder: Path, name: str = "rig.csv", seed: int = 0) -> Path:
+    """y(k) = 1.5 y(k−1) − 0.7 y(k−2) + u(k−1) + 0.5 u(k−2), with a little noise."""
+    rng = np.random.default_rng(seed)
+    u = np.repeat(rng.choice([-1.0, 1.0], 200), 3)
+    y = np.zeros_like(u)
+    for k in range(2, u.size):
+        y[k] = 1.5 * y[k - 1] - 0.7 * y[k - 2] + u[k - 1] + 0.5 * u[k - 2]
+    y += 0.01 * rng.standard_normal(y.size)
+    rows = [f"{0.1 * k:.1f},{a},{b:.8g}" for k, (a, b) in enumerate(zip(u, y, strict=True))]
+    path = folder / name
+    path.write_text("\n".join(["time [s],volts [V],beam [rad]", *rows]) + "\n")
+    return path
+
+
+def test_records_become_the_study_of_their_structure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data = _rig(tmp_path)
+    code = run(["--quiet", "run", str(data)])
+    shown = capsys.readouterr().out.strip().splitlines()
+    assert code == 0
+    # The verdict and the next step stand where eyes are: last.
+    assert any(line.startswith("Answer: ") for line in shown[-8:])
+    assert "--controller pi_d" in " ".join(shown[-3:])
+    again = run_study(tmp_path / "rig-study.toml", output=tmp_path / "again")
+    fit = again.identified[0].fit
+    assert fit is not None
+    assert again.identified[0].name == "beam from volts"
+    assert min(again.identified[0].on_unseen.popitem()[1].fit_percent.values()) > 95.0
+    first = (tmp_path / "rig-output" / "report.txt").read_text().split("Parameters")[0]
+    assert first == (tmp_path / "again" / "report.txt").read_text().split("Parameters")[0]
+
+
+def test_a_study_that_was_changed_by_hand_stays(tmp_path: Path) -> None:
+    made = propose_study([_rig(tmp_path)], folder=tmp_path)
+    target = made.write(tmp_path / "rig-study.toml")
+    made.write(target)
+    target.write_text(target.read_text().replace("Models of rig", "Mine"))
+    with pytest.raises(StudyError, match="not as flightid wrote it"):
+        made.write(target)
+    assert "Mine" in target.read_text()
+
+
+def test_columns_are_told_by_name_then_unit_or_refused() -> None:
+    stamps = np.arange(4) * 0.1
+    channels = dict.fromkeys(("a", "b"), stamps)
+    known = Record.from_arrays(stamps, others=channels, units={"a": "V", "b": "rad"})
+    found = columns_of([known], (), ())
+    assert (found.inputs, found.outputs) == (("a",), ("b",))
+    named = columns_of([known], ("b",), ())
+    assert (named.inputs, named.outputs) == (("b",), ("a",))
+    bare = Record.from_arrays(stamps, others=channels, units={"a": "1", "b": "1"})
+    with pytest.raises(StudyError, match="do not tell which are inputs"):
+        columns_of([bare], (), ())
+    with pytest.raises(UnknownNameError, match="no such column"):
+        columns_of([bare], ("c",), ())
+
+
+def test_data_without_a_model_give_no_study(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="carry no model"):
+        Proposal((), ()).write(tmp_path / "study.toml")
+    assert "No model can be identified" in Proposal((), ()).refusal()
