@@ -11,7 +11,7 @@ FUZZ_RUNS ?= 1000000
 # Rewritten asserts are kept between runs, whatever the shell says of byte code.
 PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
-.PHONY: demo test test-slow test-nightly docs fuzz fuzz-files same-wheel bench lint hooks format stubs develop wheel constraints clean help
+.PHONY: demo test test-slow test-nightly docs fuzz fuzz-files kills same-wheel bench lint hooks format stubs develop wheel constraints clean help
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/ —/'
@@ -74,6 +74,9 @@ same-wheel:  ## build the wheel twice and compare the bytes
 	touch crates/python/src/lib.rs
 	SOURCE_DATE_EPOCH=315532800 $(BIN)/maturin build --release --quiet --out build/twice/b
 	for wheel in build/twice/a/*.whl; do cmp $$wheel build/twice/b/$$(basename $$wheel) || exit 1; done
+
+kills: develop  ## kill commands at 200 random moments and look for losses
+	$(BIN)/python -m tests.stress.kills --kills 200
 
 fuzz-files: develop  ## throw damaged files at the Python readers, in children with limits
 	$(BIN)/python -m tests.fuzz --runs $(FUZZ_RUNS) --keep build/fuzz
