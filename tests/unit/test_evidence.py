@@ -107,7 +107,11 @@ def test_residual_tests_and_inspections_become_checks() -> None:
         verdict = Light.AMBER
         findings = (Finding("narrow", Light.AMBER, "too narrow", "fly a sweep"),)
 
-    check = inspection_check(Inspected())  # type: ignore[arg-type]
+        def findings_on(self, channels: tuple[str, ...]) -> tuple[Finding, ...]:
+            assert channels == ("tau_phi", "p")
+            return self.findings
+
+    check = inspection_check(Inspected(), ("tau_phi", "p"))  # type: ignore[arg-type]
     assert (check.light, check.what) == (Light.AMBER, "too narrow")
 
 

@@ -182,9 +182,10 @@ def _with_inspection(result: Fit | Reduction, file: Path) -> Fit | Reduction:
     import flightid
     from flightid.evidence import inspection_check
 
-    check = inspection_check(flightid.inspect_log(file))
+    inspection = flightid.inspect_log(file)
 
     def examined(fit: Fit) -> Fit:
+        check = inspection_check(inspection, (*fit.model.inputs, *fit.model.outputs))
         return replace(fit, evidence=fit.evidence.with_checks([check]))
 
     if not isinstance(result, flightid.Reduction):

@@ -187,10 +187,11 @@ def worse(one: Check | None, other: Check) -> Check:
     return one if worst(pair) is one.light else other
 
 
-def inspection_check(inspection: Inspection) -> Check:
-    """The verdict on the log that the data come from."""
-    light = inspection.verdict
-    reasons = [finding for finding in inspection.findings if finding.light is light]
+def inspection_check(inspection: Inspection, channels: Iterable[str]) -> Check:
+    """The verdict on the log that the data come from, as far as the fitted axes go."""
+    findings = inspection.findings_on(channels)
+    light = worst(findings)
+    reasons = [finding for finding in findings if finding.light is light]
     if light is Light.GREEN or not reasons:
         return Check(INSPECTION, light, f"{inspection.name} can support identification")
     return Check(INSPECTION, light, reasons[0].message, reasons[0].action)

@@ -11,7 +11,7 @@ from flightid.inspection.thresholds import (
 )
 from flightid.logs import Log
 
-LOG_BITS = {
+COPTER_LOG_BITS = {
     0: "fast attitude: RATE, ATT and PID at the loop rate",
     1: "medium attitude; with bit 0 system identification data come at the loop rate",
     10: "motor outputs",
@@ -19,6 +19,9 @@ LOG_BITS = {
     18: "fast IMU",
 }
 """Bits of ArduCopter's LOG_BITMASK that identification needs (ArduCopter/defines.h)."""
+PLANE_LOG_BITS = {7: "IMU", 13: "servo outputs", 20: "attitude and PID terms at the loop rate"}
+"""The same of ArduPlane, which numbers them otherwise (ArduPlane/defines.h)."""
+LOG_BITS = {"copter": COPTER_LOG_BITS, "plane": PLANE_LOG_BITS}
 SDLOG_PROFILE = 25
 """PX4: default set 1, system identification 8, high rate 16 (logged_topics.cpp)."""
 SWEEP_START_HZ, SWEEP_STOP_HZ, SWEEP_RECORD_S = 0.2, 20.0, 130
@@ -33,29 +36,49 @@ def shortest_flight_s() -> float:
 def logging(log: Log) -> str:
     """Settings that make the autopilot log fast enough."""
     if log.kind == "px4":
-        return (
-            f"set SDLOG_PROFILE {SDLOG_PROFILE} (default, system identification and high rate) and "
-            "fly again"
-        )
+        return _px4_logging(log)
+    wanted_bits = LOG_BITS.get(log.vehicle or "")
     present = log.parameters.get("LOG_BITMASK")
+    if wanted_bits is None:
+        return "log attitude, rates, outputs and PID terms at the loop rate (LOG_BITMASK)"
     if present is None or not 0 <= present < 2**31:
-        bits = " + ".join(str(2**bit) for bit in LOG_BITS)
-        return f"add {bits} to LOG_BITMASK (fast attitude, motor outputs, PID, fast IMU)"
-    wanted = int(present) | sum(2**bit for bit in LOG_BITS)
-    missing = [str(bit) for bit in LOG_BITS if not int(present) >> bit & 1]
+        bits = " + ".join(str(2**bit) for bit in wanted_bits)
+        return f"add {bits} to LOG_BITMASK ({', '.join(wanted_bits.values())})"
+    wanted = int(present) | sum(2**bit for bit in wanted_bits)
+    missing = [str(bit) for bit in wanted_bits if not int(present) >> bit & 1]
     if not missing:
         return "LOG_BITMASK holds all that is needed: check for a card that is too slow"
-    return f"set LOG_BITMASK {wanted} (now {int(present)}; bits {', '.join(missing)} are missing)"
+    which = f"bit {missing[0]} is" if len(missing) == 1 else f"bits {', '.join(missing)} are"
+    return f"set LOG_BITMASK {wanted} (now {int(present)}; {which} missing)"
+
+
+def _px4_logging(log: Log) -> str:
+    """The logging profile, where the firmware that flew has one."""
+    present = log.parameters.get("SDLOG_PROFILE")
+    if present is None:
+        return (
+            "log commands and body rates at full rate: the parameters of this firmware hold no "
+            f"SDLOG_PROFILE; newer ones take SDLOG_PROFILE {SDLOG_PROFILE}"
+        )
+    wanted = int(present) | SDLOG_PROFILE
+    if wanted == int(present):
+        return f"SDLOG_PROFILE {wanted} holds all that is needed: check for a card that is too slow"
+    return (
+        f"set SDLOG_PROFILE {wanted} (now {int(present)}; with system identification and high "
+        "rate) and fly again"
+    )
 
 
 def excitation(log: Log) -> str:
     """Manoeuvre that excites the axes."""
     repeats = "two runs an axis, one of them with the opposite sign, the other axes quiet"
+    piloted = "fly piloted frequency sweeps of 90 s an axis from 0.3 Hz up"
     if log.kind == "px4":
-        return (
-            "fly piloted frequency sweeps of 90 s an axis from 0.3 Hz up, or the autotune "
-            f"(MC_AT_START); {repeats}"
-        )
+        tunes = [name for name in ("MC_AT_START", "FW_AT_START") if name in log.parameters]
+        autotune = f", or the autotune ({' or '.join(tunes)})" if tunes else ""
+        return f"{piloted}{autotune}; {repeats}"
+    if log.vehicle == "copter" and "SID_AXIS" not in log.parameters and log.parameters:
+        return f"{piloted}; {repeats}"
     if log.vehicle == "copter":
         return (
             f"fly system identification mode with {SID_MIXER}, SID_F_START_HZ "

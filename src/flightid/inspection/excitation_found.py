@@ -15,6 +15,13 @@ from flightid.logs import Log, SidRun
 
 PX4_AUTOTUNE = {2: "roll", 4: "pitch", 6: "yaw"}
 """State of autotune_attitude_control_status while an axis is excited."""
+AUTOMATIC = {
+    *("AUTO", "GUIDED", "RTL", "LAND", "CIRCLE", "SMART_RTL", "BRAKE", "THROW", "AVOID_ADSB"),
+    *("GUIDED_NOGPS", "FOLLOW", "AUTOROTATE", "DESCEND", "TERMINATION", "OFFBOARD", "ORBIT"),
+}
+"""Modes in which no stick moves the vehicle, besides those named AUTO_…, of all autopilots."""
+PLANE_AUTOMATIC = {"LOITER", "TAKEOFF", "QLAND", "QRTL", "THERMAL", "LOITER_ALT_QLAND"}
+"""ArduPlane's own: a copter's LOITER is flown by stick."""
 SWEEP_RATIO, SWEEP_CYCLES, SWEEP_ORDER = 3.0, 8, 0.9
 
 
@@ -25,7 +32,9 @@ class FoundExcitation:
     Attributes
     ----------
     kind : str
-        ``"sid"``, ``"autotune"``, ``"sweep"``, ``"steps"``, ``"pilot"``; ``"hand"`` on the ground.
+        ``"sid"``, ``"autotune"``, ``"sweep"``, ``"steps"``; plain flying by ``"pilot"`` or
+        ``"autopilot"``, ``"flying"`` where both did or the log does not tell; ``"hand"`` on the
+        ground.
     axis : str
         ``"roll"``, ``"pitch"``, ``"yaw"``, or another injection point in words.
     start_s, stop_s : float
@@ -45,6 +54,11 @@ class FoundExcitation:
         """Whether the autopilot made it, so that it is independent of what the sensors read."""
         return self.kind in ("sid", "autotune")
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is plain flying, no manoeuvre that was made for identification."""
+        return self.kind in ("pilot", "autopilot", "flying")
+
 
 def excitations(log: Log, spans: tuple[Span, ...]) -> tuple[FoundExcitation, ...]:
     """Everything that excited the vehicle, injected runs first.
@@ -59,7 +73,8 @@ def excitations(log: Log, spans: tuple[Span, ...]) -> tuple[FoundExcitation, ...
         for span in spans:
             if any(e.is_injected and _overlap(span, e) for e in found):
                 continue
-            manoeuvre = _shape(set_point, axis, span) or _motion(rate, axis, span, flying)
+            moved = _plain(log, span) if flying else ("hand", "moved on the ground")
+            manoeuvre = _shape(set_point, axis, span) or _motion(rate, axis, span, *moved)
             found += [manoeuvre] if manoeuvre is not None else []
     return tuple(found)
 
@@ -154,12 +169,35 @@ def _steps(stamps: NDArray[np.float64], values: NDArray[np.float64]) -> int:
     return int(np.count_nonzero(np.diff(landed.astype(np.int8)) == 1))
 
 
-def _motion(rate: Signal | None, axis: str, span: Span, flying: bool) -> FoundExcitation | None:
+def _plain(log: Log, span: Span) -> tuple[str, str]:
+    """Who flew a span by the modes that the log tells: kind of excitation, and words for it."""
+    told = [e for e in log.events if e.kind == "mode" and e.time_s is not None]
+    before = [e for e in told if e.time_s is not None and e.time_s <= span[0]]
+    since = [e for e in told if e.time_s is not None and span[0] < e.time_s <= span[1]]
+    # A log that begins in the air writes its first mode a moment after its first sample.
+    modes = [e.text.split(" ")[0] for e in (*before[-1:], *since)]
+    if not modes:
+        return "flying", "plain flying"
+    by_itself = {_is_automatic(mode, log.vehicle) for mode in modes}
+    names = " and ".join(dict.fromkeys(modes))
+    if by_itself == {True}:
+        return "autopilot", f"the autopilot's own flying ({names})"
+    return ("pilot" if by_itself == {False} else "flying"), f"plain flying ({names})"
+
+
+def _is_automatic(mode: str, vehicle: str | None) -> bool:
+    return mode.startswith("AUTO_") or mode in (
+        AUTOMATIC | (PLANE_AUTOMATIC if vehicle == "plane" else set())
+    )
+
+
+def _motion(
+    rate: Signal | None, axis: str, span: Span, kind: str, how: str
+) -> FoundExcitation | None:
     if rate is None:
         return None
     values = rate.within([span])
     spread = float(np.std(values)) if values.size else 0.0
     if spread < RESTING_RATE.value:
         return None
-    kind, how = ("pilot", "plain flying") if flying else ("hand", "moved on the ground")
     return FoundExcitation(kind, axis, span[0], span[1], f"body rate {spread:.2g} rad/s rms, {how}")

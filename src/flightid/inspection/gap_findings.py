@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from flightid.conventions import Light
 from flightid.findings import Finding, counted
+from flightid.inspection.advice import logging
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.rates import StreamRate, stream_gaps
 from flightid.inspection.signals import Span
@@ -29,7 +30,7 @@ def gap_findings(log: Log, rate: StreamRate, phases: FlightPhases) -> list[Findi
                 Light.AMBER,
                 f"{rate.label} has {counted(len(flown), 'gap')}{where}, the longest "
                 f"{_longest(flown):.3g} s (median interval {1e3 / rate.rate_hz:.3g} ms)",
-                "use a faster card, or log less; records are cut at gaps",
+                f"{_remedy(log, flown)}; records are cut at gaps",
             )
         )
     if paused := [gap for gap in gaps if gap not in flown]:
@@ -42,6 +43,19 @@ def gap_findings(log: Log, rate: StreamRate, phases: FlightPhases) -> list[Findi
             )
         )
     return findings
+
+
+def _remedy(log: Log, gaps: list[Span]) -> str:
+    """What to do about gaps: a card loses samples only where the logger counted them."""
+    dropouts = [gap for gap in log.gaps if log.kind == "px4" and gap.duration_s > 0]
+    lost = any(d.start_s < stop and d.stop_s > start for d in dropouts for start, stop in gaps)
+    if lost or any(finding.code == "messages-dropped" for finding in log.findings):
+        return "use a faster card, or log less"
+    if log.kind == "px4" or "DSF" in log:
+        return (
+            f"the logger counts no lost samples there, so that no card is to blame: {logging(log)}"
+        )
+    return "the log does not tell whether the card or the autopilot left them out"
 
 
 def _longest(gaps: list[Span]) -> float:

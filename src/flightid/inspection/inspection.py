@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from textwrap import fill
 
 from flightid.conventions import Light
 from flightid.findings import Finding, worst
+from flightid.inspection.axes import axes_of
 from flightid.inspection.excitation_found import FoundExcitation
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.rates import StreamRate
@@ -89,6 +91,21 @@ class Inspection(Result, schema="flightid.inspection/1"):
         labels = [label for band in self.bands for label in (band.input, band.output) if label]
         return tuple(dict.fromkeys(label.split(".")[0] for label in labels))
 
+    def findings_on(self, channels: Iterable[str]) -> tuple[Finding, ...]:
+        """Findings on the whole log and on the axes that hold any of some channels.
+
+        Parameters
+        ----------
+        channels : iterable of str
+            Canonical names, for example ``"q"``; none of any axis: all findings count.
+        """
+        wanted = set(channels)
+        names = axes_of(self.vehicle)
+        others = {axis for axis, own in names.items() if not wanted & set(own)}
+        if len(others) == len(names):
+            return self.findings
+        return tuple(f for f in self.findings if f.code.rsplit("-", 1)[-1] not in others)
+
     def with_findings(self, findings: tuple[Finding, ...]) -> Inspection:
         """Copy with other findings."""
         return replace(self, findings=findings)
@@ -107,7 +124,10 @@ class Inspection(Result, schema="flightid.inspection/1"):
 
     def summary(self) -> Table:
         """Table of the verdicts, the worst first."""
-        rows = tuple((str(f.light), f.code, f.message, f.action or None) for f in self.findings)
+        rows = tuple(
+            (str(finding.light), finding.code, finding.message, action or None)
+            for finding, action in self._advised()
+        )
         columns = (Column("light"), Column("code"), Column("found"), Column("do"))
         return Table(f"{self.name}: {WORDS[self.verdict]}", columns, rows)
 
@@ -115,11 +135,11 @@ class Inspection(Result, schema="flightid.inspection/1"):
         """Verdict, sentences and tables for a terminal."""
         head = f"{self.name}: {self.firmware or self.kind}, {self.duration_s:.1f} s"
         said = [f"{head}\nThis log {WORDS[self.verdict]}."]
-        for finding in self.findings:
+        for finding, action in self._advised():
             text = f"{finding.light}: {finding.message}"
             said.append(fill(text, WIDTH, subsequent_indent="    "))
-            if finding.action:
-                advice = f"  do: {finding.action}"
+            if action:
+                advice = f"  do: {action}"
                 said.append(fill(advice, WIDTH, initial_indent="  ", subsequent_indent="        "))
         return "\n\n".join(["\n".join(said), *(t.to_text() for t in self.tables()[1:])])
 
@@ -131,6 +151,13 @@ class Inspection(Result, schema="flightid.inspection/1"):
         )
         tables = (self._axes(), self._excitations(), self._saturations(), self._skews())
         return "\n\n".join([head, *(each.to_text() for each in tables if each.rows)])
+
+    def _advised(self) -> Iterator[tuple[Finding, str]]:
+        """Findings with what to do; an advice that several share is given once."""
+        given: set[str] = set()
+        for finding in self.findings:
+            yield finding, "" if finding.action in given else finding.action
+            given.add(finding.action)
 
     def _axes(self) -> Table:
         columns = (
@@ -180,12 +207,25 @@ class Inspection(Result, schema="flightid.inspection/1"):
             Column("first"),
             Column("second"),
             Column("second is later by", "ms", 3),
+            Column("±", "ms", 2),
+            Column("resolution", "ms", 2),
             Column("correlation", "", 3),
         )
         rows = tuple(
-            (s.quantity, s.first, s.second, 1e3 * s.lag_s, s.correlation) for s in self.skews
+            (
+                s.quantity,
+                s.first,
+                s.second,
+                1e3 * s.lag_s if s.is_told else None,
+                1e3 * s.half_width_s,
+                1e3 * s.resolution_s,
+                s.correlation,
+            )
+            for s in self.skews
         )
-        return Table("Clock skew between streams", columns, rows)
+        untold = any(not s.is_told for s in self.skews)
+        note = "–: none can be told, it is below the resolution or its 95 % interval (±) holds zero"
+        return Table("Clock skew between streams", columns, rows, (note,) if untold else ())
 
     def _rates(self) -> Table:
         columns = (
@@ -202,16 +242,18 @@ class Inspection(Result, schema="flightid.inspection/1"):
             (
                 r.label,
                 r.rows,
-                r.rate_hz,
-                r.mean_hz,
-                100.0 * r.jitter,
-                r.n_gaps,
-                r.longest_gap_s or None,
+                *(
+                    (None, None, None, None, None)
+                    if r.is_burst
+                    else (r.rate_hz, r.mean_hz, 100 * r.jitter, r.n_gaps, r.longest_gap_s or None)
+                ),
                 r.n_disordered,
             )
-            for r in self.rates
+            for r in sorted(self.rates, key=lambda rate: rate.is_burst)
         )
-        return Table("Rates", columns, rows)
+        burst = any(r.is_burst for r in self.rates)
+        note = "no rate: rows come in bursts, whose spacing is that of the writing"
+        return Table("Rates", columns, rows, (note,) if burst else ())
 
     def _tables(self) -> tuple[Table, ...]:
         return self.tables()

@@ -14,6 +14,10 @@ from flightid.logs import Log
 
 FEWEST_ROWS = 10
 """Messages with fewer stamped rows have no rate worth a line."""
+FASTEST_HZ = 10_000.0
+"""No autopilot samples anything faster: such spacing is that of the writing."""
+BURST = 3.0
+"""Rate of the median interval over the mean rate from which uneven rows come in bursts."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,12 @@ class StreamRate:
     n_gaps: int
     longest_gap_s: float
     n_disordered: int
+
+    @property
+    def is_burst(self) -> bool:
+        """Whether rows come many at once, so that the median interval tells no rate."""
+        uneven = self.jitter > 1.0 and self.rate_hz > BURST * self.mean_hz
+        return self.rate_hz > FASTEST_HZ or uneven
 
     @property
     def label(self) -> str:

@@ -104,7 +104,8 @@ def axis_bands(
         labels = (command.label, motion.label)
         band, coherence, largest = None, None, None
         if response is not None and tau in response.inputs:
-            band, coherence, largest, why = _band(response, rate, tau, slowest)
+            band, coherence, largest, reason = _band(response, rate, tau, slowest)
+            why = f"{reason}{why}" if reason else ""
         elif response is not None:
             why = f"{labels[0]} did not move"
         found.append(AxisBand(axis, *labels, slowest, band, coherence, why, largest))
@@ -117,20 +118,21 @@ def _response(
     """Estimate all axes at once; None with the reason where that is not possible."""
     if not spans or not axes:
         return None, "nothing was flown" if axes else "no axis has command and rate logged"
-    kept = _records(log, axes, spans)
-    inputs = [axis.command for axis in axes if _moves(kept, axis.command)]
+    made = _records(log, axes, spans)
+    inputs = [axis.command for axis in axes if _moves(made, axis.command)]
     if not inputs:
-        return None, "no command moved" if kept else "no span holds command and rate together"
+        return None, "no command moved" if made else "no span holds command and rate together"
     # Conditioning on each other input costs one independent window.
     windows = INDEPENDENT_WINDOWS.value + len(inputs) - 1
+    kept = _without_scraps(made, windows)
     total = sum(record.duration_s for record in kept)
-    window = min(total / windows, *(record.duration_s for record in kept))
+    window = min(total / windows, kept[-1].duration_s)
     low = CYCLES_IN_WINDOW.value * 2.0 * math.pi / window
     high = 2.0 * math.pi * kept[0].sample_rate_hz / SAMPLES_PER_CYCLE_LEAST.value
     if high < 1.2 * low:
         return None, (
             f"the windows reach down to {low / (2 * math.pi):.2g} Hz, the sampling up to "
-            f"{high / (2 * math.pi):.2g} Hz: no band is left"
+            f"{high / (2 * math.pi):.2g} Hz: no band is left{_cut(made, kept, spans)}"
         )
     try:
         return estimate_response(
@@ -141,18 +143,34 @@ def _response(
             n_omega=60,
             window_s=[window, window / 2] if high > 4 * low else [window],
             covariance=False,
-        ), ""
+        ), _cut(made, kept, spans)
     except FlightidError as error:
         return None, error.problem
 
 
 def _records(log: Log, axes: list[AxisChannels], spans: tuple[Span, ...]) -> list[Record]:
-    """Records of the spans, without scraps that would shorten the windows of all."""
+    """Records of the spans, cut at gaps."""
     wanted = [find(log, name) for axis in axes for name in (axis.command, axis.rate)]
     signals = [signal for signal in wanted if signal is not None]
-    made = records(signals, {axis.command for axis in axes}, spans)
-    longest = max((record.duration_s for record in made), default=0.0)
-    return [record for record in made if record.duration_s >= 0.2 * longest]
+    return records(signals, {axis.command for axis in axes}, spans)
+
+
+def _without_scraps(made: list[Record], windows: float) -> list[Record]:
+    """The longest records, as many as give the longest windows that all of them hold."""
+    ordered = sorted(made, key=lambda record: -record.duration_s)
+    lengths = np.array([record.duration_s for record in ordered])
+    reach = np.minimum(lengths, np.cumsum(lengths) / windows)
+    return ordered[: int(np.argmax(reach)) + 1]
+
+
+def _cut(made: list[Record], kept: list[Record], spans: tuple[Span, ...]) -> str:
+    """What gaps did to the windows; empty where none cut a span."""
+    if len(made) <= len(spans):
+        return ""
+    return (
+        f"; gaps cut the flight into {len(made)} pieces, the longest "
+        f"{kept[0].duration_s:.2g} s: close them first"
+    )
 
 
 def _moves(made: list[Record], name: str) -> bool:

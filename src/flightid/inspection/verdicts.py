@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from flightid.conventions import Light
@@ -48,14 +47,8 @@ _RANK = {Light.RED: 0, Light.AMBER: 1, Light.UNKNOWN: 2, Light.GREEN: 3}
 
 
 def _ranked(findings: list[Finding]) -> tuple[Finding, ...]:
-    """Worst first; an advice that several verdicts share is given once."""
-    given: set[str] = set()
-    ranked = []
-    for finding in sorted(findings, key=lambda finding: _RANK[finding.light]):
-        repeated = finding.action in given
-        given.add(finding.action)
-        ranked.append(replace(finding, action="") if repeated else finding)
-    return tuple(ranked)
+    """Worst first."""
+    return tuple(sorted(findings, key=lambda finding: _RANK[finding.light]))
 
 
 def _flight(log: Log, found: Inspection) -> list[Finding]:
@@ -181,16 +174,17 @@ def _excitation(log: Log, found: Inspection) -> list[Finding]:
         ]
     if not found.phases.airborne:
         return []
-    made = [e for e in found.excitations if e.kind != "pilot"]
+    made = [e for e in found.excitations if not e.is_plain]
     if made:
         text = "; ".join(f"{e.kind} on {e.axis} ({e.detail})" for e in made[:6])
         return [Finding("excitation-found", Light.GREEN, f"excitation found: {text}")]
     axes = ", ".join(dict.fromkeys(e.axis for e in found.excitations))
+    who = ", ".join(dict.fromkeys(e.detail.split(", ", 1)[1] for e in found.excitations))
     return [
         Finding(
             "pilot-only",
             Light.AMBER,
-            f"plain flying is the only excitation ({axes}): it holds little power above 1 Hz and "
+            f"{who} is the only excitation ({axes}): it holds little power above 1 Hz and "
             "moves several axes at once",
             advice.excitation(log),
         )
@@ -199,7 +193,7 @@ def _excitation(log: Log, found: Inspection) -> list[Finding]:
 
 def _bands(log: Log, found: Inspection) -> list[Finding]:
     findings = [_band(log, band) for band in found.bands if band.rate_hz > 0]
-    if all(finding.code != "band" for finding in findings):
+    if not any(finding.code.startswith("band") for finding in findings):
         measured = [b.largest_coherence for b in found.bands if b.largest_coherence is not None]
         seen = f"largest found {max(measured):.2f}" if measured else "none could be measured"
         findings.append(
@@ -235,7 +229,8 @@ def _band(log: Log, band: AxisBand) -> Finding:
             advice.excitation(log),
         )
     light = Light.GREEN if band.span >= BAND_GOOD.value else Light.AMBER
-    return Finding("band", light, text, "" if light is Light.GREEN else advice.excitation(log))
+    action = "" if light is Light.GREEN else advice.excitation(log)
+    return Finding(f"band-{band.axis}", light, text, action)
 
 
 def _loop(log: Log, found: Inspection) -> list[Finding]:
@@ -282,11 +277,12 @@ def _quality(log: Log, found: Inspection) -> list[Finding]:
         Finding(
             "skew",
             Light.AMBER,
-            f"{skew.second} shows the same motion {1e3 * skew.lag_s:.1f} ms later than "
-            f"{skew.first}: clock skew, or the delay of a filter",
+            f"{skew.second} shows the same motion {1e3 * skew.lag_s:.1f} ms "
+            f"(± {1e3 * skew.half_width_s:.1f}) later than {skew.first}: "
+            "clock skew, or the delay of a filter",
             "take command and rate from the same message",
         )
         for skew in found.skews
-        if abs(skew.lag_s) > max(SKEW.value, skew.resolution_s)
+        if skew.exceeds(SKEW.value)
     ]
     return findings

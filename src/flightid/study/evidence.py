@@ -31,7 +31,8 @@ def examined(fit: Fit, item: ModelResults, inspection: Inspection | None) -> Fit
     """
     checks: list[Check] = []
     if inspection is not None:
-        checks.append(inspection_check(inspection))
+        channels = (*fit.model.inputs, *fit.model.outputs)
+        checks.append(inspection_check(inspection, channels))
     response = item.response
     if response is not None and not fit.responses and _is_of(response, fit):
         outputs, inputs = tuple(fit.model.outputs), tuple(fit.model.inputs)

@@ -175,15 +175,14 @@ class UlogSource:
                     "copy the log from the card again and compare; Log.skipped lists the places",
                 )
             )
-        longest_s = max((gap.duration_s for gap in self.gaps), default=0.0)
-        if longest_s > 0:
-            total_s = sum(gap.duration_s for gap in self.gaps)
+        lost_s = [gap.duration_s for gap in self.gaps if gap.duration_s > 0]
+        if lost_s:
             found.append(
                 Finding(
                     "logger-dropouts",
                     Light.AMBER,
-                    f"the logger lost samples {len(self.gaps)} times, {total_s:.3g} s in all, "
-                    f"the longest {longest_s:.3g} s",
+                    f"the logger lost samples {counted(len(lost_s), 'time')}, {sum(lost_s):.3g} s "
+                    f"in all, the longest {max(lost_s):.3g} s",
                     "use a faster card, or log fewer topics",
                 )
             )

@@ -1,0 +1,131 @@
+"""What the inspection says of lags, gaps, modes and firmware holds where it is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from flightid.conventions import Light
+from flightid.evidence import inspection_check
+from flightid.findings import Finding
+from flightid.inspection import advice
+from flightid.inspection.excitation_found import _plain
+from flightid.inspection.flight_phases import FlightPhases
+from flightid.inspection.gap_findings import _remedy
+from flightid.inspection.inspection import Inspection
+from flightid.inspection.rates import StreamRate
+from flightid.inspection.signals import Signal
+from flightid.inspection.skew import StreamSkew, _skew
+from flightid.inspection.usable_band import _without_scraps
+from flightid.logs.source import Event, Gap
+
+
+def log(**fields: object) -> Any:
+    known = {"kind": "px4", "vehicle": "copter", "parameters": {}, "gaps": (), "findings": ()}
+    return SimpleNamespace(**{**known, **fields})
+
+
+def skew(late_s: float, rate_hz: float, seconds: float, noise: float) -> StreamSkew:
+    rng = np.random.default_rng(3)
+    fast_s = np.arange(0.0, seconds, 0.005)
+    motion = np.convolve(rng.standard_normal(fast_s.size + 40), np.hanning(41), "valid")
+    slow_s = np.arange(1.0, seconds - 1.0, 1.0 / rate_hz)
+    values = np.interp(slow_s - late_s, fast_s, motion)
+    values += noise * motion.std() * rng.standard_normal(slow_s.size)
+    first, second = Signal("p", fast_s, motion, "rad/s", "a"), Signal("p", slow_s, values, "", "b")
+    found = _skew("p", first, second, ((0.0, seconds),))
+    assert found is not None
+    return found
+
+
+def test_a_lag_has_an_interval_and_is_told_only_where_the_streams_tell_it() -> None:
+    clear = skew(0.02, 50.0, 60.0, noise=0.1)
+    assert abs(clear.lag_s - 0.02) < clear.half_width_s < 0.002
+    assert clear.exceeds(0.004)
+    assert not skew(0.03, 1.0, 90.0, noise=0.1).is_told
+    short = skew(0.012, 10.0, 8.0, noise=0.4)
+    assert short.half_width_s > 0.004
+    assert not short.exceeds(0.004)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "logging", "excitation"),
+    [
+        (
+            {"SDLOG_PROFILE": 1.0, "MC_AT_START": 0.0},
+            "set SDLOG_PROFILE 25 (now 1;",
+            "(MC_AT_START",
+        ),
+        ({"SDLOG_PROFILE": 35.0}, "set SDLOG_PROFILE 59 (now 35;", "0.3 Hz up;"),
+        ({"SYS_AUTOSTART": 1.0}, "hold no SDLOG_PROFILE", "0.3 Hz up;"),
+    ],
+)
+def test_advice_names_only_what_the_firmware_has(
+    parameters: dict[str, float], logging: str, excitation: str
+) -> None:
+    flown = log(parameters=parameters)
+    assert logging in advice.logging(flown)
+    assert excitation in advice.excitation(flown)
+
+
+def test_bits_of_the_logging_mask_are_those_of_the_vehicle() -> None:
+    plane = log(kind="ardupilot", vehicle="plane", parameters={"LOG_BITMASK": 65535.0})
+    assert advice.logging(plane) == "set LOG_BITMASK 1114111 (now 65535; bit 20 is missing)"
+    without_sid = log(kind="ardupilot", parameters={"LOG_BITMASK": 65535.0})
+    assert "SID_AXIS" not in advice.excitation(without_sid)
+
+
+@pytest.mark.parametrize(
+    ("modes", "kind", "words"),
+    [
+        (["AUTO_MISSION", "AUTO_RTL"], "autopilot", "the autopilot's own flying (AUTO_MISSION and"),
+        (["STABILIZE (mode 0, reason 1)"], "pilot", "plain flying (STABILIZE)"),
+        (["LOITER (mode 5)", "RTL (mode 6)"], "flying", "plain flying (LOITER and RTL)"),
+        ([], "flying", "plain flying"),
+    ],
+)
+def test_who_flew_is_read_from_the_modes(modes: list[str], kind: str, words: str) -> None:
+    events = tuple(Event(5.0 + 3 * i, "mode", mode) for i, mode in enumerate(modes))
+    found = _plain(log(events=events), (6.0, 20.0))
+    assert found[0] == kind
+    assert found[1].startswith(words)
+    if kind == "flying" and modes:
+        assert _plain(log(events=events, vehicle="plane"), (6.0, 20.0))[0] == "autopilot"
+
+
+def test_a_card_is_blamed_only_where_the_logger_lost_samples() -> None:
+    gaps = [(3.0, 3.4)]
+    assert "faster card" in _remedy(log(gaps=(Gap(3.1, 3.2, ""),)), gaps)
+    silent = _remedy(log(gaps=(Gap(3.1, 3.1, ""), Gap(8.0, 9.0, "")), parameters={}), gaps)
+    assert "no card is to blame" in silent
+
+
+def test_one_scrap_does_not_shorten_the_windows_of_all() -> None:
+    pieces = (1.45, 2.91, 3.12, 1.87, 2.08, 5.51, 4.16, 6.55)
+    made = [SimpleNamespace(duration_s=length) for length in pieces]
+    kept = _without_scraps(cast("Any", made), 7.0)
+    assert [each.duration_s for each in kept] == [6.55, 5.51, 4.16, 3.12, 2.91]
+
+
+def test_bursts_have_no_rate() -> None:
+    steady = StreamRate("SIDD", None, 9000, 400.0, 80.0, 0.1, 1, 60.0, 0)
+    assert not steady.is_burst
+    assert replace(steady, rate_hz=2.5e5, mean_hz=1.5e5).is_burst
+    assert replace(steady, rate_hz=10.2, mean_hz=3.0, jitter=5.1).is_burst
+
+
+def test_evidence_of_an_axis_is_not_that_of_another() -> None:
+    findings = (
+        Finding("narrow-band-roll", Light.AMBER, "roll: too narrow", "sweep"),
+        Finding("band-pitch", Light.GREEN, "pitch: usable"),
+        Finding("airborne", Light.GREEN, "airborne"),
+    )
+    phases = FlightPhases(((0.0, 9.0),), True, None, "")
+    seen = Inspection("a", "px4", "", "copter", 9.0, (), phases, (), (), (), (), findings)
+    assert inspection_check(seen, ("tau_theta", "q")).light is Light.GREEN
+    assert inspection_check(seen, ("tau_phi", "p")).what == "roll: too narrow"
+    assert inspection_check(seen, ("u", "y")).light is Light.AMBER
