@@ -106,8 +106,11 @@ def test_unidentifiable_parameters_are_named() -> None:
     both = fid.TransferFunctionModel(
         (fid.TransferFunction("p", "tau_phi", "a*b"),), parameters, {"p": "rad/s"}
     )
-    with pytest.raises(FitError, match="do not see a parameter: found c"):
-        fid.identify(both, data_of(both))
+    seen = fid.identify(both.with_fixed(b=3.0), data_of(both))
+    assert (seen.names, seen.parameters["c"].status) == (("a",), "not seen")
+    assert seen.parameters["c"].stderr is None
+    assert "no influence" in seen.parameters["c"].reason
+    assert "not-seen" in codes(seen)
     with pytest.raises(FitError, match="cannot tell these parameters apart: found a, b"):
         fid.identify(both.with_fixed(c=1.0), data_of(both))
     assert fid.identify(both.with_fixed(c=1.0, b=3.0), data_of(both)).cost < 1e-20

@@ -153,7 +153,7 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
 
     def __repr__(self) -> str:
         """Size, average cost and what the kind adds, on one line."""
-        free = sum(p.status in ("free", "at bound") for p in self.parameters.values())
+        free = sum(p.status in ("free", "at bound", "not seen") for p in self.parameters.values())
         counts = {"response": len(self.responses), "record": len(self.records)}
         seen = [f"{n} {word}{'' if n == 1 else 's'}" for word, n in counts.items() if n]
         unit = "" if self.responses else " %"

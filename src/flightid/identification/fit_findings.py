@@ -14,6 +14,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification.multistart import CONVERGED, End
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.influence import NEXT
 
 Group = TypeVar("Group", bound=Sequence[End])
 
@@ -166,9 +167,14 @@ def _judge_average(average: float, noise: NoiseCost | None, *, withheld: bool) -
 
 
 def judge_parameters(parameters: Mapping[str, Estimate]) -> list[Finding]:
-    """Verdicts on each parameter: at a bound, insensitive, badly bounded."""
+    """Verdicts on each parameter: not seen, at a bound, insensitive, badly bounded."""
     found = []
     for p in parameters.values():
+        if p.status == "not seen":
+            text = (
+                f"{p.name} has no influence on what was fitted: {p.value:.4g} {p.unit} is its start"
+            )
+            found.append(Finding("not-seen", Light.RED, text, NEXT))
         if p.status == "at bound":
             found.append(
                 Finding(

@@ -79,6 +79,13 @@ def model_from_description(content: Mapping[str, object]) -> Model:
     ...     "parameters": {"K": {"value": 2.0}}, "responses": {"y/u": {"gain": "K"}}})
     TransferFunctionModel('transfer functions', 1 response [y/u], 1 parameters, 1 free)
     """
+    if "kind" not in content and {"states", "equations"} & set(content):
+        raise ModelError(
+            "the model does not say its kind",
+            found="states or equations, but no key kind",
+            needed='kind = "state-space" on its first line, before any [table]',
+            action="docs/models.md shows a whole file",
+        )
     word = content.get("kind", "transfer")
     kind = KINDS.get(word) if isinstance(word, str) else None
     if kind is None:

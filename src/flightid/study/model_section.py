@@ -6,12 +6,15 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from flightid.conventions import Light
 from flightid.dynamics.derivatives.derivatives import derivatives
 from flightid.dynamics.modes.approximate_modes import approximate_modes
 from flightid.dynamics.modes.modes import modes
-from flightid.errors import ModelError
+from flightid.errors import DataError, ModelError
+from flightid.findings import Finding
 from flightid.identification import PolynomialDetails
 from flightid.models import StateSpaceModel
+from flightid.models.model import model_of
 from flightid.plot.modes import pole_map
 from flightid.plot.polynomial import pole_zero
 from flightid.plot.residuals import correlations, spectrum_comparison
@@ -131,6 +134,10 @@ def _spectra(spectra: SpectrumComparison) -> Iterator[Block]:
 
 def _physics(item: ModelResults, fit: Fit) -> Iterator[Block]:
     """Modes of any model; approximations and derivatives of those that have them."""
+    lacking = _without_point(fit)
+    if lacking is not None:
+        yield Lights((lacking,))
+        return
     approximations, table = None, None
     # A rig's or a filter's states fit no textbook formula, and coefficients are no derivatives.
     with suppress(ModelError):
@@ -143,6 +150,21 @@ def _physics(item: ModelResults, fit: Fit) -> Iterator[Block]:
         shown = (Paragraph(f"No modes: {reason}."),)
     yield from (*shown, *physics_blocks(approximations, table))
     yield from _beside(item, fit)
+
+
+def _without_point(source: object) -> Finding | None:
+    """What to do where equations have no finite linearisation at the model's trim."""
+    try:
+        modes(source)
+    except DataError as error:
+        trim = getattr(model_of(source), "trim", {})
+        zero = [name for name in getattr(model_of(source), "states", ()) if not trim.get(name)]
+        words = f"no modes and derivatives: at the trim, with {', '.join(zero)} zero, {error}"
+        action = "give [trim] in the model file, such as the speed at which it was flown"
+        return Finding("no-point", Light.AMBER, words, action)
+    except ModelError:
+        return None
+    return None
 
 
 def _beside(item: ModelResults, fit: Fit) -> tuple[Block, ...]:

@@ -6,10 +6,12 @@ intervals: the cost is not a likelihood. Intervals come from `flightid.uncertain
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import SingularError
+from flightid.uncertainty.influence import require_apart, require_influence
 
 Array = NDArray[np.float64]
 
@@ -38,7 +40,7 @@ def gauss_newton_hessian(jacobian: Array) -> Array:
     return np.asarray(2.0 * jacobian.T @ jacobian)
 
 
-def inverse_hessian(jacobian: Array) -> Array:
+def inverse_hessian(jacobian: Array, names: Sequence[str] = ()) -> Array:
     """(2 JᵀJ)⁻¹ by orthogonal triangularisation, which keeps twice the digits of the product.
 
     Raises
@@ -52,23 +54,23 @@ def inverse_hessian(jacobian: Array) -> Array:
     array([[0.02]])
     """
     scale = np.linalg.norm(jacobian, axis=0)
-    if np.any(scale == 0.0):
-        raise SingularError("a parameter has no influence on the residuals")
+    require_influence(scale, names)
     triangle = np.linalg.qr(jacobian / scale, mode="r")
-    diagonal = np.abs(np.diag(triangle))
-    if len(jacobian) < len(scale) or np.any(diagonal <= 1e-14 * diagonal.max(initial=0.0)):
-        raise SingularError("the Hessian of the cost is singular to working precision")
+    lacking = np.zeros(max(len(scale) - len(jacobian), 0))
+    require_apart(np.concatenate([np.diag(triangle), lacking]), names)
     root = np.linalg.solve(triangle, np.eye(len(scale))) / scale[:, None]
     return np.asarray(0.5 * root @ root.T)
 
 
-def cramer_rao(jacobian: Array) -> Array:
+def cramer_rao(jacobian: Array, names: Sequence[str] = ()) -> Array:
     """Cramér–Rao bounds √(ℋ⁻¹)_ii in the units of the parameters.
 
     Parameters
     ----------
     jacobian : ndarray, shape (n_residuals, n_parameters)
         Derivatives of the weighted residuals, whose squares add up to the cost.
+    names : sequence of str
+        Of the parameters, for the error.
 
     Returns
     -------
@@ -88,7 +90,7 @@ def cramer_rao(jacobian: Array) -> Array:
     >>> cramer_rao(np.array([[1.0, 0.0], [0.0, 2.0]]))
     array([0.70710678, 0.35355339])
     """
-    return np.asarray(np.sqrt(np.diag(inverse_hessian(jacobian))))
+    return np.asarray(np.sqrt(np.diag(inverse_hessian(jacobian, names))))
 
 
 def correlation(covariance: Array) -> Array:

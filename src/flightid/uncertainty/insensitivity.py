@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import SingularError
+from flightid.uncertainty.influence import require_influence
 
 Array = NDArray[np.float64]
 
 
-def insensitivity(jacobian: Array) -> Array:
+def insensitivity(jacobian: Array, names: Sequence[str] = ()) -> Array:
     """Insensitivity 1/√ℋ_ii: the change of one parameter alone that raises the cost by one half.
 
     Parameters
     ----------
     jacobian : ndarray, shape (n_residuals, n_parameters)
         Derivatives of the weighted residuals, whose squares add up to the cost.
+    names : sequence of str
+        Of the parameters, for the error.
 
     Returns
     -------
@@ -38,8 +42,7 @@ def insensitivity(jacobian: Array) -> Array:
     array([0.14142136])
     """
     size = np.linalg.norm(jacobian, axis=0)
-    if np.any(size == 0.0):
-        raise SingularError("a parameter has no influence on the residuals")
+    require_influence(size, names)
     return np.asarray(1.0 / (np.sqrt(2.0) * size))
 
 

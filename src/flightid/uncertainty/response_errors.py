@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import SingularError
+from flightid.uncertainty.influence import require_apart, require_influence
 
 Array = NDArray[np.float64]
 _DECIBEL = 20.0 / np.log(10.0)
@@ -50,12 +50,9 @@ def estimator_gain(jacobian: Array, sensitivity: Array, *, total: Array | None =
     array([[0.5, 0.5]])
     """
     scale = np.linalg.norm(jacobian, axis=0)
-    if np.any(scale == 0.0):
-        raise SingularError("a parameter has no influence on the residuals")
+    require_influence(scale)
     q, triangle = np.linalg.qr(jacobian / scale)
-    diagonal = np.abs(np.diag(triangle))
-    if np.any(diagonal <= 1e-14 * diagonal.max(initial=0.0)):
-        raise SingularError("the Hessian of the cost is singular to working precision")
+    require_apart(np.diag(triangle))
     moved = triangle if total is None else q.T @ (total / scale)
     return np.asarray(np.linalg.solve(moved, q.T @ sensitivity) / scale[:, None])
 

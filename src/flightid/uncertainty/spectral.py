@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import SingularError
+from flightid.uncertainty.influence import require_apart, require_influence
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -89,12 +90,16 @@ def spectral_covariance(jacobian: Complex, residuals: Complex) -> tuple[Array, f
     n_parameters = jacobian.shape[2]
     flat = np.concatenate([jacobian.real, jacobian.imag]).reshape(-1, n_parameters)
     scale = np.linalg.norm(flat, axis=0)
-    if np.any(scale == 0.0) or len(flat) <= n_parameters:
-        raise SingularError("a parameter has no influence on the residuals")
+    require_influence(scale)
+    if len(flat) <= n_parameters:
+        raise SingularError(
+            "too few harmonics for the parameters",
+            found=f"{len(flat)} numbers",
+            needed=f"more than {n_parameters}",
+            action="widen the band, take longer records, or fix parameters",
+        )
     q, triangle = np.linalg.qr(flat / scale)
-    diagonal = np.abs(np.diag(triangle))
-    if np.any(diagonal <= 1e-14 * diagonal.max(initial=0.0)):
-        raise SingularError("the Hessian of the cost is singular to working precision")
+    require_apart(np.diag(triangle))
     shape = (2, *jacobian.shape)
     unit = q.reshape(shape)[0] + 1j * q.reshape(shape)[1]
     # The fit bends towards each residual by its leverage: half of a complex row's two numbers.

@@ -31,6 +31,7 @@ _DECIBEL = 20.0 / np.log(10.0)
 _DEGREE = 180.0 / np.pi
 _AT_BOUND = 1e-9
 _SHARE = 0.1
+UNSEEN = "no influence on what was fitted: its value is where it started"
 
 
 @dataclass(frozen=True)
@@ -87,10 +88,14 @@ def statistics(
     Raises
     ------
     FitError
-        The data do not see a parameter, or a combination of parameters.
+        The data see no parameter, or not some combination of them.
     """
     free = fitted.parameters.free
     inner = np.array([not at_bound(parameter) for parameter in free], dtype=bool)
+    weighted = coherence_jacobian(fitted, selected)
+    seen = np.any(end.jacobian != 0.0, axis=0) & np.any(weighted != 0.0, axis=0)
+    # One that nothing answers to keeps its value and costs the others nothing.
+    inner &= seen | ~np.any(inner & seen)
     names = tuple(p.name for p, keep in zip(free, inner, strict=True) if keep)
     jacobian = end.jacobian[:, inner]
     require_identifiable(names, jacobian)
@@ -106,8 +111,8 @@ def statistics(
         if bias is not None:
             moved = -gain @ bias
             covariance = covariance + np.outer(moved, moved)
-    weighted = coherence_jacobian(fitted, selected)[:, inner]
-    correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
+    weighted = weighted[:, inner]
+    correlation = correlation_of(inverse_hessian(weighted, names)) if names else np.zeros((0, 0))
     parameters = fitted_parameters(fitted, names, covariance, weighted, freedom, withheld=withheld)
     source = UNKNOWN if withheld else errors.source
     return Statistics(
@@ -192,7 +197,7 @@ def fitted_parameters(
     fitted : TransferFunctionModel or StateSpaceModel
         At the estimates.
     names : tuple of str
-        Parameters of the arrays: free and not at a bound.
+        Parameters of the arrays: free, not at a bound, and with influence.
     covariance : ndarray, shape (n, n), or None
         Of the estimates over repeated flights.
     weighted : ndarray, shape (n_residuals, n)
@@ -206,22 +211,25 @@ def fitted_parameters(
     -------
     dict of str to Estimate
     """
-    bounds = dict(zip(names, cramer_rao(weighted), strict=True)) if names else {}
-    slack = dict(zip(names, insensitivity(weighted), strict=True)) if names else {}
+    bounds = dict(zip(names, cramer_rao(weighted, names), strict=True)) if names else {}
+    slack = dict(zip(names, insensitivity(weighted, names), strict=True)) if names else {}
     errors = _standard_errors(fitted, names, covariance)
     degrees = {} if freedom is None else dict(zip(names, map(float, freedom), strict=True))
     result = {}
     for name, parameter in fitted.parameters.items():
         value = float(parameter.value or 0.0)
-        bound = parameter.free and name not in names
+        left = parameter.free and name not in names
+        bound = left and at_bound(parameter)
         result[name] = Estimate(
             name,
             value,
             parameter.unit,
             errors.get(name),
-            _reason(parameter, bound, covariance is not None, value, withheld),
+            UNSEEN
+            if left and not bound
+            else _reason(parameter, bound, covariance is not None, value, withheld),
             degrees.get(name),
-            status="at bound" if bound else parameter.status,
+            status="at bound" if bound else "not seen" if left else parameter.status,
             cramer_rao_percent=_percent(bounds.get(name), value),
             insensitivity_percent=_percent(slack.get(name), value),
         )

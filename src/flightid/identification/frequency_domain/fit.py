@@ -37,6 +37,7 @@ from flightid.identification.frequency_domain.estimates import Statistics, stati
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.feedback_findings import judge_feedback, points_of
 from flightid.identification.frequency_domain.noise_cost import noise_costs
+from flightid.identification.frequency_domain.opened import opened, response_at
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.response_parts import PartComparison
 from flightid.identification.frequency_domain.search import minimise
@@ -65,14 +66,16 @@ def fit_responses(
     """Fit a model to measured responses; see `flightid.identify`."""
     check_channels(model, data)
     selected = select_by(model, data, options)
-    setup = check_start(model, selected)
+    model, nudged = opened(model, selected)
+    setup = [*nudged, *check_start(model, selected)]
     try:
         return _fit_selected(model, data, selected, setup, options)
     except FitError as error:
         if not setup:
             raise
         # What looked wrong before the fit is the likeliest reason why there is none.
-        action = "; ".join(f"{each.message} — {each.action}" for each in setup)
+        steps = [error.action or "", *(f"{each.message} — {each.action}" for each in setup)]
+        action = "; ".join(step for step in steps if step)
         raise FitError(
             error.problem, found=error.found, needed=error.needed, action=action
         ) from error
@@ -171,12 +174,6 @@ def check_channels(model: GreyBoxModel, data: FrequencyResponse) -> None:
     needed = (name for each in model.responses for name in (each.output, each.input))
     for name in dict.fromkeys(needed):
         require_match(name, data.units[name], model.units[name])
-
-
-def response_at(model: GreyBoxModel, omega: Array, place: int) -> NDArray[np.complex128]:
-    """One response of the model, by its place."""
-    values = model.parameters.independent_values()
-    return np.asarray(model.native.response(values, np.ascontiguousarray(omega))[place])
 
 
 def check_start(model: GreyBoxModel, selected: Sequence[SelectedResponse]) -> list[Finding]:

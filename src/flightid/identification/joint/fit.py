@@ -31,10 +31,10 @@ from flightid.identification.frequency_domain.fit import (
     check_channels,
     check_start,
     compare_responses,
-    response_at,
     select_by,
 )
 from flightid.identification.frequency_domain.noise_cost import noise_costs
+from flightid.identification.frequency_domain.opened import opened, response_at
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
 from flightid.identification.frequency_domain.selection import SelectedResponse
 from flightid.identification.joint.independence import judge_independence
@@ -110,9 +110,13 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
     response, records = _divided(data)
     of_responses = options.of_responses
     check_channels(model, response)
-    prepared = prepare_records(model, records, options)
     points = _points(model, response, of_responses)
+    model, nudged = opened(model, points.selected)
+    if nudged:
+        points = _points(model, response, of_responses)
+    prepared = prepare_records(model, records, options)
     setup = [
+        *nudged,
         *judge_independence(response, records, model.outputs),
         *judge_channels(prepared),
         *check_start(model, points.selected),

@@ -189,7 +189,7 @@ def assemble(
     weighted = known.jacobian / np.sqrt(2.0)
     parameters = fitted_parameters(fitted, names, known.covariance, weighted, known.freedom)
     # Orthogonal residuals of unit variance: the inverse Hessian of ½ Σ r².
-    correlation = correlation_of(inverse_hessian(weighted)) if names else np.zeros((0, 0))
+    correlation = correlation_of(inverse_hessian(weighted, names)) if names else np.zeros((0, 0))
     best = groups[0][0]
     total = sum(costs.values())
     return Fit(
