@@ -109,6 +109,32 @@ class Table:
         rows = tuple(tuple(row[index] for index in keep) for row in self.rows)
         return Table(self.title, tuple(self.columns[i] for i in keep), rows, self.notes)
 
+    def said_once(self, longest: int = 60) -> Table:
+        """Copy whose long texts that several rows repeat stand below, under a number.
+
+        Example
+        -------
+        >>> rows = (("a", "why " * 20), ("b", "why " * 20), ("c", "short"))
+        >>> found = Table("t", (Column("name"), Column("note")), rows).said_once()
+        >>> [row[1] for row in found.rows], found.notes[0][:12]
+        (['see (1)', 'see (1)', 'short'], '(1) why why ')
+        """
+        cells = [cell for row in self.rows for cell in row if isinstance(cell, str)]
+        long = [cell for cell in dict.fromkeys(cells) if len(cell) > longest]
+        numbers = {
+            cell: place
+            for place, cell in enumerate((each for each in long if cells.count(each) > 1), 1)
+        }
+        rows = tuple(
+            tuple(
+                f"see ({numbers[cell]})" if isinstance(cell, str) and cell in numbers else cell
+                for cell in row
+            )
+            for row in self.rows
+        )
+        below = (f"({place}) {cell}" for cell, place in numbers.items())
+        return Table(self.title, self.columns, rows, (*below, *self.notes))
+
     def to_text(self) -> str:
         """Plain text with aligned columns."""
         headings = [column.heading for column in self.columns]

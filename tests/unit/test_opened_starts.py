@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -82,3 +85,9 @@ def test_a_model_without_a_trim_is_told_which_states_stand_at_zero() -> None:
     assert "[trim]" in (found.action or "")
     assert isinstance(falling, fid.StateSpaceModel)
     assert _without_point(falling.linearise({"V": 60.0, "n": 1.0})) is None
+
+
+def test_the_whole_file_of_the_guide_is_a_model() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "models.md").read_text(encoding="utf-8")
+    whole = page.split("## A whole file")[1].split("```toml\n")[1].split("```")[0]
+    assert model_from_description(tomllib.loads(whole)).inputs == ("lat",)

@@ -236,7 +236,7 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
         shown = (self.details or Details()).quantities(self.parameters)
         rows = [_row(p, level, alone.get(p.name)) for p in shown]
         table = Table(f"Fit of {self.model.name}", columns, tuple(rows), self._notes())
-        return table.without_empty_columns()
+        return table.without_empty_columns().said_once()
 
     def _by_noise_alone(self) -> dict[str, float]:
         """Standard errors without the scatter between parts, where there is any."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -21,7 +22,7 @@ class ExportSettings:
     model : str
         Name of the study's model.
     file : str
-        Name of the file, in the folder ``export`` of the output.
+        Name of the file, in the folder ``export`` of the output; left out: the model's, as C.
     format : str or None
         None: by the suffix.
     options : mapping
@@ -140,11 +141,12 @@ def read_uses(root: TableReader, models: Sequence[str]) -> UsesSettings:
 
 
 def _export(reader: TableReader) -> ExportSettings:
-    file = reader.text("path")
+    model = reader.text("model")
+    file = reader.maybe(reader.text, "path") or f"{re.sub(r'[^0-9A-Za-z]+', '_', model)}.c"
     if "/" in file or "\\" in file or file.startswith("."):
         raise reader.error("path", "does not fit", found=file, needed="a name without a folder")
     made = ExportSettings(
-        reader.text("model"),
+        model,
         file,
         reader.maybe(reader.text, "format"),
         reader.values("options"),
