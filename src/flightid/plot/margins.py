@@ -284,7 +284,7 @@ def _mark(
     colour: str,
 ) -> None:
     """A bar from the curve to the level, named with the margin and its interval."""
-    if margin.value is None or place.value is None:
+    if margin.value is None or not place.value:  # nothing stands at 0 rad/s on a log axis
         return
     at = float(np.interp(np.log(place.value), np.log(omega), values))
     # The level's next turn: a crossover may lie on either side of it.
@@ -333,7 +333,7 @@ def _nyquist_marks(made: go.Figure, margins: Margins) -> None:
         (margins.gain_margin, margins.phase_crossover, look.RIVAL),
         (margins.gain_reduction_margin, margins.gain_reduction_crossing, look.OTHER),
     ):
-        if margin.value is not None and place.value is not None:
+        if margin.value is not None and place.value:
             real = np.interp(
                 np.log(place.value),
                 np.log(margins.curve.omega_rad_s),
