@@ -90,3 +90,39 @@ def test_a_fit_in_turbulence_names_filter_error() -> None:
     assert "filter_error" in said.action
     assert fit.evidence.light is Light.RED
     assert "turbulence" in fit.evidence.reason.message
+
+
+def test_records_of_vehicles_that_differ_are_no_turbulence() -> None:
+    model = fid.StateSpaceModel.from_dict(
+        {
+            "name": "short period",
+            "states": {"alpha": "rad", "q": "rad/s"},
+            "inputs": {"de": "rad"},
+            "outputs": {"alpha": "alpha", "q": "q"},
+            "parameters": {
+                "Za": {"value": 1.0, "unit": "1/s"},
+                "Ma": {"value": -4.0, "unit": "1/s^2"},
+                "Mq": {"value": -2.0, "unit": "1/s"},
+                "Md": {"value": -8.0, "unit": "1/s^2"},
+            },
+            "equations": {"alpha'": "q - Za*alpha", "q'": "Ma*alpha + Mq*q + Md*de"},
+        }
+    )
+    random = np.random.default_rng(3)
+    records = []
+    for share in (-0.03, 0.0, 0.03):
+        own = {"Ma": -4.0 * (1.0 + share), "Md": -8.0 * (1.0 - share)}
+        stick = 0.05 * np.repeat(random.choice([-1.0, 0.0, 1.0], 20), 25)
+        blank = fid.Record.from_arrays(
+            np.arange(500) * 0.02, inputs={"de": stick}, units={"de": "rad"}, hold="zero"
+        )
+        flown = fid.simulate(model.with_values(own), blank)
+        levels = {"alpha": 0.0005, "q": 0.001}
+        noisy = {k: flown[k] + v * random.standard_normal(500) for k, v in levels.items()}
+        records.append(flown.replace(noisy))
+    fit = fid.identify(model, records)
+    assert "process-noise" not in {finding.code for finding in fit.findings}
+    assert fit.agreement is not None
+    assert fit.agreement.freedom is not None
+    low, high = fit.parameters["Md"].interval95 or (0.0, 0.0)
+    assert low < -8.0 < high

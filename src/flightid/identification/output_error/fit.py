@@ -49,6 +49,7 @@ from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.measured_states import state_outputs
 from flightid.record import Channel, Record, Step
+from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import JointResiduals
 from flightid.version import VERSION
 
@@ -161,10 +162,36 @@ def conclude(
     noise = (
         []
         if not judged() or (runs_of is not None and runs_of.is_segmented)
-        else judge_process_noise(fitted, prepared.arrays, [outputs for outputs, _ in runs])
+        else judge_process_noise(
+            fitted, prepared.arrays, _free_runs(prepared, runs, best.noise, known.agreement)
+        )
     )
     fit = _assemble(fitted, prepared, options, groups, runs, known, setup, noise)
     return without_intervals(fit, TURBULENT) if noise else fit
+
+
+def _free_runs(
+    prepared: RecordSet,
+    runs: Sequence[tuple[Array, Array]],
+    noise: Array,
+    agreement: Agreement,
+) -> list[Array]:
+    """Free runs beside which noise on the states is looked for.
+
+    Where records differ, each at its own estimates, one step of Gauss and Newton from the common
+    ones: what vehicles differ by follows the model's modes too, and is no turbulence.
+    """
+    if agreement.freedom is None:
+        return [outputs for outputs, _ in runs]
+    whitener = np.linalg.inv(np.linalg.cholesky(noise))
+    found = []
+    for (_, measured, _), (outputs, slopes) in zip(prepared.arrays, runs, strict=True):
+        white = np.tensordot(whitener, slopes, axes=1).reshape(measured.size, -1)
+        size = np.linalg.norm(white, axis=0)
+        size = np.where(size > 0.0, size, 1.0)
+        residual = (whitener @ (measured - outputs)).ravel()
+        found.append(outputs + slopes @ (np.linalg.lstsq(white / size, residual)[0] / size))
+    return found
 
 
 def searched(
