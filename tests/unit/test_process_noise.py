@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.conventions import Light
@@ -126,3 +127,34 @@ def test_records_of_vehicles_that_differ_are_no_turbulence() -> None:
     assert fit.agreement.freedom is not None
     low, high = fit.parameters["Md"].interval95 or (0.0, 0.0)
     assert low < -8.0 < high
+
+
+def test_a_lag_that_is_left_out_is_no_turbulence_to_a_filter() -> None:
+    model = fid.StateSpaceModel.from_dict(
+        {
+            "name": "roll",
+            "states": {"p": "rad/s"},
+            "inputs": {"da": "rad"},
+            "outputs": {"p": "p"},
+            "parameters": {
+                "Lp": {"value": -3.0, "unit": "1/s"},
+                "Lda": {"value": 20.0, "unit": "1/s^2"},
+            },
+            "equations": {"p'": "Lp*p + Lda*da"},
+        }
+    )
+    random = np.random.default_rng(4)
+    stick = 0.05 * np.repeat(random.choice([-1.0, 0.0, 1.0], 40), 25)
+    behind = fid.Record.from_arrays(
+        np.arange(1000) * 0.02, inputs={"da": stick}, units={"da": "rad"}, hold="zero"
+    )
+    for lag_s, told in ((0.0, True), (0.15, False)):
+        kept = np.exp(-0.02 / lag_s) if lag_s else 0.0
+        moved = lfilter([1.0 - kept], [1.0, -kept], stick)
+        flown = fid.simulate(model, behind.replace({"da": moved}))
+        noisy = flown["p"] + 0.003 * random.standard_normal(1000)
+        record = flown.replace({"da": stick, "p": noisy})
+        fit = fid.identify(model, record, method="filter_error")
+        assert (fit.parameters["Lda"].interval95 is not None) is told
+        codes = {finding.code for finding in fit.findings}
+        assert ("inputs-in-errors" in codes) is not told

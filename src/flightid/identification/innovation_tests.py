@@ -33,6 +33,7 @@ FEWEST_LAGS = 5
 """Beyond the parameters that were fitted: below it there is no test."""
 ROUNDING = 1e-8
 """Errors over outputs below which there is rounding alone."""
+ORDERS = "raise the orders of the input's part, check its delay, or look for feedback"
 TINY = float(np.finfo(float).tiny)
 
 
@@ -91,10 +92,12 @@ class InnovationTests:
             return self
         return replace(self, independent=None)
 
-    def findings(self, *, biased: bool) -> list[Finding]:
-        """Verdicts; `biased` says whether coloured errors bias estimates of this structure."""
+    def findings(self, *, biased: bool, action: str = ORDERS) -> list[Finding]:
+        """Verdicts; `biased` says whether coloured errors bias estimates of this structure.
+
+        `action` is what to do where inputs foretell the errors.
+        """
         if not self.is_independent:
-            action = "raise the orders of the input's part, check its delay, or look for feedback"
             light = Light.RED if is_material(self.worth_percent) else Light.AMBER
             return [Finding("inputs-in-errors", light, self.why_biased, action)]
         if self.is_white or not biased:

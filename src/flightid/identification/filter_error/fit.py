@@ -32,6 +32,7 @@ from flightid.identification.filter_error.innovations import (
 from flightid.identification.filter_error.search import minimise, with_gust
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
+from flightid.identification.innovation_tests import innovation_tests
 from flightid.identification.multistart import DenseEnd, cluster, collect, draw_starts
 from flightid.identification.output_error.distinct import require_distinct
 from flightid.identification.output_error.equation_records import equation_runs
@@ -50,6 +51,7 @@ from flightid.identification.regression.fit import (
 )
 from flightid.identification.regression.options import FilterErrorOptions
 from flightid.identification.rival_fits import judged
+from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import StateSpaceModel
 from flightid.record import Record, Step
 from flightid.uncertainty.estimate import Estimate
@@ -57,6 +59,11 @@ from flightid.uncertainty.estimate import Estimate
 Array = NDArray[np.float64]
 _FIRST_SHARE = 0.1
 _FLOOR = 1e-6
+MISSING = (
+    "add the lag or delay that the model lacks, which process noise took for turbulence, "
+    "or look for feedback"
+)
+"""What to do where inputs foretell innovations."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +113,13 @@ def fit_filter_error(
         found.agreement.of(count),
     )
     noise = _noises(problem, end, filtered)
-    return assemble(
+    tests = innovation_tests(
+        [each.innovations.T for each in filtered],
+        [each.inputs for each in problem.data],
+        [each.outputs for each in problem.data],
+        (0, count),
+    ).beside(known.agreement)
+    fit = assemble(
         "filter error",
         inner,
         [[replace(each, x=each.x[: problem.n_free]) for each in group] for group in groups],
@@ -115,7 +128,7 @@ def fit_filter_error(
         records,
         _fitted_records(problem, records, filtered),
         options,
-        findings=_judge(problem, bounded),
+        findings=[*_judge(problem, bounded), *tests.findings(biased=False, action=MISSING)],
         extra={
             "process_noise": dict(noise.process),
             "innovation_covariance": noise.innovation.tolist(),
@@ -125,6 +138,7 @@ def fit_filter_error(
         residual_horizon=1,
         noise=explained_percent(records, model.outputs),
     )
+    return fit if tests.is_independent else without_intervals(fit, tests.why_biased)
 
 
 def _problem(

@@ -127,7 +127,9 @@ def judge_process_noise(
             "residuals follow the model's own modes, as turbulence makes them, or dynamics that it "
             f"lacks: one sample ahead {np.sqrt(found.left[worst]):.2g} of the free run's error is "
             f"left in {fitted.outputs[worst]}",
-            "use method='filter_error', which has noise on the states; in calm air mend the model",
+            "use method='filter_error', which has noise on the states. A lag or delay that the "
+            "model lacks looks alike: in calm air mend the model; else inputs that foretell the "
+            "filter's innovations, or a fit that a lag or delay improves, tell",
         )
     ]
 
