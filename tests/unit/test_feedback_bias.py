@@ -52,3 +52,4 @@ def test_a_fit_names_what_the_pilot_bends(feedback: float) -> None:
     named = [each.message for each in fit.findings if each.code == "loop-bias"]
     assert len(named) == (feedback > 0.0)
     assert all("Zw" in message and "Lp" not in message for message in named)
+    assert (fit.covariance is None) is (feedback > 0.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,7 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification.frequency_domain.error_model import ErrorModel
 from flightid.identification.frequency_domain.estimates import Statistics
+from flightid.responses import FrequencyResponse
 
 Array = NDArray[np.float64]
 LARGE, RULING = 0.5, 2.0
@@ -44,7 +47,25 @@ def judge_feedback(found: Statistics) -> list[Finding]:
             "loop-bias",
             Light.RED if shares[order[0]] >= RULING else Light.AMBER,
             f"the closed loop brings output noise to the inputs, which moves {named}; "
-            "bars are widened by such a move, values are not corrected",
+            "so there are no intervals",
             "log the injected signal and use estimator='instrument', or fly with the loop open",
         )
     ]
+
+
+def why_bent(data: FrequencyResponse, found: Statistics, bent: Sequence[Finding]) -> str:
+    """Why a direct estimate of a closed loop has no intervals; empty where it has.
+
+    Parameters
+    ----------
+    data : FrequencyResponse
+    found : Statistics
+    bent : sequence of Finding
+        What `judge_feedback` said of it: a bias that is small beside the bars stays in them.
+    """
+    if not (data.loop and data.loop.is_closed) or (found.bias is not None and not bent):
+        return ""
+    return (
+        "a loop was closed and no instrument is given: output noise comes back to the inputs and "
+        "moves a direct estimate"
+    )

@@ -35,7 +35,11 @@ from flightid.identification.frequency_domain.error_model import (
 )
 from flightid.identification.frequency_domain.estimates import Statistics, statistics
 from flightid.identification.frequency_domain.estimator_bias import Correction
-from flightid.identification.frequency_domain.feedback_findings import judge_feedback, points_of
+from flightid.identification.frequency_domain.feedback_findings import (
+    judge_feedback,
+    points_of,
+    why_bent,
+)
 from flightid.identification.frequency_domain.noise_cost import noise_costs
 from flightid.identification.frequency_domain.opened import opened, response_at
 from flightid.identification.frequency_domain.options import FrequencyDomainOptions
@@ -120,13 +124,14 @@ def _fit_selected(
         compare=compare,
         bias=points_of(feedback_bias(data), errors),
     )
-    setup += judge_feedback(found)
+    bent = judge_feedback(found)
+    setup += bent
     responses = compare_responses(fitted, selected)
     curves = [response_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
     noise = noise_costs(selected, curves, by_noise)
     fit = _assemble(fitted, options, data, groups, responses, found, setup, noise)
     fit = replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
-    reason = "" if withheld else why_misfit(fit.average_cost, noise)
+    reason = "" if withheld else why_misfit(fit.average_cost, noise) or why_bent(data, found, bent)
     return without_intervals(fit, reason) if reason else fit
 
 
