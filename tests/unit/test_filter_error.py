@@ -129,7 +129,8 @@ def test_a_gust_felt_as_the_velocity_is_found_and_unbends_its_derivatives() -> N
     heave, bent = fit.parameters["Zw"], white.parameters["Zw"]
     truth = gusts.TRUTH["Zw"]
     assert abs(heave.value - truth) < 3.0 * heave.stderr < 0.2
-    assert abs(bent.value - truth) > 3.0 * bent.stderr
+    assert abs(bent.value - truth) > abs(heave.value - truth)
+    assert bent.stderr is None  # inputs foretell what white noise leaves of the gust
     gust = fit.provenance["gust"]
     assert gust["state"] == "w"
     assert gust["outputs"] == ["az"]
