@@ -74,6 +74,16 @@ def test_a_kernel_smooths_a_short_record(kernel):
     assert miss[1] < 0.5 * miss[0]
 
 
+def test_a_slow_pole_outlasts_the_lags():
+    rng = np.random.default_rng(1)
+    u = np.repeat(np.sign(rng.standard_normal(401)), 2)[:800]
+    y = lfilter([0.0, 0.0, 0.1, 0.05], [1.0, -0.99], u) + 0.1 * rng.standard_normal(800)
+    record = fid.Record.from_arrays(np.arange(800) / 20, inputs={"u": u}, outputs={"y": y})
+    found = fid.impulse_response(record)
+    assert found.covariance is None
+    assert "outlasts" in found.reason
+
+
 def test_advice_on_a_good_record():
     advice = fid.advise(flown(ARMAX, 2, n=1200, noise=0.3))
     assert advice.excitation_orders == {"u": 50}

@@ -14,7 +14,7 @@ from flightid.errors import OptionError
 from flightid.evidence import Check, Evidence, inspection_check, residual_check
 from flightid.evidence.evidence import ALWAYS, NAMES
 from flightid.evidence.parameter_checks import declared_signs
-from flightid.evidence.spans import Span, judge_span
+from flightid.evidence.spans import Span, judge_coherence, judge_span, spans_of
 from flightid.findings import Finding, worst
 
 
@@ -74,6 +74,19 @@ def test_views_hold_everything() -> None:
     ]
     assert repr(evidence) == "Evidence(amber, 1 checks, not examined: inspection)"
     assert set(ALWAYS) < set(NAMES)
+
+
+def test_coherence_counts_the_gaps_of_a_band_and_its_text_names_them() -> None:
+    omega = np.geomspace(1.0, 16.0, 9)
+    coherence = np.array([0.1, 0.9, 0.9, 0.1, 0.1, 0.1, 0.1, 0.9, 0.1])
+    (span,) = spans_of(
+        fid.FrequencyResponse.from_values(
+            omega, np.ones(9), inputs=["a"], outputs=["y"], coherence=coherence[None, None]
+        )
+    )
+    assert judge_coherence([span]).light == "amber"
+    assert str(span) == "y 1.41 to 2 and 11.3 rad/s"
+    assert "y 1.41 to 2 and 11.3 rad/s: too narrow" in judge_span([span]).what
 
 
 @pytest.mark.parametrize(("ratio", "light"), [(20.0, "green"), (4.0, "amber"), (2.0, "amber")])

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid import _native
@@ -19,6 +20,7 @@ from flightid.errors import (
     UnitError,
     UnknownNameError,
 )
+from flightid.identification.narx.findings import free_run_findings
 from flightid.models import Lag, NarxModel, Term
 from flightid.models.narx.terms import product_term
 from tests.closeness import assert_close
@@ -369,3 +371,16 @@ def test_names_that_the_native_half_does_not_know() -> None:
         _native.select_terms(*given, one, "cubic", 1.0, True, 0, "terms", 0.0, 1)
     with pytest.raises(ModelError, match="not defined"):
         _native.select_terms(*given, one, "gaussian", 1.0, True, 0, "terms", 0.0, 1, "lasso", 0.0)
+
+
+def test_a_true_linear_vehicle_does_not_lose_to_the_linear_model_by_chance() -> None:
+    for seed in range(4):
+        u, e = np.random.default_rng(seed).standard_normal((2, 600))
+        y = lfilter([0.0, 0.5, 0.2], [1.0, -1.2, 0.5], u) + lfilter([0.2], [1.0, -1.2, 0.5], e)
+        record = fid.Record.from_arrays(np.arange(600) / 20, inputs={"u": u}, outputs={"y": y})
+        asked = fid.NarxStructure(("u",), "y", 2, 2, kernel=None, held_back=0.5)
+        fit = fid.identify(asked, record)
+        assert "loses-to-linear" not in {finding.code for finding in fit.findings}
+    right, wrong = np.full(100, 0.1), np.linspace(0.5, 0.6, 100)
+    assert free_run_findings([wrong], [right], None)[0].code == "loses-to-linear"
+    assert free_run_findings([1.01 * e[:100]], [np.roll(e[:100], 1)], None) == ()

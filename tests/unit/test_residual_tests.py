@@ -151,10 +151,8 @@ def test_a_two_level_input_is_not_testable_squared(signal: np.ndarray) -> None:
         assert "two levels" in test.reason
         assert test.largest is None
     assert tests.test("uε", "e1", "u1").verdict != "not testable"
-    assert any(
-        finding.code == "residuals-not-testable" and "two levels" in finding.message
-        for finding in tests.findings
-    )
+    # A test that could find nothing is void, and takes no green away.
+    assert "residuals-not-testable" not in {finding.code for finding in tests.findings}
 
 
 def test_three_levels_are_testable() -> None:

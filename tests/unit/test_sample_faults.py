@@ -47,6 +47,7 @@ def dead(share: float) -> np.ndarray:
         (np.sin(np.exp(0.15 * TIME_S)) * np.exp(0.1 * TIME_S), "1", []),
         (spiked(), "1", [("spikes", Light.RED)]),
         (ROLL + 3.0 * (np.arange(N) == 700), "1", [("spikes", Light.AMBER)]),
+        (ROLL + 2 * np.pi * (np.arange(N) == 700), "rad", [("spikes", Light.AMBER)]),
         (dead(0.02), "1", [("flat", Light.AMBER)]),
         (dead(0.2), "1", [("flat", Light.RED)]),
         (np.repeat(ROLL[::5], 5), "1", [("samples-repeated", Light.AMBER)]),

@@ -11,9 +11,11 @@ from flightid.conventions import Light
 from flightid.evidence.evidence import BAND, COHERENCE, Check
 from flightid.inspection.thresholds import BAND_GOOD, BAND_LEAST, MINIMUM_COHERENCE
 from flightid.responses import FrequencyResponse
-from flightid.responses.bands import COHERENT, coherent_band
+from flightid.responses.bands import coherent_band, coherent_parts
 
 MORE = "fly a sweep or multisine over a decade around the crossover, or excite more"
+MOST_PARTS = 3
+"""Unbroken runs of frequencies that are named one by one."""
 
 
 @dataclass(frozen=True)
@@ -27,9 +29,12 @@ class Span:
     band_rad_s : tuple of float, or None
         rad/s; None where no two neighbouring frequencies have the coherence.
     coherence : float
-        Mean γ² in the band; over all frequencies where there is none.
+        Mean γ² from the lowest to the highest frequency of the band, gaps between them too; over
+        all frequencies where there is no band.
     decades : float or None
         Width of the coherent frequencies, gaps left out; None: no gap.
+    parts : tuple of (float, float)
+        Unbroken runs of coherent frequencies, rad/s; empty: the band has no gap.
 
     Example
     -------
@@ -41,6 +46,7 @@ class Span:
     band_rad_s: tuple[float, float] | None
     coherence: float
     decades: float | None = None
+    parts: tuple[tuple[float, float], ...] = ()
 
     @property
     def ratio(self) -> float:
@@ -53,8 +59,13 @@ class Span:
         """Name and band."""
         if self.band_rad_s is None:
             return f"{self.name} has no band with coherence"
-        low, high = self.band_rad_s
-        return f"{self.name} {low:.3g} to {high:.3g} rad/s"
+        parts = self.parts or (self.band_rad_s,)
+        if len(parts) > MOST_PARTS:
+            low, high = self.band_rad_s
+            broken = f"{low:.3g} to {high:.3g} rad/s in {len(parts)} pieces"
+            return f"{self.name} {broken}, together {self.ratio:.3g} to 1"
+        said = [f"{a:.3g} to {b:.3g}" if b > a else f"{a:.3g}" for a, b in parts]
+        return f"{self.name} {' and '.join(said)} rad/s"
 
 
 def spans_of(response: FrequencyResponse) -> list[Span]:
@@ -73,8 +84,12 @@ def spans_of(response: FrequencyResponse) -> list[Span]:
     spans = []
     for name, coherence in zip(response.outputs, response.multiple_coherence, strict=True):
         band, decades = coherent_band(response.omega_rad_s, coherence)
-        counted = coherence[coherence >= COHERENT] if band is not None else coherence
-        spans.append(Span(name, band, float(np.mean(counted)), decades))
+        omega = response.omega_rad_s
+        inside = np.ones(omega.size, dtype=np.bool_)
+        if band is not None:
+            inside = (omega >= band[0]) & (omega <= band[1])
+        mean = float(np.mean(coherence[inside]))
+        spans.append(Span(name, band, mean, decades, tuple(coherent_parts(omega, coherence))))
     return spans
 
 

@@ -154,6 +154,9 @@ def _wraps(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | 
     turn = TURN / si_base(unit)[0]
     steps = np.diff(values)
     at = np.flatnonzero(np.abs(np.abs(steps) - turn) < 0.05 * turn)
+    alone, _, _ = _alone(values)
+    # A lone sample that is off by a turn is a spike; both of its steps are.
+    at = at[~np.isin(at, alone) & ~np.isin(at + 1, alone)]
     if not at.size or np.median(np.abs(steps)) > 0.1 * turn:
         return None
     said = f"{name} jumps by a whole turn {counted(at.size, 'time')}: a heading that wraps"

@@ -32,13 +32,32 @@ def usable_band(
     >>> usable_band(np.array([1.0, 2.0, 4.0, 8.0]), np.array([0.2, 0.7, 0.9, 0.5]))
     (2.0, 4.0)
     """
+    runs = [run for run in coherent_parts(omega_rad_s, coherence, minimum) if run[1] > run[0]]
+    return max(runs, key=lambda run: run[1] / run[0]) if runs else None
+
+
+def coherent_parts(
+    omega_rad_s: NDArray[np.float64], coherence: NDArray[np.float64], minimum: float = COHERENT
+) -> list[tuple[float, float]]:
+    """Lowest and highest frequency, rad/s, of each unbroken run of coherent frequencies.
+
+    Parameters
+    ----------
+    omega_rad_s, coherence : ndarray, shape (n_f,)
+    minimum : float
+        Smallest coherence γ².
+
+    Example
+    -------
+    >>> coherent_parts(np.array([1.0, 2.0, 4.0, 8.0]), np.array([0.7, 0.7, 0.1, 0.9]))
+    [(1.0, 2.0), (8.0, 8.0)]
+    """
     good = np.concatenate([[False], coherence >= minimum, [False]])
     edges = np.flatnonzero(np.diff(good.astype(np.int8)))
-    runs = [(a, b - 1) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - 1 > a]
-    if not runs:
-        return None
-    low, high = max(runs, key=lambda run: omega_rad_s[run[1]] / omega_rad_s[run[0]])
-    return float(omega_rad_s[low]), float(omega_rad_s[high])
+    return [
+        (float(omega_rad_s[first]), float(omega_rad_s[end - 1]))
+        for first, end in zip(edges[::2], edges[1::2], strict=True)
+    ]
 
 
 def coherent_band(

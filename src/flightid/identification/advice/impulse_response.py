@@ -29,6 +29,8 @@ WHITENER = 20
 SAMPLES_PER_COEFFICIENT = 3
 LAST = 4
 """One over the share of the lags, at their end, that has to be zero."""
+SMOOTH = 2
+"""Powers of the lag, from zero, that a slow tail is tested for."""
 OUTLASTS = (
     "the response outlasts {} lags, the most that the records allow, which bends all of them: no "
     "intervals; give longer records, or fit a model with poles (output error)"
@@ -283,11 +285,26 @@ def _determined(data: SampledChannels, n: int) -> bool:
 
 
 def _ends(values: Array, covariance: Array, count: int) -> bool:
-    """Whether chance explains the last quarter of the lags."""
+    """Whether chance explains the last quarter of the lags, each by itself and as a slow tail.
+
+    All lags together have no power against a tail that is small everywhere and of one sign; its
+    mean and slope have, so they are tested beside it (contrasts; Scheffé, *The Analysis of
+    Variance*, section 3.5), each test at half the level.
+    """
     last = max(values.size // LAST, 1)
-    tail = values[-last:]
-    statistic = float(tail @ np.linalg.pinv(covariance[-last:, -last:], hermitian=True) @ tail)
-    return float(chdtrc(last, statistic)) >= (1.0 - LEVEL) / count
+    tail, spread = values[-last:], covariance[-last:, -last:]
+    smooth = np.vander(np.linspace(-1.0, 1.0, last), min(SMOOTH, last))
+    chances = (
+        _chance(tail, spread),
+        _chance(smooth.T @ tail, smooth.T @ spread @ smooth),
+    )
+    return min(chances) >= (1.0 - LEVEL) / (len(chances) * count)
+
+
+def _chance(values: Array, covariance: Array) -> float:
+    """Probability of values as large, if they are zero."""
+    inverse = np.linalg.pinv(covariance, hermitian=True)
+    return float(chdtrc(values.size, float(values @ inverse @ values)))
 
 
 def _require(names: tuple[str, ...], n_lags: int, negative_lags: int, kernel: str | None) -> None:

@@ -138,7 +138,7 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
         findings=(
             *collinear_finding(collinear, len(chosen)),
             *free_run_findings(
-                details.free_run_rms, details.baseline_free_run_rms, _held(flown, free)
+                _judged(structure, free), _judged(structure, linear), _held(flown, free)
             ),
             *tests.findings(biased=True),
         ),
@@ -187,7 +187,10 @@ def _parameters(
 
 
 def _baseline(model: NarxStructure, scaling: Scaling, records: Sequence[Record]) -> NarxModel:
-    """Linear model with all lags on all samples; combinations of other lags are left out."""
+    """Linear model with all lags, its weights from the samples that the other's come from.
+
+    Combinations of other lags are left out.
+    """
     linear = replace(
         model,
         kernel=None,
@@ -198,9 +201,8 @@ def _baseline(model: NarxStructure, scaling: Scaling, records: Sequence[Record])
         maximum_terms=len(model.lags) + 1,
         regularisation="none",
         penalty=0.0,
-        held_back=0.0,
     )
-    data, _ = regressors_of(linear, scaling, records)
+    _, data = regressors_of(linear, scaling, records)
     candidates = replace(candidate_terms(linear, data.vectors), forced=0)
     return _model(linear, scaling, _select(linear, candidates, data).chosen)
 
@@ -281,6 +283,12 @@ def _rms(runs: Sequence[NarxRun]) -> float:
     """Error over all records after the lags."""
     errors = np.concatenate([np.subtract(*run.scored) for run in runs])
     return float(np.sqrt(np.mean(errors**2)))
+
+
+def _judged(structure: NarxStructure, runs: Sequence[NarxRun]) -> list[Array]:
+    """Errors of free runs by record: before the part held back, which gave the weights."""
+    errors = [np.subtract(*run.scored) for run in runs]
+    return [row[: row.size - round(structure.held_back * row.size)] for row in errors]
 
 
 def _held(records: Sequence[Record], runs: Sequence[NarxRun]) -> str | None:

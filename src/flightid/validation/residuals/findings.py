@@ -9,6 +9,7 @@ from flightid.findings import Finding
 from flightid.uncertainty.foretold import is_material
 from flightid.uncertainty.residual_correlation import LEVEL
 from flightid.validation.residuals.correlation_result import CorrelationTest, Kind, Verdict
+from flightid.validation.residuals.obstacles import VOID
 
 _CODES = {
     Kind.WHITENESS: "residuals-not-white",
@@ -51,7 +52,11 @@ def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]
             )
         )
     missed = dict.fromkeys(
-        test.reason for test in tests if test.counts and test.verdict is Verdict.NOT_TESTABLE
+        test.reason
+        for test in tests
+        if test.counts
+        and test.verdict is Verdict.NOT_TESTABLE
+        and not (made and test.reason == VOID)
     )
     for reason in missed:
         names = ", ".join(test.name for test in tests if test.counts and test.reason == reason)

@@ -7,6 +7,8 @@ import numpy as np
 from flightid.uncertainty.residual_correlation import Series, centred
 from flightid.validation.residuals.correlation_result import NEEDS_ONE_STEP, Kind
 
+VOID = "the input has two levels, so its square is constant or a copy of the input"
+"""There is nothing that such a test could find: no light, where others that count are made."""
 TWO_LEVELS = 1e-6
 """Variance of u² beyond what u itself explains, over its squared mean, of a two-level input."""
 ROUNDING = 1e-9
@@ -44,7 +46,7 @@ def _of_input(kind: Kind, e: Series, u: Series, open_loop: bool) -> str:
             "the model; test against the injected excitation"
         )
     if kind in (Kind.EVEN, Kind.EVEN_SQUARED) and is_two_level(u):
-        return "the input has two levels, so its square is constant or a copy of the input"
+        return VOID
     if kind is Kind.EVEN_SQUARED and is_two_level(e):
         return "the residual has two levels, so its square is constant"
     return ""
