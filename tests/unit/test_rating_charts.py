@@ -231,7 +231,7 @@ def test_a_chart_of_ones_own(tmp_path: Path) -> None:
         ("{ bandwidth = [1, inf] }", "{ bandwidth = [nan, 1] }", r"needs \[lowest, highest\]"),
         ("{ bandwidth = [1, inf] }", "{ width = [1, 2] }", "is none of its quantities"),
         ("[[chart.case]]", "[chart.case]", "its cases or its levels are missing"),
-        ("[[chart]]", "[chart", "not a chart file"),
+        ("[[chart]]", "[chart", "rating charts is no TOML"),
     ],
 )
 def test_files_that_are_none(old: str, new: str, match: str, tmp_path: Path) -> None:
@@ -247,5 +247,5 @@ def test_a_file_that_is_missing_or_huge(tmp_path: Path) -> None:
         rating_charts(tmp_path / "none.toml")
     huge = tmp_path / "huge.toml"
     huge.write_bytes(b"#" * ((1 << 20) + 1))
-    with pytest.raises(FileFormatError, match="1048577 bytes"):
+    with pytest.raises(FileFormatError, match="more than 1048576 bytes"):
         rating_charts(huge)

@@ -172,7 +172,7 @@ def test_files_lose_nothing(tmp_path: Path) -> None:
 def test_strange_files_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "x.nc"
     path.write_bytes(b"not netcdf")
-    with pytest.raises(FileFormatError, match="not a netCDF file"):
+    with pytest.raises(FileFormatError, match="not a whole HDF5 file"):
         read_response(path)
     with pytest.raises(FileFormatError, match="not a frequency response"):
         from_xarray(xr.Dataset())
