@@ -9,6 +9,10 @@ from html import escape
 Cell = str | float | int | bool | None
 
 
+LONG_TEXT = 60
+"""Letters above which a text that several rows repeat stands below the table."""
+
+
 @dataclass(frozen=True)
 class Column:
     """Heading of a table column.
@@ -109,7 +113,7 @@ class Table:
         rows = tuple(tuple(row[index] for index in keep) for row in self.rows)
         return Table(self.title, tuple(self.columns[i] for i in keep), rows, self.notes)
 
-    def said_once(self, longest: int = 60) -> Table:
+    def said_once(self) -> Table:
         """Copy whose long texts that several rows repeat stand below, under a number.
 
         Example
@@ -120,7 +124,7 @@ class Table:
         (['see (1)', 'see (1)', 'short'], '(1) why why ')
         """
         cells = [cell for row in self.rows for cell in row if isinstance(cell, str)]
-        long = [cell for cell in dict.fromkeys(cells) if len(cell) > longest]
+        long = [cell for cell in dict.fromkeys(cells) if len(cell) > LONG_TEXT]
         numbers = {
             cell: place
             for place, cell in enumerate((each for each in long if cells.count(each) > 1), 1)

@@ -62,7 +62,7 @@ def _commands(text: str) -> list[str]:
 
 def test_commands_are_found() -> None:
     assert len(_commands(README)) > 15
-    assert "flightid inspect flight.BIN " in "".join(_commands(README))
+    assert "flightid tune flight.BIN " in "".join(_commands(README))
 
 
 @pytest.mark.parametrize("page", TEXTS, ids=lambda page: page.name)
