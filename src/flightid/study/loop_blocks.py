@@ -48,7 +48,7 @@ def made_block(entry: Mapping[str, Any]) -> loops.Block:
     Example
     -------
     >>> made_block({"kind": "low_pass", "inputs": "p", "outputs": "p_f", "corner_rad_s": 60.0})
-    Block(low_pass, p -> p_f)
+    Block(low-pass: [p] to [p_f])
     """
     given = dict(entry)
     kind = given.pop("kind", None)
