@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -46,8 +47,9 @@ def test_px4_2016_was_moved_by_hand(shared_data: Path) -> None:
     assert means["sensor_combined"] == pytest.approx(248, abs=1)
 
 
-def test_no_coherence_is_named_where_none_was_measured(shared_data: Path) -> None:
-    inspection = fid.inspect_log(shared_data / "logs" / "px4_esc_status.ulg")
+@pytest.mark.parametrize("name", ["px4_esc_status.ulg", "arducopter_457.BIN"])
+def test_the_coherence_that_is_named_was_measured(shared_data: Path, name: str) -> None:
+    inspection = fid.inspect_log(shared_data / "logs" / name)
     band = next(f for f in inspection.findings if f.code == "no-usable-band")
-    assert "none could be measured" in band.message
-    assert "0.00" not in band.message
+    # Flown in pieces with gaps between: windows that they hold give a coherence, and no zero.
+    assert 0.5 < float(re.search(r"largest found ([\d.]+)", band.message).group(1)) < 1.0
