@@ -114,7 +114,7 @@ def _models(study: StudyResults) -> Finding:
         )
         said += f", for the reasons named with them: {', '.join(named)}"
     if light is Light.AMBER:
-        said += "; the doubts stand with them above"
+        said += "; each says what is to be doubted"
     return Finding("answer", light, said, first.action if bad else _next(study))
 
 
