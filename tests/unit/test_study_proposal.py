@@ -9,7 +9,7 @@ import pytest
 
 from flightid import Record, run_study
 from flightid.cli.program import run
-from flightid.errors import StudyError, UnknownNameError
+from flightid.errors import OptionError, StudyError, UnknownNameError
 from flightid.study.proposal import Proposal, propose_study
 from flightid.study.proposal.columns import columns_of
 
@@ -76,3 +76,25 @@ def test_data_without_a_model_give_no_study(tmp_path: Path) -> None:
     with pytest.raises(StudyError, match="carry no model"):
         Proposal((), ()).write(tmp_path / "study.toml")
     assert "No model can be identified" in Proposal((), ()).refusal()
+
+
+def test_records_without_times_take_a_sample_time_into_the_study(tmp_path: Path) -> None:
+    rig = _rig(tmp_path)
+    rows = [line.split(",")[1:] for line in rig.read_text().splitlines()]
+    bare = tmp_path / "bare.csv"
+    bare.write_text("\n".join(",".join(row) for row in rows))
+    made = propose_study([bare], folder=tmp_path, sample_time_s=0.1)
+    told = [line for line in made.lines if line.startswith("sample_time_s")]
+    assert told == ["sample_time_s = 0.1"] * 3
+    with pytest.raises(OptionError, match="no time column"):
+        propose_study([bare], folder=tmp_path)
+
+
+def test_a_folder_for_gains_is_asked_for_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "none" / "gains.toml"
+    words = ["tune", str(_rig(tmp_path)), "--controller", "pi", "--write", str(target)]
+    assert run(words) == 2
+    assert "there is no folder" in capsys.readouterr().err
+    assert not (tmp_path / "rig-study.toml").exists()

@@ -66,10 +66,14 @@ def taken_study(
         An option of studies for data, or the other way round.
     """
     if is_study(files):
-        for name in ("model", "inputs", "outputs"):
-            if asked.get(name):
+        from flightid.cli.option_fields import flags_of
+        from flightid.study.proposal.options import ProposalOptions
+
+        usual = ProposalOptions()
+        for name, value in asked.items():
+            if value and value != getattr(usual, name, value):
                 raise click.UsageError(
-                    f"--{name} belongs to a log or records; a study says its own"
+                    f"{flags_of(name)[-1]} belongs to a log or records; a study says its own"
                 )
         return files[0], output
     if log is not None:

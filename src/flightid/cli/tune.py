@@ -79,6 +79,8 @@ def command(
     """
     from flightid.study.tuning import TuneSettings
 
+    if target is not None and not target.parent.is_dir():
+        raise click.UsageError(f"--write: there is no folder {target.parent}: make it first")
     study = None
     *parts, data = parted(options, _fields())
     asked = {name: each for part in parts for name, each in part.items()}

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from flightid.control.autopilots.pid_loop import PidLoop
+from flightid.control.tuning.limits import ANGLE
 from flightid.conventions import Light
 from flightid.findings import Finding, counted, worst
 from flightid.report.content import Document, Lights, Section, TableBlock
@@ -147,7 +149,9 @@ def _gains(designs: tuple[PidDesign, ...], findings: tuple[Finding, ...]) -> Fin
     promise = f" keep at least {min(least):.0f}° of phase margin" if least else " keep their limits"
     steps = max(len(design.stages) for design in designs)
     axes = ", ".join(design.axis for design in designs)
-    way = "--write gains.param writes them; " + (
+    plain = any(isinstance(design.loop, PidLoop) for design in designs)
+    file = "gains.c (or .toml)" if plain else "gains.param"
+    way = f"--write {file} writes them; " + (
         f"fly step 1 of {steps}, log, and look again" if steps > 1 else "fly them, and log"
     )
     message = f"gains of {axes}{promise} at the worst vehicle that the data allow"
@@ -184,9 +188,8 @@ def _margin_table(designs: tuple[PidDesign, ...]) -> Table:
             if any(cell is not None for cell in cells):
                 rows.append((design.axis, loop, *cells))
     asked = designs[0].requirements
-    note = (
-        f"Required: {asked.phase_margin_deg:g} deg ({asked.angle_phase_margin_deg:g} deg of the "
-        f"angle loop) and {asked.gain_margin_db:g} dB."
-    )
+    angled = any(each.loop == ANGLE for design in designs for each in design.promises)
+    angle = f" ({asked.angle_phase_margin_deg:g} deg of the angle loop)" if angled else ""
+    note = f"Required: {asked.phase_margin_deg:g} deg{angle} and {asked.gain_margin_db:g} dB."
     title = "Margins of the worst vehicle that the data allow"
     return Table(title, tuple(columns), tuple(rows), (note,)).without_empty_columns()

@@ -20,6 +20,7 @@ from flightid.study.proposal.columns import Columns, columns_of
 from flightid.study.proposal.proposal import Proposal
 from flightid.validation import scan_orders
 
+TIME_COLUMN = "time"
 KINDS = ("arx", "armax", "oe")
 ORDERS = {"na": (1, 2, 3, 4), "nb": (1, 2, 3), "nc": (1, 2), "nf": (1, 2, 3, 4), "nk": (1, 2, 3)}
 USED = {"arx": ("na", "nb", "nk"), "armax": ("na", "nb", "nc", "nk"), "oe": ("nb", "nf", "nk")}
@@ -28,6 +29,28 @@ FITTED, CHOSEN, ALONE = 0.6, 1.0, (0.5, 0.75)
 """Part of a record that is fitted, the rest ranks structures; and where it also has to verify."""
 CYCLES, SAMPLES_PER_CYCLE = 10.0, 10.0
 """What a response needs: cycles of its lowest frequency in a record, samples of its highest."""
+
+
+@dataclass(frozen=True)
+class RecordTimes:
+    """Where the times of samples stand, as `flightid.read_records` is told.
+
+    Example
+    -------
+    >>> RecordTimes(sample_time_s=0.08).lines
+    ('sample_time_s = 0.08',)
+    """
+
+    time_column: str = TIME_COLUMN
+    sample_time_s: float | None = None
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What a study says of it, where it is not the usual."""
+        told = {
+            name: value for name, value in vars(self).items() if value not in (None, TIME_COLUMN)
+        }
+        return tuple(f"{name} = {toml_value(value)}" for name, value in told.items())
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +69,7 @@ def study_of_records(
     model: str | None,
     inputs: tuple[str, ...],
     outputs: tuple[str, ...],
+    times: RecordTimes | None = None,
 ) -> Proposal:
     """Study file for records.
 
@@ -59,22 +83,24 @@ def study_of_records(
         Equations in place of a structure that is looked for.
     inputs, outputs : tuple of str
         Columns, where their names do not tell.
+    times : RecordTimes, optional
+        Where the times of samples stand; default: in the column "time".
 
     Raises
     ------
     StudyError
         A file holds several manoeuvres, or no column can be told for an input or output.
     """
-    read = [(path, _one(path)) for path in paths]
+    times = times or RecordTimes()
+    read = [(path, _one(path, times)) for path in paths]
     columns = columns_of([record for _, record in read], inputs, outputs)
     groups, missed = _groups(read, columns)
     body: list[str] = []
     names: list[str] = []
     for group in groups:
         segments = _segments(group)
-        body += [
-            line for name, path, span in segments.all for line in _record(name, path, span, folder)
-        ]
+        for name, path, span in segments.all:
+            body += [*_record(name, path, span, folder), *times.lines]
         for output in columns.outputs if model is None else columns.outputs[:1]:
             name = (
                 f"{output} from {' and '.join(group.inputs)}" if model is None else Path(model).stem
@@ -89,9 +115,9 @@ def study_of_records(
     return Proposal((*head, *body), tuple(names), tuple(missed))
 
 
-def _one(path: Path) -> Record:
+def _one(path: Path, times: RecordTimes) -> Record:
     """The record of a file."""
-    found = read_records(path)
+    found = read_records(path, **vars(times))
     if len(found) != 1:
         raise StudyError(
             f"{path.name} holds several manoeuvres",

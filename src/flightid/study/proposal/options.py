@@ -20,3 +20,7 @@ class ProposalOptions(Options):
     model: str | None = option(None, doc="Library model or model file in place of the usual one.")
     inputs: tuple[str, ...] = option((), doc="Columns of records that drive.")
     outputs: tuple[str, ...] = option((), doc="Columns of records that answer.")
+    time_column: str = option("time", doc="Name of the time column of records.")
+    sample_time_s: float | None = option(
+        None, unit="s", above=0.0, doc="Sample time of records without time column."
+    )

@@ -80,6 +80,7 @@ class Proposal:
                 found="nothing to identify" if first is None else first.message,
                 action="" if first is None else first.action,
             )
+        file.parent.mkdir(parents=True, exist_ok=True)
         if file.exists() and not _is_untouched(file):
             raise StudyError(
                 "a study of that name is there, and it is not as flightid wrote it",

@@ -8,7 +8,7 @@ from pathlib import Path
 from flightid.errors import OptionError
 from flightid.logs import is_log
 from flightid.study.proposal.of_log import study_of_log
-from flightid.study.proposal.of_records import study_of_records
+from flightid.study.proposal.of_records import TIME_COLUMN, RecordTimes, study_of_records
 from flightid.study.proposal.proposal import Proposal
 
 
@@ -19,6 +19,8 @@ def propose_study(
     model: str | None = None,
     inputs: Sequence[str] = (),
     outputs: Sequence[str] = (),
+    time_column: str = TIME_COLUMN,
+    sample_time_s: float | None = None,
     tune: bool = False,
 ) -> Proposal:
     """Write the study that data ask for: what was flown says what can be identified, and how.
@@ -34,6 +36,10 @@ def propose_study(
         in place of a structure that is looked for.
     inputs, outputs : sequence of str
         Columns of records, where their names do not tell.
+    time_column : str
+        Name of the time column of records.
+    sample_time_s : float, optional
+        Time between samples of records without a time column, s.
     tune : bool
         Let the study end in gains of the autopilot that flew.
 
@@ -52,12 +58,22 @@ def propose_study(
     logs = [path for path in paths if is_log(path)]
     if not logs:
         return study_of_records(
-            paths, Path(folder), model=model, inputs=tuple(inputs), outputs=tuple(outputs)
+            paths,
+            Path(folder),
+            model=model,
+            inputs=tuple(inputs),
+            outputs=tuple(outputs),
+            times=RecordTimes(time_column, sample_time_s),
         )
-    if len(paths) > 1 or inputs or outputs:
+    if (
+        len(paths) > 1
+        or inputs
+        or outputs
+        or RecordTimes(time_column, sample_time_s) != RecordTimes()
+    ):
         raise OptionError(
-            "a log is taken alone, and its channels have names",
+            "a log is taken alone, and its channels have names and stamps",
             found=", ".join(path.name for path in paths),
-            needed="one log without inputs= and outputs=, or records from files",
+            needed="one log without columns and sample_time_s=, or records from files",
         )
     return study_of_log(logs[0], Path(folder), model=model, tune=tune)
