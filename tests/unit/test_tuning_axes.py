@@ -12,7 +12,7 @@ import flightid as fid
 from flightid.control.autopilots import AxisLoop, axis_loop, read_parameters
 from flightid.control.tuning.sampled_plants import SampledPlants, sample_plants
 from flightid.conventions import Light
-from flightid.errors import DataError, OptionError, UnknownNameError
+from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
 from flightid.plot.tuning import gain_map, nichols, time_responses
 from flightid.report.content import Document
 from flightid.report.html import to_html
@@ -168,6 +168,99 @@ def test_nothing_is_written_where_there_are_no_gains(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="so none are written"):
         design.write(tmp_path / "roll.param")
     assert not list(tmp_path.iterdir())
+
+
+def _slow_yaw() -> fid.LinearSystem:
+    return fid.LinearSystem([[-1.0]], [[140.0]], [[1.0]], [[0.0]], ("tau_psi",), ("r",), [0.4])
+
+
+def test_a_refused_axis_leaves_the_others_and_their_files(
+    tuning: fid.Tuning, tmp_path: Path
+) -> None:
+    turned = dataclasses.replace(_slow_yaw(), b=[[-140.0]])
+    made = fid.tune(
+        {"yaw": turned, "roll": _FIXED, "pitch": _FIXED},
+        gains=_loops("roll", "pitch", "yaw"),
+        requirements=NEED, gyro="raw", band_rad_s=(0.5, 100.0), nominal=True,
+    )  # fmt: skip
+    assert [each.axis for each in made.refused] == ["yaw"]
+    assert "positive command with a negative rate" in made.refused[0].reason
+    assert not made.exists
+    assert [each.axis for each in made.sound] == ["roll", "pitch"]
+    assert made.gains == tuning.gains
+    assert "yaw is not tuned" in str(made.summary())
+    written = made.write(tmp_path / "gains.param")
+    for path in written:
+        assert "YAW" not in "".join(read_parameters(path))
+    first = written[0].read_text("utf-8")
+    assert "# yaw is not in this file, its gains stay as flown: r answers" in first
+    assert next(f for f in made.findings if f.code == "axis-refused").light is Light.RED
+
+
+def test_axes_of_one_model_are_written_together_or_not_at_all(tmp_path: Path) -> None:
+    fast = dataclasses.replace(NEED, crossover_rad_s=60.0)
+    plant = fid.load_model("rate_integrator", axis="yaw").with_values({"Ntpsi": 40.0, "tau": 0.03})
+    made = fid.tune(
+        {"roll": _FIXED, "pitch": _FIXED, "yaw": plant},
+        gains=_loops("roll", "pitch", "yaw"),
+        requirements={"roll": NEED, "pitch": fast, "yaw": NEED},
+        gyro="raw", angle_loop=False, band_rad_s=(0.5, 60.0), nominal=True,
+    )  # fmt: skip
+    assert made["roll"].exists
+    assert not made["pitch"].exists
+    assert [each.axis for each in made.sound] == ["yaw"]
+    assert "couples it with pitch" in made.left_out["roll"]
+    path, *_ = made.write(tmp_path / "gains.param")
+    assert {name.split("_")[2] for name in read_parameters(path)} == {"YAW"}
+
+
+def test_no_axis_that_may_be_tuned_is_an_error() -> None:
+    turned = dataclasses.replace(_slow_yaw(), b=[[-140.0]])
+    with pytest.raises(ModelError, match="negative rate"):
+        fid.tune({"yaw": turned}, gains=_loops("yaw"), nominal=True, band_rad_s=(0.5, 60.0))
+
+
+def test_axes_designed_alone_are_refused_where_the_coupling_breaks_them(tmp_path: Path) -> None:
+    options = {"requirements": NEED, "gyro": "raw", "band_rad_s": (0.5, 60.0), "nominal": True}
+    fits = {"roll": _FIXED, "pitch": _FIXED}
+    made = fid.tune(fits, gains=_loops("roll", "pitch"), other_loops="open", **options)
+    single = fid.tune_pid(_FIXED, gains=_loops("roll")["roll"], **options)
+    assert made["roll"].gains == single.gains
+    (together,) = made.together
+    crossover = next(
+        each
+        for each in together.closed[0].promises
+        if (each.loop, each.name) == ("rate loop", "crossover")
+    )
+    alone = made["roll"].promise("rate loop", "crossover")
+    assert alone.nominal is not None
+    assert crossover.nominal is not None
+    assert alone.nominal <= 20.0 < crossover.nominal
+    # The same number as of gains that flew, which are judged with all flown loops closed.
+    gains = {design.axis: design.loop for design in made.designs}
+    again = fid.tune(fits, gains=gains, **options)
+    assert_close(
+        crossover.nominal, again["roll"].promise("rate loop", "crossover").flown, rtol=1e-9,
+        why="one computation",
+    )  # fmt: skip
+    red = [finding for finding in made.findings if finding.light is Light.RED]
+    assert {finding.code for finding in red} == {"coupling-ignored"}
+    assert "crossover" in red[0].message
+    assert not made.sound
+    with pytest.raises(DataError, match="so none are written"):
+        made.write(tmp_path / "gains.param")
+    assert "no" in str(made.closed_table())
+    assert not any(each.closed for each in again.together)
+
+
+def test_axes_without_coupling_may_be_designed_alone() -> None:
+    free = _coupled(0.0)
+    made = fid.tune(
+        {"roll": free, "pitch": free}, gains=_loops("roll", "pitch"), other_loops="open",
+        requirements=NEED, gyro="raw", band_rad_s=(0.5, 60.0), nominal=True,
+    )  # fmt: skip
+    assert [each.is_kept for each in made.together[0].closed] == [True, True]
+    assert len(made.sound) == 2
 
 
 def test_pictures_and_report_show_every_loop(tuning: fid.Tuning) -> None:

@@ -74,8 +74,9 @@ def command(
     A MODEL is a .toml file, the JSON of a fit, or the output folder of a study, all models of which
     are taken. The table [tune] of the study holds requirements and options; what is given here goes
     before it, and without either the usual ones apply. Gains keep their margins for every plant
-    that the data allow. The exit code is 1 where a verdict on the gains is red; nothing is written
-    then, unless --accept-red is given, and the files say so.
+    that the data allow. An axis that its data do not allow, or whose gains have a red verdict, is
+    refused by name and left out of the files, which say so; axes that one model couples are written
+    together or not at all. The exit code is then 1. --accept-red writes all that there is.
     """
     from flightid.study.tuning import TuneSettings
 
@@ -105,13 +106,20 @@ def command(
         _show(tuning, level)
     if study is not None:
         note(f"Wrote {study.output / 'report.html'}")
-    if target is not None and tuning.exists:
-        accepted = bool(options.get("accept_red"))
-        for path in _written(tuning, target, overwrite, accepted):
-            note(f"Wrote {path}")
+    if target is not None:
+        _write(tuning, target, overwrite, accept_red=bool(options.get("accept_red")))
     if study is not None and not as_json:
         show_answer(study)
     leave_by_verdict(tuning.findings)
+
+
+def _write(tuning: Tuning, target: Path, overwrite: bool, *, accept_red: bool) -> None:
+    """Write what may be flown, and name what stays as it flew."""
+    if tuning.sound or accept_red:
+        for path in _written(tuning, target, overwrite, accept_red):
+            note(f"Wrote {path}")
+    for axis, why in ({} if accept_red else tuning.left_out).items():
+        note(f"Not written, stays as flown: {axis}: {why}")
 
 
 def _written(tuning: Tuning, target: Path, overwrite: bool, accept_red: bool) -> Iterable[Path]:
@@ -123,11 +131,12 @@ def _written(tuning: Tuning, target: Path, overwrite: bool, accept_red: bool) ->
 
     if target.exists() and not overwrite:
         raise click.UsageError(f"{target} is there already: name another file, or --overwrite")
+    designs = tuning.designs if accept_red else tuning.sound
     several = len(tuning.designs) > 1
-    names = [f"{target.stem}_{each.axis}" if several else target.stem for each in tuning.designs]
+    names = [f"{target.stem}_{each.axis}" if several else target.stem for each in designs]
     made = [
         export(design, target.with_name(f"{identifier(name)}.c"))
-        for name, design in zip(names, tuning.designs, strict=True)
+        for name, design in zip(names, designs, strict=True)
     ]
     return [path for each in made for path in each.files]
 
@@ -159,6 +168,8 @@ def _show(tuning: Tuning, level: float | None) -> None:
         click.echo(f"\n{design.promise_table(**at)}")
     if tuning.together:
         click.echo(f"\n{tuning.together_table()}")
+    if any(each.closed for each in tuning.together):
+        click.echo(f"\n{tuning.closed_table()}")
 
 
 def _of_models(files: tuple[Path, ...], log: Path | None, settings: TuneSettings) -> Tuning | None:

@@ -44,9 +44,13 @@ def tuning_section(tuning: Tuning, title: str = "Gains") -> Section:
     title : str
     """
     blocks: list[Block] = []
+    if tuning.refused:
+        blocks.append(Lights(tuple(each.finding for each in tuning.refused)))
     verdicts = [finding for each in tuning.together for finding in each.findings()]
     if tuning.together:
         blocks += [Lights(tuple(verdicts)), TableBlock(tuning.together_table())]
+    if any(each.closed for each in tuning.together):
+        blocks.append(TableBlock(tuning.closed_table()))
     parts = tuple(
         Section(f"{design.axis.capitalize()} gains", design_blocks(design))
         for design in tuning.designs

@@ -16,6 +16,7 @@ from flightid.table import Cell, Column, Table
 
 if TYPE_CHECKING:
     from flightid.control.tuning.pid_design import PidDesign
+    from flightid.control.tuning.result import Tuning
     from flightid.study.identified import ModelResults
     from flightid.study.results import StudyResults
 
@@ -49,8 +50,8 @@ def answer_of(study: StudyResults) -> StudyAnswer:
     tuning = study.tuning
     if tuning is None:
         return StudyAnswer(tuple(findings))
-    findings.append(_gains(tuning.designs, tuning.findings))
-    made = tuple(design for design in tuning.designs if design.exists)
+    findings.append(_gains(tuning))
+    made = tuning.sound or tuple(design for design in tuning.designs if design.exists)
     return StudyAnswer(tuple(findings), (_gain_table(made), _margin_table(made)) if made else ())
 
 
@@ -130,16 +131,14 @@ def _next(study: StudyResults) -> str:
     return f"for gains of a PID: flightid tune {source} --controller pi_d"
 
 
-def _gains(designs: tuple[PidDesign, ...], findings: tuple[Finding, ...]) -> Finding:
+def _gains(tuning: Tuning) -> Finding:
     """Whether there are gains, and what they promise or what is in the way."""
-    none = [design for design in designs if not design.exists]
-    red = [each for each in findings if each.light is Light.RED]
-    if none or red:
-        reasons = [f"{each.axis}: {', '.join(each.binding)}" for each in none]
-        first = red[0] if red else None
-        said = "; ".join([*reasons, *([first.message] if first else [])])
-        action = first.action if first else "relax what cannot be met, or identify better"
-        return Finding("gains", Light.RED, f"no gains to fly: {said}", action)
+    designs, findings = tuning.sound, tuning.findings
+    left = "; ".join(f"{axis}: {why}" for axis, why in tuning.left_out.items())
+    red = next((each for each in findings if each.light is Light.RED), None)
+    if not designs:
+        action = red.action if red else "relax what cannot be met, or identify better"
+        return Finding("gains", Light.RED, f"no gains to fly: {left}", action)
     least = [
         each.worst
         for design in designs
@@ -155,6 +154,8 @@ def _gains(designs: tuple[PidDesign, ...], findings: tuple[Finding, ...]) -> Fin
         f"fly step 1 of {steps}, log, and look again" if steps > 1 else "fly them, and log"
     )
     message = f"gains of {axes}{promise} at the worst vehicle that the data allow"
+    if left:
+        message += f"; none to fly, they stay as flown: {left}"
     return Finding("gains", worst(findings) if findings else Light.GREEN, message, way)
 
 

@@ -9,9 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flightid.control.tuning.result import Tuning
-from flightid.conventions import Light
 from flightid.files import sha256_of_file
-from flightid.findings import worst
 from flightid.progress import progress
 from flightid.report.html import to_html
 from flightid.report.text import to_text
@@ -120,7 +118,7 @@ def _run(
         tuning = None
         if wanted is not None:
             tuning = faults.spare("tuning", _tuned, None, runner, staged, taken.log, wanted)
-        if tuning is not None and tuning.plain and worst(tuning.findings) is not Light.RED:
+        if tuning is not None and tuning.plain and tuning.sound:
             faults.spare("the controller file", _write_gains, None, tuning, folder)
         uses = use_models(staged, settings.uses, folder, faults, runner)
         qualities = {}

@@ -7,16 +7,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from flightid.control.autopilots import axis_loop_of
 from flightid.control.tuning.controller_options import ControllerOptions
 from flightid.control.tuning.options import TuneOptions
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
-from flightid.control.tuning.result import Tuning
+from flightid.control.tuning.result import RefusedAxis, Tuning
 from flightid.control.tuning.tune import tune
 from flightid.control.tuning.tune_controller import tune_controller
 from flightid.control.tuning.tune_pid import CHANNELS
-from flightid.errors import StudyError
+from flightid.errors import DataError, FlightidError, ModelError, StudyError
 from flightid.models import Model, load_model
 from flightid.models.model import model_of
 from flightid.options import options_of
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
 KINDS = (TuningRequirements, TuneOptions, ControllerOptions)
 """Dataclasses whose options are the keys of [tune], and options of ``flightid tune``."""
-AUTOPILOT_ONLY = ("gyro", "angle_loop", "signs")
+AUTOPILOT_ONLY = ("gyro", "angle_loop", "signs", "other_loops")
 """Options that a PID of its own does not know."""
 
 
@@ -179,25 +178,37 @@ def _controllers(
 ) -> Tuning | None:
     """A PID of its own around each loop that is asked for, of the first model that has it."""
     designs: dict[str, PidDesign] = {}
+    errors: dict[str, FlightidError] = {}
     for model, checks in known:
         channels = cast(Model, model_of(model))
         for name in controller.loops or _only_loop(channels):
             output, input = _loop_channels(name)
-            if name in designs or output not in channels.outputs or input not in channels.inputs:
+            if (
+                name in designs
+                or name in errors
+                or output not in channels.outputs
+                or input not in channels.inputs
+            ):
                 continue
             asked = {k: v for k, v in vars(settings.options).items() if k not in AUTOPILOT_ONLY}
-            designs[name] = tune_controller(
-                model, inputs=input, outputs=output, controller=controller,
-                requirements=settings.requirements, verification=checks, **asked,
-            )  # fmt: skip
-    missing = [name for name in controller.loops if name not in designs]
+            try:
+                designs[name] = tune_controller(
+                    model, inputs=input, outputs=output, controller=controller,
+                    requirements=settings.requirements, verification=checks, **asked,
+                )  # fmt: skip
+            except (DataError, ModelError) as error:
+                errors[name] = error
+    missing = [name for name in controller.loops if name not in {*designs, *errors}]
+    if errors and not designs:
+        raise next(iter(errors.values()))
     if missing or not designs:
         raise StudyError(
             "no model has the loop that is to be closed",
             found=", ".join(missing) or "models with several inputs or outputs, and no loops named",
             needed="loops as output/input of fitted models",
         )
-    return Tuning(tuple(designs.values()), ())
+    refused = tuple(RefusedAxis.by(name, error) for name, error in errors.items())
+    return Tuning(tuple(designs.values()), (), refused)
 
 
 def _only_loop(model: Model) -> tuple[str, ...]:
@@ -222,7 +233,7 @@ def _tuned(
 ) -> Tuning:
     return tune(
         fits,
-        gains={axis: axis_loop_of(log, axis) for axis in fits},
+        gains=log,
         requirements=settings.requirements,
         verifications=checks,
         **vars(settings.options),

@@ -16,7 +16,7 @@ from flightid.control.tuning.gain_search import GainSearchResult, search
 from flightid.control.tuning.gain_search import steps as search_steps
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
-from flightid.control.tuning.loop_problem import LoopProblem, Plants
+from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem, Plants
 from flightid.control.tuning.margins_beyond import MarginBeyond, margins_beyond
 from flightid.control.tuning.promises import Promise, promises
 from flightid.control.tuning.requirements import TuningRequirements
@@ -189,23 +189,61 @@ def tune_axis(
     advance : callable
         Told of steps done.
     """
-    gyro, paths = setting.gyro, ControllerPaths(loops[place], setting.gyro, setting.with_angle)
-    before = paths.gains_of(flown[place])
-    as_flown = problem_of(setting, setting.searched.axis(place, flown, gyro), paths, None)
-    limit = noise_limit(setting, as_flown, before)
-    problem = problem_of(setting, setting.searched.axis(place, loops, gyro), paths, limit)
+    paths = ControllerPaths(loops[place], setting.gyro, setting.with_angle)
+    limit = _noise_limit(setting, paths, flown, place)
+    plants = setting.searched.axis(place, loops, setting.gyro)
     first = list(range(1 + len(setting.evidence.corners)))
-    found = search(problem, first, advance)
+    found = search(problem_of(setting, plants, paths, limit), first, advance)
     loop = paths.with_parameters(paths.parameters(found.gains))
-    fresh = problem_of(setting, setting.judged.axis(place, loops, gyro), paths, limit)
-    # What flew had the other axes' flown gains around it, not those that they are given here.
-    fresh_flown = replace(fresh, plants=setting.judged.axis(place, flown, gyro))
-    old = fresh_flown.judge(before[None]) if flown[place].has_flown else None
+    fresh, old = _judged(setting, paths, limit, loops, flown, place)
     gains = paths.gains_of(loop)
     made, met = promises(fresh, gains, old)
     held = None if old is None else old.stable[0]
     beyond = margins_beyond(fresh, gains, setting.evidence.band_rad_s)
     return AxisResult(found, loop, made, met, held, fresh, beyond)
+
+
+def judge_axis(
+    setting: Setting, loops: list[AxisLoop], flown: list[AxisLoop], place: int
+) -> tuple[tuple[Promise, ...], NDArray[np.bool_]]:
+    """What the gains of one axis promise as they stand, and which fresh plants keep it.
+
+    Parameters
+    ----------
+    setting : Setting
+    loops, flown : list of AxisLoop
+        All axes as they stand, and as flown.
+    place : int
+        Which axis.
+    """
+    paths = ControllerPaths(loops[place], setting.gyro, setting.with_angle)
+    limit = _noise_limit(setting, paths, flown, place)
+    fresh, old = _judged(setting, paths, limit, loops, flown, place)
+    return promises(fresh, paths.gains_of(loops[place]), old)
+
+
+def _noise_limit(
+    setting: Setting, paths: ControllerPaths, flown: list[AxisLoop], place: int
+) -> float | None:
+    """Largest output noise of one axis."""
+    as_flown = problem_of(setting, setting.searched.axis(place, flown, setting.gyro), paths, None)
+    return noise_limit(setting, as_flown, paths.gains_of(flown[place]))
+
+
+def _judged(
+    setting: Setting,
+    paths: ControllerPaths,
+    limit: float | None,
+    loops: list[AxisLoop],
+    flown: list[AxisLoop],
+    place: int,
+) -> tuple[LoopProblem, LoopAssessment | None]:
+    """The axis on fresh plants, and its flown gains among the others' flown gains."""
+    fresh = problem_of(setting, setting.judged.axis(place, loops, setting.gyro), paths, limit)
+    if not flown[place].has_flown:
+        return fresh, None
+    around = replace(fresh, plants=setting.judged.axis(place, flown, setting.gyro))
+    return fresh, around.judge(paths.gains_of(flown[place])[None])
 
 
 def axis_steps(setting: Setting, loop: AxisLoop) -> int:

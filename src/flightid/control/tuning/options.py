@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from flightid.control.autopilots.axis_loop import Gyro
 from flightid.control.tuning.tune_pid import DRAWS
 from flightid.options import Options, option
+
+OtherLoops = Literal["closed", "open"]
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,12 @@ class TuneOptions(Options):
     nominal: bool = option(False, doc="Take a model without covariance, for its own margins alone.")
     draws: int = option(DRAWS, minimum=1, doc="Plants drawn from the covariance.")
     seed: int = option(0, minimum=0, doc="Seed of the draws.")
+    other_loops: OtherLoops = option(
+        "closed",
+        choices=("closed", "open"),
+        doc="Loops of the other axes of one model while an axis is designed; open: each alone, "
+        "and then judged with all closed.",
+    )
     accept_red: bool = option(
         False,
         doc="Make gains where the data refuse them, and write them: every refusal stands in the "

@@ -294,17 +294,28 @@ def write_steps(
     findings: Iterable[Finding],
     path: str | Path,
     *,
+    left: Sequence[str] = (),
     overwrite: bool = False,
     accept_red: bool = False,
 ) -> tuple[Path, ...]:
     """Write the steps of several axes together; an axis that arrives earlier stays there.
+
+    Parameters
+    ----------
+    designs : sequence of PidDesign
+    findings : iterable of Finding
+        Verdicts beside those of the designs.
+    path : str or Path
+    left : sequence of str
+        Axes that the files leave out, with the reason: written at their top.
+    overwrite, accept_red : bool
 
     Raises
     ------
     DataError
         An axis has no gains, or a finding is red and that was not accepted.
     """
-    accepted = require_gains(designs, findings, accept_red=accept_red)
+    accepted = [*left, *require_gains(designs, findings, accept_red=accept_red)]
     plain = [design.plain for design in designs if design.plain is not None]
     if plain:
         return _write_settings(plain, as_path(path), accepted, overwrite=overwrite)

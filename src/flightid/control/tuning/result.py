@@ -2,83 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from flightid.control.tuning.pid_design import PidDesign, write_steps
+from flightid.control.tuning.pid_design import PidDesign, require_gains, write_steps
+from flightid.control.tuning.together import Together
 from flightid.conventions import Light
-from flightid.errors import UnknownNameError
+from flightid.errors import FlightidError, UnknownNameError
 from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
 
 @dataclass(frozen=True)
-class Together:
-    """Loops of coupled axes, all closed.
+class RefusedAxis:
+    """An axis that its data do not allow to be tuned.
 
     Attributes
     ----------
-    axes : tuple of str
-    stable_plants, n_plants : int
-        Of the fresh plants, how many are stable, by the poles of the whole.
-    disk_margin, worst_disk_margin : float or None
-        α of the least disk of simultaneous gains and phases at all outputs that is not stood, at
-        the estimate and at the worst plant; None where that is unstable.
-    gain_db, phase_deg : float or None
-        What all outputs may gain or lose at once, at the worst plant.
-    flown_disk_margin : float or None
-        With the flown gains, at the estimate.
-    coupling : float or None
-        Largest closed-loop gain from one axis' rate set-point to another axis' rate.
-    flown_stable_plants : int
-        Of the same plants, how many the flown gains hold stable.
+    axis : str
+    reason, action : str
+        Why, and what to do about it.
 
     Example
     -------
-    >>> Together(("roll", "pitch"), 300, 300, 0.9, 0.8, 7.4, 43.6, 1.1, 0.2, 300).all_stable
-    True
+    >>> print(RefusedAxis("pitch", "the fit is red", "sweep it again").finding.message)
+    pitch is not tuned, and its gains stay as flown: the fit is red
     """
 
-    axes: tuple[str, ...]
-    stable_plants: int
-    n_plants: int
-    disk_margin: float | None
-    worst_disk_margin: float | None
-    gain_db: float | None
-    phase_deg: float | None
-    flown_disk_margin: float | None
-    coupling: float | None
-    flown_stable_plants: int
+    axis: str
+    reason: str
+    action: str = ""
+
+    @classmethod
+    def by(cls, axis: str, error: FlightidError) -> RefusedAxis:
+        """The axis that an error stops."""
+        found = "" if error.found is None else f": found {error.found}"
+        return cls(axis, f"{error.problem}{found}", str(error.action or ""))
 
     @property
-    def all_stable(self) -> bool:
-        """Whether every plant is stable."""
-        return self.stable_plants == self.n_plants
-
-    def findings(self) -> Iterator[Finding]:
-        """Verdicts on the loops together."""
-        names = " and ".join(self.axes)
-        if not self.all_stable:
-            bad = self.n_plants - self.stable_plants
-            yield Finding(
-                "together-unstable",
-                Light.RED,
-                f"{names} closed together: {bad} of {self.n_plants} plants are unstable",
-                "do not fly these gains; identify the coupling better",
-            )
-        elif self.gain_db is not None and self.phase_deg is not None:
-            yield Finding(
-                "together",
-                Light.GREEN,
-                f"{names} closed together: all plants stable; every output may change at once by "
-                f"±{self.gain_db:.1f} dB or ±{self.phase_deg:.0f}° at the worst plant",
-            )
-
-    def to_dict(self) -> dict[str, object]:
-        """Plain values."""
-        return {key: list(v) if isinstance(v, tuple) else v for key, v in vars(self).items()}
+    def finding(self) -> Finding:
+        """The verdict."""
+        said = f"{self.axis} is not tuned, and its gains stay as flown: {self.reason}"
+        return Finding("axis-refused", Light.RED, said, self.action)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,6 +57,8 @@ class Tuning(Result, schema="flightid.tuning/1"):
         One for each axis.
     together : tuple of Together
         One for each set of axes that one model couples.
+    refused : tuple of RefusedAxis
+        Axes that were asked for and that their data do not allow; the others stand.
 
     Example
     -------
@@ -100,6 +68,7 @@ class Tuning(Result, schema="flightid.tuning/1"):
 
     designs: tuple[PidDesign, ...]
     together: tuple[Together, ...]
+    refused: tuple[RefusedAxis, ...] = ()
 
     def __getitem__(self, axis: str) -> PidDesign:
         """Design of an axis.
@@ -118,7 +87,7 @@ class Tuning(Result, schema="flightid.tuning/1"):
     @property
     def exists(self) -> bool:
         """Whether every axis has gains."""
-        return all(design.exists for design in self.designs)
+        return not self.refused and all(design.exists for design in self.designs)
 
     @property
     def gains(self) -> dict[str, float]:
@@ -126,10 +95,35 @@ class Tuning(Result, schema="flightid.tuning/1"):
         return {name: value for design in self.designs for name, value in design.gains.items()}
 
     @property
+    def sound(self) -> tuple[PidDesign, ...]:
+        """Axes whose gains may be written: found, without a red verdict, judged as they will fly.
+
+        Axes that one model couples were judged with each other's new gains, so all of them are
+        sound or none is; axes of models of their own stand alone.
+        """
+        return tuple(each for each in self.designs if each.axis not in self.left_out)
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Why the gains of an axis are not written, by axis."""
+        reasons = {each.axis: each.reason for each in self.refused}
+        reasons |= {each.axis: why for each in self.designs if (why := _unsound(each))}
+        for each in self.together:
+            bad = [axis for axis in each.axes if axis in reasons]
+            red = [finding.message for finding in each.findings() if finding.light is Light.RED]
+            if bad or red:
+                why = (
+                    red[0] if red else f"one model couples it with {bad[0]}, which has none to fly"
+                )
+                reasons = dict.fromkeys(each.axes, why) | reasons
+        return reasons
+
+    @property
     def findings(self) -> tuple[Finding, ...]:
         """Verdicts on each axis and on what they do together."""
         single = [finding for design in self.designs for finding in design.findings]
-        return (*single, *(finding for each in self.together for finding in each.findings()))
+        together = [finding for each in self.together for finding in each.findings()]
+        return (*(each.finding for each in self.refused), *single, *together)
 
     def __repr__(self) -> str:
         """Axes with their worst phase margins on one line."""
@@ -147,8 +141,9 @@ class Tuning(Result, schema="flightid.tuning/1"):
             for note in table.notes
         )
         together = tuple(str(finding) for each in self.together for finding in each.findings())
+        refused = tuple(str(each.finding) for each in self.refused)
         columns = tables[0].columns if tables else (Column("parameter"),)
-        return Table("Gains", columns, rows, (*notes, *together))
+        return Table("Gains", columns, rows, (*refused, *notes, *together))
 
     def together_table(self) -> Table:
         """What coupled axes stand together."""
@@ -176,25 +171,61 @@ class Tuning(Result, schema="flightid.tuning/1"):
         note = "Gains and phases that all outputs may gain or lose at once, each for itself."
         return Table("Coupled axes closed together", columns, rows, (note,))
 
+    def closed_table(self) -> Table:
+        """What axes that were designed alone promised, and what is left with all loops closed."""
+        columns = (
+            *(Column("axis"), Column("loop"), Column("quantity"), Column("required")),
+            *(Column("designed alone", digits=3), Column("all loops closed", digits=3)),
+            *(Column("worst", digits=3), Column("unit"), Column("kept")),
+        )
+        rows: list[tuple[Cell, ...]] = [
+            (
+                *(axis.axis, now.loop, now.name, now.required),
+                *(self[axis.axis].promise(now.loop, now.name).nominal, now.nominal, now.worst),
+                *(now.unit, now.met if now.required else None),
+            )
+            for each in self.together
+            for axis in each.closed
+            for now in axis.promises
+        ]
+        note = "Worst: of the fresh plants, with the new gains of all axes in their loops."
+        return Table("Designed alone, closed together", columns, tuple(rows), (note,))
+
     @property
     def plain(self) -> bool:
         """Whether gains are there, of controllers of their own and of no autopilot."""
-        return self.exists and all(design.plain is not None for design in self.designs)
+        made = [design for design in self.designs if design.exists]
+        return bool(made) and all(design.plain is not None for design in made)
 
     def write(
         self, path: str | Path, *, overwrite: bool = False, accept_red: bool = False
     ) -> tuple[Path, ...]:
-        """Write all axes as the autopilot's parameter files, step by step; see `PidDesign.write`.
+        """Write the sound axes as parameter files, step by step; see `PidDesign.write`.
+
+        Every file names the axes that it leaves as they flew, and why. With `accept_red` every
+        axis that has gains is written.
 
         Raises
         ------
         DataError
-            An axis has no gains, or a finding is red.
+            No axis has gains without a red finding.
         OptionError
             A file is already there.
         """
+        designs = self.sound
+        if accept_red:
+            designs = tuple(each for each in self.designs if each.exists)
+        if not designs:
+            require_gains(self.designs, self.findings, accept_red=accept_red)
+        findings = self.findings if accept_red else ()
+        kept = {each.axis for each in designs}
+        left = [
+            f"{axis} is not in this file, its gains stay as flown: {why}"
+            for axis, why in self.left_out.items()
+            if axis not in kept
+        ]
         return write_steps(
-            self.designs, self.findings, path, overwrite=overwrite, accept_red=accept_red
+            designs, findings, path, left=left, overwrite=overwrite, accept_red=accept_red
         )
 
     def _computed(self) -> dict[str, object]:
@@ -206,6 +237,14 @@ class Tuning(Result, schema="flightid.tuning/1"):
 
     def _tables(self) -> tuple[Table, ...]:
         return tuple(table for design in self.designs for table in design._tables())
+
+
+def _unsound(design: PidDesign) -> str:
+    """Why the gains of one axis alone are not to be flown; empty where they may."""
+    if not design.exists:
+        return f"no gains meet the requirements: {', '.join(design.binding)}"
+    red = [finding.message for finding in design.findings if finding.light is Light.RED]
+    return red[0] if red else ""
 
 
 def _in_short(design: PidDesign) -> str:
