@@ -16,6 +16,7 @@ from flightid.control.tuning.options import TuneOptions
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.excitation import Limits, RateAxis
 from flightid.excitation.options import DesignOptions
+from flightid.export.options import FORMATS
 from flightid.identification.methods import METHODS
 from flightid.identification.reduction.rules import ReductionLimits
 from flightid.logs.options import PartOptions
@@ -26,6 +27,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.options import Options, options_of
 from flightid.record.options import ChannelOptions, ReadOptions
 from flightid.responses.options import ResponseOptions
+from flightid.simulation.fly_options import FlyOptions
 from flightid.simulation.options import SimulationOptions
 from flightid.study.fit_settings import VerifySettings
 from flightid.study.proposal.options import ProposalOptions
@@ -58,6 +60,10 @@ def sections() -> dict[str, type[Options]]:
         "simulate": SimulationOptions,
         "Noise of a simulation": Noise,
         "simulate model, without records": StickOptions,
+        "export, C": FORMATS["c"],
+        "export, FMU": FORMATS["fmu"],
+        "export, JSBSim": FORMATS["jsbsim"],
+        "fly": FlyOptions,
         "reduce": ReductionLimits,
         "tune": TuneOptions,
         "tune_controller": ControllerOptions,

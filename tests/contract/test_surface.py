@@ -19,7 +19,6 @@ SAY = {"problem", "found", "needed", "action", "message", "what"}
 # Arguments that neither a command nor a study has: their verbs are Python's alone.
 PYTHON_ONLY = {
     "after_rise": "reduce; a study says it in [reduce]",
-    "compile": "export; the command has --sources-only",
     "cutoff_hz": "smooth",
     "dt": "of python-control's systems",
     "given": "margins of a loop",

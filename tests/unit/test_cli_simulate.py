@@ -147,13 +147,14 @@ def test_the_picture_shows_measured_beside_simulated() -> None:
 
 def test_export_from_the_command_line(tmp_path: Path, capsys) -> None:
     path = tmp_path / "sp.c"
-    words = ["export", "short_period", str(path), "--rate", "100", "--value", "Mq=-3", "--tunable"]
-    assert run([*words, "--json"]) == 0
+    words = ["export", "short_period", str(path), "--sample-time-s", "0.01", "--value", "Mq=-3"]
+    assert run([*words, "--tunable", "--json"]) == 0
     plain = json.loads(capsys.readouterr().out)
+    assert plain["options"]["tunable"] is True
     assert plain["files"] == [str(path), str(path.with_suffix(".h"))]
     assert '"Mq", "1/s", (-3.0)' in path.read_text()
     unit = tmp_path / "sp.fmu"
-    words = ["export", "short_period", str(unit), "--rate", "100", "--sources-only"]
+    words = ["export", "short_period", str(unit), "--sample-time-s", "0.01", "--no-compile"]
     assert run([*words, "--interface", "co-simulation"]) == 0
     assert "co-simulation" in capsys.readouterr().out
     aero = tmp_path / "aero.xml"
@@ -162,5 +163,7 @@ def test_export_from_the_command_line(tmp_path: Path, capsys) -> None:
     assert run([*words, "--property", "rudder=fcs/rudder-left-pos-rad"]) == 0
     assert "fcs/rudder-left-pos-rad" in aero.read_text()
     capsys.readouterr()
+    assert run([*words, "--tunable"]) == 2
+    assert "--tunable is no option of format jsbsim" in capsys.readouterr().err
     assert run(["export", "short_period", str(tmp_path / "sp.xyz")]) == 2
     assert "format of an export is not known" in capsys.readouterr().err

@@ -171,13 +171,28 @@ def test_datagrams_in_and_out() -> None:
 def test_fly_from_the_command_line(tmp_path, capsys) -> None:
     path = tmp_path / "flown.nc"
     words = ["fly", "short_period", "--duration", "0.1", "--rate", "50", "--listen", "0"]
-    assert run([*words, "--feedback", "elevator=q:0.1", "--output", str(path), "--json"]) == 0
+    assert (
+        run(
+            [
+                *words,
+                "--feedback",
+                "elevator=q:0.1:alpha:0.2",
+                "--limits",
+                "elevator=-0.3:0.3",
+                "--output",
+                str(path),
+                "--json",
+            ]
+        )
+        == 0
+    )
     said = capsys.readouterr()
-    assert json.loads(said.out)["frames"] == 5
+    plain = json.loads(said.out)
+    assert (plain["frames"], plain["options"]["limits"]) == (5, {"elevator": [-0.3, 0.3]})
     assert "Listening at 127.0.0.1" in said.err
     assert fid.read_records(path)[0].n_samples == 5
-    for wrong, words_said in ((["--feedback", "elevator=q"], "is not INPUT=OUTPUT:GAIN"),
-                              (["--send", "nowhere"], "is not HOST:PORT")):  # fmt: skip
+    for wrong, words_said in ((["--feedback", "elevator=q"], "needed INPUT=OUTPUT:GAIN"),
+                              (["--send", "nowhere"], "needed HOST:PORT")):  # fmt: skip
         assert run(["fly", "short_period", *wrong]) == 2
         assert words_said in capsys.readouterr().err
 

@@ -13,6 +13,29 @@ from flightid.errors import OptionError, StudyError, UnknownNameError
 from flightid.study.proposal import Proposal, propose_study
 from flightid.study.proposal.columns import columns_of
 
+RIG_WITH_GAINS = """
+[study]
+title = "Rig"
+[verify]
+residual_tests = true
+[[record]]
+name = "all"
+path = "rig.csv"
+[[model]]
+name = "beam"
+structure = "oe"
+inputs = ["volts"]
+outputs = "beam"
+identify = "all"
+band_rad_s = [1.7, 6.3]
+nb = [2]
+nf = [2]
+nk = [1]
+[tune]
+controller = "pi"
+draws = 10
+"""
+
 
 def _rig(folder: Path, name: str = "rig.csv", seed: int = 0) -> Path:
     """y(k) = 1.5 y(k−1) − 0.7 y(k−2) + u(k−1) + 0.5 u(k−2), with a little noise."""
@@ -45,6 +68,16 @@ def test_records_become_the_study_of_their_structure(
     assert min(again.identified[0].on_unseen.popitem()[1].fit_percent.values()) > 95.0
     first = (tmp_path / "rig-output" / "report.txt").read_text().split("Parameters")[0]
     assert first == (tmp_path / "again" / "report.txt").read_text().split("Parameters")[0]
+
+
+def test_a_controller_of_a_study_is_written_as_code(tmp_path: Path) -> None:
+    _rig(tmp_path)
+    study = tmp_path / "study.toml"
+    study.write_text(RIG_WITH_GAINS)
+    made = run_study(study)
+    assert made.tuning is not None
+    gain = made.tuning.designs[0].gains["Kp"]
+    assert f"{gain:.4g} * " in (made.output / "controller.c").read_text()
 
 
 def test_a_study_that_was_changed_by_hand_stays(tmp_path: Path) -> None:

@@ -46,7 +46,7 @@ band_rad_s = [2.0, 20.0]
 [[export]]
 model = "Roll, slow"
 path = "roll.c"
-options = { sample_time_s = 0.0025 }
+sample_time_s = 0.0025
 [[loop]]
 name = "Rate feedback"
 model = "Roll, slow"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -115,30 +114,13 @@ def command(
 
 def _write(tuning: Tuning, target: Path, overwrite: bool, *, accept_red: bool) -> None:
     """Write what may be flown, and name what stays as it flew."""
+    from flightid.export.gains import write_gains
+
     if tuning.sound or accept_red:
-        for path in _written(tuning, target, overwrite, accept_red):
+        for path in write_gains(tuning, target, overwrite=overwrite, accept_red=accept_red):
             note(f"Wrote {path}")
     for axis, why in ({} if accept_red else tuning.left_out).items():
         note(f"Not written, stays as flown: {axis}: {why}")
-
-
-def _written(tuning: Tuning, target: Path, overwrite: bool, accept_red: bool) -> Iterable[Path]:
-    """Parameter files of an autopilot; C or TOML of a PID of its own."""
-    if target.suffix != ".c":
-        return tuning.write(target, overwrite=overwrite, accept_red=accept_red)
-    from flightid import export
-    from flightid.export.names import identifier
-
-    if target.exists() and not overwrite:
-        raise click.UsageError(f"{target} is there already: name another file, or --overwrite")
-    designs = tuning.designs if accept_red else tuning.sound
-    several = len(tuning.designs) > 1
-    names = [f"{target.stem}_{each.axis}" if several else target.stem for each in designs]
-    made = [
-        export(design, target.with_name(f"{identifier(name)}.c"))
-        for name, design in zip(names, designs, strict=True)
-    ]
-    return [path for each in made for path in each.files]
 
 
 def _holds_models(files: tuple[Path, ...]) -> bool:

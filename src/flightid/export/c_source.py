@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Literal
 
 import jinja2
 import numpy as np
@@ -23,12 +22,12 @@ from flightid.export.names import (
     number_literal,
     text_literal,
 )
+from flightid.export.options import Hold
 from flightid.models import StateSpaceModel
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.state_space.integration_steps import STEP_RADIUS, steps_per_sample
 from flightid.version import VERSION
 
-Hold = Literal["zero", "first"]
 MAXIMUM_HISTORY = 100_000
 """Longest delay in samples: the past of an input is held in the model's own memory."""
 

@@ -26,6 +26,8 @@ class ExportFiles(Result, schema="flightid.exported/1"):
         What was written and how it is used, by keyword.
     findings : tuple of Finding
         What the format could not carry as it is.
+    options : mapping of str to object
+        Of the format, as they were used.
 
     Example
     -------
@@ -37,6 +39,7 @@ class ExportFiles(Result, schema="flightid.exported/1"):
     files: tuple[Path, ...]
     facts: Mapping[str, str] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+    options: Mapping[str, object] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Format and names of the files on one line, and the number of findings."""

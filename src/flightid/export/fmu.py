@@ -31,8 +31,9 @@ from flightid.export.c_source import (
     linear_source,
 )
 from flightid.export.exported import ExportFiles
-from flightid.export.fmu_description import FmuDescription, Interface
+from flightid.export.fmu_description import FmuDescription
 from flightid.export.names import comment, identifier
+from flightid.export.options import FmuOptions, Interface
 from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.models import LinearSystem, StateSpaceModel
@@ -54,17 +55,7 @@ _ABSENT = (
 )  # fmt: skip
 
 
-def export_fmu(
-    model: object,
-    path: Path,
-    name: str,
-    *,
-    sample_time_s: float | None = None,
-    interfaces: Sequence[Interface] | None = None,
-    pade_order: int | None = None,
-    substeps: int | None = None,
-    compile: bool = True,
-) -> ExportFiles:
+def export_fmu(model: object, path: Path, name: str, options: FmuOptions) -> ExportFiles:
     """Write an FMU of FMI 3.0.
 
     Parameters
@@ -75,23 +66,15 @@ def export_fmu(
         File ending in ``.fmu``.
     name : str
         Of the model.
-    sample_time_s : float, optional
-        Internal step of co-simulation, s; a discrete model has its own.
-    interfaces : sequence of {"model-exchange", "co-simulation"}, optional
-        Left out: both where the model allows it. Model exchange has no delays and no samples.
-    pade_order : int, optional
-        Approximate delays, so that model exchange is possible.
-    substeps : int, optional
-        Runge-Kutta steps in an internal step; left out: step times eigenvalue at most 0.05.
-    compile : bool
-        Put a binary for this machine into the FMU; without, an importer compiles the sources.
+    options : FmuOptions
+        Without substeps the product of step and eigenvalue is at most 0.05.
 
     Raises
     ------
     ExportError
         There is no C compiler; model exchange was asked of a model with delays or samples.
     OptionError
-        A missing sample time, or an unknown interface.
+        A missing sample time.
 
     Reference
     ---------
@@ -99,15 +82,16 @@ def export_fmu(
     """
     if path.suffix.lower() != ".fmu":
         raise OptionError("an FMU is a file in .fmu", found=path.name)
-    prepared = _prepared(model, pade_order)
-    chosen, findings = _interfaces(prepared, interfaces)
+    prepared = _prepared(model, options.pade_order)
+    chosen, findings = _interfaces(prepared, options.interfaces)
+    step = options.sample_time_s
     prefix = identifier(name)
     if isinstance(prepared, StateSpaceModel):
         code = equation_source(
-            prepared, name, prefix, sample_time_s, "zero", substeps, radius=RADIUS
+            prepared, name, prefix, step, "zero", options.substeps, radius=RADIUS
         )
     else:
-        code = linear_source(prepared, name, prefix, sample_time_s, "zero")
+        code = linear_source(prepared, name, prefix, step, "zero")
     made = {f"sources/{key}": text for key, text in _sources(code, name, chosen).items()}
     token = "{" + hashlib.sha256("".join(made.values()).encode()).hexdigest()[:32] + "}"
     made = {key: text.replace(_TOKEN, token) for key, text in made.items()}
@@ -115,7 +99,7 @@ def export_fmu(
     content: dict[str, bytes] = {"modelDescription.xml": description.text().encode()}
     content |= {key: text.encode() for key, text in made.items()}
     place = f"binaries/{platform_tuple()}/{code.prefix}{library_suffix()}"
-    if compile:
+    if options.compile:
         content[place] = _binary(made, code.prefix)
     else:
         findings.append(_sources_alone())
@@ -124,7 +108,7 @@ def export_fmu(
         "interfaces": " and ".join(chosen),
         "internal step": f"{code.sample_time_s:g} s",
         "method": code.method,
-        "binary": place if compile else "none",
+        "binary": place if options.compile else "none",
         "tunable": f"{len(code.parameters)} parameters",
     }
     return ExportFiles("fmu", (path,), facts, tuple(findings))
@@ -155,9 +139,6 @@ def _prepared(model: object, pade_order: int | None) -> StateSpaceModel | Linear
 def _interfaces(
     model: StateSpaceModel | LinearSystem, wanted: Sequence[Interface] | None
 ) -> tuple[tuple[Interface, ...], list[Finding]]:
-    for each in wanted or ():
-        if each not in BOTH:
-            raise OptionError("interface is not known", found=each, needed=" or ".join(BOTH))
     reason = ""
     if isinstance(model, LinearSystem):
         reason = "the model is a recursion over samples"

@@ -6,15 +6,14 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from flightid.errors import UnitError
 from flightid.export.c_source import CSource, Entry
+from flightid.export.options import Interface
 from flightid.units import DIMENSIONLESS, si_base
 from flightid.version import VERSION
 
-Interface = Literal["model-exchange", "co-simulation"]
 _SI = {
     "kilogram": "kg", "meter": "m", "second": "s", "ampere": "A", "kelvin": "K", "mole": "mol",
     "candela": "cd", "radian": "rad",

@@ -19,6 +19,7 @@ from flightid.errors import ExportError, OptionError
 from flightid.export.exported import ExportFiles
 from flightid.export.fmu_description import plain
 from flightid.export.names import identifier
+from flightid.export.options import JsbsimOptions
 from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.models import LinearSystem
@@ -41,16 +42,7 @@ _MOMENTS = {"p": "ROLL", "q": "PITCH", "r": "YAW"}
 _FORCES = {"u": "X", "v": "Y", "beta": "Y", "w": "Z", "alpha": "Z"}
 
 
-def export_jsbsim(
-    model: object,
-    path: Path,
-    name: str,
-    *,
-    mass_kg: float | None = None,
-    inertia_kg_m2: Mapping[str, float] | None = None,
-    trim: Mapping[str, float] | None = None,
-    properties: Mapping[str, str] | None = None,
-) -> ExportFiles:
+def export_jsbsim(model: object, path: Path, name: str, options: JsbsimOptions) -> ExportFiles:
     """Write the aerodynamics section of a JSBSim aircraft from a linear model's derivatives.
 
     Parameters
@@ -61,15 +53,9 @@ def export_jsbsim(
         File ending in ``.xml``, for ``<aerodynamics file="..."/>``.
     name : str
         Of the model.
-    mass_kg : float, optional
-        For the forces; needed where the model has their states.
-    inertia_kg_m2 : mapping of str to float
-        ``ixx``, ``iyy``, ``izz`` and, where it is not zero, ``ixz``.
-    trim : mapping of str to float, optional
-        ``u`` and ``w``, m/s, ``theta``, rad, and inputs, where the model was linearised; left out:
-        its own constants U0, W0, theta0, else what is needed is asked for.
-    properties : mapping of str to str, optional
-        JSBSim property by input or state, for names that are not `PROPERTIES`.
+    options : JsbsimOptions
+        A trim that is left out is the model's own constants U0, W0, theta0, else what is needed is
+        asked for; properties go before `PROPERTIES`.
 
     Raises
     ------
@@ -93,15 +79,15 @@ def export_jsbsim(
     system = linear_system(model)
     if system.is_discrete:
         raise ExportError("JSBSim takes derivatives in continuous time", found=repr(system))
-    point = _trim_of(model, trim)
-    known = {**PROPERTIES, **(properties or {})}
+    point = _trim_of(model, options.trim)
+    known = {**PROPERTIES, **(options.properties or {})}
     _check_names(system, known)
     root = Element("aerodynamics")
     SubElement(root, "documentation").text = plain(f"{name}: written by flightid")
-    for axis, rows in _axes(system, point, mass_kg, inertia_kg_m2).items():
+    for axis, rows in _axes(system, point, options.mass_kg, options.inertia_kg_m2).items():
         part = SubElement(root, "axis", name=axis)
         if axis in ("X", "Y", "Z"):
-            _trim_force(part, axis, point, mass_kg or 0.0)
+            _trim_force(part, axis, point, options.mass_kg or 0.0)
         for variable, factor in rows.items():
             _function(part, axis, variable, factor, known[variable], point)
     indent(root)

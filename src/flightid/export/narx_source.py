@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from flightid.errors import OptionError
-from flightid.export.c_source import CSource, Entry, Hold, Tables, rendered, step_of_samples
+from flightid.export.c_source import CSource, Entry, Tables, rendered, step_of_samples
+from flightid.export.options import Hold
 from flightid.models import NarxModel
 
 

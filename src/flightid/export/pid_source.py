@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from flightid.control.autopilots.pid_loop import PidLoop
@@ -13,8 +14,8 @@ from flightid.files import write_atomically
 from flightid.version import VERSION
 
 
-def export_pid(loop: PidLoop, path: Path, name: str) -> ExportFiles:
-    """Write header and source of a sampled controller.
+def export_pid(loop: PidLoop, path: Path, name: str, remarks: Iterable[str] = ()) -> ExportFiles:
+    """Write header and source of a sampled controller; further remarks stand above its own.
 
     Raises
     ------
@@ -34,7 +35,7 @@ def export_pid(loop: PidLoop, path: Path, name: str) -> ExportFiles:
     tracking = loop.values.get("tracking_s", 0.0)
     words = {
         "title": comment(name), "output": comment(loop.axis), "prefix": identifier(name),
-        "remarks": [comment(each.replace("−", "-")) for each in loop.remarks()],
+        "remarks": [comment(each.replace("−", "-")) for each in (*remarks, *loop.remarks())],
         "version": VERSION, "stem": stem,
         "step": step, "sense": "-1.0" if loop.direct else "1.0",
         "back": min(1.0, step / tracking) if tracking else 0.0,

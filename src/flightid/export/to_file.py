@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.pid_design import PidDesign, require_gains
 from flightid.conventions import Light
 from flightid.errors import ExportError, OptionError
@@ -14,6 +16,7 @@ from flightid.export.c import export_c
 from flightid.export.exported import ExportFiles
 from flightid.export.fmu import export_fmu
 from flightid.export.jsbsim import export_jsbsim
+from flightid.export.options import FORMATS
 from flightid.export.pid_source import export_pid
 from flightid.files import as_path
 from flightid.findings import Finding
@@ -26,8 +29,9 @@ from flightid.models import (
 )
 from flightid.models.linear.system_files import MATLAB_RECIPE
 from flightid.models.model import linear_system, model_of
+from flightid.options import Options, checked
 
-FORMATS = {
+SUFFIXES = {
     ".toml": "toml",
     ".mat": "mat",
     ".json": "json",
@@ -69,12 +73,7 @@ def export(
     name : str, optional
         Of the model in the file; left out: the file's name.
     **options
-        Of the format. C: ``sample_time_s``, ``hold`` ("zero" or "first"), ``substeps``,
-        ``tunable`` (equations with parameters to change, instead of exact samples). FMU:
-        ``sample_time_s`` (the internal step), ``interfaces`` (of "model-exchange" and
-        "co-simulation"), ``pade_order`` (for delays in model exchange), ``substeps``,
-        ``compile`` (False: sources alone). JSBSim: ``mass_kg``, ``inertia_kg_m2``, ``trim``,
-        ``properties``.
+        Of the format: the fields of its dataclass in `flightid.export.options.FORMATS`.
 
     Returns
     -------
@@ -107,49 +106,58 @@ def export(
     ExportFiles(c: roll.c, roll.h)
     """
     place = as_path(path)
-    chosen = format or FORMATS.get(place.suffix.lower(), "")
-    if chosen not in FORMATS.values():
-        known = ", ".join(f"{kind} ({suffix})" for suffix, kind in FORMATS.items())
-        raise OptionError("format of an export is not known", found=format or place.name,
-                          needed=f"one of {known}")  # fmt: skip
+    chosen = format_of(place, format)
     if isinstance(source, PidDesign):
+        checked(Options, options, "a controller")
         return _controller(source, place, name or place.stem, chosen)
+    made = checked(FORMATS[chosen], options, f"format {chosen}")
     model = model_of(source)
     if chosen in _WRITERS:
-        return _called(_WRITERS[chosen], model, place, name or place.stem, options=options)
-    if options:
-        raise OptionError(f"format {chosen} has no such options", found=", ".join(options))
+        files = _WRITERS[chosen](model, place, name or place.stem, made)
+        return replace(files, options=made.to_dict())
     return _toml(model, place) if chosen == "toml" else _matrices(source, model, place, chosen)
 
 
-def _called(
-    function: Callable[..., ExportFiles], *arguments: object, options: Mapping[str, object]
-) -> ExportFiles:
-    """The writer of a format with its options, which are checked by name."""
-    known = set(function.__kwdefaults__ or {})
-    unknown = set(options) - known
-    if unknown:
-        raise OptionError(
-            "the format has no such option",
-            found=", ".join(sorted(unknown)),
-            needed=", ".join(sorted(known)),
-        )
-    return function(*arguments, **options)
+def format_of(path: Path, format: str | None = None) -> str:
+    """Format of a file: the one that is named, else by its suffix.
+
+    Raises
+    ------
+    OptionError
+        Neither says one.
+    """
+    chosen = format or SUFFIXES.get(path.suffix.lower(), "")
+    if chosen not in FORMATS:
+        known = ", ".join(f"{kind} ({suffix})" for suffix, kind in SUFFIXES.items())
+        raise OptionError("format of an export is not known", found=format or path.name,
+                          needed=f"one of {known}")  # fmt: skip
+    return chosen
 
 
 def _controller(design: PidDesign, path: Path, name: str, format: str) -> ExportFiles:
-    loop = design.plain
-    if loop is None or format not in ("c", "toml"):
-        raise ExportError(
-            "the gains of a controller have no such file",
-            found=f"{design.flown.autopilot} as {format}",
-            needed="a PID of its own, as C or TOML",
-            action="write the gains of an autopilot with the design's write",
-        )
+    loop = plain_loop(design, format)
     require_gains([design])
     if format == "c":
         return export_pid(loop, path, name)
     return ExportFiles("toml", design.write(path, overwrite=True))
+
+
+def plain_loop(design: PidDesign, format: str = "c") -> PidLoop:
+    """The PID of its own that a design tuned.
+
+    Raises
+    ------
+    ExportError
+        It tuned an autopilot, or the format holds no controller.
+    """
+    if design.plain is None or format not in ("c", "toml"):
+        raise ExportError(
+            "the gains of a controller have no such file",
+            found=f"{design.flown.autopilot} as {format}",
+            needed="a PID of its own, as C or TOML",
+            action="write the gains of an autopilot as its parameter file",
+        )
+    return design.plain
 
 
 def _toml(model: object, path: Path) -> ExportFiles:

@@ -7,7 +7,7 @@ import math
 import socket
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Protocol, Self
 
@@ -16,6 +16,7 @@ import numpy as np
 from flightid.errors import DataError, OptionError
 from flightid.record import Record
 from flightid.result import Result
+from flightid.simulation.fly_options import FlyOptions
 from flightid.simulation.stepper import Stepper
 from flightid.table import Column, Table
 
@@ -64,12 +65,15 @@ class FlownSession(Result, schema="flightid.flown_session/1", untold={"record": 
         Longest delay of a frame, s.
     stopped : bool
         Whether an interrupt ended it before its time.
+    options : mapping of str to object
+        As they were used; empty where the loop was driven by hand.
     """
 
     record: Record
     late_frames: int
     worst_late_s: float
     stopped: bool = False
+    options: Mapping[str, object] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Frames and late ones on one line."""
@@ -166,6 +170,47 @@ def fly_in_real_time(
         name="flown",
     )
     return FlownSession(record, late_frames, worst, flown < count)
+
+
+def fly_model(
+    model: object, options: FlyOptions, *, say: Callable[[str], None] | None = None
+) -> FlownSession:
+    """Fly a model beside the clock, its pilot and its cockpit on the other ends of UDP.
+
+    Parameters
+    ----------
+    model : what `Stepper` takes
+    options : FlyOptions
+    say : callable, optional
+        Takes a sentence on where it listens, and one on what it could not deliver.
+
+    Raises
+    ------
+    FlightidError
+        As `Stepper` and `fly_in_real_time`.
+    OSError
+        The port is taken.
+
+    Example
+    -------
+    >>> from flightid.models import LinearSystem
+    >>> lag = LinearSystem([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ("u",), ("y",))
+    >>> fly_model(lag, FlyOptions(duration_s=0.05)).options["sample_rate_hz"]
+    100.0
+    """
+    stepper = Stepper(
+        model, 1.0 / options.sample_rate_hz, feedback=options.gains, limits=options.bounds
+    )
+    heard = None if options.listen is None else (options.host, options.listen)
+    with UdpLink(stepper.inputs, listen=heard, send=options.cockpit, style=options.style) as link:
+        if say is not None and heard is not None:
+            say(f"Listening at {options.host}:{link.port} for {', '.join(stepper.inputs)}")
+        session = fly_in_real_time(
+            stepper, link.pilot, duration_s=options.duration_s, show=link.show
+        )
+        if say is not None and link.rejected:
+            say(f"{link.rejected} datagrams were damaged or not delivered.")
+    return replace(session, options=options.to_dict())
 
 
 class UdpLink:

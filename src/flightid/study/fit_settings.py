@@ -106,7 +106,7 @@ def read_fit(reader: TableReader, usual: FitSettings | None = None) -> FitSettin
     method = reader.choice("method", METHOD_NAMES, usual.method)
     kind = next(way.options for way in METHODS if way.name == method)
     known = [each.name for each in options_of(kind)]
-    given = {key: value for key, value in reader.rest().items() if key != "method"}
+    given = reader.rest()
     kept = {key: value for key, value in usual.options.items() if key in known}
     where = f"study file, {reader.where}"
     read = read_options(kind, {**kept, **given}, where, error=StudyError)

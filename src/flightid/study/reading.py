@@ -49,9 +49,10 @@ class TableReader:
         return self._values[key]
 
     def rest(self) -> dict[str, Any]:
-        """All values, for a part that checks its own keys."""
-        self._known += list(self._values)
-        return dict(self._values)
+        """All values that nobody asked for, for a part that checks its own keys."""
+        left = {key: value for key, value in self._values.items() if key not in self._known}
+        self._known += list(left)
+        return left
 
     def text(self, key: str, default: str = REQUIRED) -> str:
         """One string."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flightid.control.tuning.result import Tuning
+from flightid.export.gains import write_gains
 from flightid.files import sha256_of_file
 from flightid.progress import progress
 from flightid.report.html import to_html
@@ -151,8 +152,10 @@ def _tuned(runner: StageRunner, *inputs: object) -> Tuning | None:
 
 
 def _write_gains(tuning: Tuning, folder: Path) -> None:
-    """Gains of controllers of their own, beside the models."""
-    tuning.write(folder / "controller.toml")
+    """Gains of controllers of their own, beside the models: numbers, and code where it runs."""
+    write_gains(tuning, folder / "controller.toml")
+    if all(design.plain and design.plain.sampled for design in tuning.sound):
+        write_gains(tuning, folder / "controller.c")
 
 
 def _paths(settings: object) -> Iterator[Path]:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from flightid.control.closed_loop.close_loop import close_loop
 from flightid.control.closed_loop.result import ClosedLoop
@@ -145,9 +145,9 @@ def _around(fit: Fit, loop: LoopSettings) -> ClosedLoop:
 
 def _exported(fits: Mapping[str, Fit], asked: ExportSettings, folder: Path) -> ExportFiles:
     (folder / EXPORTS).mkdir(exist_ok=True)
-    made = export(
-        _fit(fits, asked.model), folder / EXPORTS / asked.file, asked.format, **asked.options
-    )
+    options: dict[str, Any] = asked.options.to_dict()
+    place = folder / EXPORTS / asked.file
+    made = export(_fit(fits, asked.model), place, asked.format, **options)
     # The folder gets its own name when the study is whole: paths are told from there.
     return replace(made, files=tuple(path.relative_to(folder) for path in made.files))
 

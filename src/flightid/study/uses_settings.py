@@ -5,12 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from flightid.control.closed_loop.close_loop import DRAWS
 from flightid.errors import StudyError
+from flightid.export.options import FORMATS
+from flightid.export.to_file import format_of
+from flightid.options import Options
 from flightid.study.loop_blocks import made_block
-from flightid.study.reading import TableReader
+from flightid.study.reading import TableReader, read_each
 
 
 @dataclass(frozen=True)
@@ -23,16 +27,15 @@ class ExportSettings:
         Name of the study's model.
     file : str
         Name of the file, in the folder ``export`` of the output; left out: the model's, as C.
-    format : str or None
-        None: by the suffix.
-    options : mapping
+    format : str
+    options : Options
         Of the format.
     """
 
     model: str
     file: str
-    format: str | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
+    format: str = "c"
+    options: Options = field(default_factory=Options)
 
 
 @dataclass(frozen=True)
@@ -145,14 +148,9 @@ def _export(reader: TableReader) -> ExportSettings:
     file = reader.maybe(reader.text, "path") or f"{re.sub(r'[^0-9A-Za-z]+', '_', model)}.c"
     if "/" in file or "\\" in file or file.startswith("."):
         raise reader.error("path", "does not fit", found=file, needed="a name without a folder")
-    made = ExportSettings(
-        model,
-        file,
-        reader.maybe(reader.text, "format"),
-        reader.values("options"),
-    )
-    reader.finish()
-    return made
+    format = format_of(Path(file), reader.maybe(reader.text, "format"))
+    (options,) = read_each([FORMATS[format]], reader)
+    return ExportSettings(model, file, format, options)
 
 
 def _rotor(reader: TableReader) -> RotorSettings:

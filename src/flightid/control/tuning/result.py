@@ -212,21 +212,34 @@ class Tuning(Result, schema="flightid.tuning/1"):
         OptionError
             A file is already there.
         """
+        designs, left = self.writable(accept_red=accept_red)
+        findings = self.findings if accept_red else ()
+        return write_steps(
+            designs, findings, path, left=left, overwrite=overwrite, accept_red=accept_red
+        )
+
+    def writable(
+        self, *, accept_red: bool = False
+    ) -> tuple[tuple[PidDesign, ...], tuple[str, ...]]:
+        """Axes that a file may hold, and what it says of those that it leaves out.
+
+        Raises
+        ------
+        DataError
+            No axis has gains without a red finding.
+        """
         designs = self.sound
         if accept_red:
             designs = tuple(each for each in self.designs if each.exists)
         if not designs:
             require_gains(self.designs, self.findings, accept_red=accept_red)
-        findings = self.findings if accept_red else ()
         kept = {each.axis for each in designs}
-        left = [
+        left = tuple(
             f"{axis} is not in this file, its gains stay as flown: {why}"
             for axis, why in self.left_out.items()
             if axis not in kept
-        ]
-        return write_steps(
-            designs, findings, path, left=left, overwrite=overwrite, accept_red=accept_red
         )
+        return designs, left
 
     def _computed(self) -> dict[str, object]:
         return {
