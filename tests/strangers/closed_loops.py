@@ -86,5 +86,5 @@ CASES = tuple(
         partial(fly, feedback=feedback, estimator=estimator),
     )
     for name, feedback in (("hands off", 0.0), ("heave held", PILOT))
-    for estimator in ("composite",)
+    for estimator in ("composite", "prewhitened")
 )

@@ -47,7 +47,7 @@ def loop_check(test: FeedbackTest) -> Check:
         return Check(LOOP, Light.AMBER, str(test), CLOSED_ACTION)
     if test.is_function_of_outputs:
         return Check(LOOP, Light.RED, str(test), UNKNOWN_ACTION)
-    if test.loop == "unknown" and test.source != "instrument":
+    if test.loop == "unknown" and not test.is_taken_care_of:
         return Check(LOOP, Light.UNKNOWN, str(test), UNKNOWN_ACTION)
     return Check(LOOP, Light.GREEN, str(test))
 

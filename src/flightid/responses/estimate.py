@@ -18,6 +18,7 @@ from flightid.record.several import as_records
 from flightid.responses.errors.linear_estimate import LinearEstimate, WindowedWeights
 from flightid.responses.estimators.local_polynomial import estimate_local_polynomial
 from flightid.responses.estimators.periodic import estimate_periodic
+from flightid.responses.estimators.prewhitened import PREWHITENED, estimate_prewhitened
 from flightid.responses.estimators.windowed import (
     estimate_windowed,
     windowed_errors,
@@ -73,10 +74,12 @@ def estimate_response(
     excitations : str or iterable of str, optional
         Channels of injected signals that are independent of the noise; needed by "instrument".
         Default for that method: the channels with the role excitation.
-    estimator : {"composite", "instrument", "local_polynomial", "periodic"}
+    estimator : {"composite", "instrument", "local_polynomial", "periodic", "prewhitened"}
         "composite": directly from inputs to outputs. "instrument": for records with a loop closed,
         by way of the excitation. "local_polynomial": without windows, for short records.
         "periodic": at the harmonics of inputs that repeat (`Record.period_s`), whole periods alone.
+        "prewhitened": directly by a model of the noise, which a closed loop without a logged
+        excitation does not bias.
     overlap : float
         Overlap of neighbouring windows: 0, 0.5, 0.75, 0.8 …
     detrend : {"mean", "line", "none"}
@@ -104,7 +107,7 @@ def estimate_response(
     -----
     Assumes a linear time-invariant vehicle and noise at the outputs alone. Noise on a measured
     input makes the gain too low. Biased when a loop is closed around the vehicle and output noise
-    reaches the input through it: then use the excitation as instrument.
+    reaches the input through it: then use the excitation as instrument, or "prewhitened".
 
     Reference
     ---------
@@ -157,7 +160,13 @@ def estimate_response(
     lengths = ", ".join(f"{plan.length * samples.sample_time_s:.6g}" for plan in plans)
     step = Step("estimate_response", options | {"window_s": lengths, "overlap": overlap}, VERSION)
     estimate = estimate_windowed(samples, omega, plans, detrend)
-    response = _with_inputs(windowed_response(estimate, estimator, step), samples, listed, loop)
+    response = windowed_response(estimate, estimator, step)
+    if estimator == PREWHITENED:
+        response = estimate_prewhitened(
+            response, samples, listed, shifts=shifts_of(overlap), covariance=covariance
+        )
+        return _with_inputs(response, samples, listed, loop)
+    response = _with_inputs(response, samples, listed, loop)
     if not covariance:
         return response
     try:
@@ -176,6 +185,8 @@ def _with_inputs(
     shapes = [record.input_shape for record in records]
     if response.estimator.startswith("instrument"):
         test = FeedbackTest("unknown", "instrument")
+    elif response.estimator == PREWHITENED:
+        test = FeedbackTest("unknown", "noise model")
     else:
         test = feedback_of(samples, float(response.omega_rad_s[-1]), records, loop)
     return replace(

@@ -123,6 +123,7 @@ def feedback_findings(test: FeedbackTest) -> tuple[Finding, ...]:
             Light.AMBER,
             f"{seen}, and the direct estimate tends to minus the inverse of the controller where "
             "output noise dominates",
-            "use estimator='instrument' with the injected excitation, or fly with the loop open",
+            "use estimator='instrument' with the injected excitation, estimator='prewhitened' "
+            "where it was not logged, or fly with the loop open",
         ),
     )

@@ -9,7 +9,7 @@ from flightid.options import Options, option
 from flightid.record.hold import LOOPS, Loop
 from flightid.responses.windows.windows import DEFAULT_FREQUENCIES
 
-ESTIMATORS = ("composite", "instrument", "local_polynomial", "periodic")
+ESTIMATORS = ("composite", "instrument", "local_polynomial", "periodic", "prewhitened")
 DETRENDS = ("none", "mean", "line")
 
 
@@ -32,7 +32,8 @@ class ResponseOptions(Options):
     estimator: str = option(
         "composite",
         choices=ESTIMATORS,
-        doc="Direct; by way of the excitation, for closed loops; without windows; or at harmonics.",
+        doc="Direct; by way of the excitation, for closed loops; without windows; at harmonics; or "
+        "with a model of the noise, for loops whose excitation was not logged.",
     )
     n_omega: int = option(DEFAULT_FREQUENCIES, minimum=2, doc="Log-spaced frequencies in the band.")
     window_s: str | float | Sequence[float] = option(

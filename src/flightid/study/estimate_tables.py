@@ -24,6 +24,7 @@ WORDS = {
     "local_polynomial": "local polynomial estimate",
     "periodic": "estimate at harmonics",
     "instrument": "instrument estimate",
+    "prewhitened": "estimate with a noise model",
     "output_error": "output error on the records",
     "equation_error": "equation error on the records",
     "fourier_regression": "regression on Fourier integrals",

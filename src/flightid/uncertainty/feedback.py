@@ -51,11 +51,11 @@ class FeedbackTest:
     Attributes
     ----------
     loop : {"open", "closed", "unknown"}
-    source : {"test", "declared", "repeats", "instrument", "no noise", "same sample", "too short"}
+    source : {"test", "declared", "repeats", "instrument", "noise model", "no noise", ...}
         How it is known: the test of past noise; the user's word; inputs that repeat exactly, or
-        outputs without noise, which feed nothing back; an estimate by way of an excitation, which a
-        closed loop does not bias. Or why it is not: input and output go together within a sample;
-        records too short to tell.
+        outputs without noise, which feed nothing back; an estimate by way of an excitation or of a
+        model of the noise, which a closed loop does not bias. Or why it is not ("same sample", "too
+        short"): input and output go together within a sample; records too short to tell.
     p_value : float or None
         Chance of so large a share with the loop open, over all inputs; None without a test.
     input : str or None
@@ -82,7 +82,12 @@ class FeedbackTest:
     @property
     def is_closed(self) -> bool:
         """Whether estimates from these inputs straight to outputs are biased."""
-        return self.loop == "closed" and self.source != "instrument"
+        return self.loop == "closed" and not self.is_taken_care_of
+
+    @property
+    def is_taken_care_of(self) -> bool:
+        """Whether the way of estimating keeps a closed loop from bending it."""
+        return self.source in ("instrument", "noise model")
 
     @property
     def is_function_of_outputs(self) -> bool:
@@ -100,6 +105,7 @@ class FeedbackTest:
                 "without delay or a vehicle that answers at once would"
             ),
             "instrument": "estimated by way of the excitation, which a closed loop does not bias",
+            "noise model": "estimated with a model of the noise, which a closed loop does not bias",
             "no noise": "no loop seen: the outputs hold no noise that could be fed back",
             "too short": "whether a loop is closed cannot be told: the records are too short",
         }

@@ -18,8 +18,10 @@ from flightid.errors import DataError, ModelError, SingularError
 from flightid.identification.frequency_domain.model_residuals import ModelResiduals
 from flightid.models import GreyBoxModel, Parameter
 from flightid.responses import FrequencyResponse
-from flightid.responses.errors.linear_estimate import Functional, LinearEstimate
+from flightid.responses.errors.functional import Functional
+from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource
+from flightid.responses.estimators.prewhitened import PREWHITENED
 from flightid.simulation.model_outputs import systems_of
 
 Array = NDArray[np.float64]
@@ -51,6 +53,8 @@ def why_unknown(data: FrequencyResponse) -> str:
         return ""
     if data.estimator.endswith("arithmetic"):
         return "the response is a result of arithmetic"
+    if data.estimator == PREWHITENED:
+        return "outputs were left out of a response by a noise model, or it came without covariance"
     if data.estimator == "given":
         return "the response was given as values"
     return "the response was read from a file or estimated with covariance=False"

@@ -48,7 +48,8 @@ def judge_feedback(found: Statistics) -> list[Finding]:
             Light.RED if shares[order[0]] >= RULING else Light.AMBER,
             f"the closed loop brings output noise to the inputs, which moves {named}; "
             "so there are no intervals",
-            "log the injected signal and use estimator='instrument', or fly with the loop open",
+            "use estimator='instrument' with the injected signal, estimator='prewhitened' where it "
+            "was not logged, or fly with the loop open",
         )
     ]
 

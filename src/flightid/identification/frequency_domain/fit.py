@@ -113,7 +113,8 @@ def _fit_selected(
     if curves is not None and errors.known is not None and sensitivity is not None:
         # Residuals answer to points and to the model's estimates with opposite signs.
         slopes = np.asarray(-np.linalg.lstsq(sensitivity, groups[0][0].jacobian)[0], np.float64)
-        compare = PartComparison(without, fitted, selected, errors, slopes).compare
+        if data.linear is not None and data.linear.weights.tells_parts:
+            compare = PartComparison(without, fitted, selected, errors, slopes).compare
     found = statistics(
         fitted,
         selected,

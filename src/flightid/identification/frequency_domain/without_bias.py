@@ -39,6 +39,9 @@ SAME_COST, SAME_VALUE = 1e-3, 1e-3
 """Relative differences of cost and values that searches leave by ending where steps are small."""
 NOISE = 1.1
 """Ratio of the cost with the estimator inside to that without, up to which it may be noise."""
+CHANCE = 4.0
+"""Mean square of misfits over their errors up to which a cost that rose is chance: neighbouring
+points share their errors, so few of them are independent."""
 MISFIT = 10.0
 """Mean square of misfits over their errors from which on another start is tried."""
 
@@ -99,7 +102,7 @@ def take_out(
     except (FitError, *OUTSIDE) as error:
         return not_done(str(error))
     best = _Judgement.of(objective, ends[0].found)
-    if best.found.end.cost > NOISE * plain.cost:
+    if best.found.end.cost > NOISE * plain.cost and best.misfit > CHANCE:
         return not_done(
             f"it would raise the cost from {plain.cost:.3g} to {best.found.end.cost:.3g}: the "
             "model does not hold what the records do, or the search met a wrong minimum"

@@ -7,15 +7,16 @@ model's response but this functional of the model's outputs. The difference is t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import ShapeError
 from flightid.responses.errors.covariance import WindowedErrors
+from flightid.responses.errors.functional import Functional
 from flightid.responses.errors.local_errors import LocalErrors
 from flightid.responses.errors.noise import NoiseSpectrum, noise_of_residuals
 from flightid.responses.errors.pilot import Pilot, Pilots
@@ -29,13 +30,13 @@ Real = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 
-Functional = Callable[[Sequence[Real]], Complex]
-"""From changes of the outputs, one array (n_out, n_samples) for each record, to the change of the
-response, shape (n_out, n_in, n_f)."""
-
-
 class OutputWeights(Protocol):
-    """The weights of an estimate on its outputs."""
+    """The weights of an estimate on its outputs.
+
+    `tells_parts`: a part of the records adds the share of the response that its power has.
+    """
+
+    tells_parts: ClassVar[bool]
 
     def functional(self, outputs: Places, inputs: Places, frequencies: Places) -> Functional:
         """The weights at some places, made ready to be applied again and again."""
@@ -63,6 +64,7 @@ class WindowedWeights:
     """
 
     errors: WindowedErrors
+    tells_parts: ClassVar[bool] = True
 
     def functional(self, outputs: Places, inputs: Places, frequencies: Places) -> Functional:
         """See `OutputWeights`."""
@@ -115,6 +117,7 @@ class LocalWeights:
     fits: tuple[LocalFit, ...]
     sample_time_s: float
     noise: NoiseSpectrum
+    tells_parts: ClassVar[bool] = True
 
     def functional(self, outputs: Places, inputs: Places, frequencies: Places) -> Functional:
         """See `OutputWeights`."""
@@ -197,9 +200,11 @@ class LinearEstimate:
             Pilots(inputs, outputs, step, float(omega_rad_s[-1])),
         )
 
-    def select(self, outputs: Places, inputs: Places, frequencies: Places) -> LinearEstimate:
-        """Follow a selection of the response."""
+    def select(self, outputs: Places, inputs: Places, frequencies: Places) -> LinearEstimate | None:
+        """Follow a selection of the response; None where the weights need the outputs left out."""
         rows, columns, points = self.places
+        if not self.weights.tells_parts and len(set(outputs.tolist())) < len(rows):
+            return None
         return replace(
             self,
             output_records=tuple(record[outputs] for record in self.output_records),
@@ -234,7 +239,12 @@ class LinearEstimate:
         return self.weights.functional(*self.places)
 
     def pilots_of_outputs(self) -> list[Pilot] | None:
-        """Pilot models of the response's outputs; None where records hold too few bins."""
+        """Pilot models of the response's outputs; None where they cannot be had.
+
+        Records with too few bins, or weights by a noise model, whose errors pilots do not know.
+        """
+        if not self.weights.tells_parts:
+            return None
         found = [self.pilots.found[row] for row in self.places[0]]
         known = [each for each in found if each is not None]
         return known if len(known) == len(found) else None

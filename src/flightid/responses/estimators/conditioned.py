@@ -125,6 +125,20 @@ def random_error(
     return np.asarray(error)
 
 
+def coherence_of(
+    random_error: NDArray[np.float64], n_independent: float | NDArray[np.float64], shifts: int
+) -> NDArray[np.float64]:
+    """Coherence that gives a random error by so many windows: `random_error` solved for γ².
+
+    Example
+    -------
+    >>> coherence_of(random_error(np.array([0.6, 0.8]), 5, 2), 5, 2).round(5)
+    array([0.6, 0.8])
+    """
+    relative = np.asarray(random_error) / overlap_factor(shifts)
+    return np.asarray(1.0 / (1.0 + 2.0 * n_independent * relative**2))
+
+
 def condition(
     spectra: Spectra, n_inputs: int, omega: NDArray[np.float64], names: tuple[str, ...]
 ) -> ConditionalSpectra:
