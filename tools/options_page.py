@@ -33,6 +33,7 @@ from flightid.study.fit_settings import VerifySettings
 from flightid.study.proposal.options import ProposalOptions
 from flightid.study.response_settings import ResponseSettings
 from flightid.validation.verification.options import VerifyOptions
+from flightid.vehicles.gain_flight import GainFlightOptions
 from flightid.vehicles.pilot_inputs import StickOptions
 
 PAGE = Path(__file__).parent.parent / "docs" / "options.md"
@@ -68,6 +69,7 @@ def sections() -> dict[str, type[Options]]:
         "tune": TuneOptions,
         "tune_controller": ControllerOptions,
         "TuningRequirements": TuningRequirements,
+        "[fly] of a study, fly_gains": GainFlightOptions,
         "excitation.plan (design)": DesignOptions,
         "RateAxis: the guess of a design": RateAxis,
         "Limits of a design": Limits,

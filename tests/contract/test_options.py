@@ -58,6 +58,7 @@ OF_COMMANDS = {
     "reduce": "drop what the data do not determine",
     "residual_tests": "test residuals",
     "scan": "try several orders",
+    "parameters": "file of an autopilot's parameters to fly",
     "scenario": "flight to simulate",
     "seed": "seed of random numbers",
     "tune": "gains at the end",

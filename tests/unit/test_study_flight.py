@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +19,8 @@ from flightid.vehicles import Autopilot, QuadrotorParameters, fly
 
 
 def _plan(text: str) -> FlightPlan:
-    return read_flight(TableReader(tomllib.loads('simulate = "quadrotor"\n' + text), "[flight]"))
+    plain = tomllib.loads('simulate = "quadrotor"\n' + text)
+    return read_flight(TableReader(plain, "[flight]"), Path())
 
 
 def test_defaults_are_the_simulators() -> None:

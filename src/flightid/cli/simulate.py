@@ -40,18 +40,29 @@ def command() -> None:
     help="Sweep settings: flightid's, or those of the published rig study.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Seed of noise.")
+@click.option(
+    "--parameters",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    help="Gains to fly: a file of `flightid tune --write`.",
+)
 @json_option
-def quadrotor(output: Path, scenario: str, seed: int, as_json: bool) -> None:
+def quadrotor(
+    output: Path, scenario: str, seed: int, parameters: Path | None, as_json: bool
+) -> None:
     """Sweep a 450 mm quadrotor on a gyroscopic rig; print the truth an identification should find.
 
     The log is ArduCopter's: mixer sweeps of roll, pitch and yaw, then doublets for verification.
     """
+    from flightid.control.autopilots import read_parameters
     from flightid.progress import progress
+    from flightid.vehicles import Autopilot
     from flightid.vehicles.ardupilot_log import write_ardupilot_log
     from flightid.vehicles.scenario import fly_scenario
 
+    gains = {} if parameters is None else read_parameters(parameters)
+    autopilot = vars(Autopilot().with_parameters(gains))
     with progress(2, "Flying") as advance:
-        flight = fly_scenario(scenario, seed=seed)
+        flight = fly_scenario(scenario, seed=seed, autopilot=autopilot)
         advance()
         write_ardupilot_log(flight, output)
         advance()

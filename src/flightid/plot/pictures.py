@@ -37,6 +37,7 @@ from flightid.plot.tuning import time_responses
 from flightid.plot.verification import comparison, mismatch_envelopes, prediction
 from flightid.record import Record
 from flightid.validation import ResidualSpectra, ResidualTests, Verification
+from flightid.vehicles import GainFlight
 
 
 def fit_picture(fit: Fit, *, name: str | None = None, record: int = 0) -> go.Figure:
@@ -128,6 +129,12 @@ def _tuning(result: Tuning, *, axis: str | None = None) -> go.Figure:
     return time_responses(result.designs[0] if axis is None else result[axis])
 
 
+def _gain_flight(result: GainFlight, *, name: str | None = None) -> go.Figure:
+    if not result.loops:
+        raise DataError("the flight shows no loop to draw", found=", ".join(result.lost.values()))
+    return loop_bode(result.loops[name or next(iter(result.loops))])
+
+
 def _handling_qualities(result: HandlingQualities) -> go.Figure:
     on_charts = [rating for rating in result.ratings if len(rating.chart.axes) == 2]
     if not on_charts:
@@ -153,6 +160,7 @@ PICTURES: Mapping[str, Callable[..., Any]] = {
     "Excitation": excitation_history,
     "Fit": fit_picture,
     "FrequencyResponse": response_figure,
+    "GainFlight": _gain_flight,
     "HandlingQualities": _handling_qualities,
     "ImpulseResponse": impulse_response,
     "Interconnection": diagram,

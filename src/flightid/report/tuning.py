@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from flightid.plot.margins import loop_bode
 from flightid.plot.tuning import gain_map, nichols, time_responses
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Lights, Section, TableBlock
@@ -13,6 +14,7 @@ from flightid.report.figures import figure_block
 if TYPE_CHECKING:
     from flightid.control.tuning.pid_design import PidDesign
     from flightid.control.tuning.result import Tuning
+    from flightid.vehicles import GainFlight
 
 
 def design_blocks(design: PidDesign) -> tuple[Block, ...]:
@@ -56,6 +58,27 @@ def tuning_section(tuning: Tuning, title: str = "Gains") -> Section:
         for design in tuning.designs
     )
     return Section(title, tuple(blocks), parts)
+
+
+def gain_flight_blocks(flown: GainFlight) -> tuple[Block, ...]:
+    """Blocks of a section about gains that were flown again.
+
+    Parameters
+    ----------
+    flown : GainFlight
+
+    Returns
+    -------
+    tuple of Block
+    """
+    pictures = (
+        figure_block(
+            loop_bode(found),
+            f"{name}: the broken loop as flown with the new gains, with its 95 % band.",
+        )
+        for name, found in flown.loops.items()
+    )
+    return (*result_blocks(flown), *pictures)
 
 
 def _pictures(design: PidDesign) -> Iterator[Block]:

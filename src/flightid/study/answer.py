@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from flightid.control.tuning.result import Tuning
     from flightid.study.identified import ModelResults
     from flightid.study.results import StudyResults
+    from flightid.vehicles import GainFlight
 
 MARGINS = {"phase margin": "deg", "gain margin": "dB"}
 
@@ -51,6 +52,8 @@ def answer_of(study: StudyResults) -> StudyAnswer:
     if tuning is None:
         return StudyAnswer(tuple(findings))
     findings.append(_gains(tuning))
+    if study.gain_flight is not None:
+        findings.append(_flown(study.gain_flight))
     made = tuning.sound or tuple(design for design in tuning.designs if design.exists)
     return StudyAnswer(tuple(findings), (_gain_table(made), _margin_table(made)) if made else ())
 
@@ -157,6 +160,20 @@ def _gains(tuning: Tuning) -> Finding:
     if left:
         message += f"; none to fly, they stay as flown: {left}"
     return Finding("gains", worst(findings) if findings else Light.GREEN, message, way)
+
+
+def _flown(flight: GainFlight) -> Finding:
+    """Whether the simulated vehicle keeps what the gains promise."""
+    first = next((each for each in flight.findings if each.light is Light.RED), None)
+    said = f"{flight.meeting} of {len(flight.judged)} pairs of 95 % intervals meet"
+    least = [
+        each.measured.value
+        for each in flight.margins
+        if each.name == "phase margin" and each.measured.value is not None
+    ]
+    said += f", least phase margin {min(least):.0f}°" if least else ""
+    told = f"flown again in the simulated vehicle: {first.message if first else said}"
+    return Finding("flown-again", worst(flight.findings), told, first.action if first else "")
 
 
 def _gain_table(designs: tuple[PidDesign, ...]) -> Table:

@@ -19,7 +19,7 @@ from flightid.report.closed_loop import closed_loop_section
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.report.handling_qualities import handling_qualities_blocks
-from flightid.report.tuning import tuning_section
+from flightid.report.tuning import gain_flight_blocks, tuning_section
 from flightid.study.answer import answer_of, in_short
 from flightid.study.estimate_tables import model_table
 from flightid.study.faults import section_of, whole_section
@@ -93,6 +93,8 @@ def _uses(study: StudyResults) -> Iterator[Section]:
         yield Section("Files", (TableBlock(table), *exported))
     if study.tuning is not None:
         yield whole_section("Gains", tuning_section, study.tuning)
+    if study.gain_flight is not None:
+        yield section_of("Gains flown again", gain_flight_blocks, study.gain_flight)
 
 
 def _qualities(study: StudyResults) -> Iterator[Section]:
@@ -282,6 +284,8 @@ def _options(study: StudyResults) -> dict[str, Cell]:
             told = {name: value for name, value in told.items() if name not in unknown}
             told |= _told("controller", own)
         options |= told
+    if settings.fly is not None:
+        options |= _told("flight with new gains", settings.fly)
     if settings.reduce is not None:
         options |= {
             name.replace("_", " "): value for name, value in vars(settings.reduce.limits).items()

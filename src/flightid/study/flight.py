@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, dataclass, fields
-from typing import Any, Literal, TypeVar, get_args, get_origin, get_type_hints
+from pathlib import Path
+from typing import Any, Literal, TypeVar, cast, get_args, get_origin, get_type_hints
 
-from flightid.study.reading import TableReader
+from flightid.control.autopilots import read_parameters
+from flightid.control.tuning.result import Tuning
+from flightid.errors import FlightidError, StudyError
+from flightid.study.reading import TableReader, read_each
 from flightid.vehicles import (
     Autopilot,
     Flight,
+    GainFlight,
+    GainFlightOptions,
     PilotDoublet,
     QuadrotorParameters,
     Sensors,
     SidActivation,
     Turbulence,
     fly,
+    fly_gains,
 )
 
 SIMULATORS = ("quadrotor",)
@@ -63,7 +70,37 @@ class FlightPlan:
         )
 
 
-def read_flight(reader: TableReader) -> FlightPlan:
+def fly_again(tuning: Tuning | None, plan: FlightPlan, options: GainFlightOptions) -> GainFlight:
+    """The gains that were tuned, in the vehicle and the air of the first flight.
+
+    Raises
+    ------
+    DataError
+        No axis has sound gains.
+    """
+    return fly_gains(
+        tuning or Tuning((), ()),
+        vehicle=plan.vehicle,
+        autopilot=plan.autopilot,
+        sensors=plan.sensors,
+        turbulence=plan.turbulence,
+        options=options,
+    )
+
+
+def read_fly(reader: TableReader) -> GainFlightOptions:
+    """Check the table ``[fly]``.
+
+    Raises
+    ------
+    StudyError
+        A key is unknown or a value does not fit.
+    """
+    (made,) = read_each((GainFlightOptions,), reader)
+    return cast("GainFlightOptions", made)
+
+
+def read_flight(reader: TableReader, folder: Path) -> FlightPlan:
     """Check the table ``[flight]``.
 
     Raises
@@ -72,11 +109,15 @@ def read_flight(reader: TableReader) -> FlightPlan:
         A key is unknown or a value does not fit.
     """
     reader.choice("simulate", SIMULATORS)
+    parameters = reader.maybe(reader.text, "parameters")
+    autopilot = _part(Autopilot, reader.values("autopilot"), "[flight.autopilot]")
+    if parameters is not None:
+        autopilot = _with_parameters(autopilot, folder / parameters)
     plan = FlightPlan(
         tuple(_part(SidActivation, item, where) for where, item in reader.rows("sweep")),
         tuple(_part(PilotDoublet, item, where) for where, item in reader.rows("doublet")),
         _part(QuadrotorParameters, reader.values("vehicle"), "[flight.vehicle]"),
-        _part(Autopilot, reader.values("autopilot"), "[flight.autopilot]"),
+        autopilot,
         _part(Sensors, reader.values("sensors"), "[flight.sensors]"),
         _part(Turbulence, reader.values("turbulence"), "[flight.turbulence]"),
         reader.integer("log_every", 1, minimum=1),
@@ -84,6 +125,18 @@ def read_flight(reader: TableReader) -> FlightPlan:
     )
     reader.finish()
     return plan
+
+
+def _with_parameters(autopilot: Autopilot, path: Path) -> Autopilot:
+    """The autopilot with the gains of a parameter file."""
+    try:
+        return autopilot.with_parameters(read_parameters(path))
+    except (FlightidError, OSError) as error:
+        raise StudyError(
+            "study file, [flight] parameters: the gains cannot be flown",
+            found=f"{path.name}: {error}",
+            needed="a parameter file as `flightid tune --write` makes it",
+        ) from error
 
 
 def _part(kind: type[Part], values: Mapping[str, Any], where: str) -> Part:

@@ -18,6 +18,7 @@ from flightid.study.output import SCHEMA
 from flightid.study.settings import Settings
 from flightid.study.truth import Truth
 from flightid.study.uses import Uses
+from flightid.vehicles import GainFlight
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +55,8 @@ class StudyResults(
         SHA-256 of what was read, by file name.
     tuning : Tuning or None
         Gains, where the study asks for them.
+    gain_flight : GainFlight or None
+        These gains flown again in the simulated vehicle.
     qualities : mapping of str to HandlingQualities
         By model, where the study asks for them.
     uses : Uses
@@ -74,6 +77,7 @@ class StudyResults(
     truth: Truth | None = None
     files: Mapping[str, str] = field(default_factory=dict)
     tuning: Tuning | None = None
+    gain_flight: GainFlight | None = None
     qualities: Mapping[str, HandlingQualities] = field(default_factory=dict)
     uses: Uses = field(default_factory=Uses)
     faults: tuple[Finding, ...] = ()

@@ -16,18 +16,20 @@ from flightid.report.html import to_html
 from flightid.report.text import to_text
 from flightid.study.error_list import ErrorList
 from flightid.study.faults import Faults
+from flightid.study.flight import fly_again
 from flightid.study.output import RESULTS, require_replaceable, whole_folder
 from flightid.study.pipeline import identify_models
 from flightid.study.qualities import rate_models, require_pairs
 from flightid.study.record_files import require_files
 from flightid.study.settings import read_settings
-from flightid.study.stage_runner import StageRunner
+from flightid.study.stage_runner import StageResult, StageRunner
 from flightid.study.study import Study
 from flightid.study.taking import take
 from flightid.study.task import load_task
 from flightid.study.tuning import TuneSettings, tune_models
 from flightid.study.uses import use_models
 from flightid.surface import as_key, speaking
+from flightid.vehicles import GainFlight
 
 
 def _tuning(of_study: TuneSettings | None, asked: bool | Mapping[str, Any]) -> TuneSettings | None:
@@ -116,9 +118,15 @@ def _run(
         wanted = _tuning(settings.tune, tune)
         files = {item.name: sha256_of_file(item) for item in (source, *taken.files)}
         faults = Faults()
-        tuning = None
+        tuned = None
         if wanted is not None:
-            tuning = faults.spare("tuning", _tuned, None, runner, staged, taken.log, wanted)
+            inputs = (runner, staged, taken.log, wanted)
+            tuned = faults.spare("tuning", _tuned, None, *inputs)
+        tuning = None if tuned is None else tuned.value
+        flown = None
+        if settings.flight is not None and settings.fly is not None and tuning is not None:
+            asked = (tuned, settings.flight, settings.fly)
+            flown = faults.spare("the flight with new gains", _flown, None, runner, *asked)
         if tuning is not None and tuning.plain and tuning.sound:
             faults.spare("the controller file", _write_gains, None, tuning, folder)
         uses = use_models(staged, settings.uses, folder, faults, runner)
@@ -134,6 +142,7 @@ def _run(
             taken.truth,
             files,
             tuning,
+            flown,
             qualities,
             uses,
             tuple(faults.findings),
@@ -146,9 +155,14 @@ def _run(
     return study
 
 
-def _tuned(runner: StageRunner, *inputs: object) -> Tuning | None:
+def _tuned(runner: StageRunner, *inputs: object) -> StageResult[Tuning | None]:
     """Gains, as a stage."""
-    return runner.stage("tuning", tune_models, *inputs).value
+    return runner.stage("tuning", tune_models, *inputs)
+
+
+def _flown(runner: StageRunner, *inputs: object) -> GainFlight:
+    """The flight with new gains, as a stage."""
+    return runner.stage("the flight with new gains", fly_again, *inputs).value
 
 
 def _write_gains(tuning: Tuning, folder: Path) -> None:

@@ -18,7 +18,7 @@ from flightid.record import InputShape
 from flightid.study.conditioning import Conditioning, read_conditioning, require_records
 from flightid.study.error_list import ErrorList
 from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
-from flightid.study.flight import FlightPlan, read_flight
+from flightid.study.flight import FlightPlan, read_flight, read_fly
 from flightid.study.model_settings import ModelSettings, read_model
 from flightid.study.qualities_settings import QualitiesSettings, read_qualities
 from flightid.study.reading import TOP, TableReader
@@ -28,6 +28,7 @@ from flightid.study.references import require_conditions, require_references
 from flightid.study.response_settings import ResponseSettings, read_response
 from flightid.study.tuning import TuneSettings, read_tune
 from flightid.study.uses_settings import UsesSettings, read_uses
+from flightid.vehicles import GainFlightOptions
 
 Value = TypeVar("Value")
 
@@ -97,6 +98,8 @@ class Settings:
         How the autopilot's gains are tuned; None: not at all.
     uses : UsesSettings
         What is done with the fitted models.
+    fly : GainFlightOptions or None
+        How tuned gains are flown again in the simulated vehicle; None: not at all.
     qualities : QualitiesSettings or None
         How handling qualities are read off the fits; None: not at all.
     """
@@ -121,6 +124,7 @@ class Settings:
     tune: TuneSettings | None = None
     qualities: QualitiesSettings | None = None
     uses: UsesSettings = field(default_factory=UsesSettings)
+    fly: GainFlightOptions | None = None
 
     def segment(self, name: str) -> Segment:
         """Segment of this name."""
@@ -160,6 +164,7 @@ def read_settings(path: Path) -> Settings:
     check = table("verify", read_verify) or read_verify(nothing)
     reducing = table("reduce", read_reduce)
     tuning = table("tune", read_tune)
+    flown_again = table("fly", read_fly)
     qualities = table("handling_qualities", read_qualities, folder)
     model = partial(read_model, response=response, fit=fit, check=check, reduced="reduce" in root)
     # What a model lacks hangs on the tables of all: without those, nothing can be said of it.
@@ -173,6 +178,13 @@ def read_settings(path: Path) -> Settings:
             StudyError(
                 "study file: [[segment]] cuts a log, and there is none",
                 needed="span_s in a [[record]]",
+            )
+        )
+    if flown_again is not None and not ("flight" in root and "tune" in root):
+        collected.errors.append(
+            StudyError(
+                "study file: [fly] flies tuned gains in the vehicle that was simulated",
+                needed="[flight] and [tune] beside it",
             )
         )
     # What refers to a part that could not be read is no error of its own.
@@ -201,6 +213,7 @@ def read_settings(path: Path) -> Settings:
         tuning,
         qualities,
         uses,
+        flown_again,
     )
 
 
@@ -272,7 +285,7 @@ def _source(root: TableReader, folder: Path) -> tuple[Path | None, FlightPlan | 
         path = folder / log.text("path")
         log.finish()
         return path, None
-    return None, read_flight(flight) if "flight" in root else None
+    return None, read_flight(flight, folder) if "flight" in root else None
 
 
 def _segment(reader: TableReader) -> Segment:

@@ -3,6 +3,8 @@
 from flightid.vehicles.ardupilot_log import write_ardupilot_log
 from flightid.vehicles.autopilot import Autopilot, PilotDoublet, RateGains, SidActivation
 from flightid.vehicles.flight import Flight, fly
+from flightid.vehicles.gain_flight import GainFlightOptions, fly_gains
+from flightid.vehicles.gain_flight_result import FlownMargin, GainFlight
 from flightid.vehicles.quadrotor import QuadrotorParameters, Sensors, Turbulence
 from flightid.vehicles.scenario import fly_scenario
 from flightid.vehicles.truth import RateTruth, rate_truth
@@ -23,6 +25,9 @@ __all__ = [
     "Encoders",
     "Flight",
     "FlightConditions",
+    "FlownMargin",
+    "GainFlight",
+    "GainFlightOptions",
     "PilotDoublet",
     "QuadrotorParameters",
     "RateGains",
@@ -34,6 +39,7 @@ __all__ = [
     "TwinRotorParameters",
     "fly",
     "fly_closed_loop",
+    "fly_gains",
     "fly_scenario",
     "rate_truth",
     "write_ardupilot_log",

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, field
+import re
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
-from flightid.errors import OptionError
+from flightid.errors import OptionError, UnknownNameError
 from flightid.vehicles.quadrotor import Axes
 
 AXIS_LETTERS = ("RLL", "PIT", "YAW")
@@ -138,6 +140,39 @@ class Autopilot:
             centidegrees = math.degrees(self.acceleration_rad_s2[index]) * 100
             named[f"ATC_ACCEL_{letters[0]}_MAX"] = round(centidegrees)
         return named
+
+    def with_parameters(self, values: Mapping[str, float]) -> Autopilot:
+        """With other rate gains, angle gains or gyro filter, by ArduPilot's names.
+
+        Raises
+        ------
+        UnknownNameError
+            A parameter that the simulated controller does not take from a file.
+        """
+        rate, angle = list(self.rate), list(self.angle_p)
+        gyro_filter_hz = self.gyro_filter_hz
+        for name, value in values.items():
+            match = re.fullmatch(r"ATC_(RAT|ANG)_(RLL|PIT|YAW)_(\w+)", name)
+            kind, letters, key = match.groups() if match else ("", AXIS_LETTERS[0], "")
+            place = AXIS_LETTERS.index(letters)
+            if kind == "RAT" and key.lower() in asdict(rate[place]):
+                rate[place] = replace(rate[place], **{key.lower(): value})
+            elif kind == "ANG" and key == "P":
+                angle[place] = value
+            elif name == "INS_GYRO_FILTER":
+                gyro_filter_hz = value
+            else:
+                raise UnknownNameError(
+                    "the simulated autopilot does not take this parameter",
+                    found=name,
+                    needed="ATC_RAT_xxx_…, ATC_ANG_xxx_P or INS_GYRO_FILTER",
+                )
+        return replace(
+            self,
+            rate=(rate[0], rate[1], rate[2]),
+            angle_p=(angle[0], angle[1], angle[2]),
+            gyro_filter_hz=gyro_filter_hz,
+        )
 
     def to_native(self) -> dict[str, Any]:
         """Fields by name, as the native half reads them."""
