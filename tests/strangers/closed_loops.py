@@ -80,11 +80,20 @@ def fly(seed: int, *, feedback: float, estimator: str) -> Trial:
     return fit_trial(fit, TRUTH)
 
 
+def fly_jointly(seed: int, *, feedback: float, estimator: str) -> Trial:
+    """The response of both sweeps beside two more of them as records."""
+    flown, beside = (record(2 * seed + k, feedback=feedback) for k in range(2))
+
+    def fit() -> fid.Fit:
+        response = fid.estimate_response(flown, estimator=estimator, band_rad_s=(0.5, 10.0))
+        return fid.identify(model(), [response, *beside])
+
+    return fit_trial(fit, TRUTH)
+
+
 CASES = tuple(
-    Case(
-        f"piloted sweeps, {name}, {estimator}",
-        partial(fly, feedback=feedback, estimator=estimator),
-    )
+    Case(f"{kind}, {name}, {estimator}", partial(way, feedback=feedback, estimator=estimator))
+    for kind, way in (("piloted sweeps", fly), ("piloted sweeps joint", fly_jointly))
     for name, feedback in (("hands off", 0.0), ("heave held", PILOT))
     for estimator in ("composite", "prewhitened")
 )

@@ -7,7 +7,10 @@ import pytest
 from scipy.signal import lfilter
 
 import flightid as fid
+from flightid.uncertainty.blocks import JointResiduals, RecordBlock
+from flightid.uncertainty.covariance import residual_covariance
 from flightid.uncertainty.fed_noise import fed_noise_spectrum
+from tests.closeness import assert_close
 from tests.strangers import closed_loops
 
 POLE, GAIN, FED = 0.9, 0.5, -0.3
@@ -53,3 +56,28 @@ def test_a_fit_names_what_the_pilot_bends(feedback: float) -> None:
     assert len(named) == (feedback > 0.0)
     assert all("Zw" in message and "Lp" not in message for message in named)
     assert (fit.covariance is None) is (feedback > 0.0)
+
+
+def test_a_joint_fit_names_what_the_pilot_bends_in_its_response() -> None:
+    swept = closed_loops.record(1, feedback=closed_loops.PILOT)
+    response = fid.estimate_response(swept, band_rad_s=(0.5, 10.0), n_omega=40)
+    beside = closed_loops.record(7, feedback=closed_loops.PILOT, duration_s=10.0)[0]
+    fit = fid.identify(
+        closed_loops.model(),
+        [response, beside],
+        band_rad_s=(0.5, 10.0),
+        minimum_coherence=None,
+        correct_bias=False,
+    )
+    (named,) = [each.message for each in fit.findings if each.code == "loop-bias"]
+    assert "Zcol" in named
+    assert fit.covariance is None
+
+
+def test_bias_beside_records_moves_estimates_as_least_squares_do() -> None:
+    """One parameter: 3 points that it moves by 1 of them, the record by information 6."""
+    block = RecordBlock.of(np.full((1, 6, 1), 1.0), np.zeros((1, 6, 0)), np.zeros((1, 6)))
+    other = JointResiduals(np.ones((3, 1)), np.ones((3, 1)), bias=np.full(3, 0.3))
+    known = residual_covariance([block], other)
+    assert other.bias is not None
+    assert_close(known.white @ (other.slopes.T @ other.bias), 0.1, rtol=1e-9, why="0.9 of 9")

@@ -60,11 +60,14 @@ class JointResiduals:
         The same with data that follow the parameters, as corrected points do.
     measured : bool
         Whether the residuals are of data; else they bring curvature alone.
+    bias : ndarray, shape (n_residuals,), optional
+        Of the residuals.
     """
 
     slopes: Array
     total: Array
     measured: bool = True
+    bias: Array | None = None
 
     def of(self, parameters: NDArray[np.bool_]) -> JointResiduals:
         """Columns of some parameters."""

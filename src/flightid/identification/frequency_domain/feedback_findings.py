@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification.frequency_domain.error_model import ErrorModel
-from flightid.identification.frequency_domain.estimates import Statistics
 from flightid.responses import FrequencyResponse
 
 Array = NDArray[np.float64]
+LOOP_BIAS = "loop-bias"
 LARGE, RULING = 0.5, 2.0
 """Bias over the standard error without it from which a parameter is named, and from which red."""
 
@@ -30,21 +30,29 @@ def points_of(bias: NDArray[np.complex128] | None, errors: ErrorModel) -> Array 
     return np.concatenate(parts)
 
 
-def judge_feedback(found: Statistics) -> list[Finding]:
-    """Name the parameters that noise bends by way of a closed loop."""
-    if found.bias is None or found.covariance is None:
+def judge_feedback(
+    names: Sequence[str], covariance: Array | None, bias: Array | None
+) -> list[Finding]:
+    """Name the parameters that noise bends by way of a closed loop.
+
+    Parameters
+    ----------
+    names : sequence of str
+    covariance : ndarray, shape (n, n), or None
+        Of the estimates, the square of their bias included.
+    bias : ndarray, shape (n,), or None
+    """
+    if bias is None or covariance is None:
         return []
-    variance = np.diag(found.covariance) - found.bias**2
-    shares = np.abs(found.bias) / np.sqrt(np.maximum(variance, np.finfo(float).tiny))
+    variance = np.diag(covariance) - bias**2
+    shares = np.abs(bias) / np.sqrt(np.maximum(variance, np.finfo(float).tiny))
     order = [int(k) for k in np.argsort(-shares) if shares[k] >= LARGE]
     if not order:
         return []
-    named = ", ".join(
-        f"{found.names[k]} {found.bias[k]:+.3g} ({shares[k]:.2g} standard errors)" for k in order
-    )
+    named = ", ".join(f"{names[k]} {bias[k]:+.3g} ({shares[k]:.2g} standard errors)" for k in order)
     return [
         Finding(
-            "loop-bias",
+            LOOP_BIAS,
             Light.RED if shares[order[0]] >= RULING else Light.AMBER,
             f"the closed loop brings output noise to the inputs, which moves {named}; "
             "so there are no intervals",
@@ -54,17 +62,18 @@ def judge_feedback(found: Statistics) -> list[Finding]:
     ]
 
 
-def why_bent(data: FrequencyResponse, found: Statistics, bent: Sequence[Finding]) -> str:
+def why_bent(data: FrequencyResponse, bias: Array | None, bent: Sequence[Finding]) -> str:
     """Why a direct estimate of a closed loop has no intervals; empty where it has.
 
     Parameters
     ----------
     data : FrequencyResponse
-    found : Statistics
+    bias : ndarray or None
+        Of the estimates; None where it is not known.
     bent : sequence of Finding
         What `judge_feedback` said of it: a bias that is small beside the bars stays in them.
     """
-    if not (data.loop and data.loop.is_closed) or (found.bias is not None and not bent):
+    if not (data.loop and data.loop.is_closed) or (bias is not None and not bent):
         return ""
     return (
         "a loop was closed and no instrument is given: output noise comes back to the inputs and "

@@ -125,15 +125,15 @@ def _fit_selected(
         compare=compare,
         bias=points_of(feedback_bias(data), errors),
     )
-    bent = judge_feedback(found)
+    bent = judge_feedback(found.names, found.covariance, found.bias)
     setup += bent
     responses = compare_responses(fitted, selected)
     curves = [response_at(fitted, each.omega_rad_s, k) for k, each in enumerate(selected)]
     noise = noise_costs(selected, curves, by_noise)
     fit = _assemble(fitted, options, data, groups, responses, found, setup, noise)
     fit = replace(fit, provenance={**fit.provenance, "estimator_bias": correction})
-    reason = "" if withheld else why_misfit(fit.average_cost, noise) or why_bent(data, found, bent)
-    return without_intervals(fit, reason) if reason else fit
+    reason = why_misfit(fit.average_cost, noise) or why_bent(data, found.bias, bent)
+    return without_intervals(fit, reason) if reason and not withheld else fit
 
 
 def select_by(

@@ -27,6 +27,11 @@ from flightid.identification.frequency_domain.bias_objective import Objective
 from flightid.identification.frequency_domain.bias_rounds import iterate
 from flightid.identification.frequency_domain.error_model import ErrorModel, error_model, whitening
 from flightid.identification.frequency_domain.estimator_bias import Correction
+from flightid.identification.frequency_domain.feedback_findings import (
+    LOOP_BIAS,
+    points_of,
+    why_bent,
+)
 from flightid.identification.frequency_domain.fit import (
     check_channels,
     check_start,
@@ -52,6 +57,7 @@ from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
+from flightid.responses.feedback import feedback_bias
 from flightid.uncertainty.blocks import JointResiduals
 
 Array = NDArray[np.float64]
@@ -91,6 +97,16 @@ class ChosenPoints:
         ]
         return JointResiduals(slopes, slopes - np.vstack(moved))
 
+    def whitened(self, bias: NDArray[np.complex128] | None) -> Array | None:
+        """Bias of the response as residuals of unit variance; None where it is not known."""
+        known = points_of(bias, self.errors)
+        if known is None:
+            return None
+        matrices = [matrix for _, _, matrix in whitening(self.errors)]
+        ends = np.cumsum([matrix.shape[1] for matrix in matrices])[:-1]
+        parts = zip(matrices, np.split(known, ends), strict=True)
+        return np.concatenate([matrix @ part for matrix, part in parts])
+
     def _slopes(self, fitted: GreyBoxModel) -> Array:
         values, free = fitted.parameters.independent_values(), fitted.parameters.free_indices
         by_response = []
@@ -127,14 +143,17 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
         made = _without_bias(found, prepared, response, points, options)
         setup += made.outcome.findings()
     beside = made.points.beside(made.found.fitted, made.following)
+    beside = replace(beside, bias=made.points.whitened(feedback_bias(response)))
     fit = conclude(made.found, options, setup, beside)
+    bent = [each for each in fit.findings if each.code == LOOP_BIAS]
+    bent_by = why_bent(response, beside.bias, bent)
     noise = noise_costs(
         points.selected,
         [response_at(fit.model, each.omega_rad_s, k) for k, each in enumerate(points.selected)],
         points.errors,
     )
     fit = _with_responses(fit, response, made.points, noise, made.outcome.provenance(options.hold))
-    reason = made.outcome.withheld or why_misfit(fit.average_cost, noise)
+    reason = made.outcome.withheld or why_misfit(fit.average_cost, noise) or bent_by
     return without_intervals(fit, reason) if reason else fit
 
 

@@ -22,6 +22,7 @@ from flightid.identification.fit_findings import (
     judge_search,
 )
 from flightid.identification.fitted_record import FittedRecord
+from flightid.identification.frequency_domain.feedback_findings import judge_feedback
 from flightid.identification.multistart import End, cluster, collect, draw_starts, local_minima
 from flightid.identification.output_error.distinct import require_distinct, run_with_slopes
 from flightid.identification.output_error.equation_records import (
@@ -148,10 +149,7 @@ def conclude(
     best = groups[0][0]
     fitted = _with_estimates(model, best)
     own = [start.filled(end) for start, end in zip(prepared.own, best.own, strict=True)]
-    runs = [
-        run_with_slopes(fitted, prepared, runs_of, place, numbers)
-        for place, numbers in enumerate(own)
-    ]
+    runs = [run_with_slopes(fitted, prepared, runs_of, k, numbers) for k, numbers in enumerate(own)]
     if runs_of is not None:
         own = [runs_of.start(fitted, prepared, k, numbers) for k, numbers in enumerate(own)]
         setup = [*setup, *judge_runs(runs_of)]
@@ -159,6 +157,7 @@ def conclude(
     known = record_statistics(
         fitted, prepared, own, best.determined, runs, best.noise, options.limit, beside, starts
     )
+    setup = [*setup, *judge_feedback(known.names, known.covariance, known.bias)]
     noise = (
         []
         if not judged() or (runs_of is not None and runs_of.is_segmented)

@@ -50,6 +50,8 @@ class RecordStatistics:
         Smallest and largest ratio of a standard error to that for white residuals.
     agreement : Agreement
         Of records and of their halves.
+    bias : ndarray, shape (n,), or None
+        Of the estimates, by what was fitted beside the records; the covariance holds its square.
     """
 
     parameters: Mapping[str, Estimate]
@@ -59,6 +61,7 @@ class RecordStatistics:
     own: list[Own]
     colour: tuple[float, float]
     agreement: Agreement
+    bias: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +123,10 @@ def record_statistics(
     require_identifiable(names, triangle)
     known = residual_covariance(blocks, other)
     covariance = known.covariance + _of_starts(starts, blocks, whitener, known.white)
+    moved = None
+    if other is not None and other.bias is not None:
+        moved = np.asarray(known.white @ (other.slopes.T @ other.bias))
+        covariance = covariance + np.outer(moved, moved)
     parameters = fitted_parameters(
         fitted, names, covariance, triangle / np.sqrt(2.0), known.freedom
     )
@@ -145,6 +152,7 @@ def record_statistics(
         ],
         known.colour,
         known.agreement,
+        moved,
     )
 
 
