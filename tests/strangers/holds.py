@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Literal
 
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
@@ -23,6 +24,10 @@ UNITS = {"Za": "1/s", "Ma": "1/s^2", "Mq": "1/s", "Md": "1/s^2", "tau": "s"}
 NOISE = 0.02
 GUST = 0.15
 Array = noises.Array
+Hold = Literal["zero", "first", "band_limited"]
+TRUE_HOLDS: dict[str, Hold] = {
+    "steps": "zero", "held": "zero", "straight": "first", "smooth": "band_limited",
+}  # fmt: skip
 Curve = Callable[[Array], Array]
 
 
@@ -72,8 +77,8 @@ def curve_of(random: np.random.Generator, n: int, shape: str) -> Curve:
     return lambda at: samples[np.clip(np.floor(at + 1e-6).astype(int), 0, n - 1)]
 
 
-def flight(seed: int, shape: str, *, told: bool, gust: bool = False) -> fid.Record:
-    """One flight of a minute at 20 Hz."""
+def flight(seed: int, shape: str, *, told: bool | Hold, gust: bool = False) -> fid.Record:
+    """One flight of a minute at 20 Hz; told the truth, nothing, or a hold that may be wrong."""
     random = np.random.default_rng(seed)
     n = round(DURATION_S / STEP_S)
     curve = curve_of(random, n, shape)
@@ -89,14 +94,14 @@ def flight(seed: int, shape: str, *, told: bool, gust: bool = False) -> fid.Reco
     clean = _advanced(phi, gamma[:, 0], push)[:, ::FINE]
     noise = NOISE * clean.std(axis=1)[:, None] * random.standard_normal(clean.shape)
     alpha, q = clean + noise
-    hold = {"smooth": "band_limited", "straight": "first"}.get(shape, "zero")
+    hold = TRUE_HOLDS[shape] if told is True else told or None
     return fid.Record.from_arrays(
         np.arange(n) * STEP_S,
         inputs={"de": curve(np.arange(float(n)))},
         outputs={"alpha": alpha, "q": q},
         units={"de": "rad", "alpha": "rad", "q": "rad/s"},
         name=f"flight {seed}",
-        hold=hold if told else None,
+        hold=hold,
         loop="open",
     )
 
@@ -109,7 +114,7 @@ def _advanced(phi: Array, gamma: Array, push: Array) -> Array:
     return np.array([lfilter([0.0, gamma[k], rest[k]], below, push) for k in range(2)])
 
 
-def fly(seed: int, *, shape: str, told: bool, method: str) -> Trial:
+def fly(seed: int, *, shape: str, told: bool | Hold, method: str) -> Trial:
     """One flight, fitted as the documentation says, all options at their defaults."""
     record = flight(seed, shape, told=told, gust=method == "filter_error")
 
@@ -128,14 +133,22 @@ METHODS = (
     "output_error", "filter_error", "equation_error", "fourier_regression",
     "fourier_output_error", "composite", "joint",
 )  # fmt: skip
-SHAPES = ("steps", "held", "straight", "smooth")
+WRONG: dict[str, Hold] = {"steps": "first", "held": "first", "straight": "zero", "smooth": "zero"}
+TELLINGS: tuple[tuple[str, dict[str, Hold] | bool], ...] = (
+    ("told", True), ("not told", False), ("told wrong", WRONG),
+)  # fmt: skip
 
 CASES = tuple(
     Case(
-        f"hold {method}, {shape}, {'told' if told else 'not told'}",
-        partial(fly, shape=shape, told=told, method=method),
+        f"hold {method}, {shape}, {name}",
+        partial(
+            fly,
+            shape=shape,
+            told=told if isinstance(told, bool) else told[shape],
+            method=method,
+        ),
     )
     for method in METHODS
-    for shape in SHAPES
-    for told in (True, False)
+    for shape in TRUE_HOLDS
+    for name, told in TELLINGS
 )

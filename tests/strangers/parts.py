@@ -14,7 +14,7 @@ from scipy.signal import chirp, lfilter
 import flightid as fid
 from tests.strangers import noises
 from tests.strangers.counting import Case, Trial, fit_trial
-from tests.strangers.output_error import STEP_S, TRUTH, model
+from tests.strangers.output_error import COLOURS, STEP_S, TRUTH, Noise, model
 
 SCATTER = 0.03
 """Relative deviation of each coefficient from flight to flight."""
@@ -61,6 +61,17 @@ def steps_flown(random: np.random.Generator, scatter: float) -> fid.Record:
     inputs = stepped(random, n)
     rate = response(inputs, *drawn(random, scatter, TRUTH), 0.0)
     return recorded(inputs, rate + NOISE * rate.std() * random.standard_normal(n))
+
+
+def quiet_tail(
+    random: np.random.Generator, scatter: float, *, busy: float, noise: Noise
+) -> fid.Record:
+    """Steps flown for a share of the record, nothing after it, under noise of some colour."""
+    n = round(DURATION_S / STEP_S)
+    inputs = stepped(random, n)
+    inputs[round(busy * n) :] = 0.0
+    rate = response(inputs, *drawn(random, scatter, TRUTH), 0.0)
+    return recorded(inputs, rate + NOISE * rate.std() * noise(random, n))
 
 
 def changed_midway(random: np.random.Generator, change: float) -> fid.Record:
@@ -141,4 +152,19 @@ CHANGES = tuple(
     )
     for change in (0.0, 0.2)
 )
-CASES = (*FLEETS, *CHANGES)
+TAILS = tuple(
+    Case(
+        f"output error, quiet after {100 * busy:.0f} %, {name}",
+        partial(
+            fly,
+            flight=partial(quiet_tail, busy=busy, noise=COLOURS[name]),
+            count=1,
+            scatter=0.0,
+            fit=by_output_error,
+            truth=TRUTH,
+        ),
+    )
+    for busy in (1.0, 0.45, 0.2)
+    for name in ("white", "AR(1) 0.9")
+)
+CASES = (*FLEETS, *CHANGES, *TAILS)

@@ -48,7 +48,8 @@ def test_an_unknown_hold_is_as_before_and_said() -> None:
     assert "steps" in sized
     assert "straight lines between samples, yet tau_phi" in said
     assert "every 3 samples" in said
-    assert not _said(told)
+    (doubted,) = _said(told)
+    assert "steps between samples, not straight lines as was declared" in doubted
     assert fit.provenance["inputs"] == {"hold": "first", "hold_from": "assumed"}
 
 

@@ -10,7 +10,9 @@ from flightid.conventions import Light
 from flightid.evidence import Check, Evidence
 from flightid.evidence.part_checks import agreement_check
 from flightid.uncertainty.agreement import Agreement, compare_parts
+from flightid.uncertainty.blocks import RecordBlock, flights_of, noise_heard
 from flightid.uncertainty.parts import RecordParts, chance_alike, larger, scatter
+from flightid.uncertainty.residual_noise import Autoregression
 from tests.closeness import assert_close
 from tests.strangers.parts import arx_flown, by_arx, by_output_error, changed_midway, steps_flown
 
@@ -81,6 +83,17 @@ def test_records_that_differ_carry_the_scatter_and_students_freedom() -> None:
     assert agreement_check(agreed.agreement).light is Light.AMBER
     two = compare_parts(flights[:1] + flights[2:], third, third, np.array([np.inf]))
     assert agreement_check(two.agreement).light is Light.RED
+
+
+def test_halves_hold_the_same_information_where_the_tail_is_quiet() -> None:
+    random = np.random.default_rng(4)
+    shared = random.standard_normal((2, 1000, 3))
+    shared[:, 200:] = 0.0
+    block = RecordBlock.of(shared, np.ones((2, 1000, 1)), random.standard_normal((2, 1000)))
+    white = [Autoregression(np.array([1.0]), np.empty(0), 1000, 0)] * 2
+    (flight,) = flights_of(noise_heard(white, [block]), [block])
+    shares = flight.information @ np.linalg.inv(flight.information.sum(axis=0))
+    assert_close(np.trace(shares[0]), 1.5, rtol=0.02, why="a sample is a hundredth of a half")
 
 
 def test_halves_that_differ_by_little_are_amber_with_the_wider_interval() -> None:

@@ -1,4 +1,4 @@
-"""What a fit would be, were its inputs held otherwise: where no record knows its hold.
+"""What a fit would be, were its inputs held otherwise.
 
 The fit is made again from its own estimates under every other hold. How far estimates move, in
 their standard errors, says whether the hold matters; how much of the outputs is left says which
@@ -19,10 +19,13 @@ from flightid.evidence.gather import CONVERGED, FROM_LOG
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain.estimator_bias import Correction
+from flightid.identification.hold_likelihood import held_outputs, independent_share
 from flightid.identification.methods import Method, flat
 from flightid.identification.rival_fits import estimates_alone
-from flightid.record.chosen_hold import ASSUMED, ChosenHold
+from flightid.record import Record
+from flightid.record.chosen_hold import ASSUMED, DECLARED, RECORDED, ChosenHold
 from flightid.record.hold import BETWEEN, HOLDS, InputHold
+from flightid.record.repeats import found_staircase
 from flightid.responses import FrequencyResponse
 
 Data = Any
@@ -30,12 +33,15 @@ NEGLIGIBLE = 0.3
 """Standard errors by which an estimate may move: a 95 % interval then holds 94 in 100."""
 DECISIVE = 6.0
 """Difference of log-likelihoods, odds of 400 to 1, that counts as told by the data."""
+DOUBTFUL = 3.0
+"""The same for a hold that was told: chance alone gives it in less than 1 of 100 fits."""
 STEPS = 25
 """Most steps of a fit under another hold: it starts half a sample from its end."""
 OF_A_LOG = (
     "; delays of the model hold the half step for which an autopilot's output stands still "
     "(declare hold='zero' for a log at the loop's rate to take it out)"
 )
+_TOLD = {DECLARED: "was declared", RECORDED: "the records say"}
 _STARTED = {"starts": 1, "start_from": "model", "maximum_iterations": STEPS, "correct_bias": False}
 
 
@@ -72,7 +78,11 @@ class OtherHold:
 def with_hold_tested(
     fit: Fit, method: Method, data: Data, given: Mapping[str, Any], held: ChosenHold
 ) -> tuple[Fit, ChosenHold]:
-    """The fit with what other holds would make of it; as it is where the hold is known.
+    """The fit with what other holds would make of it.
+
+    Where nobody knows the hold, every other one that is possible is tried; what was told, or what
+    records know, is tried against its rival where the data can tell, and nothing is said where they
+    do not speak against it.
 
     Parameters
     ----------
@@ -89,54 +99,164 @@ def with_hold_tested(
     tuple of Fit and ChosenHold
         The hold with the finding that follows in place of the bare question.
     """
-    if held.source != ASSUMED or not held.findings or fit.covariance is None:
+    if fit.covariance is None:
         return fit, held
-    stairs = any(each.light is Light.AMBER for each in held.findings)
-    steps = [step for each in flat(data) for step in getattr(each, "history", ())]
-    logged = any(step.operation == FROM_LOG for step in steps)
-    # An autopilot's outputs are steps of its loop, never lines: with half a step of delay, smooth.
-    possible: tuple[InputHold, ...] = ("band_limited",) if logged else HOLDS
-    others: list[InputHold] = ["zero"] if stairs else [h for h in possible if h != held.hold]
-
-    def again(hold: InputHold) -> Fit:
-        return method.run(fit.model, _corrected(data, hold, fit), {**given, **fresh, "hold": hold})
-
-    names = getattr(method.options, "__dataclass_fields__", {})
-    fresh = {key: value for key, value in _STARTED.items() if key in names}
+    rivals = _Rivals(fit, method, data, given, held.hold)
     try:
-        # A response keeps what its estimator adds: both holds meet the same points.
-        with estimates_alone():
-            # Without a gust's states both are quick, and what differs is the hold alone.
-            apart = fit.responses or fit.provenance.get("gust")
-            beside = again(held.hold) if apart and others else fit
-            known = [_other(hold, again(hold), beside, fit) for hold in others]
+        if held.source in _TOLD:
+            return _told(fit, held, rivals)
+        if held.source != ASSUMED or not held.findings:
+            return fit, held
+        return _asked(fit, held, rivals)
     except FlightidError:
         return fit, held
-    if not all(np.isfinite(each.moved) for each in known):
+
+
+@dataclass(frozen=True)
+class _Rivals:
+    """Fits of the same data under other holds, from the estimates of one fit."""
+
+    fit: Fit
+    method: Method
+    data: Data
+    given: Mapping[str, Any]
+    assumed: InputHold
+
+    @property
+    def logged(self) -> bool:
+        """Whether the data come from an autopilot's log."""
+        return self.made_by(FROM_LOG)
+
+    def made_by(self, operation: str) -> bool:
+        """Whether any of the data went through an operation."""
+        steps = [step for each in flat(self.data) for step in getattr(each, "history", ())]
+        return any(step.operation == operation for step in steps)
+
+    @property
+    def told_apart(self) -> bool:
+        """Whether residuals in time can prefer one hold to another."""
+        return bool(self.fit.records) and self.fit.residual_horizon != 1
+
+    def under(self, holds: Sequence[InputHold]) -> list[OtherHold]:
+        """The fits; none where one of them says nothing."""
+        with estimates_alone():
+            # Without a gust's states both are quick, and what differs is the hold alone.
+            apart = self.fit.responses or self.fit.provenance.get("gust")
+            beside = self._again(self.assumed) if apart and holds else self.fit
+            found = [_other(hold, self._again(hold), beside, self.fit) for hold in holds]
+        return found if all(np.isfinite(each.moved) for each in found) else []
+
+    def by_likelihood(self, holds: Sequence[InputHold]) -> list[OtherHold]:
+        """What the records alone say of other holds, without a fit."""
+        records = [each for each in flat(self.data) if isinstance(each, Record)]
+        here, *others = held_outputs(self.fit.model, records, self.given, [self.assumed, *holds])
+        free = [parameter.name for parameter in self.fit.model.parameters.free]
+        places = [free.index(name) for name in self.fit.names]
+        return [
+            _moved_by(hold, self.fit, (there.values - here.values)[places], there.gain_over(here))
+            for hold, there in zip(holds, others, strict=True)
+        ]
+
+    def _again(self, hold: InputHold) -> Fit:
+        names = getattr(self.method.options, "__dataclass_fields__", {})
+        fresh = {key: value for key, value in _STARTED.items() if key in names}
+        # A response keeps what its estimator adds: both holds meet the same points.
+        data = _corrected(self.data, hold, self.fit)
+        return self.method.run(self.fit.model, data, {**self.given, **fresh, "hold": hold})
+
+
+def _told(fit: Fit, held: ChosenHold, rivals: _Rivals) -> tuple[Fit, ChosenHold]:
+    """A hold that somebody vouches for: doubted where the data say otherwise."""
+    if not rivals.told_apart:
         return fit, held
-    sizes = {
-        each.hold: {"parameter": each.parameter, "moved": each.moved, "gain": each.gain}
-        for each in known
-    }
+    rival: InputHold = "zero" if held.hold != "zero" else "band_limited"
+    known = rivals.by_likelihood([rival])
+    if known[0].moved <= NEGLIGIBLE:
+        return fit, held
+    whose = f"as {_TOLD[held.source]}"
+    finding = None
+    if (known[0].gain or 0.0) > DOUBTFUL:
+        if rival != "zero" and not rivals.logged:
+            known += rivals.by_likelihood(["first"])
+        finding = _contradicted(max(known, key=lambda each: each.gain or 0.0), held.hold, whose)
+    elif rival == "zero" and known[0].is_likely:
+        finding = _steps_told_otherwise(known[0], rivals, whose)
+    fit = _noted(fit, known)
+    if finding is None:
+        return fit, held
+    return _widened(fit, known), replace(held, findings=(*held.findings, finding))
+
+
+def _steps_told_otherwise(steps: OtherHold, rivals: _Rivals, whose: str) -> Finding | None:
+    """A staircase in samples that were told as anything else; none where a simulator made them."""
+    if rivals.logged or rivals.made_by("simulate"):
+        return None
+    for record in (each for each in flat(rivals.data) if isinstance(each, Record)):
+        for name in rivals.fit.model.inputs:
+            stairs = found_staircase(record[name])
+            if stairs is not None:
+                return Finding(
+                    "hold-contradicted",
+                    Light.AMBER,
+                    f"inputs are {BETWEEN[rivals.assumed]} between samples, {whose}, yet {name} of "
+                    f"{record.name!r} {stairs}; as steps, {steps.parameter} is "
+                    f"{steps.moved:.2g} standard errors away",
+                    "declare hold='zero' if the vehicle got these steps",
+                )
+    return None
+
+
+def _asked(fit: Fit, held: ChosenHold, rivals: _Rivals) -> tuple[Fit, ChosenHold]:
+    """A hold that was taken where nobody knows."""
+    stairs = any(each.light is Light.AMBER for each in held.findings)
+    # An autopilot's outputs are steps of its loop, never lines: with half a step of delay, smooth.
+    possible: tuple[InputHold, ...] = ("band_limited",) if rivals.logged else HOLDS
+    others: list[InputHold] = ["zero"] if stairs else [h for h in possible if h != held.hold]
+    known = rivals.under(others)
+    if others and not known:
+        return fit, held
     finding = judged(known, held.hold)
-    if logged and not stairs:
+    if rivals.logged and not stairs:
         finding = replace(finding, message=finding.message + OF_A_LOG)
     said = held.findings if stairs else ()
-    fit = replace(fit, provenance={**fit.provenance, "other_holds": sizes})
-    if finding.light is not Light.GREEN and not logged:
+    fit = _noted(fit, known)
+    if finding.light is not Light.GREEN and not rivals.logged:
         fit = _widened(fit, known)
     return fit, replace(held, findings=(*said, finding))
 
 
+def _noted(fit: Fit, known: Sequence[OtherHold]) -> Fit:
+    sizes = {
+        each.hold: {"parameter": each.parameter, "moved": each.moved, "gain": each.gain}
+        for each in known
+    }
+    return replace(fit, provenance={**fit.provenance, "other_holds": sizes})
+
+
+def _contradicted(best: OtherHold, taken: InputHold, whose: str) -> Finding:
+    return Finding(
+        "hold-contradicted",
+        Light.AMBER,
+        f"the data say that inputs are {BETWEEN[best.hold]} between samples, not {BETWEEN[taken]} "
+        f"{whose}: log-likelihood {best.gain:.3g} higher, {best.parameter} {best.moved:.2g} "
+        "standard errors away",
+        f"declare hold={best.hold!r} for the record, or the hold that is true; a delay of half a "
+        "sample that the model lacks looks alike",
+    )
+
+
 def _other(hold: InputHold, other: Fit, beside: Fit, fit: Fit) -> OtherHold:
     shift = [other.parameters[n].value - beside.parameters[n].value for n in fit.names]
+    ended = other.termination in CONVERGED | {""} and fit.termination in CONVERGED | {""}
+    return _moved_by(hold, fit, np.array(shift), _gain(other, fit) if ended else None)
+
+
+def _moved_by(hold: InputHold, fit: Fit, shift: np.ndarray, gain: float | None) -> OtherHold:
     moved = [
         abs(size) / (fit.parameters[name].stderr or np.nan)
         for size, name in zip(shift, fit.names, strict=True)
     ]
     furthest = int(np.argmax(moved))
-    ended = other.termination in CONVERGED | {""} and fit.termination in CONVERGED | {""}
-    gain = _gain(other, fit) if ended else None
     return OtherHold(
         hold, fit.names[furthest], float(moved[furthest]), gain, tuple(map(float, shift))
     )
@@ -172,17 +292,10 @@ def _gain(other: Fit, fit: Fit) -> float | None:
     total = 0.0
     for name, cost in fit.costs.items():
         rows = [each.residual(name) for each in fit.records]
-        count = sum(len(row) * _independent(row) for row in rows)
+        count = sum(len(row) * independent_share(row) for row in rows)
         tiny = np.finfo(float).tiny
         total += 0.5 * count * float(np.log(max(cost, tiny) / max(other.costs[name], tiny)))
     return total
-
-
-def _independent(row: np.ndarray) -> float:
-    """Share of samples that count, by the first autocorrelation."""
-    power = float(row @ row)
-    first = float(row[1:] @ row[:-1]) / power if power > 0.0 else 0.0
-    return (1.0 - max(first, 0.0)) / (1.0 + max(first, 0.0))
 
 
 def judged(others: Sequence[OtherHold], assumed: InputHold) -> Finding:
@@ -202,23 +315,16 @@ record says: log-likelihood 40 higher, tau 9 standard errors away
     furthest = max(others, key=lambda each: each.moved)
     size = f"{furthest.parameter} {furthest.moved:.2g} standard errors"
     if furthest.moved <= NEGLIGIBLE:
-        said = f"{taken}; any other hold moves no estimate further than {size}"
-        return Finding("hold-unimportant", Light.GREEN, said)
+        same = f"{taken}; any other hold moves no estimate further than {size}"
+        return Finding("hold-unimportant", Light.GREEN, same)
     matters = [each for each in others if each.moved > NEGLIGIBLE]
     told = [each for each in matters if each.gain is not None]
     best = max(told, key=lambda each: each.gain or 0.0, default=furthest)
     if best.gain is not None and best.gain > DECISIVE:
-        return Finding(
-            "hold-contradicted",
-            Light.AMBER,
-            f"the data say that inputs are {BETWEEN[best.hold]} between samples, not "
-            f"{BETWEEN[assumed]} as was taken where no record says: log-likelihood "
-            f"{best.gain:.3g} higher, {best.parameter} {best.moved:.2g} standard errors away",
-            f"declare hold={best.hold!r} for the record, or the hold that is true",
-        )
+        return _contradicted(best, assumed, "as was taken where no record says")
     if len(told) == len(matters) and all((each.gain or 0.0) < -DECISIVE for each in told):
-        said = f"{taken}; the data prefer it to every other hold that would move an estimate"
-        return Finding("hold-supported", Light.GREEN, said)
+        data = f"{taken}; the data prefer it to every other hold that would move an estimate"
+        return Finding("hold-supported", Light.GREEN, data)
     return Finding(
         "hold-unknown",
         Light.AMBER,

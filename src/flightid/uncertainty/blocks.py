@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.uncertainty.parts import RecordParts
+from flightid.uncertainty.parts import LEAST_INFORMATION, RecordParts
 from flightid.uncertainty.residual_noise import Autoregression
 
 Array = NDArray[np.float64]
@@ -92,18 +92,47 @@ def _levels(blocks: Sequence[RecordBlock]) -> Array:
 
 
 def _halves(block: RecordBlock) -> Array:
-    """[basis, projected in the first half, projected in the second], (n_outputs, n, m + 2 n)."""
+    """[basis, projected in the first half, projected in the second], (n_outputs, n, m + 2 n).
+
+    Halves hold the same information, not the same time: a quiet tail tells nothing by itself.
+    """
     n_outputs, n_samples = block.residual.shape
     own, shared = (
         part.reshape(n_outputs, n_samples, -1) for part in (block.basis, block.projected)
     )
     m, count = own.shape[2], shared.shape[2]
     wide = np.zeros((n_outputs, n_samples, m + 2 * count))
-    half = n_samples // 2
+    half = middle_of(_information(block.projected).reshape(n_outputs, n_samples).sum(axis=0))
     wide[:, :, :m] = own
     wide[:, :half, m : m + count] = shared[:, :half]
     wide[:, half:, m + count :] = shared[:, half:]
     return wide
+
+
+def middle_of(shares: Array) -> int:
+    """First sample of a second half: up to it, half of what non-negative shares add up to.
+
+    Both halves hold a sample; where nothing is shared they are of one length.
+
+    Example
+    -------
+    >>> middle_of(np.array([3.0, 1.0, 1.0, 1.0, 0.0, 0.0])), middle_of(np.zeros(6))
+    (1, 3)
+    """
+    held = np.cumsum(shares)
+    if not held[-1] > 0.0:
+        return len(shares) // 2
+    place = int(np.searchsorted(held, 0.5 * held[-1], side="left")) + 1
+    return min(max(place, 1), len(shares) - 1)
+
+
+def _information(slopes: Array) -> Array:
+    """Share of each row in the information on all parameters (its leverage), shape (n_rows,)."""
+    size = np.linalg.norm(slopes, axis=0)
+    scaled = slopes[:, size > 0.0] / size[size > 0.0]
+    sizes, axes = np.linalg.eigh(scaled.T @ scaled)
+    kept = sizes > LEAST_INFORMATION
+    return np.asarray(np.sum((scaled @ axes[:, kept]) ** 2 / sizes[kept], axis=1))
 
 
 def noise_heard(models: Sequence[Autoregression], blocks: Sequence[RecordBlock]) -> list[Array]:

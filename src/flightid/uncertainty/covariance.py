@@ -279,6 +279,13 @@ def _inverse_root(triangle: Array) -> Array:
             needed="residuals that answer to each",
             action="lower the orders, or look for outliers and unlike scales in the records",
         )
+    if not np.all(np.diag(triangle)):
+        raise FitError(
+            "the data cannot tell parameters apart",
+            found=f"{int(np.sum(np.diag(triangle) == 0.0))} combinations without effect",
+            needed="residuals that answer to each by itself",
+            action="lower the orders, or leave out a channel that repeats another",
+        )
     return np.asarray(solve_triangular(triangle / size, np.eye(len(size))) / size[:, None])
 
 

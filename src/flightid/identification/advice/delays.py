@@ -183,7 +183,7 @@ class _ArxScan:
         for n_a in [n for n in PAST if n <= self.past] or [self.past]:
             # Below the first rows is what so many past outputs leave of the input's lags.
             left = rest[n_a:, self.past :]
-            for n_b in WINDOW:
+            for n_b in [n for n in WINDOW if n <= self.span]:
                 windows = sliding_window_view(left[:, :-1], n_b, axis=1).transpose(1, 0, 2)
                 windows = windows[: self.largest + 1]
                 target = np.broadcast_to(left[:, -1:], (*windows.shape[:2], 1))

@@ -23,6 +23,7 @@ from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.random_error import CovarianceSource
 from flightid.responses.estimators.prewhitened import PREWHITENED
 from flightid.simulation.model_outputs import systems_of
+from flightid.uncertainty.blocks import middle_of
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -140,9 +141,10 @@ class Correction:
         measured = self._linear.output_records
         made = [one - rest for one, rest in zip(measured, left, strict=True)]
         nothing = [np.zeros_like(one) for one in measured]
+        middles = [_middle(rows) for rows in made]
 
         def halved(place: int, rows: Array) -> list[Complex]:
-            half = rows.shape[1] // 2
+            half = middles[place]
             found = []
             for span in (slice(0, half), slice(half, None)):
                 alone = list(nothing)
@@ -244,3 +246,10 @@ class Correction:
     @cached_property
     def _records(self) -> ModelResiduals:
         return ModelResiduals(self._linear, self.data.outputs, self.hold)
+
+
+def _middle(rows: Array) -> int:
+    """Where half of what the model makes of each output, about its mean, is over."""
+    power = (rows - rows.mean(axis=1, keepdims=True)) ** 2
+    whole = np.maximum(power.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+    return middle_of((power / whole).sum(axis=0))

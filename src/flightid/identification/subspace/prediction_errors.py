@@ -19,6 +19,8 @@ from flightid.uncertainty.covariance import white_covariance
 
 Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array, Array, Array]
+DISTINCT = 1e-12
+"""Least share of an error that the other outputs do not hold, below which it is rounding."""
 ROUNDS = 12
 SETTLED = 1e-10
 """Relative change of the log determinant of the innovations between rounds."""
@@ -278,7 +280,13 @@ def _tangent(predictor: Predictor, matrices: Matrices) -> Array:
 def _whitener(errors: tuple[Array, ...], degrees: int | None = None) -> Array:
     joint = np.hstack(errors)
     count = joint.shape[1] if degrees is None else degrees / len(joint)
-    return np.asarray(np.linalg.inv(np.linalg.cholesky(joint @ joint.T / count)))
+    size = np.sqrt(np.sum(joint**2, axis=1) / count)
+    size = np.where(size > 0.0, size, 1.0)
+    alike = (joint / size[:, None]) @ (joint / size[:, None]).T / count
+    # Outputs that are one and the same but for rounding.
+    lift = max(DISTINCT - float(np.linalg.eigvalsh(alike)[0]), 0.0)
+    root = np.linalg.cholesky(alike + lift * np.eye(len(size)))
+    return np.asarray(np.linalg.inv(root) / size)
 
 
 def _search(

@@ -80,7 +80,7 @@ class SampledChannels:
         }
 
     def require_change(self) -> None:
-        """Refuse channels that are constant over all records.
+        """Refuse channels that are constant within every record.
 
         Raises
         ------
@@ -88,11 +88,16 @@ class SampledChannels:
             A channel does not change.
         """
         for name, row in zip(list(self.units), (self.output, *self.inputs), strict=True):
-            if np.ptp(row) <= 1e-14 * np.max(np.abs(row)):
+            moved = max(float(np.ptp(row[span])) for span in self.spans)
+            if moved <= 1e-14 * np.max(np.abs(row)):
+                values = [
+                    f"{row[span.start] + offset[name]:.6g}"
+                    for span, offset in zip(self.spans, self.offsets, strict=True)
+                ]
                 raise DataError(
                     f"channel {name!r} is constant",
-                    found=f"{row[0] + self.offsets[0][name]:.6g} throughout",
-                    needed="a channel that changes",
+                    found=f"{' and '.join(dict.fromkeys(values))} throughout",
+                    needed="a channel that changes within a record",
                     action="leave the channel out or choose another record",
                 )
 

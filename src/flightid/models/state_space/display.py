@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from html import escape
 
 from flightid.models.language.symbolic import ZERO, Formula, Printer, latex_name
 from flightid.models.state_space.linear import Linearisation
 from flightid.models.state_space.parts import derivative
 
+REMEMBERED = 32
+"""Structures whose matrices are kept."""
 _BREAK = r" \\ "
 Rows = tuple[tuple[Formula, ...], ...]
 
@@ -93,27 +96,48 @@ def matrices_as_latex(model: Linearisation) -> MatrixDisplay:
     ModelError
         A derivative is too long to be shown.
     """
-    n, names = len(model.states), model.point_names
-    definitions = {name: output.expression for name, output in model.definitions.items()}
-    printer = Printer(names, definitions, list(model.tables))
+    return _derived(
+        (tuple(model.states), tuple(model.inputs), tuple(model.outputs)),
+        tuple(model.point_names),
+        tuple(model.equations.items()),
+        tuple(output.expression for output in model.measurements.values()),
+        tuple((name, output.expression) for name, output in model.definitions.items()),
+        tuple(model.tables),
+        tuple(model.delays.values()),
+    )
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _derived(
+    channels: tuple[tuple[str, ...], ...],
+    names: tuple[str, ...],
+    sides: tuple[tuple[str, str], ...],
+    measured: tuple[str, ...],
+    defined: tuple[tuple[str, str], ...],
+    tables: tuple[str, ...],
+    delays: tuple[str, ...],
+) -> MatrixDisplay:
+    """Values have no part in this: a search asks it of the same equations again and again."""
+    states, inputs, outputs = channels
+    n, definitions = len(states), dict(defined)
+    printer = Printer(names, definitions, tables)
     by_names = printer.derivatives
-    sides = model.equations.items()
     equations = [by_names(f"({left}) - ({right})") for left, right in sides]
     forces = [by_names(f"({right}) - ({left})") for left, right in sides]
-    outputs = [by_names(output.expression) for output in model.measurements.values()]
-    entries = [term for row in (*equations, *outputs) for term in row]
+    answers = [by_names(each) for each in measured]
+    entries = [term for row in (*equations, *answers) for term in row]
     return MatrixDisplay(
         _part(equations, 0, n),
         _part(forces, n, 2 * n),
         _part(forces, 2 * n, len(names)),
-        _part(outputs, 0, n),
-        _part(outputs, n, 2 * n),
-        _part(outputs, 2 * n, len(names)),
-        tuple(model.states),
-        tuple(model.inputs),
-        tuple(model.outputs),
-        tuple(printer.value(delay) for delay in model.delays.values()),
-        tuple((latex_name(name), printer.value(text)) for name, text in definitions.items()),
+        _part(answers, 0, n),
+        _part(answers, n, 2 * n),
+        _part(answers, 2 * n, len(names)),
+        states,
+        inputs,
+        outputs,
+        tuple(printer.value(delay) for delay in delays),
+        tuple((latex_name(name), printer.value(text)) for name, text in defined),
         not frozenset(names) & frozenset().union(*(term.names for term in entries)),
     )
 

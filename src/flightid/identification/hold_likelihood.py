@@ -1,0 +1,157 @@
+"""What records say of a hold that was told: likelihood and estimates under another, without a fit.
+
+Estimates under another hold lie half a sample of delay away: a few steps of Gauss and Newton from
+those of the fit, on the records themselves, reach them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.identification.output_error.distinct import run_with_slopes
+from flightid.identification.output_error.equation_records import (
+    EquationRuns,
+    equation_runs,
+    segmented_starts,
+)
+from flightid.identification.records.options import RecordOptions
+from flightid.identification.records.setup import OwnNumbers, RecordSet, prepare_records
+from flightid.models import GreyBoxModel
+from flightid.record import Record
+from flightid.record.hold import InputHold
+from flightid.uncertainty.blocks import RecordBlock
+
+Array = NDArray[np.float64]
+TINY = float(np.finfo(float).tiny)
+STEPS = 2
+"""Of Gauss and Newton: what a delay moves by half a sample bends by less than the second tells."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutputs:
+    """Records beside a model whose inputs are held in one way.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n_free,)
+        Estimates by the records alone, near those of the fit.
+    left : list of ndarray, shape (n_outputs, n_samples)
+        Measured less modelled, by record.
+    """
+
+    values: Array
+    left: list[Array]
+
+    def gain_over(self, other: HeldOutputs) -> float:
+        """Logarithm of this likelihood over another: ½ Σ n ln(power left there / here)."""
+        total = 0.0
+        for output in range(len(self.left[0])):
+            here, there = ([each[output] for each in one.left] for one in (self, other))
+            power = [max(sum(float(row @ row) for row in rows), TINY) for rows in (there, here)]
+            count = sum(len(row) * independent_share(row) for row in there)
+            total += 0.5 * count * float(np.log(power[0] / power[1]))
+        return total
+
+
+def independent_share(row: Array) -> float:
+    """Share of samples that count, by the first autocorrelation.
+
+    Example
+    -------
+    >>> round(independent_share(np.tile([1.0, -1.0], 50)), 3)
+    1.0
+    """
+    power = float(row @ row)
+    first = float(row[1:] @ row[:-1]) / power if power > 0.0 else 0.0
+    return (1.0 - max(first, 0.0)) / (1.0 + max(first, 0.0))
+
+
+def held_outputs(
+    model: GreyBoxModel,
+    records: Sequence[Record],
+    given: Mapping[str, Any],
+    holds: Sequence[InputHold],
+) -> list[HeldOutputs]:
+    """Records beside a model near whose values the estimates lie, under each of some holds.
+
+    Parameters
+    ----------
+    model : GreyBoxModel
+        With the estimates of a fit.
+    records : sequence of Record
+    given : mapping
+        Options of the fit, of which those of records count.
+    holds : sequence of {"zero", "first", "band_limited"}
+
+    Raises
+    ------
+    FlightidError
+        The model cannot be run there.
+    """
+    known = {field.name for field in fields(RecordOptions)}
+    options = RecordOptions(**{name: value for name, value in given.items() if name in known})
+    prepared = prepare_records(model, records, options)
+    runs_of = equation_runs(model, prepared)
+    if runs_of is not None:
+        prepared = segmented_starts(prepared, runs_of)
+    return [_under(replace(prepared, hold=hold), runs_of) for hold in holds]
+
+
+def _under(prepared: RecordSet, runs_of: EquationRuns | None) -> HeldOutputs:
+    free = [parameter.name for parameter in prepared.model.parameters.free]
+    values = np.array([prepared.model.parameters[name].value or 0.0 for name in free])
+    sizes = np.std(np.concatenate([each[1] for each in prepared.arrays], axis=1), axis=1)
+    for round_ in range(STEPS):
+        if round_:
+            model = prepared.model.with_values(dict(zip(free, map(float, values), strict=True)))
+            prepared = replace(prepared, model=model)
+        runs = [
+            run_with_slopes(prepared.model, prepared, runs_of, place, own)
+            for place, own in enumerate(prepared.own)
+        ]
+        left = [each[1] - run[0] for each, run in zip(prepared.arrays, runs, strict=True)]
+        steps = _steps(left, [slopes for _, slopes in runs], sizes, len(free))
+        left = [
+            rest - slopes @ step for rest, (_, slopes), step in zip(left, runs, steps, strict=True)
+        ]
+        sizes = np.sqrt(np.mean(np.concatenate(left, axis=1) ** 2, axis=1))
+        values = values + steps[0][: len(free)]
+        own = [
+            numbers.filled(_free_values(numbers) + step[len(free) :])
+            for numbers, step in zip(prepared.own, steps, strict=True)
+        ]
+        prepared = replace(prepared, own=own)
+    return HeldOutputs(values, left)
+
+
+def _steps(
+    left: Sequence[Array], slopes: Sequence[Array], sizes: Array, n_free: int
+) -> list[Array]:
+    """Least squares: changes of the shared parameters and of each record's own numbers."""
+    weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
+    blocks, rests = [], []
+    for rest, slope in zip(left, slopes, strict=True):
+        white = slope * weights[:, None, None]
+        rests.append((rest * weights[:, None]).ravel())
+        blocks.append(RecordBlock.of(white[:, :, :n_free], white[:, :, n_free:], rest))
+    projected = np.vstack([block.projected for block in blocks])
+    shared = np.linalg.lstsq(projected, np.concatenate(rests))[0]
+    found = []
+    for block, rest in zip(blocks, rests, strict=True):
+        inner = block.basis.T @ rest - block.shared_on_own @ shared
+        found.append(np.concatenate([shared, np.linalg.lstsq(block.triangle, inner)[0]]))
+    return found
+
+
+def _free_values(numbers: OwnNumbers) -> Array:
+    parts = (
+        (numbers.initial, numbers.free_initial),
+        (numbers.shift, numbers.free_shift),
+        (numbers.bias, numbers.free_bias),
+    )
+    return np.concatenate([values[places] for values, places in parts])
