@@ -202,6 +202,7 @@ def same_dimension(first: str, second: str) -> bool:
     return bool(one.dimensionality == two.dimensionality)
 
 
+@cache
 def is_convertible(source: str, target: str) -> bool:
     """Tell whether a factor between two stated units is safe: same dimension, and same angle.
 

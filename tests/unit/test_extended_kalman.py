@@ -32,7 +32,7 @@ def test_on_linear_equations_it_becomes_the_steady_filter() -> None:
     random = np.random.default_rng(0)
     inputs, measured = random.standard_normal((1, 400)), random.standard_normal((400, 1))
     model = _linear()
-    innovations, triangles, states = _native.extended_filter(
+    (innovations, triangles, states), _ = _native.extended_filter(
         model.native, model.parameters.independent_values(), inputs, measured,
         (STEP_S, "zero", 4), (np.zeros(2), np.eye(2), [], []), (density, variance),
     )  # fmt: skip
@@ -61,12 +61,82 @@ def test_constants_of_channels_are_found() -> None:
     measured = clean["x"][:, None] + 0.7
     # A constant push moves x by a quarter of it for good: x alone tells neither from a bias.
     for biased, shifted, wanted in (([0], [], 0.75), ([], [0], 3.0)):
-        _, _, states = _native.extended_filter(
+        (_, _, states), _ = _native.extended_filter(
             model.native, model.parameters.independent_values(), inputs, measured,
             (STEP_S, "first", 4), (np.zeros(3), 10.0 * np.eye(3), shifted, biased),
             (np.zeros(2), np.array([1e-4])),
         )  # fmt: skip
         assert_close(states[-1, 2], wanted, rtol=0.02, why="a start that fades")
+
+
+def test_slopes_are_those_of_the_filter() -> None:
+    model = fid.StateSpaceModel(
+        states={"alpha": "rad", "q": "rad/s"},
+        input_units={"de": "rad", "da": "rad"},
+        measurements={
+            "alpha": fid.Output("alpha", "rad"),
+            "q": fid.Output("q", "rad/s"),
+            "az": fid.Output("lever*q' + g*sin(alpha)", "m/s^2"),
+        },
+        equations={
+            "alpha'": "Za*alpha + q",
+            "(1 + k*alpha^2)*q'": "Ma*alpha + Maa*alpha^3 + Mq*q*exp(alpha) + Md*de - Ma*da",
+        },
+        delays={"de": "tau"},
+        parameters=fid.Parameters(
+            [
+                fid.Parameter("Ma", -6.0, "1/s^2"),
+                fid.Parameter("Mq", -1.8, "1/s"),
+                fid.Parameter("Za", -1.2, "1/s"),
+                fid.Parameter("Maa", 40.0, "1/s^2"),
+                fid.Parameter("Md", -9.0, "1/s^2"),
+                fid.Parameter("k", 0.5, "1"),
+                fid.Parameter("lever", 0.3, "m"),
+                fid.Parameter("g", 4.0, "m/s^2"),
+                fid.Parameter("tau", 0.033, "s"),
+            ]
+        ),
+    )
+    n = len(model.parameters.free)
+    random = np.random.default_rng(2)
+    inputs, measured = 0.2 * random.standard_normal((2, 60)), 0.1 * random.standard_normal((60, 3))
+    constants = [1], [0, 2]
+    size = 2 + 1 + 2
+
+    def found(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        values, prior, process, variance = np.split(x, np.cumsum([n, size, 2]))
+        return _native.extended_filter(
+            model.native, values, inputs, measured, (0.02, "zero", 2),
+            (np.full(size, 0.1), np.diag(prior), *constants), (process, variance),
+        )[1]  # fmt: skip
+
+    at = np.concatenate(
+        [model.parameters.independent_values(), 0.2 + 0.1 * np.arange(size), [0.1, 0.3],
+         [0.01, 0.02, 0.05]]
+    )  # fmt: skip
+    count = at.size
+    ahead = np.eye(count)
+    turned = np.zeros((count, size, size))
+    _, priors, densities, variances = np.split(ahead, np.cumsum([n, size, 2]), axis=1)
+    turned[:, range(size), range(size)] = priors
+    values, prior, process, variance = np.split(at, np.cumsum([n, size, 2]))
+    white, logs = _native.extended_filter_slopes(
+        model.native, values, inputs, measured, (0.02, "zero", 2),
+        (np.full(size, 0.1), np.diag(prior), *constants), (process, variance),
+        tuple(map(np.ascontiguousarray, (ahead[:, :n], turned, densities, variances))),
+    )  # fmt: skip
+    for place, direction in enumerate(ahead):
+        step = 1e-6 * max(abs(at[place]), 0.01)
+        above, below = found(at + step * direction), found(at - step * direction)
+        for exact, high, low in zip((white, logs), above, below, strict=True):
+            wanted = (high - low).ravel() / (2.0 * step)
+            assert_close(
+                exact[:, place],
+                wanted,
+                rtol=0.0,
+                atol=1e-6 * np.abs(wanted).max(),
+                why="differences",
+            )
 
 
 def test_filter_error_follows_squares_where_output_error_has_no_interval() -> None:

@@ -7,6 +7,7 @@ be sharp, a sensor coarse, a simulated channel free of noise.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,24 +85,44 @@ def sample_faults(
         checks = [_input_spikes, _wraps]
     else:
         checks = [_spikes, _wraps, _dead, _held, _clipped]
-    return [fault for check in checks if (fault := check(name, stamps, values, unit))]
+    channel = _ExaminedChannel(name, stamps, values, unit)
+    return [fault for check in checks if (fault := check(channel))]
 
 
-def _fault(
-    name: str, stamps: Array, at: NDArray[np.intp], finding: tuple[str, Light, str, str]
-) -> SampleFault:
-    code, light, said, action = finding
-    return SampleFault(
-        name, float(stamps[at[0]]), float(stamps[at[-1]]), Finding(code, light, said, action)
-    )
+@dataclass(frozen=True)
+class _ExaminedChannel:
+    """One channel, all of it finite."""
+
+    name: str
+    stamps: Array
+    values: Array
+    unit: str
+
+    @cached_property
+    def alone(self) -> tuple[NDArray[np.intp], Array, float]:
+        """Samples alone; distances of all from the median of their neighbours; their spread."""
+        return _alone(self.values)
+
+    @property
+    def of_unit(self) -> str:
+        """The unit as it follows a number."""
+        return "" if self.unit == DIMENSIONLESS else f" {self.unit}"
+
+    def fault(self, at: NDArray[np.intp], finding: tuple[str, Light, str, str]) -> SampleFault:
+        """A finding on the stretch between the first and the last of some samples."""
+        code, light, said, action = finding
+        first, last = float(self.stamps[at[0]]), float(self.stamps[at[-1]])
+        return SampleFault(self.name, first, last, Finding(code, light, said, action))
 
 
 def _alone(values: Array) -> tuple[NDArray[np.intp], Array, float]:
-    """Samples alone, far from the median of their neighbours; distances from it; their spread."""
     from scipy.ndimage import maximum_filter1d  # noqa: PLC0415
 
-    away, spread = distances(values, HALF_WIDTH)
     low, high = np.percentile(values, [1, 99])
+    # A median is one of the neighbours: nothing lies further from it than steps can carry.
+    if HALF_WIDTH * float(np.abs(np.diff(values)).max()) <= HARMFUL * (high - low):
+        return np.empty(0, dtype=np.intp), np.zeros(0), 0.0
+    away, spread = distances(values, HALF_WIDTH)
     tall = (away > FAR * spread) & (away > HARMFUL * (high - low))
     # The largest of the neighbours, without the few samples that a spike may last.
     around = maximum_filter1d(np.where(tall, 0.0, away), 2 * NEIGHBOURS + 1, mode="nearest")
@@ -110,9 +131,10 @@ def _alone(values: Array) -> tuple[NDArray[np.intp], Array, float]:
     return np.flatnonzero(alone), away, spread
 
 
-def _input_spikes(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
+def _input_spikes(channel: _ExaminedChannel) -> SampleFault | None:
     """Spikes beyond all else that the input does; those of one height, or from rest, are pulses."""
-    at, _, _ = _alone(values)
+    values = channel.values
+    at, _, _ = channel.alone
     rest = np.delete(values, at)
     range_ = float(np.ptp(rest))
     pulses = at.size > 1 and float(np.ptp(values[at])) < HARMFUL * range_
@@ -120,18 +142,19 @@ def _input_spikes(name: str, stamps: Array, values: Array, unit: str) -> SampleF
         return None
     margin = HARMFUL * range_
     beyond = (values[at] < rest.min() - margin) | (values[at] > rest.max() + margin)
-    return _spikes(name, stamps, values, unit) if np.any(beyond) else None
+    return _spikes(channel) if np.any(beyond) else None
 
 
-def _spikes(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
-    at, away, spread = _alone(values)
+def _spikes(channel: _ExaminedChannel) -> SampleFault | None:
+    name, stamps, values = channel.name, channel.stamps, channel.values
+    at, away, spread = channel.alone
     if not at.size:
         return None
     share = float(np.sum(away[at] ** 2) / np.sum((values - np.median(values)) ** 2))
     light = Light.RED if share >= RED_SHARE else Light.AMBER
     said = (
         f"{counted(at.size, 'sample')} of {name} {'stands' if at.size == 1 else 'stand'} alone, "
-        f"{float(np.max(away[at])):.3g}{_of(unit)} from the neighbours at most "
+        f"{float(np.max(away[at])):.3g}{channel.of_unit} from the neighbours at most "
         f"({100 * share:.0f} % of the channel's variance; the first at {stamps[at[0]]:.6g} s)"
     )
     # Between the spikes and all others, so that what is advised takes out these and no more.
@@ -141,34 +164,31 @@ def _spikes(name: str, stamps: Array, values: Array, unit: str) -> SampleFault |
         f"bridge them where they are read: [[conditioning]] outliers = {{ deviations = "
         f"{deviations:.0f} }} in a study, conditioning.remove_outliers in Python"
     )
-    return _fault(name, stamps, at, ("spikes", light, said, action))
+    return channel.fault(at, ("spikes", light, said, action))
 
 
-def _of(unit: str) -> str:
-    return "" if unit == DIMENSIONLESS else f" {unit}"
-
-
-def _wraps(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
-    if not is_convertible(unit, "rad"):
+def _wraps(channel: _ExaminedChannel) -> SampleFault | None:
+    name, values = channel.name, channel.values
+    if not is_convertible(channel.unit, "rad"):
         return None
-    turn = TURN / si_base(unit)[0]
+    turn = TURN / si_base(channel.unit)[0]
     steps = np.diff(values)
     at = np.flatnonzero(np.abs(np.abs(steps) - turn) < 0.05 * turn)
-    alone, _, _ = _alone(values)
+    alone, _, _ = channel.alone
     # A lone sample that is off by a turn is a spike; both of its steps are.
     at = at[~np.isin(at, alone) & ~np.isin(at + 1, alone)]
     if not at.size or np.median(np.abs(steps)) > 0.1 * turn:
         return None
     said = f"{name} jumps by a whole turn {counted(at.size, 'time')}: a heading that wraps"
-    return _fault(name, stamps, at, ("wrapped", Light.RED, said, "unwrap it before it is fitted"))
+    return channel.fault(at, ("wrapped", Light.RED, said, "unwrap it before it is fitted"))
 
 
-def _dead(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
+def _dead(channel: _ExaminedChannel) -> SampleFault | None:
     """Stretches of one and the same value in a channel whose noise never rests.
 
     One at the beginning or the end may be rest.
     """
-    del unit
+    name, stamps, values = channel.name, channel.stamps, channel.values
     starts, stops = _runs(np.diff(values) == 0.0)
     inner = (starts > 0) & (stops < values.size - 1)
     starts, stops = starts[inner], stops[inner]
@@ -192,11 +212,11 @@ def _dead(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | N
         "its noise never rests elsewhere: nothing was measured there"
     )
     action = "cut the record before and after, or leave the channel out"
-    return _fault(name, stamps, np.array([first, last]), ("flat", light, said, action))
+    return channel.fault(np.array([first, last]), ("flat", light, said, action))
 
 
-def _held(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
-    del unit
+def _held(channel: _ExaminedChannel) -> SampleFault | None:
+    name, values = channel.name, channel.values
     found = found_staircase(values)
     if found is None or found.samples < 2:
         return None
@@ -206,11 +226,12 @@ def _held(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | N
     )
     action = f"resample the record to every {found.samples}th row (resample_to_s)"
     ends = np.array([0, values.size - 1])
-    return _fault(name, stamps, ends, ("samples-repeated", Light.AMBER, said, action))
+    return channel.fault(ends, ("samples-repeated", Light.AMBER, said, action))
 
 
-def _clipped(name: str, stamps: Array, values: Array, unit: str) -> SampleFault | None:
+def _clipped(channel: _ExaminedChannel) -> SampleFault | None:
     """Flat tops at the very extremes, met and left abruptly, again and again."""
+    name, values = channel.name, channel.values
     if np.unique(values).size < LEVELS:
         return None
     typical = float(np.median(np.abs(np.diff(values))))
@@ -226,12 +247,12 @@ def _clipped(name: str, stamps: Array, values: Array, unit: str) -> SampleFault 
             continue
         light = Light.RED if share >= RED_SHARE else Light.AMBER
         said = (
-            f"{name} is cut off at {end:.6g}{_of(unit)} for {100 * share:.2g} % of its samples, "
-            f"{starts.size} times"
+            f"{name} is cut off at {end:.6g}{channel.of_unit} for {100 * share:.2g} % of its "
+            f"samples, {starts.size} times"
         )
         action = "fit records in which it stays inside its range; fly a smaller amplitude"
         ends = np.array([starts[0], stops[-1] - 1])
-        return _fault(name, stamps, ends, ("clipped", light, said, action))
+        return channel.fault(ends, ("clipped", light, said, action))
     return None
 
 

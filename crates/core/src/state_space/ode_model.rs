@@ -161,7 +161,11 @@ impl OdeModel {
 
 /// Part of the tape that depends on parameters alone (its outputs: leaves, then what stands after the
 /// first `height` outputs), and the rest, which takes the leaves as inputs.
-fn split(tape: &Tape, n_moving: usize, height: usize) -> Result<(Tape, Tape), CoreError> {
+pub(crate) fn split(
+    tape: &Tape,
+    n_moving: usize,
+    height: usize,
+) -> Result<(Tape, Tape), CoreError> {
     let needed = tape.needed(&tape.outputs[..height]);
     let mut moves = vec![false; tape.operations.len()];
     for (register, operation) in tape.operations.iter().enumerate() {

@@ -101,7 +101,7 @@ impl Setting {
         parameters: &[f64],
         course: &Course<'_>,
     ) -> Result<(), CoreError> {
-        check(ode, course)?;
+        check(ode.n_inputs, course)?;
         let mut values = std::mem::take(&mut self.leaves);
         values.clear();
         values.resize(ode.leaves.n_outputs(), 0.0);
@@ -324,8 +324,8 @@ impl Setting {
     }
 }
 
-fn check(ode: &OdeModel, course: &Course<'_>) -> Result<(), CoreError> {
-    expect("inputs of the record", course.inputs.len(), ode.n_inputs * course.n_samples)?;
+pub(crate) fn check(n_inputs: usize, course: &Course<'_>) -> Result<(), CoreError> {
+    expect("inputs of the record", course.inputs.len(), n_inputs * course.n_samples)?;
     if !(course.sample_s > 0.0 && course.sample_s.is_finite()) {
         let (found, needed) = (course.sample_s, "more than zero seconds");
         return Err(CoreError::Range { what: "sample time", found, needed });

@@ -28,10 +28,19 @@ from flightid.models.state_space.measured_states import measured_point, state_ou
 from flightid.record import Record
 
 Array = NDArray[np.float64]
-DIFFERENCE = 1e-5
-"""Relative step of differences of whole runs; those of the equations are exact."""
 WIDE = 100.0
 """Variance of a measured initial state over that of its measurement."""
+
+
+_Given = tuple[
+    _native.StateSpace,
+    Array,
+    Array,
+    Array,
+    tuple[float, str, int],
+    tuple[Array, Array, list[int], list[int]],
+    tuple[Array, Array],
+]
 
 
 @dataclass(frozen=True)
@@ -52,8 +61,8 @@ class ExtendedProblem(InnovationsProblem):
 
     Reference
     ---------
-    Jategaonkar, *Flight Vehicle System Identification*, 2nd ed., §5.5 (time-varying filter; slopes
-    of the innovations by differences).
+    Jategaonkar, *Flight Vehicle System Identification*, 2nd ed., §5.5 (time-varying filter). His
+    slopes of the innovations are differences of whole runs; these are exact.
     """
 
     substeps: tuple[int, ...] = ()
@@ -74,24 +83,40 @@ class ExtendedProblem(InnovationsProblem):
         )  # fmt: skip
 
     def records(self, unknowns: Array, *, with_slopes: bool) -> list[Filtered]:
-        """Innovations of every record; slopes are differences of `residuals` alone."""
+        """Innovations of every record; slopes come with `residuals` alone."""
         del with_slopes
         return [
-            (self._found(each, steps, unknowns)[0], [])
+            (self._found(each, steps, unknowns), [])
             for each, steps in zip(self.data, self.substeps, strict=True)
         ]
 
-    def _found(
-        self, data: FilteredData, steps: int, unknowns: Array
-    ) -> tuple[RecordInnovations, Array]:
-        """One record, and the triangles of its innovations' covariances."""
-        model, (process, variance) = self.model, self.noise(unknowns)
-        n, (m, _), (p, n_samples) = len(model.states), data.inputs.shape, data.outputs.shape
+    def _found(self, data: FilteredData, steps: int, unknowns: Array) -> RecordInnovations:
+        """One record as it is kept."""
+        given, (p, n_samples) = self._given(data, steps, unknowns), data.outputs.shape
+        start, prior, shifted, _ = given[-2]
+        (innovations, triangles, states), _ = _native.extended_filter(*given)
+        n = len(self.model.states)
+        late = triangles[n_samples // 2 :]
+        usual = np.mean(late @ late.swapaxes(1, 2), axis=0)
+        own = np.concatenate([states[0, :n], states[-1, n + len(shifted) :], states[-1, n:]])
+        return RecordInnovations(
+            innovations,
+            states[:, :n],
+            np.zeros((n_samples, p, 0)),
+            own[: len(start)],
+            np.zeros((n_samples * p, 0)),
+            SteadyFilter(np.eye(n), np.zeros((n, p)), np.zeros((p, n)), usual, prior[:n, :n]),
+        )
+
+    def _given(self, data: FilteredData, steps: int, unknowns: Array) -> _Given:
+        """What the native filter takes of one record."""
+        process, variance = self.noise(unknowns)
+        n, (m, _), (p, _) = len(self.model.states), data.inputs.shape, data.outputs.shape
         shifted = list(range(m)) if self.input_bias else []
         biased = list(range(p)) if self.output_bias else []
-        seen = state_outputs(model, data.inputs, data.outputs)
-        start = np.concatenate([seen.states(data.outputs[:, :1])[:, 0], np.zeros(m + p)])
-        start = start[: n + len(shifted) + len(biased)]
+        seen = state_outputs(self.model, data.inputs, data.outputs)
+        start = np.zeros(n + len(shifted) + len(biased))
+        start[:n] = seen.states(data.outputs[:, :1])[:, 0]
         prior = np.zeros((len(start), len(start)))
         prior[:n, :n] = WIDE * seen.noise(np.diag(variance))
         unseen = np.flatnonzero(np.diag(prior)[:n] == 0.0)
@@ -101,8 +126,8 @@ class ExtendedProblem(InnovationsProblem):
             (data.inputs, shifted), (data.outputs, biased))]  # fmt: skip
         places = np.arange(n, len(start))
         prior[places, places] = np.concatenate(sizes) ** 2
-        innovations, triangles, states = _native.extended_filter(
-            model.native,
+        return (
+            self.model.native,
             self._values(unknowns),
             np.ascontiguousarray(data.inputs),
             np.ascontiguousarray(data.outputs.T),
@@ -110,74 +135,58 @@ class ExtendedProblem(InnovationsProblem):
             (start, prior, shifted, biased),
             (process, variance),
         )
-        late = triangles[n_samples // 2 :]
-        usual = np.mean(late @ late.swapaxes(1, 2), axis=0)
-        own = np.concatenate([states[0, :n], states[-1, n + len(shifted) :], states[-1, n:]])
-        made = RecordInnovations(
-            innovations,
-            states[:, :n],
-            np.zeros((n_samples, p, 0)),
-            own[: len(start)],
-            np.zeros((n_samples * p, 0)),
-            SteadyFilter(np.eye(n), np.zeros((n, p)), np.zeros((p, n)), usual, prior[:n, :n]),
-        )
-        return made, triangles
+
+    def _ahead(self, data: FilteredData, given: _Given) -> tuple[Array, Array, Array, Array]:
+        """How values, prior, densities and variances change with each unknown."""
+        (_, prior, _, _), (process, variance) = given[-2:]
+        count, n, p = self.n_all, len(process), len(variance)
+        values = np.zeros((count, len(given[1])))
+        values[np.arange(self.n_free), self.model.parameters.free_indices] = 1.0
+        densities, variances = np.zeros((count, n)), np.zeros((count, p))
+        for place, state in enumerate(self.noisy, self.n_free):
+            densities[place, state] = 2.0 * process[state]
+        begun = np.zeros((count, *prior.shape))
+        seen = state_outputs(self.model, data.inputs, data.outputs)
+        for output in range(1, p):
+            place = self.n_free + len(self.noisy) + output - 1
+            variances[place, output] = 2.0 * variance[output]
+            begun[place, :n, :n] = WIDE * seen.noise(np.diag(variances[place]))
+        return values, begun, densities, variances
 
     def residuals(self, unknowns: Array, *, with_slopes: bool) -> tuple[Array, Array]:
-        """Scaled whitened innovations of all records, and their differences by the unknowns."""
-        size = self.n_residuals
+        """Scaled whitened innovations of all records, and their exact slopes by the unknowns.
+
+        Rows without residual follow: they bring the curvature of the variances.
+        """
+        size, count = self.n_residuals, self.n_all if with_slopes else 0
+        lengths = np.array([each.outputs.shape[1] for each in self.data], dtype=np.float64)
+        total = sum(each.outputs.size for each in self.data)
+        white, logs, turned, moved = [], [], [], []
         try:
-            centre = self._whitened(unknowns)
-            if not with_slopes:
-                return self._scaled(centre), np.zeros((size, 0))
-            columns = [self._slope(unknowns, place, centre) for place in range(self.n_all)]
+            for each, steps in zip(self.data, self.substeps, strict=True):
+                given = self._given(each, steps, unknowns)
+                _, (found, log) = _native.extended_filter(*given)
+                white.append(found.ravel())
+                logs.append(log)
+                if with_slopes:
+                    slopes = _native.extended_filter_slopes(*given, self._ahead(each, given))
+                    turned.append(slopes[0])
+                    moved.append(slopes[1])
         except (FlightidError, np.linalg.LinAlgError):
             return np.full(size, np.nan), np.full((size, self.n_all), np.nan)
-        return self._scaled(centre), np.ascontiguousarray(np.array(columns).T)
-
-    def _whitened(self, unknowns: Array) -> tuple[Array, Array]:
-        """Whitened innovations, and mean logarithms of the triangles' diagonals by record."""
-        white, logs = [], []
-        for each, steps in zip(self.data, self.substeps, strict=True):
-            found, triangles = self._found(each, steps, unknowns)
-            solved = np.linalg.solve(triangles, found.innovations[:, :, None])
-            white.append(solved.ravel())
-            logs.append(np.log(np.diagonal(triangles, axis1=1, axis2=2)).mean(axis=0))
-        return np.concatenate(white), np.array(logs)
-
-    def _factor(self, logs: Array) -> float:
-        """Geometric mean of the deviations."""
-        lengths = np.array([each.outputs.shape[1] for each in self.data])
-        total = sum(each.outputs.size for each in self.data)
-        return float(np.exp(np.sum(lengths[:, None] * logs) / total))
-
-    def _scaled(self, found: tuple[Array, Array]) -> Array:
-        white, logs = found
-        return np.concatenate([self._factor(logs) * white, np.zeros(logs.size)])
-
-    def _slope(self, unknowns: Array, place: int, centre: tuple[Array, Array]) -> Array:
-        """Derivative of the residuals, then of the rows that bring the variances' curvature."""
-        low, high = self._around(unknowns, place)
-        below, above = self._whitened(low), self._whitened(high)
-        step = high[place] - low[place]
-        white = (self._factor(above[1]) * above[0] - self._factor(below[1]) * below[0]) / step
-        relative = 2.0 * (above[1] - below[1]) / step
-        roots = np.sqrt([each.outputs.shape[1] for each in self.data])
-        spread = 0.5 * roots[:, None] * (relative - relative.mean(axis=1, keepdims=True))
-        level = self._factor(centre[1]) * np.sqrt(np.mean(centre[0] ** 2))
-        return np.concatenate([white, level * spread.ravel()])
-
-    def _around(self, unknowns: Array, place: int) -> tuple[Array, Array]:
-        """Points on both sides, inside the parameter's bounds."""
-        low, high = unknowns.copy(), unknowns.copy()
-        size, least, most = 1.0, -np.inf, np.inf
-        if place < self.n_free:
-            parameter = self.model.parameters.free[place]
-            size = max(abs(unknowns[place]), 0.1 * abs(parameter.value or 0.0)) or 1.0
-            least, most = parameter.minimum, parameter.maximum
-        low[place] = max(unknowns[place] - DIFFERENCE * size, least)
-        high[place] = min(unknowns[place] + DIFFERENCE * size, most)
-        return low, high
+        factor = float(np.exp(np.sum(lengths[:, None] * np.array(logs)) / total))
+        rows = np.concatenate(white)
+        ended = factor * np.concatenate([rows, np.zeros(len(lengths) * len(logs[0]))])
+        if not with_slopes:
+            return ended, np.zeros((size, count))
+        spread = np.array(moved)
+        rise = np.tensordot(lengths, spread.sum(axis=1), axes=1) / total
+        curved = np.sqrt(lengths)[:, None, None] * (spread - spread.mean(axis=1, keepdims=True))
+        level = np.sqrt(np.mean(rows**2))
+        slope = [*turned, level * curved.reshape(-1, count)]
+        jacobian = factor * np.concatenate(slope)
+        jacobian[: rows.size] += np.multiply.outer(factor * rows, rise)
+        return ended, np.ascontiguousarray(jacobian)
 
 
 def along_the_flight(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from flightid.identification.filter_error.innovations import InnovationsProblem
 from flightid.identification.multistart import DenseEnd
 from flightid.identification.records.held_model import LinearPoint
 from flightid.identification.regression.rounds import SearchBounds
+from flightid.progress import progress
 
 Array = NDArray[np.float64]
 TRIAL_ITERATIONS = 12
@@ -22,8 +24,9 @@ TRIAL_ITERATIONS = 12
 class _LastPoint:
     """Residuals and Jacobian, computed once where both are asked for at one point."""
 
-    def __init__(self, problem: InnovationsProblem) -> None:
+    def __init__(self, problem: InnovationsProblem, advance: Callable[..., None]) -> None:
         self._problem = problem
+        self._advance = advance
         self._x = np.empty(0)
         self._found = (np.empty(0), np.empty((0, 0)))
 
@@ -37,6 +40,7 @@ class _LastPoint:
         if not np.array_equal(x, self._x):
             self._found = self._problem.residuals(x, with_slopes=True)
             self._x = x.copy()
+            self._advance()
         return self._found
 
 
@@ -48,16 +52,18 @@ def minimise(
     iterations: int | None = None,
 ) -> DenseEnd:
     """Search from one start: parameters inside their bounds, noises inside their reach."""
-    point, reach = _LastPoint(problem), problem.reach
-    ending = _native.least_squares(
-        point.residuals,
-        point.jacobian,
-        start,
-        np.concatenate([limits.lower, -reach]),
-        np.concatenate([limits.upper, reach]),
-        problem.n_residuals,
-        limits.maximum_iterations if iterations is None else iterations,
-    )
+    reach = problem.reach
+    with progress(None, "running the filter") as advance:
+        point = _LastPoint(problem, advance)
+        ending = _native.least_squares(
+            point.residuals,
+            point.jacobian,
+            start,
+            np.concatenate([limits.lower, -reach]),
+            np.concatenate([limits.upper, reach]),
+            problem.n_residuals,
+            limits.maximum_iterations if iterations is None else iterations,
+        )
     return DenseEnd.of_native(ending)
 
 

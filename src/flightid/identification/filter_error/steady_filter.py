@@ -8,12 +8,12 @@ order.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm, expm_frechet
 
+from flightid import _native
 from flightid.errors import FitError
 
 Array = NDArray[np.float64]
@@ -102,7 +102,8 @@ def steady_filter(
     """
     n = len(point.a)
     noisy = _noisy(point, sample_time_s)
-    phi, spread = np.asarray(expm(point.a * sample_time_s)), np.asarray(expm(noisy))
+    exponent = point.a * sample_time_s
+    phi, spread = _native.matrix_exponential(exponent), _native.matrix_exponential(noisy)
     q = _symmetric(phi @ spread[:n, n:])
     predicted = _riccati(phi, point.c, q, point.measurement)
     innovation = point.c @ predicted @ point.c.T + point.measurement
@@ -113,8 +114,15 @@ def steady_filter(
     found = SteadyFilter(phi @ keep, gain, point.c, innovation, predicted)
     derived = []
     for slope in slopes:
-        d_phi = _moved(point.a * sample_time_s, slope.a * sample_time_s)
-        widened = _moved(noisy, _noisy(slope, sample_time_s))
+        if np.any(slope.a):
+            d_phi = _moved(exponent, slope.a * sample_time_s)
+            widened = _moved(noisy, _noisy(slope, sample_time_s))
+        else:
+            # The upper right block is linear in the noise, all others do not hold it.
+            d_phi = np.zeros((n, n))
+            widened = _native.matrix_exponential(
+                _noisy(replace(point, process=slope.process), sample_time_s)
+            )
         d_q = _symmetric(d_phi @ spread[:n, n:] + phi @ widened[:n, n:])
         turned = weight @ slope.c @ predicted @ keep.T
         kept = weight @ slope.measurement @ weight.T - turned - turned.T
@@ -132,8 +140,12 @@ def steady_filter(
 
 
 def _moved(exponent: Array, direction: Array) -> Array:
-    """Derivative of an exponential along a direction."""
-    return np.asarray(expm_frechet(exponent, direction, compute_expm=False), dtype=np.float64)
+    """Derivative of an exponential along a direction: the corner of a larger one (Van Loan)."""
+    n = len(exponent)
+    both = np.zeros((2 * n, 2 * n))
+    both[:n, :n] = both[n:, n:] = exponent
+    both[:n, n:] = direction
+    return _native.matrix_exponential(both)[:n, n:]
 
 
 def _symmetric(matrix: Array) -> Array:

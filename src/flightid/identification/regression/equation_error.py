@@ -42,8 +42,8 @@ from flightid.identification.regression.rounds import (
     SearchBounds,
     SettledRounds,
     settle,
-    solve,
     stack,
+    stepped,
 )
 from flightid.identification.regression.sampled_equations import (
     Reconstruction,
@@ -196,7 +196,7 @@ def _finish(
         return replace(settled_at, motions=tuple(motions), operators=tuple(operators))
 
     def refit(motions: Sequence[StateMeasurements]) -> Array:
-        return solve(on(motions), end.x, settled.weights, limits)[0].x
+        return stepped(on(motions), end.x, settled.weights, limits)
 
     def residuals(motions: Sequence[StateMeasurements]) -> list[Array]:
         return [each.residuals for each in on(motions).rows(end.x, settled.weights)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,9 +89,15 @@ class EquationRegression:
 
     def left(self, place: int) -> Array:
         """What is measured of the used equations of one record."""
-        motion, operator = self.motions[place], self.operators[place]
-        both = [operator.derivative(motion.states), operator.values(motion.others)]
-        return np.concatenate(both, axis=0)[self.used]
+        return self._lefts[place]
+
+    @cached_property
+    def _lefts(self) -> tuple[Array, ...]:
+        sides = (
+            [operator.derivative(motion.states), operator.values(motion.others)]
+            for motion, operator in zip(self.motions, self.operators, strict=True)
+        )
+        return tuple(np.concatenate(both, axis=0)[self.used] for both in sides)
 
     def rows(self, theta: Array, weights: Sequence[Array]) -> list[Rows]:
         """Residuals and slopes, the unknown constants taken out under these weights."""
