@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.uncertainty.blocks import JointResiduals, RecordBlock
-from flightid.uncertainty.covariance import residual_covariance
+from flightid.uncertainty.coloured_residuals import residual_covariance
 from flightid.uncertainty.fed_noise import fed_noise_spectrum
 from tests.closeness import assert_close
 from tests.strangers import closed_loops

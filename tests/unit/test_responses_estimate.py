@@ -11,7 +11,7 @@ from scipy import signal
 from flightid import FrequencyResponse, Record, estimate_response
 from flightid.errors import DataError, OptionError, ShapeError, UnitError, UnknownNameError
 from flightid.responses.estimators.conditioned import random_error
-from flightid.responses.windows.windows import (
+from flightid.responses.windows.defaults import (
     automatic_windows,
     overlap_factor,
     plan_of,

@@ -15,7 +15,7 @@
 //! - `fits`: Least squares with bounds: the problem, its solver, and problems joined.
 //! - `frequency_domain`: Models as frequency responses, and their fit to measured ones.
 //! - `trajectories`: Differential equations integrated in time, sensitivities, shooting, loops.
-//! - `records`: Output error: models on records, the records' own numbers, weights and sums.
+//! - `output_error`: Output error: models on records, the records' own numbers, weights and sums.
 //! - `black_box`: Polynomial models and NARX: predictors, fits, scans of orders, choice of terms.
 //! - `autopilots`: Controllers and filters of ArduPilot and PX4, as their firmware computes them.
 //! - `vehicles`: Simulated vehicles in gusts, with sensors, autopilots and pilots.
@@ -28,7 +28,7 @@ pub mod frequency_domain;
 pub mod language;
 pub mod linear;
 pub mod numerics;
-pub mod records;
+pub mod output_error;
 pub mod state_space;
 pub mod tape;
 pub mod trajectories;

@@ -29,7 +29,7 @@ from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.record import Record, Step
 from flightid.table import Cell
 from flightid.uncertainty.blocks import RecordBlock
-from flightid.uncertainty.covariance import residual_covariance
+from flightid.uncertainty.coloured_residuals import residual_covariance
 from flightid.uncertainty.estimate import Estimate
 from flightid.units import require_match
 

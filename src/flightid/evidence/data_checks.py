@@ -17,7 +17,7 @@ from flightid.record import Record
 from flightid.record.checks import data_findings, record_findings
 from flightid.record.time_question import time_question
 from flightid.responses import FrequencyResponse, estimate_response
-from flightid.responses.windows.windows import CYCLES_AT_LOWEST, HIGHEST_FRACTION
+from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTION
 from flightid.uncertainty.feedback import FeedbackTest
 
 KEPT = 4

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
-from flightid.responses.windows.windows import CYCLES_AT_LOWEST, HIGHEST_FRACTION
+from flightid.responses.windows.defaults import CYCLES_AT_LOWEST, HIGHEST_FRACTION
 
 HIGH_INPUT_COHERENCE = 0.5
 """Coherence between two inputs, averaged over the band, above which conditioning is doubtful."""

@@ -27,9 +27,9 @@ from flightid.responses.estimators.windowed import (
 from flightid.responses.feedback import feedback_findings, feedback_of
 from flightid.responses.options import ResponseOptions
 from flightid.responses.response import FrequencyResponse
+from flightid.responses.windows.defaults import DEFAULT_FREQUENCIES, DEFAULT_OVERLAP, shifts_of
 from flightid.responses.windows.planning import plan_frequencies, plan_windows
 from flightid.responses.windows.samples import Samples, gather
-from flightid.responses.windows.windows import DEFAULT_FREQUENCIES, shifts_of
 from flightid.table import Cell
 from flightid.uncertainty.feedback import FeedbackTest
 from flightid.version import VERSION
@@ -46,7 +46,7 @@ def estimate_response(
     omega_rad_s: ArrayLike | None = None,
     window_s: str | float | Sequence[float] = "auto",
     estimator: str = "composite",
-    overlap: float = 0.5,
+    overlap: float = DEFAULT_OVERLAP,
     detrend: str = "mean",
     covariance: bool = True,
     loop: Loop | None = None,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from flightid.options import Options, option
 from flightid.record.hold import LOOPS, Loop
-from flightid.responses.windows.windows import DEFAULT_FREQUENCIES
+from flightid.responses.windows.defaults import DEFAULT_FREQUENCIES, DEFAULT_OVERLAP
 
 ESTIMATORS = ("composite", "instrument", "local_polynomial", "periodic", "prewhitened")
 DETRENDS = ("none", "mean", "line")
@@ -39,6 +39,8 @@ class ResponseOptions(Options):
     window_s: str | float | Sequence[float] = option(
         "auto", unit="s", above=0.0, choices=("auto",), doc="Window lengths."
     )
-    overlap: float = option(0.5, minimum=0.0, below=1.0, doc="Overlap of neighbouring windows.")
+    overlap: float = option(
+        DEFAULT_OVERLAP, minimum=0.0, below=1.0, doc="Overlap of neighbouring windows."
+    )
     detrend: str = option("mean", choices=DETRENDS, doc="What is removed from each window.")
     covariance: bool = option(True, doc="Keep what the covariance of errors needs.")

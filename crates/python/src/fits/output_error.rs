@@ -1,16 +1,16 @@
-//! Face of `flightid_core::records::output_error` for every kind of model. (Python side:
+//! Face of `flightid_core::output_error::likelihood` for every kind of model. (Python side:
 //! identification/output_error/fit.py)
 
 use flightid_core::CoreError;
 use flightid_core::fits::least_squares::{Options, Problem};
 use flightid_core::linear::discretisation::Hold;
-use flightid_core::records::linear_family::LinearFamily;
-use flightid_core::records::linear_output_error::LinearTrajectories;
-use flightid_core::records::model_on_records::{Trajectories, Wanted};
-use flightid_core::records::output_error::{Estimate, fit_from};
-use flightid_core::records::output_error_weights::Noise;
-use flightid_core::records::record_data::RecordData;
-use flightid_core::records::record_data::RecordInputs;
+use flightid_core::output_error::likelihood::{Estimate, fit_from};
+use flightid_core::output_error::linear_family::LinearFamily;
+use flightid_core::output_error::linear_output_error::LinearTrajectories;
+use flightid_core::output_error::model_on_records::{Trajectories, Wanted};
+use flightid_core::output_error::output_error_weights::Noise;
+use flightid_core::output_error::record_data::RecordData;
+use flightid_core::output_error::record_data::RecordInputs;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
 };

@@ -1,10 +1,10 @@
-//! Face of `flightid_core::records::nonlinear_output_error`. (Python side:
+//! Face of `flightid_core::output_error::nonlinear_output_error`. (Python side:
 //! identification/output_error/equation_records.py)
 
-use flightid_core::records::model_on_records::Wanted;
-use flightid_core::records::nonlinear_output_error::{EquationTrajectories, Passage};
-use flightid_core::records::record_data::RecordData;
-use flightid_core::records::record_data::RecordInputs;
+use flightid_core::output_error::model_on_records::Wanted;
+use flightid_core::output_error::nonlinear_output_error::{EquationTrajectories, Passage};
+use flightid_core::output_error::record_data::RecordData;
+use flightid_core::output_error::record_data::RecordInputs;
 use flightid_core::state_space::ode_model::OdeModel;
 use flightid_core::trajectories::shooting::Plan;
 use numpy::{

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use flightid_core::frequency_domain::frequency_fit::FrequencyFit;
 use flightid_core::frequency_domain::response_model::ResponseModel;
 use flightid_core::frequency_domain::state_space_response::FreeStateSpace;
-use flightid_core::records::state_space_family::StateSpaceFamily;
+use flightid_core::output_error::state_space_family::StateSpaceFamily;
 use flightid_core::state_space::model_samples::sample;
 use flightid_core::state_space::model_tape::{ModelTape, ModelText};
 use num_complex::Complex64;

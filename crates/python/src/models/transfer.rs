@@ -7,7 +7,7 @@ use flightid_core::frequency_domain::response_model::ResponseModel;
 use flightid_core::frequency_domain::transfer::{
     FreeTransfer, ResponseText, TransferFunctions as Functions,
 };
-use flightid_core::records::transfer_family::TransferFamily;
+use flightid_core::output_error::transfer_family::TransferFamily;
 use num_complex::Complex64;
 use numpy::{PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;

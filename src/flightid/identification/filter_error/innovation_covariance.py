@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.identification.filter_error.innovations import RecordInnovations
 from flightid.uncertainty.blocks import JointResiduals, RecordBlock
-from flightid.uncertainty.covariance import ResidualCovariance, residual_covariance
+from flightid.uncertainty.coloured_residuals import ResidualCovariance, residual_covariance
 from flightid.uncertainty.cramer_rao import inverse_hessian
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from flightid.identification.narx.regressors import Regressors
 from flightid.models.narx.structure import NarxStructure
 from flightid.uncertainty.agreement import AgreementTest
 from flightid.uncertainty.blocks import RecordBlock
-from flightid.uncertainty.covariance import white_covariance
+from flightid.uncertainty.coloured_residuals import white_covariance
 
 Array = NDArray[np.float64]
 

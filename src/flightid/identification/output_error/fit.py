@@ -1,4 +1,4 @@
-"""Output error: maximum likelihood of records in the time domain (native: `output_error.rs`).
+"""Output error: maximum likelihood of records in the time domain (native: `likelihood.rs`).
 
 The model runs free through every record. Minimised is ½ Σ vᵀR⁻¹v + (N/2) ln det R of measured minus
 model v, over the model's parameters and each record's initial state, biases and reference shifts.

@@ -20,7 +20,7 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import RecordBlock
-from flightid.uncertainty.covariance import residual_covariance, white_covariance
+from flightid.uncertainty.coloured_residuals import residual_covariance, white_covariance
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]

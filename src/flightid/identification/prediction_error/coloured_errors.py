@@ -17,7 +17,7 @@ from scipy.signal import lfilter
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 from flightid.uncertainty.blocks import RecordBlock
-from flightid.uncertainty.covariance import ResidualCovariance, residual_covariance
+from flightid.uncertainty.coloured_residuals import ResidualCovariance, residual_covariance
 
 Array = NDArray[np.float64]
 INDEPENDENT = 1e-9

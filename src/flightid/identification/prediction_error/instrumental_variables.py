@@ -13,7 +13,7 @@ from flightid.identification.prediction_error.coloured_errors import instrumenta
 from flightid.identification.prediction_error.linear_regression import reflected, regress
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
-from flightid.uncertainty.covariance import ResidualCovariance
+from flightid.uncertainty.coloured_residuals import ResidualCovariance
 
 Array = NDArray[np.float64]
 SPARE_LAGS = 8

@@ -10,7 +10,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.identification.records.setup import RecordSet
-from flightid.uncertainty.covariance import colour_findings
+from flightid.uncertainty.coloured_residuals import colour_findings
 
 ROUNDING_PERCENT = 1e-18
 """Share of an output's variance below which residuals are rounding."""

@@ -24,7 +24,7 @@ from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.uncertainty import correlation as correlation_of
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import JointResiduals, RecordBlock
-from flightid.uncertainty.covariance import residual_covariance, triangle_of
+from flightid.uncertainty.coloured_residuals import residual_covariance, triangle_of
 from flightid.uncertainty.estimate import Estimate
 
 Array = NDArray[np.float64]

@@ -59,7 +59,7 @@ from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.record import Record
 from flightid.record.several import as_records
 from flightid.uncertainty.blocks import RecordBlock
-from flightid.uncertainty.covariance import residual_covariance
+from flightid.uncertainty.coloured_residuals import residual_covariance
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flightid.identification.regression.rounds import Rows
 from flightid.uncertainty.agreement import AgreementTest
 from flightid.uncertainty.blocks import RecordBlock
-from flightid.uncertainty.covariance import white_covariance
+from flightid.uncertainty.coloured_residuals import white_covariance
 from flightid.uncertainty.spectral import averaged, spectral_covariance
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from flightid.models.sampled.recursion import run_recursion, spectral_radius
 from flightid.progress import progress
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import RecordBlock
-from flightid.uncertainty.covariance import white_covariance
+from flightid.uncertainty.coloured_residuals import white_covariance
 
 Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array, Array, Array]

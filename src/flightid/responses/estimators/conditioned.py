@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import DataError
 from flightid.responses.spectra import Spectra
-from flightid.responses.windows.windows import overlap_factor
+from flightid.responses.windows.defaults import overlap_factor
 
 WORST_CONDITION = 1e12
 """Condition number of the normalised input spectra beyond which the inputs cannot be told apart."""

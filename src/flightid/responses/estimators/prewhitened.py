@@ -20,8 +20,8 @@ from flightid.responses.errors.prewhitened import (
 )
 from flightid.responses.estimators.conditioned import coherence_of
 from flightid.responses.response import FrequencyResponse
+from flightid.responses.windows.defaults import WINDOWS_IN_RECORDS
 from flightid.responses.windows.samples import Samples
-from flightid.responses.windows.windows import WINDOWS_IN_RECORDS
 
 PREWHITENED = "prewhitened"
 TINY = float(np.finfo(float).tiny)

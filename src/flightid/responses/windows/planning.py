@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, OptionError
-from flightid.responses.windows.samples import Samples
-from flightid.responses.windows.transform import WindowPlan
-from flightid.responses.windows.windows import (
+from flightid.responses.windows.defaults import (
     CYCLES_AT_LOWEST,
     MINIMUM_LENGTH,
     automatic_windows,
@@ -19,6 +17,8 @@ from flightid.responses.windows.windows import (
     longest_window,
     plan_of,
 )
+from flightid.responses.windows.samples import Samples
+from flightid.responses.windows.transform import WindowPlan
 
 
 def plan_frequencies(

@@ -14,7 +14,7 @@ from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
-from flightid.responses.windows.windows import (
+from flightid.responses.windows.defaults import (
     DEFAULT_FREQUENCIES,
     longest_window,
     overlap_factor,

@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from flightid.uncertainty.blocks import RecordBlock
-from flightid.uncertainty.covariance import (
+from flightid.uncertainty.coloured_residuals import (
     ResidualCovariance,
     colour_findings,
     residual_covariance,

@@ -2,7 +2,7 @@
 //! (Python side: identification/output_error/fit.py)
 
 use crate::error::CoreError;
-use crate::records::linear_family::{LinearFamily, LinearPoint, Values};
+use crate::output_error::linear_family::{LinearFamily, LinearPoint, Values};
 use crate::state_space::model_tape::ModelTape;
 
 /// A state-space model linearised at its point; what its equations hold beside the linear terms

@@ -3,10 +3,10 @@
 //! (Python side: identification/output_error/fit.py)
 
 use crate::numerics::widest::widest;
-use crate::records::bias_sums::BiasSums;
-use crate::records::model_on_records::LANES;
-use crate::records::normal_equations::add_rows;
-use crate::records::output_error_weights::{Moments, Weights};
+use crate::output_error::bias_sums::BiasSums;
+use crate::output_error::model_on_records::LANES;
+use crate::output_error::normal_equations::add_rows;
+use crate::output_error::output_error_weights::{Moments, Weights};
 
 /// Products and sums of rows before any weight.
 #[derive(Debug, Clone, Default)]
@@ -95,8 +95,8 @@ fn add_columns(sums: &mut [f64], rows: &[f64]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::records::output_error_weights::Noise;
-    use crate::records::record_data::RecordData;
+    use crate::output_error::output_error_weights::Noise;
+    use crate::output_error::record_data::RecordData;
 
     #[test]
     fn weights_given_afterwards_are_weights_given_first() {

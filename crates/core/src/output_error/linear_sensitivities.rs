@@ -9,8 +9,8 @@
 use crate::linear::block_recursion::{Acting, BLOCK, Line, carry};
 use crate::linear::discretisation::Sampled;
 use crate::numerics::widest::widest;
-use crate::records::linear_family::LinearPoint;
-use crate::records::model_on_records::{LANES, Wanted};
+use crate::output_error::linear_family::LinearPoint;
+use crate::output_error::model_on_records::{LANES, Wanted};
 
 /// One number at each sample.
 type Scalars = Line<1>;

@@ -5,8 +5,8 @@ use std::sync::{Mutex, PoisonError};
 
 use crate::error::CoreError;
 use crate::linear::discretisation::Hold;
-use crate::records::model_on_records::{Trajectories, Wanted};
-use crate::records::record_data::RecordInputs;
+use crate::output_error::model_on_records::{Trajectories, Wanted};
+use crate::output_error::record_data::RecordInputs;
 use crate::state_space::ode_model::OdeModel;
 use crate::trajectories::runge_kutta::{Course, expect};
 use crate::trajectories::shooting::{Flight, Plan, Wish};

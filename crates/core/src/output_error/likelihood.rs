@@ -17,11 +17,11 @@ use crate::fits::dense_problem::Dense;
 use crate::fits::joint_objective::Joint;
 use crate::fits::least_squares::{Objective, Options, Point, Problem, Termination};
 use crate::fits::levenberg_marquardt::search;
-use crate::records::model_on_records::Trajectories;
-use crate::records::normal_equations::{Elimination, triangle};
-use crate::records::output_error_weights::{Moments, Noise, Weights};
-use crate::records::record_data::{RecordData, same};
-use crate::records::record_pass::{Part, RecordPass, Task};
+use crate::output_error::model_on_records::Trajectories;
+use crate::output_error::normal_equations::{Elimination, triangle};
+use crate::output_error::output_error_weights::{Moments, Noise, Weights};
+use crate::output_error::record_data::{RecordData, same};
+use crate::output_error::record_pass::{Part, RecordPass, Task};
 
 /// Where a fit ended.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 //! (Python side: identification/output_error/fit.py)
 
 use crate::error::CoreError;
-use crate::records::record_data::RecordData;
+use crate::output_error::record_data::RecordData;
 
 /// Smallest noise that is believed, as a share of an output's size.
 const FLOOR: f64 = 1e-9;

@@ -1,7 +1,7 @@
 //! Columns of the normal equations that output biases add, from sums over the rows alone.
 //! (Python side: identification/output_error/fit.py)
 
-use crate::records::record_data::RecordData;
+use crate::output_error::record_data::RecordData;
 
 /// Sums that bias columns need: for each whitened output Σ w and Σ √w · row.
 #[derive(Debug, Clone)]

@@ -5,7 +5,7 @@
 //! Reference: Golub & Van Loan, *Matrix Computations*, 4th ed., §4.2.9 and §5.3.
 
 use crate::numerics::widest::widest;
-use crate::records::model_on_records::LANES;
+use crate::output_error::model_on_records::LANES;
 
 /// Below this share of its own length a column counts as a combination of those before it.
 const DEPENDENT: f64 = 1e-13;

@@ -2,12 +2,12 @@
 //! (Python side: identification/output_error/fit.py)
 
 use crate::error::CoreError;
-use crate::records::bias_sums::BiasSums;
-use crate::records::model_on_records::{Trajectories, Wanted};
-use crate::records::normal_equations::{Elimination, add_rows, eliminate};
-use crate::records::output_error_weights::{Moments, Weights};
-use crate::records::output_sums::OutputSums;
-use crate::records::record_data::RecordData;
+use crate::output_error::bias_sums::BiasSums;
+use crate::output_error::model_on_records::{Trajectories, Wanted};
+use crate::output_error::normal_equations::{Elimination, add_rows, eliminate};
+use crate::output_error::output_error_weights::{Moments, Weights};
+use crate::output_error::output_sums::OutputSums;
+use crate::output_error::record_data::RecordData;
 
 /// What a pass needs beside its buffers.
 pub struct Task<'a, T: Trajectories> {

@@ -4,7 +4,7 @@
 use crate::error::CoreError;
 use crate::frequency_domain::transfer::TransferFunctions;
 use crate::frequency_domain::transfer_polynomials::Rational;
-use crate::records::linear_family::{LinearFamily, LinearPoint, Values};
+use crate::output_error::linear_family::{LinearFamily, LinearPoint, Values};
 
 /// Transfer functions, each with states of its own in controllable form and a delay of its own.
 #[derive(Debug, Clone)]

@@ -21,6 +21,7 @@ HIGHEST_FRACTION = 0.2
 """Highest trustworthy frequency as a fraction of the sampling rate."""
 AUTOMATIC_LENGTHS = 5
 DEFAULT_FREQUENCIES = 100
+DEFAULT_OVERLAP = 0.5
 MINIMUM_LENGTH = 8
 
 

@@ -5,10 +5,10 @@ use crate::error::CoreError;
 use crate::linear::block_recursion::BLOCK;
 use crate::linear::discretisation::{Hold, Sampled, discretise};
 use crate::linear::linear_simulation::sample;
-use crate::records::linear_family::{LinearFamily, LinearPoint};
-use crate::records::model_on_records::{Trajectories, Wanted};
-use crate::records::record_data::RecordInputs;
-use crate::records::sensitivity_recursion::{Recursion, Workspace};
+use crate::output_error::linear_family::{LinearFamily, LinearPoint};
+use crate::output_error::linear_sensitivities::{Recursion, Workspace};
+use crate::output_error::model_on_records::{Trajectories, Wanted};
+use crate::output_error::record_data::RecordInputs;
 
 /// A linear family on records.
 #[derive(Debug, Clone)]
