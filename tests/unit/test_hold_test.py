@@ -129,3 +129,10 @@ def test_bars_reach_what_an_unknown_hold_decides() -> None:
     low, high = untold.interval95
     assert low < holds.TRUTH["tau"] < high
     assert untold.stderr > 3.0 * told.stderr
+
+
+def test_a_model_that_runs_away_is_asked_nothing_of_its_hold() -> None:
+    record = holds.flight(0, "steps", told=True)
+    model = holds.model().with_values({"Mq": 40.0})
+    with pytest.raises(fid.FlightidError, match="leads away"):
+        held_outputs(model, [record], {}, ["zero", "first"])

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.errors import DataError
 from flightid.identification.output_error.distinct import run_with_slopes
 from flightid.identification.output_error.equation_records import (
     EquationRuns,
@@ -28,6 +29,8 @@ from flightid.uncertainty.blocks import RecordBlock
 
 Array = NDArray[np.float64]
 TINY = float(np.finfo(float).tiny)
+FAR = 100.0
+"""Residual over an output's deviation beyond which a model follows nothing."""
 STEPS = 2
 """Of Gauss and Newton: what a delay moves by half a sample bends by less than the second tells."""
 
@@ -106,6 +109,7 @@ def _under(prepared: RecordSet, runs_of: EquationRuns | None) -> HeldOutputs:
     free = [parameter.name for parameter in prepared.model.parameters.free]
     values = np.array([prepared.model.parameters[name].value or 0.0 for name in free])
     sizes = np.std(np.concatenate([each[1] for each in prepared.arrays], axis=1), axis=1)
+    largest = FAR * sizes
     for round_ in range(STEPS):
         if round_:
             model = prepared.model.with_values(dict(zip(free, map(float, values), strict=True)))
@@ -115,6 +119,7 @@ def _under(prepared: RecordSet, runs_of: EquationRuns | None) -> HeldOutputs:
             for place, own in enumerate(prepared.own)
         ]
         left = [each[1] - run[0] for each, run in zip(prepared.arrays, runs, strict=True)]
+        _require_near(left, [slopes for _, slopes in runs], largest)
         steps = _steps(left, [slopes for _, slopes in runs], sizes, len(free))
         left = [
             rest - slopes @ step for rest, (_, slopes), step in zip(left, runs, steps, strict=True)
@@ -127,6 +132,26 @@ def _under(prepared: RecordSet, runs_of: EquationRuns | None) -> HeldOutputs:
         ]
         prepared = replace(prepared, own=own)
     return HeldOutputs(values, left)
+
+
+def _require_near(left: Sequence[Array], slopes: Sequence[Array], largest: Array) -> None:
+    """Refuse to step from a model that is nowhere near its records.
+
+    Raises
+    ------
+    DataError
+        A run that explodes, or leaves far more than there was.
+    """
+    sound = all(
+        np.all(np.abs(rest) <= largest[:, None]) and np.all(np.isfinite(slope))
+        for rest, slope in zip(left, slopes, strict=True)
+    )
+    if not sound:
+        raise DataError(
+            "a step under another hold leads away from the records",
+            found=f"residuals above {FAR:g} times the outputs",
+            needed="a model that follows them",
+        )
 
 
 def _steps(
