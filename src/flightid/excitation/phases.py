@@ -131,7 +131,11 @@ def _log_norm(
     wave = lines.wave(phases, count)
     largest = np.max(np.abs(wave))
     ratio = wave / largest
-    powered = np.abs(ratio) ** (order - 1) * np.sign(ratio)
+    # ratio^(order − 1), order a power of two, as a product of squares: it keeps the sign.
+    powered = square = ratio
+    for _ in range(order.bit_length() - 2):
+        square = square * square
+        powered = powered * square
     total = np.mean(powered * ratio)
     moment = np.fft.rfft(powered)[lines.harmonics] / count
     slope = -lines.amplitudes * np.imag(np.exp(1j * phases) * np.conj(moment))
