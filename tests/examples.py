@@ -10,7 +10,7 @@ PROFILE = os.environ.get("HYPOTHESIS_PROFILE", "steady")
 FEWEST = 6
 
 
-def examples(count: int) -> settings:
+def examples(count: int, fewest: int = FEWEST) -> settings:
     """Decorator for a property that wants `count` examples in the long run."""
-    drawn = count if PROFILE != "steady" else min(count, max(FEWEST, count // 3))
+    drawn = count if PROFILE != "steady" else min(count, max(fewest, count // 3))
     return settings(max_examples=drawn, deadline=None)

@@ -11,7 +11,18 @@ PAGES = sorted((Path(__file__).parent.parent.parent / "docs").glob("*.md"))
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+LONG = {
+    *("tuning", "verification", "responses", "margins", "evidence", "regression", "inspection"),
+    *("identify", "black_box"),
+}
+"""Pages whose examples take half a second or more; the verbs they call have tests of their own."""
+RUN = [
+    pytest.param(page, id=page.name, marks=pytest.mark.nightly if page.stem in LONG else ())
+    for page in PAGES
+]
+
+
+@pytest.mark.parametrize("page", RUN)
 def test_python_blocks_run(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
 ) -> None:

@@ -105,6 +105,7 @@ def _deviates(case: dict[str, Any], seeds: range) -> np.ndarray:
     return np.array(rows)
 
 
+@pytest.mark.slow
 def test_errors_are_as_large_as_the_standard_errors_say() -> None:
     case = {**CASES["much-gyro-noise"], "n": 600}
     square = np.mean(_deviates(case, range(12)) ** 2)

@@ -236,7 +236,7 @@ def test_two_measured_loops_have_intervals_that_draws_confirm():
         [0.05, 0.05],
     )
     law = static([[2.0, 0.3], [-0.4, 1.5]])
-    omega = np.geomspace(1.0, 60.0, 25)
+    omega = np.geomspace(1.0, 60.0, 9)
     exact, error = plant.frequency_response(omega), 0.03
     rng = np.random.default_rng(4)
 
@@ -246,11 +246,11 @@ def test_two_measured_loops_have_intervals_that_draws_confirm():
             values,
             inputs=plant.inputs,
             outputs=plant.outputs,
-            random_error=np.full((2, 2, 25), error),
+            random_error=np.full((2, 2, 9), error),
         )
 
     found = fid.disk_margin(seen(exact), controller=law)
-    noise = rng.standard_normal((2, 150, 2, 2, 25))
+    noise = rng.standard_normal((2, 150, 2, 2, 9))
     drawn = exact * (1 + error * (noise[0] + 1j * noise[1]))
     gains = np.asarray(law.d)
     alphas = [np.min(alphas_of(each @ gains, 0.0)) for each in np.moveaxis(drawn, -1, 1)]
@@ -259,7 +259,7 @@ def test_two_measured_loops_have_intervals_that_draws_confirm():
     # The same errors, told as a covariance that knows one output at a time.
     spread = np.abs(exact).reshape(2, -1) * error
     matrix = np.array([np.diag(np.tile(each, 2) ** 2) for each in spread])
-    told = replace(seen(exact), errors=StoredCovariance(matrix, 25))
+    told = replace(seen(exact), errors=StoredCovariance(matrix, 9))
     other = fid.disk_margin(told, controller=law)
     assert_close(np.ptp(other.alpha.interval95) / 2, half, rtol=1e-6, why="one covariance")
     nothing = fid.FrequencyResponse.from_values(

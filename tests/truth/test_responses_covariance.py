@@ -92,7 +92,7 @@ def _predicted(response: FrequencyResponse, kind: str) -> np.ndarray:
 
 
 # The same estimator with two inputs, which is harder, is in every run.
-NIGHTLY = {"one window", "composite", "local polynomial"}
+NIGHTLY = {*CASES} - {"nothing removed", "two inputs", "instrument", "local polynomial, two inputs"}
 IN_EVERY_RUN = [
     pytest.param(case, marks=pytest.mark.nightly if case in NIGHTLY else ()) for case in CASES
 ]
