@@ -178,6 +178,24 @@ def test_margins_are_those_of_python_control() -> None:
     )  # fmt: skip
 
 
+def _chain(poles: list[float]) -> fid.LinearSystem:
+    """First-order lags one after the other; equal ones have one mode together."""
+    a = np.diag(poles) + np.diag(np.ones(len(poles) - 1), -1)
+    b, c = np.eye(len(poles), 1), np.eye(len(poles))[::-1][:1]
+    return fid.LinearSystem(a, b, c, [[0.3]], ("tau_phi",), ("p",), [0.017])
+
+
+@pytest.mark.parametrize("poles", [[-20.0, -4.0], [-20.0, 2.0, -0.3], [-7.0, -7.0, -7.0]])
+def test_sampled_plants_respond_as_their_matrices_do(poles: list[float]) -> None:
+    plants = sample_plants([_chain(poles)], ["p"], ["tau_phi"], STEP_S, hold_in_model=False)
+    omega = loop_grid(STEP_S, 300)
+    rate, angle = (each[0, 0, 0] for each in plants.responses(omega))
+    (system,), late = plants.systems, np.exp(-1j * omega * STEP_S * plants.delays[0][0])
+    exact = system.frequency_response(omega)[:, 0] * late
+    exact *= np.exp(1j * omega * plants.advances_s[0][0])
+    assert_close(np.array([rate, angle]), exact, rtol=1e-9, why="modes keep nine digits")
+
+
 def test_steps_are_those_of_the_recursion() -> None:
     """The exact controller, sample by sample, around the sampled plant."""
     truth, flown = rate_truth("roll"), axis_loop("arducopter", "roll", loop_rate_hz=400.0)

@@ -23,6 +23,8 @@ FEWEST_DECADES = 600.0
 """Least ratio of the highest frequency to the knee: slow loops have a lower one."""
 BELOW_NYQUIST = 1.0 - 1e-4
 """At half the sample rate itself filters are exactly zero."""
+PARALLEL = 1e6
+"""Condition of the modes from which a sum over them is not taken: it loses as many digits."""
 
 
 def loop_grid(sample_time_s: float, points: int) -> Array:
@@ -95,8 +97,24 @@ class SampledPlants:
         found = np.empty((len(self), 2 * self.n_axes, self.n_axes, len(omega_rad_s)), complex)
         for k, system in enumerate(self.systems):
             shift = z_lag * self.delays[k][:, None] + 1j * omega_rad_s * self.advances_s[k][:, None]
-            found[k] = system.frequency_response(omega_rad_s) * np.exp(shift)
+            found[k] = _response(system, omega_rad_s) * np.exp(shift)
         return found[:, : self.n_axes], found[:, self.n_axes :]
+
+
+def _response(system: LinearSystem, omega_rad_s: Array) -> Complex:
+    """H(e^(jωT)) as a sum over modes: thousands of frequencies cost one product of matrices.
+
+    Modes that are nearly parallel would cancel; such a system is solved at every frequency.
+    """
+    a, b, c, d, delays = system.state_space()
+    poles, modes = np.linalg.eig(a)
+    points = np.exp(1j * omega_rad_s * (system.sample_time_s or 0.0))
+    away = points - poles[:, None]
+    if np.linalg.cond(modes) > PARALLEL or not away.all():
+        return system.frequency_response(omega_rad_s)
+    residues = (c @ modes)[:, None, :] * np.linalg.solve(modes, b.astype(complex)).T
+    found = residues @ (1.0 / away) + d[:, :, None]
+    return np.asarray(found * np.exp(-1j * omega_rad_s * delays[:, None]))
 
 
 def sample_plants(
