@@ -41,7 +41,7 @@ COMMANDS = {
     "twin_rotor_rbf": ("fly.py records", "-m flightid --quiet run study.toml --output out"),
     "r50": ("fly.py", "-m flightid --quiet run study.toml --output out"),
     "ah64": ("fly.py", "-m flightid --quiet run study.toml --output out"),
-    "quadrotor_grey_box": ("study.py short 0 out",),
+    "quadrotor_grey_box": ("fly.py", "-m flightid --quiet run study.toml --output out"),
 }
 SHOTS = (
     Shot("twin-rotor-response.png", "twin_rotor_linear", "y1 to u1: estimate with its 95 % band"),
@@ -53,7 +53,7 @@ SHOTS = (
     Shot("ah64-modes.png", "ah64", "Eigenvalues with 95 % regions, beside"),
     Shot("ah64-reduction.png", "ah64", "Average cost, and the worst insensitivity"),
     Shot("grey-box-intervals.png", "quadrotor_grey_box", "Estimates with 95 % intervals"),
-    Shot("grey-box-prediction.png", "quadrotor_grey_box", "tau_phi doublet: measured"),
+    Shot("grey-box-prediction.png", "quadrotor_grey_box", "roll doublet: measured"),
 )
 FIGURE = re.compile(
     r"<figcaption>(?P<caption>.*?)</figcaption>\s*"

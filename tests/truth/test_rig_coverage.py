@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 import flightid as fid
+from flightid.models import load_structure
 
 EXAMPLE = Path(__file__).parent.parent.parent / "examples" / "quadrotor_grey_box"
 FLIGHTS = 200
@@ -17,16 +18,17 @@ def test_intervals_of_the_rig_cover_the_published_parameters(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.syspath_prepend(EXAMPLE)
-    import flights  # noqa: PLC0415
-    import vehicles  # noqa: PLC0415
+    import fly as rig  # noqa: PLC0415
 
-    truth = vehicles.truth()
+    boxes = [load_structure(EXAMPLE / name) for name in ("roll_pitch_rates.toml", "yaw_rate.toml")]
+    values = {name: p.value for name, p in rig.vehicle().parameters.items()}
+    truth = {name: float(values[name] or 0.0) for box in boxes for name in box.parameters}
     inside = dict.fromkeys(truth, 0)
     for seed in range(FLIGHTS):
-        records = flights.sweeps_at_once(truth, 1000 + seed)
+        records = rig.sweeps_at_once(1000 + seed)
         found = [
-            fid.identify(vehicles.grey_box("roll_pitch"), records[:2], hold="zero"),
-            fid.identify(vehicles.grey_box("yaw"), records[2], hold="zero"),
+            fid.identify(boxes[0], records[:2], hold="zero"),
+            fid.identify(boxes[1], records[2], hold="zero"),
         ]
         for fit in found:
             for name, parameter in fit.parameters.items():

@@ -9,7 +9,7 @@ import pytest
 
 import flightid as fid
 from flightid.errors import StudyError
-from flightid.study.published import published_table, read_published
+from flightid.study.published import published_table, published_tables, read_published
 from tests.closeness import assert_close
 
 FIGURES = """
@@ -67,4 +67,49 @@ def test_files_that_are_no_figures_are_refused(tmp_path: Path) -> None:
         read_published(path)
     path.write_text('source = "a"\n[value]\nLp = "x"', encoding="utf-8")
     with pytest.raises(StudyError, match="Lp"):
+        read_published(path)
+
+
+ERRORS = """
+source = "a paper"
+[mean_square_error.training]
+p = 0.1
+ghost = 0.2
+[mean_square_error.validation]
+p = 0.3
+[[remark]]
+printed = "all errors below 0.002"
+but = "0.1 and more"
+"""
+
+
+def test_mean_square_errors_stand_beside_ours(tmp_path: Path) -> None:
+    time_s = 0.02 * np.arange(400)
+    model = fid.load_model("rate_first_order", axis="roll")
+    record, unseen = (
+        fid.simulate(
+            model,
+            fid.Record.from_arrays(time_s, inputs={"tau_phi": np.sign(np.sin(rate * time_s))}),
+            units={"p": "rad/s"}, noise=fid.Noise(sensor={"p": 0.05}, seed=3),
+        )
+        for rate in (3.0, 5.0)
+    )  # fmt: skip
+    fit = fid.identify(model, record)
+    seen = fid.verify(fit, unseen)
+    path = tmp_path / "figures.toml"
+    path.write_text(ERRORS, encoding="utf-8")
+    errors, remarks = published_tables(read_published(path), fit, {"doublet": seen})
+    (row,) = errors.rows
+    told = dict(zip((column.name for column in errors.columns), row, strict=True))
+    assert (told["published training"], told["published validation"]) == (0.1, 0.3)
+    assert_close(told["training, record"], np.mean(fit.records[0].residual("p") ** 2), rtol=1e-12,
+                 why="one record")  # fmt: skip
+    assert told["doublet"] == seen.mse["p"]
+    assert remarks.rows == (("all errors below 0.002", "0.1 and more"),)
+
+
+def test_errors_of_another_kind_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "figures.toml"
+    path.write_text('source = "a paper"\n[mean_square_error.test]\np = 1.0\n', encoding="utf-8")
+    with pytest.raises(StudyError, match="there is no key 'test'"):
         read_published(path)

@@ -9,8 +9,13 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.conventions import Role
+from flightid.errors import FlightidError
+from flightid.report.text import to_text
+from flightid.study.settings import Segment
 from flightid.study.stage_runner import digest
 from flightid.study.stages import compare_free_run
+from flightid.study.taking import _with_injected
 from tests.unit.test_study_records import OWN, rig
 
 STUDY = """
@@ -192,3 +197,47 @@ def test_a_black_box_needs_no_band_and_says_what_it_predicts(
     reason = black.fit.evidence.reason
     assert reason is not None
     assert reason.message in said
+
+
+BRIEF = """
+[[record]]
+name = "brief"
+path = "rig.csv"
+span_s = [0.0, 0.3]
+[[model]]
+name = "Brief"
+structure = "arx"
+inputs = "drive"
+outputs = "angle"
+identify = "brief"
+na = 2
+nb = 1
+nk = 2
+"""
+
+
+def test_a_model_that_its_data_do_not_allow_leaves_the_others(
+    folder: Path, cache: dict[str, Any]
+) -> None:
+    study = run(folder, STUDY + BRIEF, cache)
+    lag, _, refused = study.identified
+    assert lag.fit is not None
+    assert refused.fit is None
+    assert "not identified" in refused.left_out[0].message
+    assert any(finding.code == "model-refused" for finding in study.findings)
+    assert "1 of 3 models not to be used" in to_text(study.short)
+    with pytest.raises(FlightidError):
+        run(folder, STUDY[: STUDY.index("[[record]]")] + BRIEF, cache)
+
+
+def test_chirps_of_a_log_have_the_names_of_their_segments() -> None:
+    time_s = 0.1 * np.arange(5)
+    flown = fid.Record.from_arrays(
+        time_s, inputs={"tau_phi": time_s}, excitations={"excitation": time_s + 1.0}
+    )
+    roll = Segment("roll", sid_axis=10, excitation="roll chirp")
+    made = _with_injected(flown, roll, ("roll chirp", "pitch chirp"))
+    assert list(made.channels) == ["tau_phi", "roll chirp", "pitch chirp"]
+    assert made["roll chirp"].tolist() == flown["excitation"].tolist()
+    assert not made["pitch chirp"].any()
+    assert {made.channels[name].role for name in ("roll chirp", "pitch chirp")} == {Role.EXCITATION}

@@ -61,7 +61,8 @@ def answer_of(study: StudyResults) -> StudyAnswer:
 def in_short(item: ModelResults) -> Finding:
     """One line about a model: the light of its evidence, and the first reason for it."""
     if item.fit is None:
-        return Finding("model", worst(item.findings), f"{item.name}: {item.left_out[0].message}")
+        why = item.left_out[0]
+        return Finding("model", worst(item.findings), f"{item.name}: {why.message}", why.action)
     verdict = item.fit.evidence.verdict
     first = f"{item.name}: average cost {item.fit.average_cost:.3g}"
     if item.settings.structure is not None:

@@ -67,6 +67,42 @@ def _with_interval(parameter: Estimate) -> str:
     return f"{parameter.value:.4g} ({low:.4g} … {high:.4g})"
 
 
+def minima_table(fit: Fit) -> Table:
+    """Where the starts of a search ended, and what each end loses.
+
+    Parameters
+    ----------
+    fit : Fit
+    """
+    best = fit.minima[0]
+    columns = (
+        *(Column("minimum"), Column("starts"), Column("objective over the best", digits=3)),
+        *(Column(name) for name in best.values),
+        Column("ended by"),
+    )
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (k, each.count, each.objective - best.objective, *each.values.values(), each.termination)
+        for k, each in enumerate(fit.minima, 1)
+    )
+    return Table("Starts inside the bounds, and the minima that they found", columns, rows)
+
+
+def correlation_table(fit: Fit) -> Table:
+    """Correlations of the free parameters' estimates.
+
+    Parameters
+    ----------
+    fit : Fit
+        With a covariance.
+    """
+    rows = tuple(
+        (name, *(round(float(r), 3) for r in row[: k + 1]), *[None] * (len(row) - k - 1))
+        for k, (name, row) in enumerate(zip(fit.names, fit.correlation, strict=True))
+    )
+    heads = tuple(Column(name, digits=3) for name in fit.names)
+    return Table("Correlations of the estimates", (Column("parameter"), *heads), rows)
+
+
 def model_table(items: Iterable[ModelResults]) -> Table:
     """All models: structure, modes, residual tests and free runs.
 
@@ -102,6 +138,8 @@ def _row(item: ModelResults) -> tuple[Cell, ...]:
     if item.fit is None:
         pairs = () if item.coherent is None else item.coherent.pairs
         reasons = "; ".join(pair.reason for pair in pairs)
+        if item.fitted.refused is not None:
+            reasons = item.fitted.refused.message
         return (item.name, "left out", None, None, None, None, None, reasons)
     fit = item.fit
     free = item.on_unseen.values()

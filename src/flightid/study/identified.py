@@ -28,11 +28,14 @@ class ModelFits:
         How the structure of the fits came about, where the study asks for a reduction.
     choice : OrderScan, NarxSearch or None
         Structures that were tried, where there were several.
+    refused : Finding or None
+        Why the data allow no fit, where other models of the study stand without it.
     """
 
     fits: Mapping[str, Fit] = field(default_factory=dict)
     reduction: Reduction | None = None
     choice: Choice | None = None
+    refused: Finding | None = None
 
     @property
     def fit(self) -> Fit | None:
@@ -108,7 +111,9 @@ class ModelResults:
 
     @property
     def left_out(self) -> tuple[Finding, ...]:
-        """Inputs of a structure without coherence, with the reason."""
+        """Inputs of a structure without coherence, or the whole model, with the reason."""
+        if self.fitted.refused is not None:
+            return (self.fitted.refused,)
         if self.coherent is None or self.settings.structure is None:
             return ()
         return tuple(

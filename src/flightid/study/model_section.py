@@ -27,9 +27,9 @@ from flightid.report.modes import modes_blocks, physics_blocks
 from flightid.report.reduction import reduction_blocks
 from flightid.report.verification import verification_blocks
 from flightid.study.choice_section import choice_blocks
-from flightid.study.estimate_tables import estimates_table
+from flightid.study.estimate_tables import correlation_table, estimates_table, minima_table
 from flightid.study.faults import blocks_until, section_of
-from flightid.study.published import published_table
+from flightid.study.published import published_tables
 from flightid.study.response_figures import response_figures
 from flightid.study.structures import goal_findings
 
@@ -76,8 +76,12 @@ def _first(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
     yield from result_blocks(fit, title=title)
     if fit.details is not None:
         yield from map(TableBlock, fit.details.tables())
+    if sum(each.count for each in fit.minima) > 1:
+        yield TableBlock(minima_table(fit), folded=True)
+    if item.settings.structure is None and fit.covariance is not None and len(fit.names) > 1:
+        yield TableBlock(correlation_table(fit), folded=True)
     if item.settings.published is not None:
-        yield TableBlock(published_table(item.settings.published, fit))
+        yield from map(TableBlock, published_tables(item.settings.published, fit, item.on_unseen))
     yield from evidence_blocks(fit.evidence)
     if len(item.fits) > 1:
         yield TableBlock(estimates_table(item, truth))

@@ -6,7 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from flightid.errors import StudyError
+from flightid.conventions import Light
+from flightid.errors import DataError, FitError, FlightidError, StudyError
+from flightid.findings import Finding
 from flightid.inspection import Inspection
 from flightid.record import Record
 from flightid.responses import CoherentPairs, FrequencyResponse
@@ -62,7 +64,8 @@ def identify_models(
 ) -> tuple[StageResult[ModelResults], ...]:
     """Carry every model through its stages.
 
-    All fits come first: models may be rivals of each other in the verification.
+    All fits come first: models may be rivals of each other in the verification. A model whose data
+    allow no fit is named, and the others stand; where none is left its error is the study's.
 
     Parameters
     ----------
@@ -82,12 +85,18 @@ def identify_models(
         What was found, with the hash of the fit and of all that was examined of it.
     """
     parts: list[Part] = []
+    errors: list[FlightidError] = []
     for asked in tasks:
         task = start_from(asked, parts)
-        responses = _responses(task, records, runner)
-        advance()
-        parts.append(_fit(task, responses, records, reducing, runner))
-        advance()
+        try:
+            responses = _responses(task, records, runner)
+            parts.append(_fit(task, responses, records, reducing, runner))
+        except (DataError, FitError) as error:
+            errors.append(error)
+            parts.append(_refused(task, error))
+        advance(2)
+    if errors and len(errors) == len(parts):
+        raise errors[0]
     fitted = {part.task.settings.name: part.fitted for part in parts}
     found = []
     for part in parts:
@@ -98,6 +107,15 @@ def identify_models(
         found.append(StageResult(_examined(item, seen), key))
         advance()
     return tuple(found)
+
+
+def _refused(task: Task, error: FlightidError) -> Part:
+    """A model that its data do not allow: it is named, and the others stand."""
+    found = "" if error.found is None else f": found {error.found}"
+    said = f"not identified: {error.problem}{found}"
+    finding = Finding("model-refused", Light.RED, said, str(error.action or ""))
+    key = digest((task.settings.name, said))
+    return Part(task, {}, None, StageResult(ModelFits(refused=finding), key))
 
 
 def start_from(task: Task, earlier: Sequence[Part]) -> Task:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+
+import numpy as np
 
 from flightid.errors import StudyError
 from flightid.identification import Fit, PolynomialDetails, SubspaceDetails
@@ -12,6 +14,12 @@ from flightid.reading import read_toml
 from flightid.study.reading import TableReader
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
+from flightid.validation import Verification
+
+SETS = ("training", "validation")
+"""What a mean square error is of."""
+SHOWN = 4
+"""Records of a fit whose errors stand each for itself."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +40,10 @@ class PublishedFigures:
         Of a model without equations.
     singular_values : tuple of float
         Of a subspace estimate, the largest first.
+    mean_square_error : mapping of str to mapping of str to float
+        Of ``"training"`` and ``"validation"``, by output, in its unit squared.
+    remarks : tuple of tuple of str
+        What is printed, and what speaks against it.
 
     Example
     -------
@@ -46,6 +58,8 @@ class PublishedFigures:
     average_cost: float | None = None
     loss: float | None = None
     singular_values: tuple[float, ...] = ()
+    mean_square_error: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    remarks: tuple[tuple[str, str], ...] = ()
 
 
 def read_published(path: Path) -> PublishedFigures:
@@ -55,8 +69,9 @@ def read_published(path: Path) -> PublishedFigures:
     ----------
     path : Path
         Keys ``source``, ``average_cost``, ``loss`` and ``singular_values``; tables ``[value]``,
-        ``[cramer_rao_percent]`` and ``[insensitivity_percent]`` of numbers by parameter; each may
-        be left out but the first.
+        ``[cramer_rao_percent]`` and ``[insensitivity_percent]`` of numbers by parameter;
+        ``[mean_square_error.training]`` and ``.validation`` by output; ``[[remark]]`` with
+        ``printed`` and ``but``; each may be left out but the first.
 
     Raises
     ------
@@ -80,6 +95,8 @@ def read_published(path: Path) -> PublishedFigures:
         reader.maybe(reader.positive, "average_cost"),
         reader.maybe(reader.positive, "loss"),
         reader.numbers("singular_values", ()),
+        _errors(reader),
+        tuple(map(_remark, reader.tables("remark"))),
     )
     reader.finish()
     return made
@@ -88,6 +105,90 @@ def read_published(path: Path) -> PublishedFigures:
 def _numbers(reader: TableReader, kind: str) -> dict[str, float]:
     inner = reader.table(kind)
     return {name: inner.number(name) for name in reader.values(kind)}
+
+
+def _errors(reader: TableReader) -> dict[str, dict[str, float]]:
+    inner = reader.table("mean_square_error")
+    found = {kind: _numbers(inner, kind) for kind in SETS if kind in inner}
+    inner.finish()
+    return found
+
+
+def _remark(reader: TableReader) -> tuple[str, str]:
+    told = (reader.text("printed"), reader.text("but"))
+    reader.finish()
+    return told
+
+
+def published_tables(
+    published: PublishedFigures, fit: Fit, unseen: Mapping[str, Verification]
+) -> tuple[Table, ...]:
+    """Every published figure of a model beside ours, and what speaks against them.
+
+    Parameters
+    ----------
+    published : PublishedFigures
+    fit : Fit
+    unseen : mapping of str to Verification
+        Free runs through records that the fit has not seen, by name.
+    """
+    first = published_table(published, fit)
+    # The source alone is no figure.
+    made = [first] if first.rows or len(first.notes) > 1 else []
+    if published.mean_square_error:
+        made.append(error_table(published, fit, unseen))
+    if published.remarks:
+        columns = (Column("printed"), Column("but"))
+        made.append(Table("Published figures, read with care", columns, published.remarks))
+    return tuple(made)
+
+
+def error_table(published: PublishedFigures, fit: Fit, unseen: Mapping[str, Verification]) -> Table:
+    """Published mean square errors of each output beside ours.
+
+    Parameters
+    ----------
+    published : PublishedFigures
+    fit : Fit
+        Its own are of all its records together.
+    unseen : mapping of str to Verification
+    """
+    outputs = dict.fromkeys(
+        name for figures in published.mean_square_error.values() for name in figures
+    )
+    ours = _training_errors(fit)
+    rows: list[tuple[Cell, ...]] = []
+    for name in outputs:
+        if name not in fit.model.outputs:
+            continue
+        first, second = (published.mean_square_error.get(kind, {}).get(name) for kind in SETS)
+        own = (errors.get(name) for errors in ours.values())
+        free = (run.mse.get(name) for run in unseen.values())
+        rows.append((name, fit.model.units.get(name, "1"), first, *own, second, *free))
+    columns = (
+        *(Column("output"), Column("unit, squared"), Column("published training", digits=3)),
+        *(Column(f"training, {name}" if name else "training", digits=3) for name in ours),
+        Column("published validation", digits=3),
+        *(Column(name, digits=3) for name in unseen),
+    )
+    note = "Mean square of measured minus modelled, in training and in free runs. Published: "
+    note += f"{published.source}."
+    made = Table("Published mean square errors beside ours", columns, tuple(rows), (note,))
+    return made.without_empty_columns()
+
+
+def _training_errors(fit: Fit) -> dict[str, dict[str, float]]:
+    """Mean squares of residuals by record and output; of all records where they are many."""
+    squares: dict[str, dict[str, list[float]]] = {}
+    for record in fit.records:
+        name = str(record.measured.name) if len(fit.records) <= SHOWN else ""
+        of_record = squares.setdefault(name, {})
+        for output in record.outputs:
+            of_record.setdefault(output, []).extend(record.residual(output) ** 2)
+    return {
+        name: {output: float(np.mean(values)) for output, values in of_record.items()}
+        for name, of_record in squares.items()
+    }
 
 
 def published_table(published: PublishedFigures, fit: Fit) -> Table:

@@ -25,7 +25,7 @@ from flightid.study.reading import TOP, TableReader
 from flightid.study.record_files import UNKNOWN, RecordFile, read_record_file, read_shape
 from flightid.study.reducing import ReduceSettings, read_reduce
 from flightid.study.references import require_conditions, require_references
-from flightid.study.response_settings import ResponseSettings, read_response
+from flightid.study.response_settings import EXCITATION, ResponseSettings, read_response
 from flightid.study.tuning import TuneSettings, read_tune
 from flightid.study.uses_settings import UsesSettings, read_uses
 from flightid.vehicles import GainFlightOptions
@@ -49,6 +49,8 @@ class Segment:
         Which of the runs of that axis, from 0.
     shape : InputShape
         What is known of the inputs beyond their samples.
+    excitation : str
+        Name of the injected signal in this segment; in the others it is zero.
     """
 
     name: str
@@ -56,6 +58,7 @@ class Segment:
     sid_axis: int | None = None
     run: int = 0
     shape: InputShape = UNKNOWN
+    excitation: str = EXCITATION
 
 
 @dataclass(frozen=True)
@@ -125,6 +128,11 @@ class Settings:
     qualities: QualitiesSettings | None = None
     uses: UsesSettings = field(default_factory=UsesSettings)
     fly: GainFlightOptions | None = None
+
+    @property
+    def injected(self) -> tuple[str, ...]:
+        """Names of all signals that were injected in the log's segments."""
+        return tuple(dict.fromkeys(segment.excitation for segment in self.segments))
 
     def segment(self, name: str) -> Segment:
         """Segment of this name."""
@@ -294,9 +302,10 @@ def _segment(reader: TableReader) -> Segment:
     axis = reader.maybe(reader.integer, "sid_axis")
     run = reader.integer("run", 0)
     shape = read_shape(reader)
+    excitation = reader.text("excitation", EXCITATION)
     reader.finish()
     if (span is None) == (axis is None):
         raise reader.error(
             "span_s or sid_axis", "must be given, not both", found=name, needed="one of them"
         )
-    return Segment(name, span, axis, run, shape)
+    return Segment(name, span, axis, run, shape, excitation)

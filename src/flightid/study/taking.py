@@ -7,13 +7,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.conventions import Role
 from flightid.errors import StudyError
 from flightid.inspection import Inspection, inspect_log
 from flightid.logs import Log, read_log
 from flightid.logs.dataflash.sid_runs import SidRun
-from flightid.record import Record
+from flightid.record import Channel, Record, Step
 from flightid.study.conditioning import Conditioning, condition, outliers_first
 from flightid.study.flight import FlightPlan
 from flightid.study.record_files import declared, load_records
@@ -98,7 +100,13 @@ def take(
     }
     cut = {
         segment.name: runner.stage(
-            f"record: {segment.name}", _cut, opened, segment, channels, needed[segment.name]
+            f"record: {segment.name}",
+            _cut,
+            opened,
+            segment,
+            channels,
+            needed[segment.name],
+            settings.injected,
         )
         for segment in settings.segments
         if segment.name in needed
@@ -178,7 +186,7 @@ def channels_needed(settings: Settings, tasks: Iterable[Task]) -> dict[str, dict
     users = [(task.settings.segments, task.inputs, task.outputs) for task in tasks]
     for task in tasks:
         # A log's system-identification run brings its injection along, under this name.
-        brought = (EXCITATION,) if settings.segments else ()
+        brought = settings.injected
         instruments = [each for each in task.settings.response.channels if each not in brought]
         for name in task.settings.flown:
             needed.setdefault(name, {}).update(dict.fromkeys(instruments, Role.EXCITATION))
@@ -197,7 +205,11 @@ def channels_needed(settings: Settings, tasks: Iterable[Task]) -> dict[str, dict
 
 
 def _cut(
-    log: Log, segment: Segment, channels: Mapping[str, Any], roles: Mapping[str, Role]
+    log: Log,
+    segment: Segment,
+    channels: Mapping[str, Any],
+    roles: Mapping[str, Role],
+    injected: tuple[str, ...],
 ) -> list[Record]:
     record = log.record(
         names=list(roles),
@@ -207,7 +219,22 @@ def _cut(
         name=segment.name,
         **channels,
     )
+    if injected != (EXCITATION,):
+        record = _with_injected(record, segment, injected)
     return [declared(record, segment.shape)]
+
+
+def _with_injected(record: Record, segment: Segment, injected: tuple[str, ...]) -> Record:
+    """The record's chirp under the segment's name, and zeros for those of other segments."""
+    there = EXCITATION in record
+    own = record[EXCITATION] if there else np.zeros(record.n_samples)
+    unit = record.unit(EXCITATION) if there else "1"
+    signals = {name: np.zeros(record.n_samples) for name in injected}
+    signals[segment.excitation] = own
+    kept = [record.channels[name] for name in record.channels if name != EXCITATION]
+    made = [Channel(name, unit, Role.EXCITATION) for name in signals]
+    step = Step("study.segment", {"excitation": segment.excitation})
+    return record.replace(signals, channels=[*kept, *made], step=step)
 
 
 def sid_run(log: Log, segment: Segment) -> SidRun:

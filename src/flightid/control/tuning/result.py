@@ -109,6 +109,7 @@ class Tuning(Result, schema="flightid.tuning/1"):
         reasons = {each.axis: each.reason for each in self.refused}
         reasons |= {each.axis: why for each in self.designs if (why := _unsound(each))}
         for each in self.together:
+            reasons |= {axis.axis: axis.finding.message for axis in each.closed if not axis.is_kept}
             bad = [axis for axis in each.axes if axis in reasons]
             red = [finding.message for finding in each.findings() if finding.light is Light.RED]
             if bad or red:
