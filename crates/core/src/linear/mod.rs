@@ -4,5 +4,6 @@ pub(crate) mod block_recursion;
 pub mod discretisation;
 pub mod hold_integrals;
 pub mod linear_recursion;
+pub mod linear_response;
 pub mod linear_simulation;
 pub mod smooth_input;

@@ -4,8 +4,10 @@ use crate::error::from_core;
 use crate::fits::output_error::hold as named;
 use flightid_core::linear::discretisation::discretise;
 use flightid_core::linear::discretisation::{Hold, StateSpace};
+use flightid_core::linear::linear_response::responses;
 use flightid_core::linear::linear_simulation::Discrete;
 use flightid_core::numerics::matrix_exponential::exponential;
+use num_complex::Complex64;
 use numpy::ndarray::Array2;
 use numpy::{
     IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
@@ -59,6 +61,36 @@ fn simulate_linear<'py>(
         .detach(|| Discrete::new(&system, sample_time_s, hold)?.run(u, n_samples, x0))
         .map_err(from_core)?;
     Ok((matrix(py, states, x0.len(), n_samples)?, matrix(py, outputs, n_outputs, n_samples)?))
+}
+
+/// linear_response(a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64], d: NDArray[np.float64], points: NDArray[np.complex128]) -> NDArray[np.complex128]
+///
+/// C (sI − A)⁻¹ B + D at points s, shape (p, m, n_points).
+#[pyfunction]
+fn linear_response<'py>(
+    py: Python<'py>,
+    a: PyReadonlyArray2<'py, f64>,
+    b: PyReadonlyArray2<'py, f64>,
+    c: PyReadonlyArray2<'py, f64>,
+    d: PyReadonlyArray2<'py, f64>,
+    points: PyReadonlyArray1<'py, Complex64>,
+) -> PyResult<Bound<'py, PyArray3<Complex64>>> {
+    let &[n_outputs, n_inputs] = d.shape() else { return Err(odd_shape()) };
+    let n = a.shape()[0];
+    if a.shape() != [n, n] || b.shape() != [n, n_inputs] || c.shape() != [n_outputs, n] {
+        return Err(odd_shape());
+    }
+    let system = StateSpace {
+        a: a.as_slice()?,
+        b: b.as_slice()?,
+        c: c.as_slice()?,
+        d: d.as_slice()?,
+        delays_s: &[],
+        n_outputs,
+    };
+    let s = points.as_slice()?;
+    let found = py.detach(|| responses(&system, n_inputs, s)).map_err(from_core)?;
+    found.into_pyarray(py).reshape([n_outputs, n_inputs, s.len()])
 }
 
 type Taps<'py> = Vec<(usize, isize, Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)>;
@@ -171,6 +203,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulate_linear, module)?)?;
     module.add_function(wrap_pyfunction!(discretise_linear, module)?)?;
     module.add_function(wrap_pyfunction!(discretise_directions, module)?)?;
+    module.add_function(wrap_pyfunction!(linear_response, module)?)?;
     module.add_function(wrap_pyfunction!(matrix_exponential, module)?)?;
     Ok(())
 }

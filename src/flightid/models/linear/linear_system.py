@@ -9,7 +9,15 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flightid.errors import DataError, ModelError, OptionError, ShapeError, UnknownNameError
+from flightid import _native
+from flightid.errors import (
+    DataError,
+    ModelError,
+    OptionError,
+    ShapeError,
+    SingularError,
+    UnknownNameError,
+)
 from flightid.models.estimated import EstimateProvenance
 from flightid.models.linear.delay_states import delays_as_states, shift_registers
 from flightid.models.linear.hold_equivalent import Hold, hold_equivalent
@@ -21,8 +29,6 @@ from flightid.table import Column, Table
 
 Array = NDArray[np.float64]
 SCHEMA = "flightid.linear_system/1"
-BLOCK = 1 << 17
-"""Elements of the matrices that are solved at a time."""
 DEFAULT_PADE_ORDER = 3
 
 
@@ -186,25 +192,21 @@ class LinearSystem(Rational, TableView):
         """
         a, b, c, d, delays = self.state_space()
         omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=np.float64))
-        points = (
-            1j * omega if self.sample_time_s is None else np.exp(1j * omega * self.sample_time_s)
+        step = self.sample_time_s
+        points = np.asarray(
+            1j * omega if step is None else np.exp(1j * omega * step), dtype=np.complex128
         )
-        states = np.empty((len(omega), *b.shape), dtype=np.complex128)
-        # As many frequencies at a time as stay in the cache.
-        size = max(BLOCK // max(a.size, 1), 1)
         try:
-            for start in range(0, len(omega), size):
-                some = slice(start, start + size)
-                pencil = points[some, None, None] * np.eye(self.order) - a
-                states[some] = np.linalg.solve(pencil, np.broadcast_to(b, states[some].shape))
-        except np.linalg.LinAlgError as error:
+            found = _native.linear_response(a, b, c, d, points)
+        except SingularError as error:
             raise DataError(
                 "the system has no finite response at these frequencies",
                 found=f"{omega.min():g} to {omega.max():g} rad/s",
                 needed="frequencies that are not poles of the system",
             ) from error
-        later = np.exp(-1j * omega[:, None] * delays)
-        return np.asarray(np.moveaxis((c @ states + d) * later[:, None, :], 0, -1))
+        if not delays.any():
+            return found
+        return np.asarray(found * np.exp(-1j * np.multiply.outer(delays, omega)))
 
     def sampled(self, sample_time_s: float, hold: Hold = "zero") -> LinearSystem:
         """The recursion that gives the exact samples for held inputs; delays become states.

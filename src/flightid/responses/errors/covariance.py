@@ -29,6 +29,8 @@ COLUMNS = 128
 SIDE_LOBES = 40.0
 """Bins of the shortest window beyond the highest frequency, past which noise does not reach the
 estimate: a Hann window's side lobes are down by 1e-9 in power there."""
+SMALL = 1e-9
+"""Sine of half an angle below which a sum over a window is its length: of 1e-5 samples at most."""
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -270,11 +272,11 @@ def basis_transform(length: int, omega: Real, angle: Real, detrend: str) -> Comp
     -------
     ndarray of complex, shape (n_omega, n_angle)
     """
-    found = _hann(length, np.add.outer(omega, angle))
+    found = _hann(length, omega, angle)
     if detrend == "none":
         return found
     flat = _dirichlet(length, angle)
-    found = found - np.multiply.outer(_hann(length, omega) / length, flat)
+    found = found - np.multiply.outer(_hann(length, omega, np.zeros(1))[:, 0] / length, flat)
     if detrend == "line":
         norm = length * (length**2 - 1.0) / 12.0
         found = found - np.multiply.outer(_hann_slope(length, omega) / norm, _slope(length, angle))
@@ -284,15 +286,28 @@ def basis_transform(length: int, omega: Real, angle: Real, detrend: str) -> Comp
 def _dirichlet(length: int, x: Real) -> Complex:
     """``Σ exp(−jxm)`` over m = −length/2 … length/2 − 1."""
     half = np.sin(x / 2.0)
-    small = np.abs(half) < 1e-12
+    small = np.abs(half) < SMALL
     ratio = np.sin(length * x / 2.0) / np.where(small, 1.0, half)
     return np.asarray(np.exp(0.5j * x) * np.where(small, length, ratio))
 
 
-def _hann(length: int, x: Real) -> Complex:
-    step = 2.0 * np.pi / length
-    sides = _dirichlet(length, x - step) + _dirichlet(length, x + step)
-    return 0.5 * _dirichlet(length, x) + 0.25 * sides
+def _hann(length: int, omega: Real, angle: Real) -> Complex:
+    """Transform of a Hann window at all sums of two angles, sines of sums from those of parts."""
+    turn = np.multiply.outer(np.exp(0.5j * omega), np.exp(0.5j * angle))
+    wide = np.multiply.outer(np.exp(0.5j * length * omega), np.exp(0.5j * length * angle)).imag
+    found = 0.5 * _ratio(wide, turn.imag, length)
+    step = np.exp(1j * np.pi / length)
+    for shift in (step, step.conjugate()):
+        # A bin to the side the numerator has the other sign.
+        sine = turn.imag * shift.real + turn.real * shift.imag
+        found = found + 0.25 * shift * _ratio(-wide, sine, length)
+    return np.asarray(turn * found)
+
+
+def _ratio(above: Real, below: Real, length: int) -> Real:
+    """Quotient of two sines, which is the length where both vanish."""
+    small = np.abs(below) < SMALL
+    return np.where(small, length, above / np.where(small, 1.0, below))
 
 
 def _slope(length: int, x: Real) -> Complex:
