@@ -57,8 +57,8 @@ class PlantSet:
         gyro: Gyro,
         factors: Callable[[Array], Complex],
     ) -> PlantSet:
-        """Evaluate plants on a grid of the loop, each with an error of its own structure."""
-        omega = loop_grid(sampled.sample_time_s, points)
+        """Evaluate plants, each with its own error, on a grid that is fine where they resonate."""
+        omega = loop_grid(sampled.sample_time_s, points, sampled.resonances())
         rate, angle = loop_responses(sampled, omega, loops, gyro)
         factor = factors(omega)
         return cls(sampled, omega, rate * factor, angle * factor)

@@ -40,7 +40,8 @@ def verdict(result: AxisResult, known: bool) -> Finding:
         return Finding(
             "no-gains",
             Light.RED,
-            f"no gains meet all requirements for every plant; nearest: {', '.join(short)}",
+            f"no gains were found that meet all requirements for every plant, on a grid over their "
+            f"ranges nor by search from it; nearest: {', '.join(short)}",
             advice(result.found.binding),
         )
     if not known:

@@ -23,7 +23,7 @@ Linear = tuple[Array, Array, Array, Array]
 """Limits, levels and their slopes."""
 GRID_P, GRID_I, GRID_D, GRID_A = 20, 6, 5, 4
 CHUNK = 96
-STARTS = 2
+STARTS, MORE_STARTS = 2, 4
 ROUNDS = 8
 HEADROOM = 2e-3
 """Slack kept in the search, for rounding of gains and frequencies between grid points."""
@@ -90,7 +90,26 @@ def search(
     # The estimate alone tells where to begin: no start need hold for every plant.
     judged = _judge_all(problem, coarse, active[:1], advance)
     starts = _starts(coarse, *judged, problem.requirements.has_target)
-    rows, best = list(active), None
+    best, rows = _exchanged(problem, space, starts, active, advance)
+    found = _report(problem, best)
+    if found.exists:
+        return found
+    # The best of the estimate may lie where other plants allow none: ask the whole grid of all.
+    judged = _judge_all(problem, coarse, rows, _unheard)
+    starts = _starts(coarse, *judged, problem.requirements.has_target, MORE_STARTS)
+    again = _report(problem, _exchanged(problem, space, [best, *starts], rows, _unheard)[0])
+    return max(found, again, key=lambda each: min(each.slack.values()))
+
+
+def _exchanged(
+    problem: LoopProblem,
+    space: _Space,
+    starts: list[Array],
+    active: list[int],
+    advance: Callable[[int], None],
+) -> tuple[Array, list[int]]:
+    """Best gains for the active plants, to which those that they violate are added, and these."""
+    rows, best = list(active), starts[0]
     for _ in range(ROUNDS):
         best = _refined(problem, space, starts, rows)
         worst = _violating(problem.judge(best[None]), rows)
@@ -99,8 +118,11 @@ def search(
             break
         rows += worst
         starts = [best, *starts[:1]]
-    assert best is not None
-    return _report(problem, best)
+    return best, rows
+
+
+def _unheard(done: int) -> None:
+    """Steps that were not announced."""
 
 
 def steps(problem: LoopProblem) -> int:
@@ -204,7 +226,9 @@ def _judge_all(
     return np.concatenate(slacks), np.concatenate(objectives)
 
 
-def _starts(coarse: Array, slack: Array, objective: Array, has_target: bool) -> list[Array]:
+def _starts(
+    coarse: Array, slack: Array, objective: Array, has_target: bool, count: int = STARTS
+) -> list[Array]:
     """Best candidates of the grid, no two of one shape; where none is feasible, the nearest."""
     feasible = slack >= 0.0
     merit = np.where(feasible & (not has_target), 100.0 + objective, np.minimum(slack, 5.0))
@@ -213,7 +237,7 @@ def _starts(coarse: Array, slack: Array, objective: Array, has_target: bool) -> 
         # Ratios of the rate loop's gains: optima hide from a search in another shape.
         shape = tuple(np.round(coarse[k, 1:3] / coarse[k, 0], 6))
         chosen.setdefault(shape, coarse[k])
-        if len(chosen) == STARTS:
+        if len(chosen) == count:
             break
     return list(chosen.values())
 

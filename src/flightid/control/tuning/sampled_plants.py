@@ -23,11 +23,15 @@ FEWEST_DECADES = 600.0
 """Least ratio of the highest frequency to the knee: slow loops have a lower one."""
 BELOW_NYQUIST = 1.0 - 1e-4
 """At half the sample rate itself filters are exactly zero."""
-PARALLEL = 1e6
-"""Condition of the modes from which a sum over them is not taken: it loses as many digits."""
+LIGHT, LIGHTEST = 0.1, 1e-3
+"""Damping below which a mode is narrower than the grid, and below which it is drawn no narrower."""
+ACROSS = np.array([-6.0, -3.0, -1.5, -0.75, 0.0, 0.75, 1.5, 3.0, 6.0])
+"""Points over a resonance, in its damping ratio."""
+APART = 1e-7
+"""Least relative distance of frequencies."""
 
 
-def loop_grid(sample_time_s: float, points: int) -> Array:
+def loop_grid(sample_time_s: float, points: int, resonances_rad_s: Array | None = None) -> Array:
     """Frequencies from far below all dynamics to half the sample rate, rad/s.
 
     Parameters
@@ -36,15 +40,26 @@ def loop_grid(sample_time_s: float, points: int) -> Array:
         Of the loop, s.
     points : int
         Above `KNEE_RAD_S`; a thin tail leads down from there.
+    resonances_rad_s : ndarray, optional
+        Further frequencies, from `SampledPlants.resonances`; as many as half the points are kept.
 
     Returns
     -------
-    ndarray, shape (TAIL_POINTS + points,)
+    ndarray, shape (TAIL_POINTS + points,), or with resonances up to half as many points more
     """
     top = BELOW_NYQUIST * np.pi / sample_time_s
     knee = min(KNEE_RAD_S, top / FEWEST_DECADES)
     tail = np.geomspace(LOWEST_RAD_S * knee / KNEE_RAD_S, knee, TAIL_POINTS, endpoint=False)
-    return np.concatenate([tail, np.geomspace(knee, top, points)])
+    even = np.concatenate([tail, np.geomspace(knee, top, points)])
+    if resonances_rad_s is None or not resonances_rad_s.size:
+        return even
+    inside = np.sort(resonances_rad_s[(resonances_rad_s > tail[1]) & (resonances_rad_s < top)])
+    kept = inside[np.unique(np.linspace(0, len(inside) - 1, points // 2).astype(int))]
+    joined = np.unique(np.concatenate([even, kept]))
+    # Points closer than rounding would divide by nothing.
+    apart = np.append(True, np.diff(joined) > APART * joined[1:])
+    apart[-1] = True
+    return np.asarray(joined[apart])
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +97,16 @@ class SampledPlants:
         """Of the loop, s."""
         return float(self.systems[0].sample_time_s or 0.0)
 
+    def resonances(self) -> Array:
+        """Frequencies across every lightly damped mode of every plant, rad/s, in no order."""
+        poles = np.concatenate([_poles(system) for system in self.systems]).astype(complex)
+        roots = np.log(poles[poles.imag > 0.0]) / self.sample_time_s
+        size = np.abs(roots)
+        damping = np.abs(roots.real) / size
+        light = damping < LIGHT
+        width = np.maximum(damping[light], LIGHTEST)
+        return np.asarray((size[light, None] * (1.0 + width[:, None] * ACROSS)).ravel())
+
     def take(self, rows: list[int]) -> SampledPlants:
         """Some of the plants."""
         return SampledPlants(
@@ -97,24 +122,8 @@ class SampledPlants:
         found = np.empty((len(self), 2 * self.n_axes, self.n_axes, len(omega_rad_s)), complex)
         for k, system in enumerate(self.systems):
             shift = z_lag * self.delays[k][:, None] + 1j * omega_rad_s * self.advances_s[k][:, None]
-            found[k] = _response(system, omega_rad_s) * np.exp(shift)
+            found[k] = system.frequency_response(omega_rad_s) * np.exp(shift)
         return found[:, : self.n_axes], found[:, self.n_axes :]
-
-
-def _response(system: LinearSystem, omega_rad_s: Array) -> Complex:
-    """H(e^(jωT)) as a sum over modes: thousands of frequencies cost one product of matrices.
-
-    Modes that are nearly parallel would cancel; such a system is solved at every frequency.
-    """
-    a, b, c, d, delays = system.state_space()
-    poles, modes = np.linalg.eig(a)
-    points = np.exp(1j * omega_rad_s * (system.sample_time_s or 0.0))
-    away = points - poles[:, None]
-    if np.linalg.cond(modes) > PARALLEL or not away.all():
-        return system.frequency_response(omega_rad_s)
-    residues = (c @ modes)[:, None, :] * np.linalg.solve(modes, b.astype(complex)).T
-    found = residues @ (1.0 / away) + d[:, :, None]
-    return np.asarray(found * np.exp(-1j * omega_rad_s * delays[:, None]))
 
 
 def sample_plants(

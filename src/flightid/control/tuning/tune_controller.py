@@ -38,7 +38,7 @@ FINE = 200.0
 """Samples of a continuous loop over that frequency's period, in radians."""
 LOOKED_AT_RAD_S = (1e-4, 1e4)
 POINTS = 4000
-WIDEST_P, HIGHEST_I, HIGHEST_D = (1e-3, 10.0), 5.0, 0.5
+WIDEST_P, HIGHEST_I, HIGHEST_D = (1e-3, 10.0), 50.0, 0.5
 WEIGHTS_TRIED = np.linspace(1.0, 0.0, 21)
 AT_ZERO, ON_AXIS = 1e-6, 1e-9
 
