@@ -1,17 +1,18 @@
 """Gains flown: tunings over right and wrong structures, methods and noise, each in `hover`.
 
-Run: python -m tests.strangers.gains --runs 500 [--first-seed 0]
+Run: python -m tests.strangers.gains --runs 500 [--first-seed 0] [--family rig] [--keep FILE]
 
-A promise is broken where the vehicle with the tuned gains is unstable or saturates hands off, or
-where its own worst margin lies below the lowest that the table prints for that loop.
+`rig` is `tests.strangers.rig_gains`. A promise is broken where the vehicle with the tuned gains is
+unstable or saturates hands off, or where its own worst margin lies below the lowest that the table
+prints for that loop.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections import Counter
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,21 +21,32 @@ from scipy.signal import chirp
 import flightid as fid
 from flightid.control.tuning import tune_pid
 from flightid.conventions import Light
-from tests.strangers import noises
+from tests.strangers import noises, rig_gains
+from tests.strangers.gain_counts import Outcome, collected, table
 from tests.strangers.hover import STEP_S, Axis, Gains, Vehicle, margins, vehicle
 
-TRUTHS = ("first order", "motor lag", "motor lag, no damping", "flapping", "motor lag and flapping")
+TRUTHS = (
+    "first order", "motor lag", "motor lag, no damping", "flapping", "motor lag and flapping",
+    "motor lag, flexible frame", "motor lag, stiffer frame",
+)  # fmt: skip
+FRAMES_HZ = {"flexible": (7.0, 14.0), "stiffer": (15.0, 35.0)}
 STRUCTURES = (
     "rate_first_order", "rate_gain_lag", "rate_integrator", "rate_integrator_motor_lag",
     "rate_motor_lag", "rate_second_order", "published",
 )  # fmt: skip
-METHODS = ("frequency_domain", "instrument", "output_error", "joint", "equation_error")
+METHODS = {
+    "instrument": 8, "frequency_domain": 2, "prewhitened": 2, "output_error": 3,
+    "output_error, closed": 3, "joint": 1, "equation_error": 1, "filter_error": 1,
+}  # fmt: skip
+"""And how often each is drawn; ", closed": told that the loop was."""
 HOLDS = {
     "first order": ("rate_first_order", "rate_gain_lag", "rate_motor_lag", "rate_second_order"),
     "motor lag": ("rate_motor_lag", "rate_second_order"),
     "motor lag, no damping": ("rate_integrator_motor_lag", "rate_motor_lag"),
     "flapping": (),
     "motor lag and flapping": (),
+    "motor lag, flexible frame": (),
+    "motor lag, stiffer frame": (),
 }
 """Structures that hold a truth; the gyro's filter is a delay to all."""
 TOLERANCE = {"phase margin": 0.25, "gain margin": 0.1}
@@ -68,22 +80,6 @@ class Flight:
         return self.structure in HOLDS[self.craft.name]
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a tuning."""
-
-    seed: int
-    flight: Flight
-    verdict: str
-    """refused, none, red, amber or green: of the gains as they would be written."""
-    why: str
-    broken: str
-    """In which way the promise did not hold; empty: it held, or there was none."""
-    seconds: float
-    wasted: bool = False
-    """Refused or red, right in structure, and its gains would have flown as promised."""
-
-
 def drawn(seed: int) -> Flight:
     """Vehicle, flown gains, structure, method and noise."""
     r = np.random.default_rng(seed)
@@ -95,10 +91,12 @@ def drawn(seed: int) -> Flight:
         damping=0.0 if "no damping" in name else -float(r.uniform(0.5, 6.0)),
         motor_s=float(r.uniform(0.02, 0.09)) if lagged else 0.0,
         mode=(float(r.uniform(9, 30)), float(r.uniform(0.4, 0.9))) if "flapping" in name else None,
+        frame=_frame(name, r),
         delay=int(r.integers(1, 9)),
         gyro_hz=float(r.uniform(30, 90)),
     )
-    method = METHODS[r.integers(len(METHODS))]
+    weights = np.array([*METHODS.values()]) / sum(METHODS.values())
+    method = str(r.choice([*METHODS], p=weights))
     fitting = HOLDS[name] if r.uniform() < 0.5 and HOLDS[name] else STRUCTURES
     structure = fitting[r.integers(len(fitting))]
     if method == "equation_error":
@@ -113,6 +111,13 @@ def drawn(seed: int) -> Flight:
         amplitude=float(r.uniform(0.08, 0.3)),
         top_hz=float(r.uniform(4.0, 20.0)),
     )  # fmt: skip
+
+
+def _frame(name: str, r: np.random.Generator) -> tuple[float, float, float] | None:
+    for word, (low, high) in FRAMES_HZ.items():
+        if word in name:
+            return float(2 * np.pi * r.uniform(low, high)), 0.02, float(r.uniform(0.05, 0.25))
+    return None
 
 
 def _flown(craft: Vehicle, r: np.random.Generator) -> Gains:
@@ -172,11 +177,14 @@ def structure_of(name: str) -> fid.TransferFunctionModel | fid.StateSpaceModel:
 def fitted(flight: Flight, seed: int) -> fid.Fit:
     """By the method of the flight, as the documentation says."""
     model, data = structure_of(flight.structure), record(flight, seed)
-    if flight.method in ("output_error", "equation_error"):
-        return fid.identify(model, data, method=flight.method)
-    estimator = "instrument" if flight.method == "instrument" else "composite"
+    name, _, told = flight.method.partition(", ")
+    if told:
+        data = data.declare(loop=told)
+    if name in ("output_error", "equation_error", "filter_error"):
+        return fid.identify(model, data, method=name)
+    estimator = name if name in ("instrument", "prewhitened") else "composite"
     response = fid.estimate_response(data, inputs="tau_phi", outputs="p", estimator=estimator)
-    if flight.method == "joint":
+    if name == "joint":
         return fid.identify(model, (response, record(flight, seed + 10**6)), method="joint")
     return fid.identify(model, response)
 
@@ -192,10 +200,13 @@ def loop_of(gains: Gains, flight: Flight) -> fid.AxisLoop:
 
 def tried(seed: int, *, draws: int = 60) -> Outcome:
     """Draw, fly, fit, tune and fly what was tuned."""
-    begun, flight = time.perf_counter(), drawn(seed)
+    begun, flight = time.process_time(), drawn(seed)
 
     def outcome(verdict: str, why: str, broken: str = "", wasted: bool = False) -> Outcome:
-        return Outcome(seed, flight, verdict, why, broken, time.perf_counter() - begun, wasted)
+        return Outcome(
+            seed, flight.craft.name, flight.structure, flight.method, flight.right, verdict, why,
+            broken, time.process_time() - begun, wasted,
+        )  # fmt: skip
 
     try:
         fit = fitted(flight, seed)
@@ -209,12 +220,27 @@ def tried(seed: int, *, draws: int = 60) -> Outcome:
     except fid.FlightidError as error:
         return outcome("refused", str(error), wasted=_would_hold(fit, flight, seed, options))
     if not design.exists:
-        return outcome("none", design.findings[0].message)
+        lost = flight.right and known_exactly(flight, options, design)
+        return outcome("none", design.findings[0].message, wasted=lost)
     red = [f.message for f in design.findings if f.light is Light.RED]
     broken = broken_promise(design, flight, seed)
     if red:
         return outcome("red", "; ".join(red), broken, flight.right and not broken)
-    return outcome(str(design.findings[0].light), "", broken)
+    light = max((f.light for f in design.findings), key=[*Light].index)
+    doubts = "; ".join(f"{f.code}" for f in design.findings if f.light is not Light.GREEN)
+    return outcome(str(light), doubts, broken)
+
+
+def known_exactly(flight: Flight, options: dict[str, Any], found: fid.PidDesign) -> bool:
+    """Whether one who knew the vehicle would find gains inside the band that the data showed."""
+    craft, n = flight.craft, len(flight.craft.a)
+    truth = fid.LinearSystem(
+        craft.a, craft.b[:, None], np.eye(n)[[-2]], [[0.0]], ("tau_phi",), ("p",),
+        [craft.delay * STEP_S],
+    )  # fmt: skip
+    band = found.provenance["band_rad_s"]
+    known = fid.tune_pid(truth, gyro="raw", nominal=True, band_rad_s=band, **options | {"draws": 1})
+    return known.exists
 
 
 def _would_hold(fit: fid.Fit, flight: Flight, seed: int, options: dict[str, Any]) -> bool:
@@ -253,54 +279,24 @@ def saturation(axis: Axis, flight: Flight, seed: int) -> float:
     return share if share > SATURATED else 0.0
 
 
-def table(outcomes: list[Outcome]) -> str:
-    """Counts by method, and the whole; then each broken promise."""
-    lines = [f"{'':30s} {'n':>4s} {'ref':>4s} {'none':>4s} {'red':>4s} {'amb':>4s} {'grn':>4s} "
-             f"{'broken':>6s} {'by green':>8s} {'good':>5s} {'refused':>7s}"]  # fmt: skip
-    groups = [("all", outcomes)]
-    groups += [(m, [o for o in outcomes if o.flight.method == m]) for m in METHODS]
-    groups += [(s, [o for o in outcomes if o.flight.structure == s]) for s in STRUCTURES]
-    groups += [(t, [o for o in outcomes if o.flight.craft.name == t]) for t in TRUTHS]
-    for name, chosen in groups:
-        kinds = Counter(o.verdict for o in chosen)
-        made = [o for o in chosen if o.verdict in ("green", "amber")]
-        held = [o for o in made if o.flight.right and not o.broken]
-        wasted = [o for o in chosen if o.wasted]
-        lines.append(
-            f"{name:30s} {len(chosen):4d} "
-            + " ".join(f"{kinds[k]:4d}" for k in ("refused", "none", "red", "amber", "green"))
-            + f" {sum(bool(o.broken) for o in made):6d}"
-            + f" {sum(bool(o.broken) for o in made if o.verdict == 'green'):8d}"
-            + f" {len(held) + len(wasted):5d} {len(wasted):7d}"
-        )
-    return "\n".join(lines)
-
-
 def main() -> None:
     """Count."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=40)
     parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--family", choices=("hover", "rig"), default="hover")
+    parser.add_argument("--keep", type=Path, help="file that outcomes are added to, and read from")
     parser.add_argument("--each", action="store_true", help="one line for every tuning")
     asked = parser.parse_args()
     tune_pid.response_bands = lambda *_: ()  # pictures, which no gain depends on
     seeds = range(asked.first_seed, asked.first_seed + asked.runs)
-    outcomes = []
-    for o in map(tried, seeds):
-        outcomes.append(o)
-        if asked.each or (o.broken and o.verdict in ("green", "amber")):
-            print(row(o), flush=True)
-    print(table(outcomes))
+    fly = tried if asked.family == "hover" else rig_gains.tried
 
+    def show(found: Outcome) -> None:
+        if asked.each or (found.broken and found.is_made):
+            print(found.row(), flush=True)
 
-def row(o: Outcome) -> str:
-    """One tuning on one line."""
-    f = o.flight
-    return (
-        f"{o.seed:5d} {o.verdict:8s} {f.craft.name:24s} {f.structure:26s} {f.method:16s} "
-        f"{'right' if f.right else 'wrong'} {'good, lost' if o.wasted else '':10s} "
-        f"{o.seconds:5.1f} s  {o.broken} | {o.why[:150]}"
-    )
+    print(table(collected(seeds, fly, asked.keep, show)))
 
 
 if __name__ == "__main__":

@@ -17,7 +17,9 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 STEP_S = 1.0 / 400.0
 FULL = 1.0
-GRID = np.geomspace(0.05, 0.999 * np.pi / STEP_S, 6000)
+GRID = np.geomspace(0.05, 0.999 * np.pi / STEP_S, 5000)
+BLOCK = 40
+"""Samples that are flown at once where no limit is met."""
 
 
 @dataclass(frozen=True)
@@ -71,10 +73,14 @@ def vehicle(
     damping: float = 0.0,
     motor_s: float = 0.0,
     mode: tuple[float, float] | None = None,
+    frame: tuple[float, float, float] | None = None,
     delay: int = 4,
     gyro_hz: float = 60.0,
 ) -> Vehicle:
-    """Command, motor lag, a mode (frequency rad/s, damping ratio; flapping), damped rate, angle."""
+    """Command, motor lag, a mode (frequency rad/s, damping ratio; flapping), damped rate, angle.
+
+    A flexible frame (rad/s, damping ratio, share of the effect) moves the gyro beside the body.
+    """
     blocks: list[tuple[Array, Array, Array]] = []
     if motor_s:
         blocks.append((np.array([[-1 / motor_s]]), np.array([1 / motor_s]), np.array([1.0])))
@@ -83,7 +89,17 @@ def vehicle(
         lag = np.array([[0.0, 1.0], [-(w**2), -2 * zeta * w]])
         blocks.append((lag, np.array([0.0, w**2]), np.array([1.0, 0.0])))
     rigid = np.array([[damping, 0.0], [1.0, 0.0]])
-    blocks.append((rigid, np.array([effect, 0.0]), np.array([1.0, 0.0])))
+    if frame is None:
+        blocks.append((rigid, np.array([effect, 0.0]), np.array([1.0, 0.0])))
+    else:
+        w, zeta, share = frame
+        moved = share * effect
+        # Bending and its rate, then what the gyro sees of body and bending, and its integral.
+        whole = np.zeros((4, 4))
+        whole[0, 1], whole[1, :2] = 1.0, (-(w**2), -2 * zeta * w)
+        whole[2, :2] = -(w**2) * moved, -(damping + 2 * zeta * w) * moved
+        whole[2:, 2:] = rigid
+        blocks.append((whole, np.array([0.0, 1.0, effect + moved, 0.0]), np.eye(4)[2]))
     a, b, c = blocks[0]
     for a2, b2, c2 in blocks[1:]:
         a = np.block([[a, np.zeros((len(a), len(a2)))], [np.outer(b2, c), a2]])
@@ -160,27 +176,50 @@ class Axis:
     def fly(
         self, injected: Array, noise: Array, disturbance: Array, start: Array | None = None
     ) -> tuple[Array, Array]:
-        """Commands and filtered rates of every loop."""
+        """Commands and filtered rates of every loop; blocks in which no limit is met at once."""
         z = np.zeros(self.size) if start is None else start.copy()
         n = len(injected)
         commands, rates = np.empty(n), np.empty(n)
         rows = np.vstack([self.a, self.c, self.g])
         moved = np.outer(noise, self.b_n) + np.outer(disturbance, self.b_d)
         added = self.d * noise + injected
-        for t in range(n):
-            ahead = rows @ z
-            u = min(max(float(ahead[-2]) + added[t], -FULL), FULL)
-            commands[t], rates[t] = u, ahead[-1]
-            z = ahead[:-2] + self.b_u * u + moved[t]
+        seen, pushed, ahead_of = self._block()
+        for first in range(0, n, BLOCK):
+            some = slice(first, min(first + BLOCK, n))
+            push = moved[some] + np.outer(added[some], self.b_u)
+            if len(push) == BLOCK:
+                path = (seen @ z + np.tensordot(pushed, push, 2)).T
+                wanted = path[0] + added[some]
+                if np.all(np.abs(wanted) <= FULL):
+                    commands[some], rates[some] = wanted, path[1]
+                    z = ahead_of[0] @ z + np.einsum("kij,kj->i", ahead_of[1], push)
+                    continue
+            for t in range(some.start, some.stop):
+                ahead = rows @ z
+                u = min(max(float(ahead[-2]) + added[t], -FULL), FULL)
+                commands[t], rates[t] = u, ahead[-1]
+                z = ahead[:-2] + self.b_u * u + moved[t]
         return commands, rates + self.h * noise
+
+    def _block(self) -> tuple[Array, Array, tuple[Array, Array]]:
+        """Of unlimited samples: outputs by start and by pushes, and the state behind them."""
+        closed = self.a + np.outer(self.b_u, self.c)
+        powers = [np.eye(self.size)]
+        for _ in range(BLOCK):
+            powers.append(closed @ powers[-1])
+        out = np.array([np.vstack([self.c, self.g]) @ power for power in powers[:BLOCK]])
+        pushed = np.zeros((BLOCK, 2, BLOCK, self.size))
+        for t in range(1, BLOCK):
+            pushed[t, :, :t] = out[:t][::-1].transpose(1, 0, 2)
+        return out, pushed, (powers[BLOCK], np.array(powers[:BLOCK])[::-1])
 
     def loops(self) -> dict[str, Complex]:
         """Rate loop, whole loop (both broken at the command) and angle loop at `GRID`."""
         lag = np.exp(-1j * GRID * STEP_S)
         z, k = 1 / lag, self.gains
-        values, vectors = np.linalg.eig(self.ad)
-        inner = np.linalg.solve(vectors, self.bd.astype(complex))
-        states = (vectors[-2:, :, None] * (inner[:, None] / (z - values[:, None]))).sum(axis=1)
+        # Rate and angle without damping share a pole: solved, not by eigenvectors.
+        pencil = z[:, None, None] * np.eye(self.n) - self.ad
+        states = np.linalg.solve(pencil, self.bd.astype(complex)[:, None])[:, -2:, 0].T
         plant, angle = states * lag**self.craft.delay
         b0, b1, b2, a1, a2 = low_pass(self.craft.gyro_hz)
         gyro = (b0 + b1 * lag + b2 * lag**2) / (1 + a1 * lag + a2 * lag**2)
