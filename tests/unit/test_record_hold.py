@@ -10,7 +10,7 @@ import pytest
 import flightid as fid
 from flightid.errors import DataError, OptionError
 from flightid.logs import channel_map
-from flightid.record import InputShape, read_records
+from flightid.record import InputShape, Step, read_records
 from flightid.record.chosen_hold import chosen_hold
 from flightid.record.repeats import found_period, found_staircase, period_of
 
@@ -170,6 +170,25 @@ def test_an_unknown_hold_is_said_with_what_was_assumed() -> None:
     assert "every 4 samples" in stairs.message
     assert not chosen_hold(_record(), "first").findings
     assert chosen_hold([_record(hold="zero"), smooth], None).hold == "zero"
+
+
+def test_inputs_of_two_levels_are_steps_and_nobody_is_asked() -> None:
+    time_s = np.arange(400) / 50
+    switched = np.where(np.random.default_rng(0).standard_normal(400) > 0.0, 6.41, 3.41)
+    arrays = {"inputs": {"u": switched, "T": np.full(400, 283.0)}, "outputs": {"y": switched}}
+    record = fid.Record.from_arrays(time_s, **arrays)
+    found = chosen_hold(record, None)
+    assert (found.hold, found.source, found.findings[0].light) == ("zero", "samples", "green")
+    assert chosen_hold(record, None, fitted="first").hold == "first"
+    assert chosen_hold(record, None, known=("first",)).hold == "first"
+    assert fid.estimate_response(record, inputs="u", window_s=2.0).input_shape.hold == "zero"
+    # One input of more levels, and a log at a lower rate than its loop, show nothing of the kind.
+    record = record.replace({"T": np.arange(400.0)})
+    assert chosen_hold(record, None).source == "assumed"
+    assert chosen_hold(record, None, inputs=["u"]).source == "samples"
+    logged = fid.Record.from_arrays(time_s, **arrays)
+    logged = logged.replace(step=Step("Log.record", {}))
+    assert chosen_hold(logged, None).source == "assumed"
 
 
 def test_a_channel_map_may_tell_the_hold(tmp_path: Path) -> None:

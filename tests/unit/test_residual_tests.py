@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 import flightid as fid
 from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
+from flightid.evidence.gather import loop_of_residuals
 from flightid.plot.residuals import correlations
 from flightid.uncertainty.residual_correlation import (
     cross_correlation,
@@ -165,6 +167,13 @@ def test_closed_loops_judge_only_past_inputs() -> None:
     opened = fid.residual_tests(e, fed_back, horizon=STEP, loop="open")
     assert opened.test("uε", "e1", "u1").verdict == "fail"
     assert any("declare loop='closed'" in finding.action for finding in opened.findings)
+    assert "residuals-lead-input" in {finding.code for finding in opened.findings}
+    # Who said that it is open is believed; where nobody did, the loop is not green.
+    assert loop_of_residuals(opened.feedback, opened.findings) is None
+    tested = replace(opened.feedback, source="test")
+    doubtful = loop_of_residuals(tested, opened.findings)
+    assert doubtful is not None
+    assert (doubtful.name, doubtful.light) == ("loop", "unknown")
     closed = fid.residual_tests(e, fed_back, horizon=STEP, loop="closed")
     found = fid.residual_tests(e, fed_back, horizon=STEP)
     assert (found.loop, found.feedback.source) == ("closed", "test")

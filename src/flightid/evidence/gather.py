@@ -23,6 +23,7 @@ from flightid.evidence.evidence import (
     GUIDELINES,
     HOLD,
     INSPECTION,
+    LOOP,
     RESIDUALS,
     SETTLED,
     SIGNS,
@@ -36,12 +37,13 @@ from flightid.findings import Finding, worst
 from flightid.inspection import Inspection
 from flightid.models.narx.structure import STOPS
 from flightid.record import Record
-from flightid.record.hold import Loop
+from flightid.record.hold import FROM_LOG, Loop
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.agreement import Agreement
-from flightid.uncertainty.feedback import declared_loop
+from flightid.uncertainty.feedback import FeedbackTest, declared_loop
 
-FROM_LOG = "Log.record"
+LEADS = "residuals-lead-input"
+"""Of a residual that goes with inputs to come, beyond chance: feedback, or dynamics missing."""
 CONVERGED = frozenset({"gradient", "step", "cost", "zero", "bounds"})
 STRAIGHT = frozenset({"", "regression", "instruments", "kernel", "subspace"})
 """Ends of methods that search nothing: linear equations solve them."""
@@ -205,3 +207,26 @@ def residual_check(findings: Iterable[Finding]) -> Check:
     if first is None:
         return Check(RESIDUALS, Light.UNKNOWN, "no residual test could be made")
     return Check(RESIDUALS, light, first.message, first.action)
+
+
+def loop_of_residuals(feedback: FeedbackTest, findings: Iterable[Finding]) -> Check | None:
+    """What residual tests know of the loop; None where it was declared or nothing speaks of one.
+
+    A residual that comes before an input makes the loop unknown where no test calls it closed.
+
+    Example
+    -------
+    >>> loop_of_residuals(FeedbackTest("closed", "test", 1e-9, "da", 0.2), ()).light.value
+    'amber'
+    >>> loop_of_residuals(FeedbackTest("open", "declared"), ()) is None
+    True
+    """
+    if feedback.source in ("declared", "repeats"):
+        return None
+    if feedback.is_closed:
+        return loop_check(feedback)
+    leads = next((each for each in findings if each.code == LEADS), None)
+    if leads is None:
+        return None
+    what = f"whether a loop is closed cannot be told: {leads.message}"
+    return Check(LOOP, Light.UNKNOWN, what, leads.action)

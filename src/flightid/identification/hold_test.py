@@ -15,7 +15,7 @@ import numpy as np
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
-from flightid.evidence.gather import CONVERGED, FROM_LOG
+from flightid.evidence.gather import CONVERGED
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain.estimator_bias import Correction
@@ -24,7 +24,7 @@ from flightid.identification.methods import Method, flat
 from flightid.identification.rival_fits import estimates_alone
 from flightid.record import Record
 from flightid.record.chosen_hold import ASSUMED, DECLARED, RECORDED, ChosenHold
-from flightid.record.hold import BETWEEN, HOLDS, InputHold
+from flightid.record.hold import BETWEEN, FROM_LOG, HOLDS, InputHold
 from flightid.record.repeats import found_staircase
 from flightid.responses import FrequencyResponse
 

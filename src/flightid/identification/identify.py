@@ -182,7 +182,8 @@ def identify(
     held = hold_for(chosen.options, flat(data), options)
     given = options if held is None else {**options, "hold": held.hold}
     fit = replace(chosen.run(model, data, given), structure=model, method=chosen.name)
-    fit = replace(fit, provenance={**fit.provenance, "told": options})
+    told = options if loop is None else {**options, "loop": loop}
+    fit = replace(fit, provenance={**fit.provenance, "told": told})
     if held is not None:
         fit = with_hold_said(*with_hold_tested(fit, chosen, data, given, held))
     return replace(fit, evidence=evidence_of(fit, flat(data), loop))

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
+
+import numpy as np
 
 from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.findings import Finding
-from flightid.record.hold import BETWEEN, InputHold, InputShape, require_hold
+from flightid.record.hold import BETWEEN, FROM_LOG, InputHold, InputShape, require_hold
 from flightid.record.record import Record
-from flightid.record.repeats import Staircase, found_staircase
+from flightid.record.repeats import Staircase, found_staircase, is_switched
 from flightid.record.several import as_records
 
-DECLARED, RECORDED, FITTED, ASSUMED = "declared", "record", "fit", "assumed"
+DECLARED, RECORDED, FITTED = "declared", "record", "fit"
+SEEN, ASSUMED = "samples", "assumed"
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,8 @@ class ChosenHold:
     Attributes
     ----------
     hold : {"zero", "first", "band_limited"}
-    source : {"declared", "record", "fit", "assumed"}
+    source : {"declared", "record", "fit", "samples", "assumed"}
+        "samples": inputs of two levels that nobody else speaks of, which are steps.
     findings : tuple of Finding
         What to know of it; empty where it was declared or the records know it.
 
@@ -95,6 +99,8 @@ def chosen_hold(
     if fitted is not None:
         return ChosenHold(require_hold(fitted, known), FITTED)
     wanted = None if inputs is None else tuple(inputs)
+    if "zero" in known and listed and all(is_seen_held(each, wanted) for each in listed):
+        return ChosenHold("zero", SEEN, (_SWITCHED,))
     for record in listed:
         for name in record.inputs if wanted is None else wanted:
             stairs = found_staircase(record[name]) if name in record else None
@@ -102,6 +108,29 @@ def chosen_hold(
                 said = _stairs(record.name, name, stairs, assumed)
                 return ChosenHold(assumed, ASSUMED, (said,))
     return found
+
+
+def is_seen_held(record: Record, inputs: Iterable[str] | None = None) -> bool:
+    """Whether every input that moves takes two levels alone, in a record that is none of a log.
+
+    A log may show an output of the autopilot more seldom than its loop makes it.
+
+    Example
+    -------
+    >>> record = Record.from_arrays(np.arange(40) / 10, inputs={"u": np.tile([0.0, 1.0], 20)})
+    >>> is_seen_held(record)
+    True
+    """
+    names = [name for name in (record.inputs if inputs is None else inputs) if name in record]
+    moving = [record[name] for name in names if np.ptp(record[name]) > 0.0]
+    logged = any(step.operation == FROM_LOG for step in record.history)
+    return bool(moving) and not logged and all(map(is_switched, moving))
+
+
+def shape_of(record: Record) -> InputShape:
+    """What a record knows of its inputs, held where nobody said and every one has two levels."""
+    known = record.input_shape
+    return replace(known, hold="zero") if known.hold is None and is_seen_held(record) else known
 
 
 def hold_of_shapes(
@@ -133,6 +162,11 @@ def hold_of_shapes(
     silent = [name for name, shape in shapes if shape.hold is None]
     said = () if not silent else (_others(silent[0], hold),)
     return ChosenHold(hold, RECORDED, said)
+
+
+_SWITCHED = Finding(
+    "hold-seen", Light.GREEN, "inputs taken as steps between samples: they take two levels alone"
+)
 
 
 def _unknown(assumed: InputHold) -> Finding:

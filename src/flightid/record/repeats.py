@@ -86,6 +86,25 @@ def found_staircase(samples: Array) -> Staircase | None:
     return Staircase(1, int(jumps.size)) if large and still else None
 
 
+def is_switched(samples: Array) -> bool:
+    """Whether samples take two levels alone and jump between them often, as a switch does.
+
+    What lies between two such samples is one of the levels: the input was held.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (n_samples,)
+
+    Example
+    -------
+    >>> is_switched(np.tile([3.0, 5.0, 5.0], 9)), is_switched(np.tile([3.0, 4.0, 5.0], 9))
+    (True, False)
+    """
+    low, high = float(np.min(samples)), float(np.max(samples))
+    two = low < high and bool(np.all((samples == low) | (samples == high)))
+    return two and int(np.count_nonzero(np.diff(samples))) >= FEWEST_JUMPS
+
+
 def found_period(samples: Array) -> int | None:
     """Find the least number of samples after which all rows repeat, to rounding.
 

@@ -12,6 +12,7 @@ from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.record import Record
+from flightid.record.chosen_hold import shape_of
 from flightid.record.history import Step
 from flightid.record.hold import InputShape, Loop, common_hold, common_loop
 from flightid.record.several import as_records
@@ -182,7 +183,7 @@ def _with_inputs(
     response: FrequencyResponse, samples: Samples, records: Sequence[Record], loop: Loop | None
 ) -> FrequencyResponse:
     """The response with what is known of its inputs: their hold, and whether they are fed back."""
-    shapes = [record.input_shape for record in records]
+    shapes = [shape_of(record) for record in records]
     if response.estimator.startswith("instrument"):
         test = FeedbackTest("unknown", "instrument")
     elif response.estimator == PREWHITENED:

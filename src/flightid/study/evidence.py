@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from flightid.evidence import Check, Evidence, inspection_check, residual_check
 from flightid.evidence.data_checks import band_checks
-from flightid.evidence.evidence import GUIDELINES, PREDICTION, RESIDUALS
-from flightid.evidence.gather import worse
+from flightid.evidence.evidence import GUIDELINES, LOOP, PREDICTION, RESIDUALS
+from flightid.evidence.gather import loop_of_residuals, worse
 from flightid.findings import Finding, worst
 from flightid.identification import Fit
 from flightid.inspection import Inspection
@@ -40,6 +40,8 @@ def examined(fit: Fit, item: ModelResults, inspection: Inspection | None) -> Fit
     if item.tests is not None and item.tests.findings:
         residuals = residual_check(item.tests.findings)
         checks.append(worse(fit.evidence.check(RESIDUALS), residuals))
+        loop = loop_of_residuals(item.tests.feedback, item.tests.findings)
+        checks += [] if loop is None else [worse(fit.evidence.check(LOOP), loop)]
     if item.on_unseen:
         said = [each for run in item.verifications.values() for each in run.findings]
         checks.append(prediction_check(item.on_unseen, (*said, *item.reduction_judged)))

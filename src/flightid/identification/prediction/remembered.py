@@ -10,7 +10,7 @@ from flightid.identification.records.record_parameters import with_record_values
 from flightid.models import StateSpaceModel
 from flightid.models.model import model_of
 from flightid.record import Record
-from flightid.record.chosen_hold import DECLARED, RECORDED
+from flightid.record.chosen_hold import DECLARED, RECORDED, SEEN
 from flightid.record.hold import HOLDS, InputHold
 
 WORDS = ("estimate", "measured", "trim")
@@ -55,7 +55,7 @@ def remembered(source: object) -> StartChoice:
         for name in ("output_bias", "input_bias")
     }
     own = tuple(told.get("record_parameters", ()))
-    known = inputs.get("hold_from") in (DECLARED, RECORDED)
+    known = inputs.get("hold_from") in (DECLARED, RECORDED, SEEN)
     hold = inputs.get("hold") if known and inputs.get("hold") in HOLDS else None
     start = start if start in WORDS else None
     return StartChoice(start, **biases, record_parameters=own, hold=hold)

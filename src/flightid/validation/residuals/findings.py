@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flightid.conventions import Light
+from flightid.evidence.gather import LEADS
 from flightid.findings import Finding
 from flightid.uncertainty.foretold import is_material
 from flightid.uncertainty.residual_correlation import LEVEL
@@ -28,7 +29,10 @@ _ACTIONS = {
     Kind.CROSS: "the outputs share noise or dynamics: give the other output as an input, or fit a "
     "state space with both",
 }
-_FEEDBACK = "the residual comes before the input: a loop is closed; declare loop='closed'"
+_BEFORE = (
+    "the residual comes before the input, as feedback makes it: declare loop='closed' where a "
+    "controller moved the input; else dynamics from it are missing"
+)
 
 
 def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]:
@@ -70,7 +74,7 @@ def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]
 
 def _failure(test: CorrelationTest, n_tests: int) -> Finding:
     p_value = test.p_value or 0.0
-    sure = p_value * n_tests < 1.0 - LEVEL
+    sure, leads = p_value * n_tests < 1.0 - LEVEL, _leads(test)
     worth = test.worth_percent
     parts = [f"{test.name} fails: p = {p_value:.2g}", *_limits_missed(test)]
     message = ", ".join(parts)
@@ -78,9 +82,9 @@ def _failure(test: CorrelationTest, n_tests: int) -> Finding:
         message += f"; among {n_tests} tests chance alone may do that"
     elif worth is not None:
         message += f"; worth {worth:.2g} % of {test.output}"
-    action = _FEEDBACK if _leads(test) else _ACTIONS[test.kind]
+    action = _BEFORE if leads else _ACTIONS[test.kind]
     light = Light.RED if sure and is_material(worth) else Light.AMBER
-    return Finding(_CODES[test.kind], light, message, action)
+    return Finding(LEADS if leads and sure else _CODES[test.kind], light, message, action)
 
 
 def _limits_missed(test: CorrelationTest) -> Iterator[str]:

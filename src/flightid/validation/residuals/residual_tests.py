@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError, OptionError
 from flightid.identification import Fit
 from flightid.record import Record
-from flightid.record.hold import common_loop
+from flightid.record.hold import LOOPS, common_loop
 from flightid.record.repeats import found_period
 from flightid.uncertainty.feedback import FeedbackTest, declared_loop, find_feedback
 from flightid.uncertainty.foretold import (
@@ -156,8 +156,11 @@ def residual_tests(
 
 
 def _known_loop(residuals: Residuals) -> str | None:
-    """What the records behind residuals know of their loop."""
+    """What a fit was told of the loop, else what the records behind residuals know."""
     if isinstance(residuals, Fit):
+        told = residuals.provenance.get("told")
+        if isinstance(told, Mapping) and told.get("loop") in LOOPS:
+            return str(told["loop"])
         records = [each.measured for each in residuals.records]
     else:
         listed = residuals if isinstance(residuals, list | tuple) else [residuals]
