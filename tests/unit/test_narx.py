@@ -21,7 +21,9 @@ from flightid.errors import (
     UnknownNameError,
 )
 from flightid.identification.narx.findings import free_run_findings
+from flightid.identification.narx.simulation_error import SimulationError
 from flightid.models import Lag, NarxModel, Term
+from flightid.models.narx.scaling import Scaling
 from flightid.models.narx.terms import product_term
 from tests.closeness import assert_close
 from tests.narx_records import quadratic
@@ -384,3 +386,65 @@ def test_a_true_linear_vehicle_does_not_lose_to_the_linear_model_by_chance() -> 
     right, wrong = np.full(100, 0.1), np.linspace(0.5, 0.6, 100)
     assert free_run_findings([wrong], [right], None)[0].code == "loses-to-linear"
     assert free_run_findings([1.01 * e[:100]], [np.roll(e[:100], 1)], None) == ()
+
+
+def _saturating(seed: int, noise: float) -> fid.Record:
+    random = np.random.default_rng(seed)
+    u, y = np.repeat(random.uniform(-1.0, 1.0, 100), 3), np.zeros(300)
+    for t in range(2, 300):
+        push = 0.5 * u[t - 1] - 0.3 * u[t - 1] ** 2
+        y[t] = 1.4 * np.tanh(y[t - 1]) - 0.6 * y[t - 2] + push
+    y = y + noise * random.standard_normal(300)
+    return fid.Record.from_arrays(np.arange(300) / 10, inputs={"u": u}, outputs={"y": y})
+
+
+@pytest.mark.parametrize(
+    "kernel", ["gaussian", "multiquadric", "inverse_multiquadric", "thin_plate"]
+)
+def test_the_gradient_of_free_runs_is_that_of_differences(kernel: str) -> None:
+    random = np.random.default_rng(0)
+    scaling = Scaling(
+        {"y": 0.0, "u": 0.0}, {"y": 1.0, "u": 1.0}, {"y": "1", "u": "1"}, 0.1, (-3.0, 3.0)
+    )
+    structure = fid.NarxStructure(("u",), "y", 2, 2, kernel=kernel, width=2.0)
+    terms = (
+        *(product_term([lag]) for lag in structure.lags),
+        product_term([Lag("y", 1), Lag("y", 2), Lag("u", 1), Lag("y", 2)]),
+        Term("1", centre=(0.1, 0.2, 0.3, 0.4)),
+        Term("2", centre=(-0.5, 0.2, -0.3, 0.1)),
+    )
+    model = NarxModel(structure, terms, (0.9, -0.3, 0.4, 0.1, 0.05, 0.02, -0.03), scaling)
+    runs = [
+        (0.1 * random.standard_normal(60), random.uniform(-1.0, 1.0, (1, 60))) for _ in range(2)
+    ]
+    error = SimulationError(model, runs, centres=True)
+    values, found = error.start, error.jacobian(error.start)
+    assert values.size == 7 + (kernel != "thin_plate") + 8
+    for place, column in enumerate(found.T):
+        step = np.zeros(values.size)
+        step[place] = 1e-6
+        slope = (error.residuals(values + step) - error.residuals(values - step)) / 2e-6
+        assert_close(column, slope, rtol=0.0, atol=1e-7, why="central differences")
+
+
+def test_weights_of_free_runs_beat_those_one_step_ahead_and_linear_wins_where_it_should() -> None:
+    asked = fid.NarxStructure(("u",), "y", 2, 2, kernel=None, degree=3)
+    noisy, clean = _saturating(0, 0.1), _saturating(1, 0.0)
+    ahead, free = (
+        fid.identify(replace(asked, focus=focus), noisy) for focus in ("prediction", "simulation")
+    )
+    one, other = (fid.predict(fit, clean).rms_error["y"] for fit in (ahead, free))
+    assert other < 0.6 * one
+    assert "terms-by-free-run" in {finding.code for finding in free.findings}
+    assert all(each.stderr is None for each in free.parameters.values())
+    truth = fid.PolynomialModel(("u",), "y", 0.1, a=[1, -1.4, 0.7], b=[[0.3]], nk=(1,))
+    record = noisy.replace({"y": truth.simulate(noisy)})
+    noise = 0.1 * np.random.default_rng(2).standard_normal(300)
+    record = record.replace({"y": record["y"] + noise})
+    linear = fid.identify(replace(asked, focus="simulation"), record)
+    assert "linear-delivered" in {finding.code for finding in linear.findings}
+    assert {term.degree for term in linear.model.terms} <= {0, 1}
+    unseen = clean.replace({"y": truth.simulate(clean)})
+    assert fid.predict(linear, unseen).fit_percent["y"] > 95.0
+    with pytest.raises(OptionError, match="neither penalised nor held back"):
+        replace(asked, focus="simulation", held_back=0.5)

@@ -167,3 +167,30 @@ def test_scans_that_cannot_be_made():
     )
     with pytest.raises(OptionError, match="output to model is not said"):
         fid.scan_orders(both, both)
+
+
+def test_every_kind_is_ranked_by_the_same_free_runs():
+    random = np.random.default_rng(11)
+    records = []
+    for _ in range(2):
+        u, y = np.repeat(random.uniform(-1.0, 1.0, 100), 4), np.zeros(400)
+        for t in range(2, 400):
+            y[t] = 1.2 * y[t - 1] - 0.5 * y[t - 2] + 0.3 * u[t - 1]
+        y = y + 3.0 + 0.01 * random.standard_normal(400)
+        records.append(
+            fid.Record.from_arrays(np.arange(400) / 10, inputs={"u": u}, outputs={"y": y})
+        )
+    tried = {"na": [2], "nb": [1, 2], "nc": 1, "nd": 1, "nf": [2], "nk": 1}
+    scan = fid.scan_orders(*records, kind="any", **tried)
+    assert {each.kind for each in scan.trials} == {"ARX", "ARMAX", "OE", "BJ", "subspace", "NARX"}
+    errors = [t.free_run_rms for t in scan.trials if t.free_run_rms is not None]
+    assert errors == sorted(errors)
+    for trial in scan.trials:
+        if trial.model is not None and trial.free_run_rms is not None:
+            made = fid.predict(trial.model, records[1], settle_s=scan.settle_s)
+            assert_close(trial.free_run_rms, made.rms_error["y"], rtol=1e-12, why="one protocol")
+            assert made.start == round(scan.settle_s * 10), "the same samples for every kind"
+    best = fid.predict(scan.best, records[1], settle_s=scan.settle_s).rms_error["y"]
+    assert_close(errors[0], best, rtol=1e-12, why="what is ranked is delivered")
+    assert {row[0] for row in scan.summary(3).rows} == {each.kind for each in scan.trials}
+    assert len(plot.order_scan(scan, scan.simplest.structure).data) == 4

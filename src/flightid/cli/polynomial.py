@@ -1,4 +1,4 @@
-"""``flightid polynomial``: black-box models from records, or a scan of their orders."""
+"""``flightid polynomial``: black-box models from records, or a scan of orders and kinds."""
 
 from __future__ import annotations
 
@@ -60,6 +60,8 @@ def command(
 ) -> None:
     """Fit a polynomial model to the records of FILES, or scan its orders.
 
+    --scan --kind any ranks every kind, subspace and NARX too, by free run of the unseen records.
+
     The exit code is 1 where a verdict is red.
     """
     import flightid
@@ -72,14 +74,20 @@ def command(
     if scan:
         if not unseen:
             raise click.UsageError("--scan ranks by free run: name unseen records by --validation")
+        from flightid.models.polynomial.orders import ANY, EVERY_ORDER
+
         tried: dict[str, Any] = {
             name: _tried(orders.get(name, (most,))) for name, most in HIGHEST.items()
         }
+        if kind == ANY:
+            tried |= {name: each for name, each in EVERY_ORDER.items() if name not in orders}
         scanned = flightid.scan_orders(
             records, unseen, inputs=inputs, outputs=output, kind=kind, **tried, **given
         )
         emit(scanned, as_json=as_json)
         fit, findings = scanned.best, scanned.findings
+    elif kind == "any":
+        raise click.UsageError("--kind any ranks kinds: add --scan and --validation")
     else:
         structure = flightid.PolynomialModel.general(
             inputs, output, **one_each(kind, orders), **given

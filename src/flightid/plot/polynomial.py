@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from flightid.identification import Fit, ImpulseResponse
 from flightid.identification.subspace.roots import ALL
-from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.plot import look
 from flightid.uncertainty.quantiles import half_width
 from flightid.validation import OrderScan
+from flightid.validation.order_scan.result import Structure, words_of
 
 CHI2_95_2 = 5.991
 """95 % point of χ² with two degrees of freedom."""
@@ -19,28 +19,30 @@ HIGHEST = 3.0
 """Errors beyond this many times the smallest are drawn at the upper edge."""
 
 
-def order_scan(scan: OrderScan, taken: PolynomialStructure | None = None) -> go.Figure:
-    """Draw free-run error and BIC of each structure over its number of coefficients.
+def order_scan(scan: OrderScan, taken: Structure | None = None) -> go.Figure:
+    """Draw free-run error and (of one kind) BIC of structures over their coefficients.
 
     Parameters
     ----------
     scan : OrderScan
         Result of `flightid.scan_orders`.
-    taken : PolynomialStructure, optional
+    taken : structure, optional
         Structure that was taken in the end, marked too.
 
     Returns
     -------
     plotly.graph_objects.Figure
     """
-    made = look.figure(2)
-    kept = [t for t in scan.trials if t.free_run_rms is not None and t.criteria is not None]
-    counts = [t.structure.n_parameters for t in kept]
+    several = scan.is_of_several_kinds
+    made = look.figure(1 if several else 2)
+    kept = [t for t in scan.trials if t.free_run_rms is not None and (several or t.criteria)]
+    counts = [t.n_parameters for t in kept]
     rms = np.array([t.free_run_rms for t in kept], dtype=np.float64)
     bic = np.array([t.criteria.bic if t.criteria else None for t in kept], dtype=np.float64)
-    words = [t.structure.orders_text for t in kept]
+    words = [words_of(scan, t) for t in kept]
     top = HIGHEST * float(rms.min())
-    for row, values in ((1, np.minimum(rms, top)), (2, bic)):
+    rows = [(1, np.minimum(rms, top))] if several else [(1, np.minimum(rms, top)), (2, bic)]
+    for row, values in rows:
         made.add_trace(
             go.Scatter(
                 x=counts,
@@ -65,12 +67,12 @@ def order_scan(scan: OrderScan, taken: PolynomialStructure | None = None) -> go.
         if trial not in kept:
             continue
         place = kept.index(trial)
-        for row, value in ((1, rms[place]), (2, bic[place])):
+        for row, value in [(1, rms[place]), (2, bic[place])][: len(rows)]:
             made.add_trace(
                 go.Scatter(
                     x=[counts[place]],
                     y=[value],
-                    name=f"{name}: {trial.structure.orders_text}",
+                    name=f"{name}: {words_of(scan, trial)}",
                     legendgroup=name,
                     showlegend=row == 1,
                     mode="markers",
@@ -79,7 +81,9 @@ def order_scan(scan: OrderScan, taken: PolynomialStructure | None = None) -> go.
                 row=row,
                 col=1,
             )
-    look.label_axes(made, x="coefficients", y=[look.axis_title("free-run rms", scan.unit), "BIC"])
+    look.label_axes(
+        made, x="coefficients", y=[look.axis_title("free-run rms", scan.unit), "BIC"][: len(rows)]
+    )
     made.update_layout(hovermode="closest")
     return made
 

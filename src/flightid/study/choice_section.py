@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from flightid.models import PolynomialStructure
 from flightid.plot.polynomial import order_scan
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Lights, Paragraph, TableBlock
 from flightid.report.figures import figure_block
 from flightid.table import Table
 from flightid.validation import OrderScan
+from flightid.validation.order_scan.result import words_of
 
 if TYPE_CHECKING:
     from flightid.study.identified import ModelResults
@@ -31,11 +31,12 @@ def choice_blocks(item: ModelResults) -> tuple[Block, ...]:
     choice, fit, structure = item.choice, item.fit, item.settings.structure
     if not isinstance(choice, OrderScan) or fit is None or structure is None:
         return () if choice is None else result_blocks(choice)
-    shown = "Every structure tried: error in free run on the selection records, and BIC of the fit."
-    taken = fit.structure if isinstance(fit.structure, PolynomialStructure) else None
+    shown = "Every structure tried: error in free run on the selection records"
+    shown += "." if choice.is_of_several_kinds else ", and BIC of the fit."
+    taken = next((t for t in choice.trials if _orders(t.structure) == _orders(fit.structure)), None)
     words = f"Chosen by “{structure.choose}”"
     if taken is not None:
-        words += f": {taken.orders_text}"
+        words += f": {words_of(choice, taken)}"
     if structure.choose == "balanced":
         words += (
             ". Free runs do not see the noise model; so of all structures whose free-run error "
@@ -49,6 +50,11 @@ def choice_blocks(item: ModelResults) -> tuple[Block, ...]:
     return (
         Paragraph(f"{words}."),
         *lights,
-        figure_block(order_scan(choice, taken), shown),
+        figure_block(order_scan(choice, None if taken is None else taken.structure), shown),
         TableBlock(shorter, folded=True),
     )
+
+
+def _orders(structure: Any) -> tuple[str, str]:  # noqa: ANN401 - each kind's own
+    """Kind and orders: the full fit of a structure may have started otherwise."""
+    return structure.kind, structure.orders_text

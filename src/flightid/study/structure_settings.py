@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flightid.models import NarxStructure, SubspaceStructure
-from flightid.models.polynomial.orders import USED
+from flightid.models.polynomial.orders import ANY, EVERY_ORDER, USED
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.option_forms import NOTHING
 from flightid.options import Options, options_of, read_value
@@ -18,9 +18,14 @@ ORDERS: dict[str, tuple[str, ...]] = {
     **USED,
     NARX: ("output_lags", "input_lags"),
     SUBSPACE: (),
+    ANY: tuple(EVERY_ORDER),
 }
 """Orders of each structure, of which several may be tried."""
 CHOICES = ("balanced", "free_run", "simplest", "bic")
+
+
+CHOOSE = {NARX: "free_run", ANY: "simplest"}
+"""How a structure of a kind is chosen unless a study says it."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,7 @@ class StructureSettings:
     Attributes
     ----------
     kind : str
-        ``"arx"``, ``"armax"``, ``"oe"``, ``"bj"``, ``"narx"`` or ``"subspace"``.
+        ``"arx"``, ``"armax"``, ``"oe"``, ``"bj"``, ``"narx"``, ``"subspace"``; ``"any"`` of them.
     inputs : tuple of str
         Those whose response has no coherence are left out.
     outputs : tuple of str
@@ -65,7 +70,7 @@ class StructureSettings:
     def is_scanned(self) -> bool:
         """Whether several structures are tried."""
         counts = [len(values) for values in self.orders.values()]
-        return max([*counts, len(self.widths)], default=1) > 1
+        return self.kind == ANY or max([*counts, len(self.widths)], default=1) > 1
 
 
 def read_structure(reader: TableReader, identify: tuple[str, ...]) -> StructureSettings:
@@ -84,15 +89,16 @@ def read_structure(reader: TableReader, identify: tuple[str, ...]) -> StructureS
     """
     kind = reader.choice("structure", ORDERS)
     is_narx = kind == NARX
+    usual = EVERY_ORDER if kind == ANY else {"nk": (1,)}
     made = StructureSettings(
         kind,
         reader.names("inputs"),
         reader.names("outputs"),
         reader.names("select", ()),
         reader.names("coherence", identify),
-        {name: reader.integers(name, (1,) if name == "nk" else None) for name in ORDERS[kind]},
+        {name: reader.integers(name, usual.get(name)) for name in ORDERS[kind]},
         reader.numbers("width", (NarxStructure.width,)) if is_narx else (),
-        reader.choice("choose", CHOICES, "free_run" if is_narx else CHOICES[0]),
+        reader.choice("choose", CHOICES, CHOOSE.get(kind, CHOICES[0])),
         _options(kind, reader),
     )
     if kind != SUBSPACE and len(made.outputs) != 1:
@@ -107,6 +113,13 @@ def read_structure(reader: TableReader, identify: tuple[str, ...]) -> StructureS
     if is_narx and made.choose != "free_run":
         raise reader.error(
             "choose", "does not fit", found=made.choose, needed="'free_run' for NARX models"
+        )
+    if kind == ANY and made.choose in ("balanced", "bic"):
+        raise reader.error(
+            "choose",
+            "does not fit: kinds share no information criterion",
+            found=made.choose,
+            needed="'free_run' or 'simplest'",
         )
     return made
 

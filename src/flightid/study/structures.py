@@ -9,10 +9,11 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification import Fit, identify
 from flightid.models import InnovationsModel, NarxStructure, PolynomialModel
-from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
 from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
+from flightid.validation.order_scan.result import OrderTrial
+from flightid.validation.order_scan.scan_orders import fit_of
 
 Choice = OrderScan | NarxSearch
 AS_GOOD = 0.10
@@ -59,18 +60,18 @@ def _polynomial(
     tried: dict[str, Any] = {"kind": settings.kind, **settings.orders, **settings.options}
     scan = scan_orders(flown, unseen, outputs=output, inputs=inputs, **tried)
     chosen = _chosen(scan, settings.choose)
-    fit = scan.best if chosen == scan.trials[0].structure else identify(chosen, flown)
-    return fit, scan
+    return (scan.best if chosen is scan.trials[0] else fit_of(chosen, flown)), scan
 
 
-def _chosen(scan: OrderScan, how: str) -> PolynomialStructure:
-    if how == "simplest":
-        return scan.simplest.structure
-    if how == "bic":
-        return scan.smallest("bic").structure
+def _chosen(scan: OrderScan, how: str) -> OrderTrial:
+    """The trial that a rule takes."""
     first = scan.trials[0]
+    if how == "simplest":
+        return scan.simplest
+    if how == "bic":
+        return scan.smallest("bic")
     if how == "free_run" or first.free_run_rms is None:
-        return first.structure
+        return first
     limit = (1 + AS_GOOD) * first.free_run_rms
     alike = [
         (trial.criteria.bic, place)
@@ -79,7 +80,7 @@ def _chosen(scan: OrderScan, how: str) -> PolynomialStructure:
         and trial.free_run_rms is not None
         and trial.free_run_rms <= limit
     ]
-    return scan.trials[min(alike)[1]].structure if alike else first.structure
+    return scan.trials[min(alike)[1]] if alike else first
 
 
 def _narx(

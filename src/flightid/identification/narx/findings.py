@@ -54,20 +54,21 @@ def free_run_findings(
                 "use fewer terms or lags, a wider kernel, or linear terms only",
             )
         )
-    if _loses(free, linear):
+    if loses(free, linear):
         found.append(
             Finding(
                 "loses-to-linear",
                 Light.RED,
                 f"in free run the model (rms {_rms(free):.4g}) is worse than the linear model of "
                 f"the same lags (rms {_rms(linear):.4g}), by more than chance",
-                "use the linear model, or search lags and widths by free-run error",
+                "give focus='simulation', which delivers the linear model where that one wins, or "
+                "search lags and widths by free-run error",
             )
         )
     return tuple(found)
 
 
-def _loses(free: Sequence[Array], linear: Sequence[Array]) -> bool:
+def loses(free: Sequence[Array], linear: Sequence[Array]) -> bool:
     """Whether the squared errors' difference, by batches, is above zero beyond chance.
 
     Reference: Diebold & Mariano, *J. Business & Economic Statistics* 13 (1995); batch means stand

@@ -30,11 +30,12 @@ from flightid.identification.narx.candidates import (
 )
 from flightid.identification.narx.details import ChosenTerm, NarxDetails
 from flightid.identification.narx.findings import collinear_finding, free_run_findings
+from flightid.identification.narx.free_run_choice import choose_by_free_run
 from flightid.identification.narx.parts import compare_weights
 from flightid.identification.narx.regressors import Regressors, regressors_of, scaling_of
 from flightid.models.narx.model import NarxModel
 from flightid.models.narx.scaling import Scaling
-from flightid.models.narx.structure import NarxStructure
+from flightid.models.narx.structure import SIMULATION, NarxStructure
 from flightid.record import Record
 from flightid.record.several import as_records
 from flightid.uncertainty.agreement import AgreementTest
@@ -43,6 +44,8 @@ from flightid.uncertainty.estimate import Estimate
 Array = NDArray[np.float64]
 # Radial candidates beyond this are computed when they are read instead of being kept.
 MAXIMUM_BYTES = 1 << 30
+OF_FREE_RUNS = "weights minimise errors of free runs: they have no standard errors"
+MORE_TERMS = "allow more lags or terms (maximum_terms), check the delay, or look for feedback"
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,43 +92,128 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
     if structure.held_back:
         selection = _estimated(structure, selection.chosen, estimated_on)
     chosen = selection.chosen
-    agreed = compare_weights(structure, chosen, estimated_on, selection.covariance)
     model = _model(structure, scaling, chosen)
     baseline = _baseline(structure, scaling, records)
     flown = tuple(record for record in records if record.n_samples > structure.longest_lag)
-    one_step, free, linear = (
-        [NarxRun.of(each, record, horizon) for record in flown]
-        for each, horizon in ((model, 1), (model, "free_run"), (baseline, "free_run"))
+    made = _Choice(structure, selection, model, baseline, flown, estimated_on, collinear)
+    build = _of_simulation if structure.focus == SIMULATION else _of_prediction
+    arrays = [record.matrix([structure.output, *structure.inputs]) for record in records]
+    provenance = provenance_of(
+        "orthogonal least squares",
+        records,
+        arrays,
+        [scaling.mean] * len(records),
+        structure.to_dict(),
+    )
+    return build(made, provenance)
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    """What the choice of terms hands over, with the linear model and the records to run."""
+
+    structure: NarxStructure
+    selection: Selection
+    model: NarxModel
+    baseline: NarxModel
+    flown: tuple[Record, ...]
+    data: Regressors
+    collinear: int
+
+    def runs(self, model: NarxModel, horizon: int | str) -> list[NarxRun]:
+        """The model through every record."""
+        return [NarxRun.of(model, record, horizon) for record in self.flown]
+
+    def inputs_of(self, errors: Sequence[Array]) -> list[Array]:
+        """Inputs beside the errors of each record."""
+        return [
+            record.matrix(self.structure.inputs)[:, -row.shape[1] :]
+            for record, row in zip(self.flown, errors, strict=True)
+        ]
+
+
+def _of_simulation(made: _Choice, provenance: dict[str, object]) -> Fit:
+    """Weights, width, centres and number of terms by free runs; the linear model where it wins."""
+    structure = made.structure
+    found = choose_by_free_run(made.model, made.baseline, made.flown)
+    free, linear = (made.runs(each, "free_run") for each in (found.model, found.linear))
+    errors = tuple(np.subtract(*run.scored)[None] for run in free)
+    known = {item.term.name: item for item in made.selection.chosen}
+    pairs = list(zip(found.model.terms, found.model.weights, strict=True))
+    chosen = tuple(
+        replace(known[term.name], term=term, weight=weight)
+        if term.name in known
+        else ChosenTerm(term, weight, 0.0, 0.0, 0.0, 0.0)
+        for term, weight in pairs
     )
     details = NarxDetails(
-        baseline,
+        found.linear,
         chosen,
-        _rms(one_step),
+        _rms(made.runs(found.model, 1)),
         _rms(free),
         _rms(linear),
-        estimated_on.target.size,
-        scaling.units[structure.output],
+        made.data.target.size,
+        made.model.scaling.units[structure.output],
+        OF_FREE_RUNS,
     )
+    weights = {term.name: weight for term, weight in pairs}
+    tests = innovation_tests(
+        errors,
+        made.inputs_of(errors),
+        [run.measured[None] for run in free],
+        (structure.output_lags, structure.input_lags),
+    )
+    squares = sum(float(np.sum(row**2)) for row in errors)
+    return black_box_fit(
+        found.model,
+        BlackBoxRuns(made.flown, tuple(run.predicted[None] for run in free), errors, white=False),
+        BlackBoxEstimates(_parameters(structure, chosen, None, OF_FREE_RUNS), tuple(weights), None),
+        (LocalMinimum(found.sum_of_squares, 1, weights, found.termination),),
+        iterations=found.iterations,
+        noise_covariance=np.array([[squares / max(details.n_samples - len(chosen), 1)]]),
+        findings=(
+            *found.findings,
+            *free_run_findings(
+                _judged(structure, free), _judged(structure, linear), _held(made.flown, free)
+            ),
+            *tests.findings(biased=False, action=MORE_TERMS),
+        ),
+        provenance=provenance,
+        details=details,
+    )
+
+
+def _of_prediction(made: _Choice, provenance: dict[str, object]) -> Fit:
+    """Weights by least squares one step ahead."""
+    structure, selection, chosen = made.structure, made.selection, made.selection.chosen
+    agreed = compare_weights(structure, chosen, made.data, selection.covariance)
+    one_step, free = made.runs(made.model, 1), made.runs(made.model, "free_run")
+    linear = made.runs(made.baseline, "free_run")
     errors = tuple(np.subtract(*run.scored)[None] for run in one_step)
     squares = sum(float(np.sum(row**2)) for row in errors)
     weights = {item.term.name: item.weight for item in chosen}
     tests = innovation_tests(
         errors,
-        [
-            record.matrix(structure.inputs)[:, -row.shape[1] :]
-            for record, row in zip(flown, errors, strict=True)
-        ],
+        made.inputs_of(errors),
         [run.measured[None] for run in one_step],
         (structure.output_lags, structure.input_lags),
     ).beside(None if agreed is None else agreed.agreement)
-    details = replace(details, why_biased=tests.why_biased)
+    details = NarxDetails(
+        made.baseline,
+        chosen,
+        _rms(one_step),
+        _rms(free),
+        _rms(linear),
+        made.data.target.size,
+        made.model.scaling.units[structure.output],
+        tests.why_biased,
+    )
     covariance = None
     if structure.held_back and not tests.why_biased:
         covariance = _covariance(selection, agreed)
-    arrays = [record.matrix([structure.output, *structure.inputs]) for record in records]
     return black_box_fit(
-        model,
-        BlackBoxRuns(flown, tuple(run.predicted[None] for run in free), errors),
+        made.model,
+        BlackBoxRuns(made.flown, tuple(run.predicted[None] for run in free), errors),
         BlackBoxEstimates(
             _parameters(structure, chosen, agreed, tests.why_biased),
             tuple(weights),
@@ -136,19 +224,13 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
         iterations=len(chosen),
         noise_covariance=np.array([[squares / max(details.n_samples - len(chosen), 1)]]),
         findings=(
-            *collinear_finding(collinear, len(chosen)),
+            *collinear_finding(made.collinear, len(chosen)),
             *free_run_findings(
-                _judged(structure, free), _judged(structure, linear), _held(flown, free)
+                _judged(structure, free), _judged(structure, linear), _held(made.flown, free)
             ),
             *tests.findings(biased=True),
         ),
-        provenance=provenance_of(
-            "orthogonal least squares",
-            records,
-            arrays,
-            [scaling.mean] * len(records),
-            structure.to_dict(),
-        ),
+        provenance=provenance,
         details=details,
     )
 

@@ -97,6 +97,16 @@ class SubspaceStructure(Options):
         100, minimum=1, maximum=10_000, doc="Most steps of the prediction-error fit."
     )
 
+    @property
+    def kind(self) -> str:
+        """Its kind in a table of several."""
+        return "subspace"
+
+    @property
+    def orders_text(self) -> str:
+        """Its order in words."""
+        return "order by free run" if self.order is None else f"order {self.order}"
+
     def __post_init__(self) -> None:
         channels = [*self.outputs, *self.inputs]
         if len(set(channels)) < len(channels):

@@ -145,7 +145,7 @@ class NarxModel(TableView):
         name, scaling = self.output, self.scaling
         scaled = [scaling.scaled(record, channel) for channel in (name, *self.inputs)]
         ahead = 0 if horizon == "free_run" else int(horizon)
-        values, start, diverged = self._run(scaled[0], np.array(scaled[1:]), ahead)
+        values, start, diverged = self.run_scaled(np.array(scaled[1:]), scaled[0], ahead)
         predicted = values * scaling.deviation[name] + scaling.mean[name]
         predicted[:start] = record[name][:start]
         return predicted, start, diverged
@@ -171,7 +171,7 @@ class NarxModel(TableView):
             (row - scaling.mean[name]) / scaling.deviation[name]
             for name, row in zip(self.inputs, inputs, strict=True)
         ]
-        values, _, _ = self._run(np.zeros(inputs.shape[1]), np.array(rows), 0)
+        values, _, _ = self.run_scaled(np.array(rows), np.zeros(inputs.shape[1]), 0)
         return np.asarray(values * scaling.deviation[self.output] + scaling.mean[self.output])[None]
 
     @property
@@ -181,16 +181,27 @@ class NarxModel(TableView):
         middle, half = 0.5 * (low + high), 0.5 * self.structure.guard * (high - low)
         return middle - half, middle + half
 
-    def _run(self, output: Array, inputs: Array, ahead: int) -> tuple[Array, int, int | None]:
-        """Native run of scaled channels: values, samples that start it, where it was held."""
+    def run_scaled(
+        self, inputs: Array, outputs: Array, horizon: int
+    ) -> tuple[Array, int, int | None]:
+        """Native run of scaled channels: values, samples that start it, where it was held.
+
+        Parameters
+        ----------
+        inputs : ndarray, shape (n_inputs, n_samples)
+        outputs : ndarray, shape (n_samples,)
+            The one output.
+        horizon : int
+            Samples; 0: free run.
+        """
         structure = self.structure
         channels = (structure.output, *structure.inputs)
         places = {lag: place for place, lag in enumerate(structure.lags)}
         radial = [i for i, term in enumerate(self.terms) if term.centre]
         centres = [self.terms[i].centre for i in radial]
         return _native.run_narx(
-            output,
-            inputs.reshape(len(structure.inputs), output.size),
+            outputs,
+            inputs.reshape(len(structure.inputs), outputs.size),
             [(channels.index(lag.channel), lag.lag) for lag in structure.lags],
             self._monomials(places),
             np.array(centres, dtype=np.float64).reshape(len(radial), len(structure.lags)),
@@ -198,7 +209,7 @@ class NarxModel(TableView):
             structure.kernel or "gaussian",
             structure.beta,
             self.guard,
-            ahead,
+            horizon,
         )
 
     def _monomials(self, places: dict[Lag, int]) -> list[tuple[float, list[tuple[int, int]]]]:

@@ -12,6 +12,7 @@ from flightid.options import Options, option
 STOPS = ("press", "sse", "err", "terms", "aic", "aicc", "bic")
 CANDIDATES = ("data", "kmeans", "grid")
 REGULARISATIONS = ("none", "uniform", "local")
+PREDICTION, SIMULATION = "prediction", "simulation"
 
 
 @dataclass(frozen=True)
@@ -64,6 +65,10 @@ class NarxStructure(Options):
         Share of each record, at its end, that takes no part in the choice of terms: weights and
         their standard errors come from it alone, so that the errors hold in spite of the choice
         (in white noise). 0: choice and weights share all samples.
+    focus : str
+        What weights minimise: errors one step ahead (``"prediction"``), or of free runs
+        (``"simulation"``): width, centres and number of terms then follow from free runs too, and
+        the linear model is delivered where no other runs better over what was held back.
     guard : float
         Predictions are held inside the middle of the training outputs ± guard times half their
         range, and flagged.
@@ -101,6 +106,9 @@ class NarxStructure(Options):
     held_back: float = option(
         0.0, minimum=0.0, below=1.0, doc="Share of each record kept from the choice of terms."
     )
+    focus: str = option(
+        PREDICTION, choices=(PREDICTION, SIMULATION), doc="Errors that weights minimise."
+    )
     guard: float = option(3.0, minimum=1.0, unit="half ranges", doc="Where predictions are held.")
 
     def __post_init__(self) -> None:
@@ -130,6 +138,22 @@ class NarxStructure(Options):
                 found=f"regularisation={kind!r}, held_back={self.held_back}",
                 needed="one of the two",
             )
+        if self.focus == SIMULATION and (self.held_back or kind != "none"):
+            raise OptionError(
+                "weights of free runs are neither penalised nor held back for",
+                found=f"regularisation={kind!r}, held_back={self.held_back}",
+                needed="focus='prediction', or neither of them",
+            )
+
+    @property
+    def kind(self) -> str:
+        """Its kind in a table of several."""
+        return "NARX"
+
+    @property
+    def orders_text(self) -> str:
+        """Its lags and delay in words."""
+        return f"lags {self.output_lags} + {self.input_lags}, delay {self.delay}"
 
     @property
     def beta(self) -> float:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from flightid.options import Options, option
 
 KINDS = ("arx", "armax", "oe", "bj")
+ANY = "any"
+"""Every kind of a scan: these, subspace models and NARX."""
 USED = {
     "arx": ("na", "nb", "nk"),
     "armax": ("na", "nb", "nc", "nk"),
@@ -15,6 +17,15 @@ USED = {
     "bj": ("nb", "nc", "nd", "nf", "nk"),
 }
 """Orders that each kind has."""
+EVERY_ORDER: dict[str, tuple[int, ...]] = {
+    "na": (1, 2, 3, 4),
+    "nb": (1, 2, 3),
+    "nc": (1, 2),
+    "nd": (1, 2),
+    "nf": (1, 2, 3, 4),
+    "nk": (1, 2, 3),
+}
+"""Orders that a scan of every kind tries unless it is told: two modes with their delays."""
 Orders = int | Sequence[int] | None
 
 
@@ -46,4 +57,4 @@ class ScanOptions(OrderOptions):
     'armax'
     """
 
-    kind: str = option("armax", choices=KINDS, doc="Kind of polynomial model.")
+    kind: str = option("armax", choices=(*KINDS, ANY), doc="Kind of model; any: all.")

@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from flightid.conventions import Light
+from flightid.errors import OptionError
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.prediction_error.information_criteria import Criteria
-from flightid.models.polynomial.model import PolynomialModel
+from flightid.models.innovations.model import InnovationsModel
+from flightid.models.innovations.structure import SubspaceStructure
+from flightid.models.model import Model
+from flightid.models.narx.structure import NarxStructure
+from flightid.models.polynomial.orders import ANY
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
+Structure = PolynomialStructure | SubspaceStructure | NarxStructure
+Range = int | Iterable[int]
 CRITERIA = ("aic", "aicc", "bic", "mdl", "fpe")
 ALIKE = 0.02
 SHOWN = 20
@@ -22,7 +33,8 @@ SHOWN = 20
 class OrderTrial:
     """One structure: its model and criteria, and its free run on the validation records.
 
-    `free_run_rms` is in the output's unit; None where `note` says why there is none.
+    `free_run_rms` is in the output's unit; None where `note` says why there is none. `criteria` are
+    of polynomials. `fit` is kept of the best of a kind alone.
 
     Example
     -------
@@ -31,12 +43,47 @@ class OrderTrial:
     'collinear regressors'
     """
 
-    structure: PolynomialStructure
-    model: PolynomialModel | None
+    structure: Structure
+    model: Model | None
     criteria: Criteria | None
     free_run_rms: float | None
     fit_percent: float | None
     note: str = ""
+    fit: Fit | None = field(default=None, repr=False)
+
+    @property
+    def kind(self) -> str:
+        """Kind in a word: "ARX", "subspace", "NARX"."""
+        return self.structure.kind
+
+    @property
+    def n_parameters(self) -> int | None:
+        """Coefficients, terms of NARX, or what determines an innovations form; None: no model."""
+        if isinstance(self.structure, PolynomialStructure):
+            return self.structure.n_parameters
+        if isinstance(self.model, InnovationsModel):
+            n, p, m = self.model.order, len(self.model.outputs), len(self.model.inputs)
+            return n * (2 * p + m) + p * m * bool(np.any(self.model.matrices[3]))
+        return None if self.model is None else len(self.model.parameters)
+
+
+def error_of(trial: OrderTrial) -> float:
+    """Free-run error to rank by; infinite where there is none."""
+    return np.inf if trial.free_run_rms is None else trial.free_run_rms
+
+
+def whole_numbers(name: str, item: Range) -> list[int]:
+    """Orders to try.
+
+    Raises
+    ------
+    OptionError
+        There is none, or one below zero.
+    """
+    found = [item] if isinstance(item, int) else list(item)
+    if not found or min(found) < 0:
+        raise OptionError(f"{name} has nothing to try", found=found, needed="orders from 0 up")
+    return found
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -52,8 +99,8 @@ class OrderScan(Result, schema="flightid.order_scan/1"):
         Full fit of the first trial.
     validation : tuple of str
         Names of the validation records.
-    start : int
-        Longest lag of the scan, samples: what each free run starts from.
+    settle_s : float
+        First stretch of each free run, s: its start is solved for there, and no score counts it.
     unit : str
         Of the output.
 
@@ -69,8 +116,13 @@ class OrderScan(Result, schema="flightid.order_scan/1"):
     trials: tuple[OrderTrial, ...]
     best: Fit
     validation: tuple[str, ...]
-    start: int
+    settle_s: float
     unit: str
+
+    @property
+    def is_of_several_kinds(self) -> bool:
+        """Whether models of several kinds were ranked."""
+        return self.kind == ANY
 
     def smallest(self, criterion: str) -> OrderTrial:
         """Trial with the smallest ``"aic"``, ``"aicc"``, ``"bic"``, ``"mdl"`` or ``"fpe"``."""
@@ -91,20 +143,20 @@ class OrderScan(Result, schema="flightid.order_scan/1"):
             for t in self.trials
             if t.free_run_rms is not None and t.free_run_rms <= least * (1 + ALIKE)
         ]
-        return min(alike or self.trials[:1], key=lambda t: t.structure.n_parameters)
+        return min(alike or self.trials[:1], key=lambda t: t.n_parameters or 0)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Verdicts on the choice."""
         found = []
-        best, simple = self.trials[0].structure, self.simplest.structure
-        if simple.n_parameters < best.n_parameters:
+        best, simple = self.trials[0], self.simplest
+        if (simple.n_parameters or 0) < (best.n_parameters or 0):
             found.append(
                 Finding(
                     "simpler-model",
                     Light.AMBER,
-                    f"{simple.orders_text} with {simple.n_parameters} coefficients runs as well "
-                    f"within 2 % as {best.orders_text} with {best.n_parameters}",
+                    f"{words_of(self, simple)} with {simple.n_parameters} coefficients runs as "
+                    f"well within 2 % as {words_of(self, best)} with {best.n_parameters}",
                     "take the simpler one (scan.simplest)",
                 )
             )
@@ -132,9 +184,26 @@ class OrderScan(Result, schema="flightid.order_scan/1"):
 
     def summary(self, rows: int = SHOWN) -> Table:
         """Table of the best trials; marks say which structure each criterion would take."""
+        scored = Column("free-run rms", self.unit), Column("free-run fit", "%")
+        notes: tuple[str, ...] = (
+            f"ranked by free run on {', '.join(self.validation)}; the start of each run is solved "
+            f"for on the first {self.settle_s:.3g} s (NARX: measured lags), which no score counts",
+        )
+        if self.is_of_several_kinds:
+            head = Column("kind"), Column("orders"), Column("coefficients"), *scored, Column("note")
+            best = {trial.kind: trial for trial in reversed(self.trials)}
+            shown = list(self.trials[:rows])
+            shown += [t for t in self.trials[rows:] if t is best[t.kind]]
+            cells = [
+                (t.kind, t.structure.orders_text, t.n_parameters, t.free_run_rms, t.fit_percent,
+                 t.note) for t in shown
+            ]  # fmt: skip
+            counted = f"{len(shown)} of {len(self.trials)} structures, each kind's best among them"
+            notes = (*notes, counted, *map(str, self.findings))
+            return Table(repr(self), head, tuple(cells), notes)
         columns = (
             Column("na"), Column("nb"), Column("nc"), Column("nd"), Column("nf"), Column("nk"),
-            Column("coefficients"), Column("free-run rms", self.unit), Column("free-run fit", "%"),
+            Column("coefficients"), *scored,
             Column("loss"), Column("FPE"), Column("AIC", digits=7), Column("AICc", digits=7),
             Column("BIC", digits=7), Column("MDL"), Column("smallest"), Column("note"),
         )  # fmt: skip
@@ -142,8 +211,8 @@ class OrderScan(Result, schema="flightid.order_scan/1"):
         shown = list(self.trials[:rows])
         shown += [t for t in dict.fromkeys(chosen.values()) if t not in shown]
         notes = (
-            f"ranked by free run on {', '.join(self.validation)}, started by {self.start} measured "
-            "samples; criteria of the prediction errors on the records of the fit",
+            *notes,
+            "criteria of the prediction errors on the records of the fit",
             f"{len(shown)} of {len(self.trials)} structures",
             *map(str, self.findings),
         )
@@ -159,29 +228,36 @@ class OrderScan(Result, schema="flightid.order_scan/1"):
         """Number of structures and the best on one line."""
         first = self.trials[0]
         fit = "" if first.fit_percent is None else f", free-run fit {first.fit_percent:.1f} %"
-        return (
-            f"OrderScan({self.kind}, {len(self.trials)} structures, best "
-            f"{first.structure.orders_text}{fit})"
-        )
+        best = f"best {words_of(self, first)}{fit}"
+        return f"OrderScan({self.kind}, {len(self.trials)} structures, {best})"
+
+
+def words_of(scan: OrderScan, trial: OrderTrial) -> str:
+    """A structure in words, its kind too where there are several."""
+    text = trial.structure.orders_text
+    return f"{trial.kind} {text}" if scan.is_of_several_kinds else text
 
 
 def _at_edge(scan: OrderScan) -> list[str]:
-    best = scan.trials[0].structure
+    best = scan.trials[0]
+    alike = [trial.structure for trial in scan.trials if trial.kind == best.kind]
     found = []
-    for name in ("na", "nb", "nc", "nd", "nf", "nk"):
-        values = {getattr(trial.structure, name) for trial in scan.trials}
-        if len(values) > 1 and getattr(best, name) == max(values):
-            found.append(name)
+    for name in ("na", "nb", "nc", "nd", "nf", "nk", "order", "output_lags"):
+        values: set[Any] = {getattr(structure, name, None) for structure in alike} - {None}
+        if len(values) > 1 and getattr(best.structure, name) == max(values):
+            found.append(name.replace("_", " "))
     return found
 
 
 def _row(trial: OrderTrial, chosen: dict[str, OrderTrial]) -> tuple[Cell, ...]:
     s, c = trial.structure, trial.criteria
-    orders: list[Cell] = [s.na, _alike(s.nb), s.nc, s.nd, _alike(s.nf), _alike(s.nk)]
+    orders: list[Cell] = [None] * 6
+    if isinstance(s, PolynomialStructure):
+        orders = [s.na, _alike(s.nb), s.nc, s.nd, _alike(s.nf), _alike(s.nk)]
     marks = ", ".join(name.upper() for name, item in chosen.items() if item is trial)
     measures: list[Cell] = [None] * 6 if c is None else [c.loss, c.fpe, c.aic, c.aicc, c.bic, c.mdl]
     return (
-        *orders, s.n_parameters, trial.free_run_rms, trial.fit_percent, *measures,
+        *orders, trial.n_parameters, trial.free_run_rms, trial.fit_percent, *measures,
         marks.replace("AICC", "AICc"), trial.note,
     )  # fmt: skip
 

@@ -1,9 +1,9 @@
-"""Scan of polynomial orders and delays, ranked by free run on unseen records (`order_scan.rs`)."""
+"""Scan of orders, delays and kinds, ranked by free run on unseen records (`order_scan.rs`)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Unpack
 
@@ -17,18 +17,31 @@ from flightid.identification.identify import identify
 from flightid.identification.prediction.predict import predict
 from flightid.identification.prediction.request import usual_stretch
 from flightid.identification.prediction_error.information_criteria import Criteria, criteria
+from flightid.models.model import Model
 from flightid.models.polynomial.model import PolynomialModel
-from flightid.models.polynomial.orders import USED, ScanOptions
+from flightid.models.polynomial.orders import ANY, USED, ScanOptions
 from flightid.models.polynomial.structure import PolynomialOptions, PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.progress import progress, track
 from flightid.record import Record
 from flightid.record.several import as_records
 from flightid.simulation.metrics import fit_percent, rms_error
-from flightid.validation.order_scan.result import OrderScan, OrderTrial
+from flightid.validation.order_scan.every_kind import (
+    SEARCHED,
+    box_jenkins_of,
+    narx_of,
+    subspace_of,
+)
+from flightid.validation.order_scan.result import (
+    OrderScan,
+    OrderTrial,
+    Range,
+    Structure,
+    error_of,
+    whole_numbers,
+)
 
 Array = NDArray[np.float64]
-Range = int | Iterable[int]
 MOST = 20_000
 LONGEST = 40
 ITERATIONS = 40
@@ -53,9 +66,13 @@ def scan_orders(
 
     ARX and ARMAX structures come from one triangle of the largest regressor matrix, ARMAX refined
     by prediction errors from there; OE and BJ are fitted one by one. All are judged on the same
-    samples, those after the longest lag of the scan; a free run starts from the first measured
-    outputs. The information criteria are shown beside it, and which structure each would take: the
-    smallest value over the whole scan, not the first increase.
+    samples; the start of a free run is solved for on the first tenth of a record alone (NARX
+    starts from measured lags), which no score counts, and no mean of it is told. The information
+    criteria are shown beside it, and which structure each would take: the smallest value over the
+    whole scan, not the first increase.
+
+    Kind "any" ranks ARX, ARMAX and OE of these orders, BJ at the best OE's orders, subspace models
+    and NARX of as many lags, each in its own words, by the same free runs over the same samples.
 
     Parameters
     ----------
@@ -65,7 +82,7 @@ def scan_orders(
         Default: the only output.
     inputs : sequence of str, optional
         Default: all inputs.
-    kind : {"armax", "arx", "oe", "bj"}
+    kind : {"armax", "arx", "oe", "bj", "any"}
     na, nb, nc, nd, nf, nk : int or iterable of int
         Orders to try, those that the kind has; nb, nf and nk alike for all inputs.
     **options
@@ -114,7 +131,12 @@ def scan_orders(
         raise OptionError("a scan needs records to fit and records to validate on")
     name, names = _channels(fitted[0], outputs, inputs)
     orders = {"na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "nk": nk}
-    structures = _structures(kind, name, names, orders, options)
+    ScanOptions(kind=kind)
+    asked = {
+        each: _structures(each, name, names, orders, options)
+        for each in (SEARCHED if kind == ANY else (kind,))
+    }
+    structures = [structure for group in asked.values() for structure in group]
     offsets = structures[0].offsets
     data = gather_channels(fitted, name, names, offsets)
     data.require_change()
@@ -125,17 +147,28 @@ def scan_orders(
             found=f"{data.sample_time_s:.6g} and {check.sample_time_s:.6g} s",
             action="resample them with conditioning.resample",
         )
-    settle_s = _settle_s(structures, unseen)
-    trials = (
-        _native_trials(structures, data, check, unseen, settle_s)
-        if kind in ("arx", "armax")
-        else _fitted_trials(structures, fitted, unseen, settle_s)
-    )
-    trials, best = _delivered(trials, fitted, unseen, settle_s)
-    start = max(s.longest_lag for s in structures)
+    scan = _Scan(fitted, unseen, _settle_s(structures, unseen))
+    trials: list[OrderTrial] = []
+    for each, group in asked.items():
+        quick = each in ("arx", "armax")
+        trials += _native_trials(group, data, check, scan) if quick else _fitted_trials(group, scan)
+    if kind == ANY:
+        trials += _fitted_trials(box_jenkins_of(trials, orders, options), scan)
+        trials += _fitted_trials(subspace_of(structures), scan)
+        trials += _fitted_trials(narx_of(trials, whole_numbers("nb", nb)), scan)
+    ranked, best = _delivered(trials, scan)
     return OrderScan(
-        kind, tuple(trials), best, tuple(r.name for r in unseen), start, data.units[name]
+        kind, tuple(ranked), best, tuple(r.name for r in unseen), scan.settle_s, data.units[name]
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Scan:
+    """Records of the fits and of the free runs, and the first stretch that no score counts, s."""
+
+    fitted: Sequence[Record]
+    unseen: Sequence[Record]
+    settle_s: float
 
 
 def _channels(
@@ -152,13 +185,6 @@ def _channels(
     return output, tuple(record.inputs if inputs is None else inputs)
 
 
-def _values(name: str, item: Range) -> list[int]:
-    found = [item] if isinstance(item, int) else list(item)
-    if not found or min(found) < 0:
-        raise OptionError(f"{name} has nothing to try", found=found, needed="orders from 0 up")
-    return found
-
-
 def _structures(
     kind: str,
     output: str,
@@ -166,9 +192,8 @@ def _structures(
     orders: dict[str, Range],
     options: PolynomialOptions,
 ) -> list[PolynomialStructure]:
-    ScanOptions(kind=kind)
     used = USED[kind]
-    choices = [_values(name, orders[name]) for name in used]
+    choices = [whole_numbers(name, orders[name]) for name in used]
     count = int(np.prod([len(choice) for choice in choices]))
     if count > MOST:
         raise OptionError(
@@ -185,8 +210,7 @@ def _native_trials(
     structures: Sequence[PolynomialStructure],
     data: SampledChannels,
     check: SampledChannels,
-    unseen: Sequence[Record],
-    settle_s: float,
+    scan: _Scan,
 ) -> list[OrderTrial]:
     start = max(max(s.longest_lag + 1, s.nc) for s in structures)
     shortest = min(*data.lengths, *check.lengths)
@@ -230,7 +254,7 @@ def _native_trials(
         )
         measures = criteria(squares, n, structure.n_parameters)
         note = "" if converged else "not converged"
-        trials.append(_judged(structure, model, measures, unseen, settle_s, note))
+        trials.append(_judged(structure, model, measures, scan, note))
     return trials
 
 
@@ -241,36 +265,34 @@ def _common_skip(structures: Sequence[PolynomialStructure]) -> int:
     return max([*spans, *(s.na for s in structures), *(s.nc for s in structures)])
 
 
-def _fitted_trials(
-    structures: Sequence[PolynomialStructure],
-    fitted: Sequence[Record],
-    unseen: Sequence[Record],
-    settle_s: float,
-) -> list[OrderTrial]:
-    trials = []
+def _fitted_trials(structures: Sequence[Structure], scan: _Scan) -> list[OrderTrial]:
+    """Full fits, of which the best is kept with its trial."""
+    trials: list[OrderTrial] = []
+    best = None
     for structure in track(structures, "Scanning orders"):
         try:
-            fit = identify(structure, fitted)
-        except FitError as error:
+            fit = identify(structure, list(scan.fitted))
+            measures = getattr(fit.details, "criteria", None)
+            trial = replace(_judged(structure, fit.model, measures, scan), fit=fit)
+        except (DataError, FitError, OptionError) as error:
             trials.append(OrderTrial(structure, None, None, None, None, str(error)))
             continue
-        trials.append(_judged(structure, fit.model, fit.details.criteria, unseen, settle_s))
+        if best is None or error_of(trial) < error_of(trials[best]):
+            if best is not None:
+                trials[best] = replace(trials[best], fit=None)
+            best = len(trials)
+        trials.append(trial if best == len(trials) else replace(trial, fit=None))
     return trials
 
 
 def _judged(
-    structure: PolynomialStructure,
-    model: PolynomialModel,
-    measures: Criteria,
-    unseen: Sequence[Record],
-    settle_s: float,
-    note: str = "",
+    structure: Structure, model: Model, measures: Criteria | None, scan: _Scan, note: str = ""
 ) -> OrderTrial:
     """A trial with its free runs: as `flightid.predict` and `flightid.verify` run models."""
-    runs = predict(model, list(unseen), settle_s=settle_s)
+    runs = predict(model, list(scan.unseen), settle_s=scan.settle_s)
     if any(run.diverged_at is not None for run in runs):
         return OrderTrial(structure, model, measures, None, None, "free run diverged")
-    pairs = [run.scored(structure.output) for run in runs]
+    pairs = [run.scored(model.outputs[0]) for run in runs]
     measured, predicted = (np.concatenate([pair[side] for pair in pairs]) for side in (0, 1))
     rms = float(rms_error(measured, predicted))
     return OrderTrial(
@@ -285,34 +307,39 @@ def _settle_s(structures: Sequence[PolynomialStructure], unseen: Sequence[Record
     return usual_stretch(shortest, most) * unseen[0].sample_time_s
 
 
-def _delivered(
-    trials: Sequence[OrderTrial],
-    fitted: Sequence[Record],
-    unseen: Sequence[Record],
-    settle_s: float,
-) -> tuple[list[OrderTrial], Fit]:
+def fit_of(trial: OrderTrial, records: Sequence[Record]) -> Fit:
+    """The full fit of a trial: it starts from the optimum that was ranked and stays with it."""
+    if trial.fit is not None:
+        return trial.fit
+    asked = trial.structure
+    if isinstance(asked, PolynomialStructure) and isinstance(trial.model, PolynomialModel):
+        asked = replace(asked, start=tuple(map(float, trial.model.theta)), starts=1)
+    return identify(asked, list(records))
+
+
+def _delivered(trials: Sequence[OrderTrial], scan: _Scan) -> tuple[list[OrderTrial], Fit]:
     """Trials in their final order, and the full fit of the first.
 
-    Full fits start from the optimum that was ranked and stay with it. Where one moves it is ranked
-    anew, so that the first trial is always the fit that is delivered.
+    Where a full fit moves the optimum it is ranked anew, so that the first trial is always the fit
+    that is delivered.
     """
-    waiting = sorted(trials, key=_error)
+    waiting = sorted(trials, key=error_of)
     made: list[tuple[OrderTrial, Fit]] = []
     failed: list[OrderTrial] = []
     reason = "collinear regressors throughout"
-    while waiting and (not made or _error(waiting[0]) < min(_error(each) for each, _ in made)):
+    while waiting and (not made or error_of(waiting[0]) < min(error_of(each) for each, _ in made)):
         trial = waiting.pop(0)
-        if trial.model is None or trial.criteria is None:
+        if trial.model is None:
+            reason = trial.note or reason
             failed.append(trial)
             continue
-        start = tuple(map(float, trial.model.theta))
         try:
-            fit = identify(replace(trial.structure, start=start, starts=1), fitted)
+            fit = fit_of(trial, scan.fitted)
         except (DataError, FitError) as error:
             reason = str(error)
             failed.append(replace(trial, free_run_rms=None, fit_percent=None, note=reason))
             continue
-        judged = _judged(trial.structure, fit.model, trial.criteria, unseen, settle_s, trial.note)
+        judged = _judged(trial.structure, fit.model, trial.criteria, scan, trial.note)
         made.append((judged, fit))
     if not made:
         raise FitError(
@@ -320,10 +347,6 @@ def _delivered(
             found=reason,
             action="scan lower orders, or use longer or richer records",
         )
-    made.sort(key=lambda each: _error(each[0]))
-    rest = sorted([each for each, _ in made[1:]] + waiting + failed, key=_error)
-    return [made[0][0], *rest], made[0][1]
-
-
-def _error(trial: OrderTrial) -> float:
-    return np.inf if trial.free_run_rms is None else trial.free_run_rms
+    made.sort(key=lambda each: error_of(each[0]))
+    rest = sorted([each for each, _ in made[1:]] + waiting + failed, key=error_of)
+    return [made[0][0], *(replace(each, fit=None) for each in rest)], made[0][1]
