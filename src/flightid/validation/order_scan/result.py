@@ -38,7 +38,8 @@ class OrderTrial:
 
     Example
     -------
-    >>> asked = PolynomialModel.arx("u", "y", na=1, nb=1)
+    >>> import flightid as fid
+    >>> asked = fid.PolynomialModel.arx("u", "y", na=1, nb=1)
     >>> OrderTrial(asked, None, None, None, None, "collinear regressors").note
     'collinear regressors'
     """
