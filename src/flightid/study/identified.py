@@ -10,6 +10,7 @@ from flightid.findings import Finding
 from flightid.identification import Fit, Reduction
 from flightid.identification.prediction.request import FREE_RUN
 from flightid.models import Model
+from flightid.record import Record
 from flightid.responses import CoherentPairs, FrequencyResponse
 from flightid.study.model_settings import ModelSettings
 from flightid.study.structures import Choice, goal_findings
@@ -67,6 +68,8 @@ class ModelResults:
         Model that stands beside the estimates.
     reduction_judged : tuple of Finding
         Whether the reduced model predicts unseen records as the full one does.
+    training : tuple of Record
+        What a structure without equations was fitted to.
     """
 
     settings: ModelSettings
@@ -78,6 +81,7 @@ class ModelResults:
     spectra: SpectrumComparison | None = None
     reference: Model | None = None
     reduction_judged: tuple[Finding, ...] = ()
+    training: tuple[Record, ...] = ()
 
     @property
     def name(self) -> str:

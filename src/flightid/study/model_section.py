@@ -16,6 +16,7 @@ from flightid.identification import PolynomialDetails
 from flightid.models import StateSpaceModel
 from flightid.models.model import model_of
 from flightid.plot.modes import pole_map
+from flightid.plot.pictures import record_history
 from flightid.plot.polynomial import pole_zero
 from flightid.plot.residuals import correlations, spectrum_comparison
 from flightid.report.blocks import result_blocks
@@ -69,6 +70,8 @@ def _first(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
         yield from response_figures(item, truth)
     elif item.settings.structure is None:
         yield from record_figures(fit)
+    for record in item.training:
+        yield figure_block(record_history(record), f"{record.name}: what the model was fitted to.")
     goal = goal_findings(fit)
     if goal:
         yield Lights(goal)

@@ -28,7 +28,7 @@ from flightid.study.stages import (
     judge_reduction,
     select_coherent,
 )
-from flightid.study.task import Task
+from flightid.study.task import Task, narrowed
 from flightid.validation import Comparison, Verification
 
 Records = Mapping[str, StageResult[list[Record]]]
@@ -243,14 +243,18 @@ def _examine(
     fit = part.fitted.value.fit
     if fit is None:
         return found
+    if part.task.model is None:
+        seen = [record for name in settings.identify for record in records[name].value]
+        channels = (part.task.inputs, part.task.outputs)
+        found = replace(found, training=tuple(narrowed(each, *channels) for each in seen))
     counts = StageResult(fit, part.fitted.key)
     tests = spectra = None
     if settings.check.tests_residuals:
         tests = runner.stage(f"residual tests: {settings.name}", examine_residuals, counts).value
     if settings.check.compares_spectra:
-        seen = records[settings.flown[0]]
+        first = records[settings.flown[0]]
         spectra = runner.stage(
-            f"spectra: {settings.name}", compare_free_run, counts, seen, settings.check.options
+            f"spectra: {settings.name}", compare_free_run, counts, first, settings.check.options
         ).value
     verified = _verifications(part, counts, records, fitted, runner)
     found = replace(found, tests=tests, spectra=spectra, verifications=verified)

@@ -184,7 +184,8 @@ class SpectrumComparison(Result, schema="flightid.spectrum_comparison/1"):
             )
             for peak in self.peaks
         ]
-        return Table(repr(self), columns, tuple(rows), tuple(map(str, self.findings)))
+        none = () if rows else ("No peak of a measured spectrum stands out of its random error.",)
+        return Table(repr(self), columns, tuple(rows), (*none, *map(str, self.findings)))
 
     def __repr__(self) -> str:
         """Size and how many peaks measurement and model share, on one line."""
