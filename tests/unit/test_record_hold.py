@@ -12,7 +12,7 @@ from flightid.errors import DataError, OptionError
 from flightid.logs import channel_map
 from flightid.record import InputShape, Step, read_records
 from flightid.record.chosen_hold import chosen_hold
-from flightid.record.repeats import found_period, found_staircase, period_of
+from flightid.record.repeats import found_period, found_staircase
 
 RNG = np.random.default_rng(5)
 
@@ -148,8 +148,6 @@ def test_a_period_is_found_only_where_all_samples_repeat() -> None:
     assert found_period(np.zeros(50)) is None
     both = np.vstack([np.tile(part[:6], 20), np.tile(part[:4], 30)])
     assert found_period(both) == 12
-    record = fid.Record.from_arrays(np.arange(508) / 50, inputs={"u": np.tile(part, 4)})
-    assert period_of(record) == pytest.approx(127 / 50)
 
 
 def test_records_with_different_holds_are_refused_unless_told() -> None:

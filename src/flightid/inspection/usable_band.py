@@ -58,11 +58,6 @@ class AxisBand:
     largest_coherence: float | None = None
 
     @property
-    def highest_hz(self) -> float:
-        """Highest frequency that the logging rate supports with ten samples a cycle, Hz."""
-        return self.rate_hz / SAMPLES_PER_CYCLE.value
-
-    @property
     def span(self) -> float:
         """Highest over lowest frequency of the band; 0 without one."""
         return self.band_rad_s[1] / self.band_rad_s[0] if self.band_rad_s else 0.0

@@ -35,24 +35,6 @@ def excitation_history(excitation: Excitation) -> go.Figure:
     )
 
 
-def excitation_spectrum(excitation: Excitation) -> go.Figure:
-    """Draw third-octave spectra below their peak, the target band and the level that counts.
-
-    Parameters
-    ----------
-    excitation : Excitation
-        What would be flown.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-    """
-    made = look.figure()
-    _add_spectrum(made, excitation, excitation.band_rad_s)
-    look.label_axes(made, x="frequency [rad/s]", y=["power below peak [dB]"], log_x=True)
-    return made
-
-
 def plan_spectrum(plan: Plan) -> go.Figure:
     """Draw the spectra of a plan with the coherence and random error that it expects.
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.record.record import Record
-
 Array = NDArray[np.float64]
 FEWEST_JUMPS = 8
 """Below it standing still may be the manoeuvre, not a hold."""
@@ -148,18 +146,3 @@ def _candidates(rows: Array, longest: int) -> NDArray[np.intp]:
     lags = np.arange(1, longest + 1)
     away = squares[n - lags] + (squares[n] - squares[lags]) - 2.0 * products[lags]
     return np.asarray(lags[away <= 1e-9 * squares[n]], dtype=np.intp)
-
-
-def period_of(record: Record) -> float | None:
-    """Time after which the inputs of a record repeat, s: what it knows, else what it shows.
-
-    Example
-    -------
-    >>> record = Record.from_arrays(np.arange(6) / 10, inputs={"u": [0, 1, 3, 0, 1, 3]})
-    >>> round(period_of(record), 9)
-    0.3
-    """
-    if record.period_s is not None or not record.inputs:
-        return record.period_s
-    lag = found_period(record.matrix(record.inputs))
-    return None if lag is None else lag * record.sample_time_s

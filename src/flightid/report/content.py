@@ -15,14 +15,6 @@ from flightid.conventions import Light
 from flightid.findings import Finding, worst
 from flightid.table import Cell, Table
 
-VERDICTS = {
-    Light.GREEN: "meets the guideline",
-    Light.AMBER: "doubtful",
-    Light.RED: "does not meet the guideline",
-    Light.UNKNOWN: "could not be judged",
-}
-"""What a light means, in words; no reader needs to see its colour."""
-
 
 @dataclass(frozen=True)
 class Paragraph:

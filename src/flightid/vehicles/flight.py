@@ -20,7 +20,6 @@ from flightid.vehicles.truth import AXES, COMMANDS, RATES, AxisName, Gyro, RateT
 
 _PREFIX = {"filtered": "gyro_filtered_", "mean": "gyro_mean_", "raw": "gyro_"}
 _UNITS = dict.fromkeys(RATES, "rad/s") | dict.fromkeys(("phi", "theta", "psi"), "rad")
-RATE_LOOP_AXES = (7, 8, 9)
 MIXER_AXES = (10, 11, 12)
 
 
