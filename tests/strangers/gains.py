@@ -49,6 +49,8 @@ HOLDS = {
     "motor lag, stiffer frame": (),
 }
 """Structures that hold a truth; the gyro's filter is a delay to all."""
+NEARLY = ("rate_motor_lag", "rate_second_order")
+"""What lacks a frame's bending alone."""
 TOLERANCE = {"phase margin": 0.25, "gain margin": 0.1}
 """Of grids and interpolation: deg, dB."""
 QUIET_S, SATURATED = 8.0, 0.02
@@ -97,7 +99,7 @@ def drawn(seed: int) -> Flight:
     )
     weights = np.array([*METHODS.values()]) / sum(METHODS.values())
     method = str(r.choice([*METHODS], p=weights))
-    fitting = HOLDS[name] if r.uniform() < 0.5 and HOLDS[name] else STRUCTURES
+    fitting = (HOLDS[name] or NEARLY) if r.uniform() < 0.65 else STRUCTURES
     structure = fitting[r.integers(len(fitting))]
     if method == "equation_error":
         structure = "published"

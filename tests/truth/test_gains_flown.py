@@ -1,0 +1,61 @@
+"""Promises of tuned gains, flown in simulators that are not flightid's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.control.tuning import tune_pid
+from tests.closeness import assert_close
+from tests.strangers import gains, hover, rig_gains
+from tests.strangers.gain_counts import Outcome, table
+
+RUNS = 30
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tried", [gains.tried, rig_gains.tried], ids=["hover", "rig"])
+def test_gains_keep_what_they_promise(
+    tried: Callable[[int], Outcome], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """None of 60 tunings breaks a promise it did not doubt; less than half of the good are lost.
+
+    A margin that is read above the identified band is said to be the model's word alone.
+    """
+    monkeypatch.setattr(tune_pid, "response_bands", lambda *_: ())
+    outcomes = [tried(seed) for seed in range(RUNS)]
+    made = [each for each in outcomes if each.is_made]
+    assert made, table(outcomes)
+    broken = [each for each in made if each.broken and "margin-beyond-band" not in each.why]
+    assert not [each.row() for each in broken], table(outcomes)
+    assert sum(each.wasted for each in outcomes) < len(made), table(outcomes)
+
+
+def test_margins_of_an_undamped_vehicle_are_those_of_flightid() -> None:
+    """Two integrators share a pole, which eigenvectors cannot tell apart."""
+    craft = hover.vehicle("motor lag", effect=80.0, motor_s=0.05, delay=3)
+    flown = hover.Gains(p=0.06, i=0.03, d=0.001, angle_p=3.0)
+    loop = hover.Axis(craft, flown).loops()["whole loop"]
+    plant = fid.LinearSystem(
+        craft.a, craft.b[:, None], np.eye(3)[[1, 2]], np.zeros((2, 1)), ("u",), ("p", "phi"),
+        [craft.delay * hover.STEP_S],
+    ).sampled(hover.STEP_S)  # fmt: skip
+    axis = gains.loop_of(flown, gains.drawn(0)).with_gains(INS_GYRO_FILTER=craft.gyro_hz)
+    rate, angle = plant.frequency_response(hover.GRID)[:, 0]
+    own = axis.feedback(hover.GRID, with_hold=False) * rate
+    own = own + axis.forward(hover.GRID, with_hold=False) * axis.angle(hover.GRID) * angle
+    assert_close(loop, own, rtol=2e-3, why="single-precision filters apart, the same loop")
+
+
+def test_a_flexible_frame_bends_beside_the_body() -> None:
+    """Its response is the sum of a damped rate and of a mode, behind the hold."""
+    effect, damping, frame = 90.0, -2.0, (60.0, 0.02, 0.1)
+    craft = hover.vehicle("frame", effect=effect, damping=damping, frame=frame, delay=0)
+    s, (w, zeta, share) = 1j * np.array([5.0, 40.0, 60.0, 90.0]), frame
+    wanted = effect / (s - damping) + share * effect * s / (s**2 + 2 * zeta * w * s + w**2)
+    pencil = s[:, None, None] * np.eye(len(craft.a)) - craft.a
+    found = np.linalg.solve(pencil, craft.b.astype(complex)[:, None])[:, -2, 0]
+    assert_close(found, wanted, rtol=1e-10, why="exact")
