@@ -193,7 +193,7 @@ def test_sampled_plants_respond_as_their_matrices_do(poles: list[float]) -> None
     (system,), late = plants.systems, np.exp(-1j * omega * STEP_S * plants.delays[0][0])
     exact = system.frequency_response(omega)[:, 0] * late
     exact *= np.exp(1j * omega * plants.advances_s[0][0])
-    assert_close(np.array([rate, angle]), exact, rtol=1e-12, why="one response, shifted by the delays")
+    assert_close(np.array([rate, angle]), exact, rtol=1e-12, why="one response, delayed")
 
 
 def test_steps_are_those_of_the_recursion() -> None:
