@@ -39,6 +39,24 @@ def test_an_unstable_part_that_no_output_sees_has_no_filter() -> None:
         steady_filter(point, [], 0.1)
 
 
+def test_a_search_that_was_stopped_asks_no_more() -> None:
+    asked = []
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        asked.append(x)
+        if len(asked) == 3:
+            raise KeyboardInterrupt
+        return np.array([np.exp(x[0]) - 7.0, x[0]])
+
+    def jacobian(x: np.ndarray) -> np.ndarray:
+        return np.array([[np.exp(x[0])], [1.0]])
+
+    wide = np.array([np.inf])
+    with pytest.raises(KeyboardInterrupt):
+        _native.least_squares(residuals, jacobian, np.zeros(1), -wide, wide, 2, 50)
+    assert len(asked) == 3
+
+
 def _problem(
     model: fid.StateSpaceModel, hold: str = "first"
 ) -> tuple[InnovationsProblem, np.ndarray]:

@@ -44,10 +44,17 @@ struct Callback<'a, 'py> {
     raised: Option<PyErr>,
 }
 
+const RAISED: CoreError = CoreError::NotFinite { what: "a callback that raised", index: 0 };
+
 impl<'py> Callback<'_, 'py> {
     fn keep(&mut self, error: PyErr) -> CoreError {
         self.raised = Some(error);
-        CoreError::NotFinite { what: "a callback that raised", index: 0 }
+        RAISED
+    }
+
+    /// A search shortens its steps where a point has no value: what raised is not asked again.
+    fn ready(&self) -> Result<(), CoreError> {
+        if self.raised.is_none() { Ok(()) } else { Err(RAISED) }
     }
 
     fn copy(&mut self, call: PyResult<Vec<f64>>, target: &mut [f64]) -> Result<(), CoreError> {
@@ -72,6 +79,7 @@ impl Problem for Callback<'_, '_> {
     }
 
     fn residuals(&mut self, x: &[f64], residuals: &mut [f64]) -> Result<(), CoreError> {
+        self.ready()?;
         let x = PyArray1::from_slice(self.py, x);
         let call = self.residuals.call1((x,)).and_then(|result| {
             let result: PyReadonlyArray1<'_, f64> = result.extract()?;
@@ -81,6 +89,7 @@ impl Problem for Callback<'_, '_> {
     }
 
     fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) -> Result<(), CoreError> {
+        self.ready()?;
         let x = PyArray1::from_slice(self.py, x);
         let call = self.jacobian.call1((x,)).and_then(|result| {
             let result: PyReadonlyArray2<'_, f64> = result.extract()?;

@@ -86,7 +86,7 @@ class ExtendedProblem(InnovationsProblem):
         """Innovations of every record; slopes come with `residuals` alone."""
         del with_slopes
         return [
-            (self._found(each, steps, unknowns), [])
+            (self._found(each, steps, unknowns), None)
             for each, steps in zip(self.data, self.substeps, strict=True)
         ]
 

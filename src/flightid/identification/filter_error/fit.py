@@ -29,7 +29,7 @@ from flightid.identification.filter_error.innovations import (
     InnovationsProblem,
     RecordInnovations,
 )
-from flightid.identification.filter_error.search import minimise, with_gust
+from flightid.identification.filter_error.search import NEAR, minimise, with_gust
 from flightid.identification.fit import Fit
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.innovation_tests import innovation_tests
@@ -89,8 +89,10 @@ def fit_filter_error(
     require_states(model, "filter error")
     records = check_records(model, data)
     problem = _problem(model, records, options)
-    groups = cluster(_search(problem, options))
-    if options.gust_states and not isinstance(problem, ExtendedProblem) and judged():
+    tried = options.gust_states and not isinstance(problem, ExtendedProblem) and judged()
+    # Ends of several starts are compared with each other: those are searched to the last.
+    groups = cluster(_search(problem, options, NEAR if tried and options.starts == 1 else 0.0))
+    if tried:
         problem, groups = with_gust(
             problem, groups, limits_of(model, options.maximum_iterations)[1]
         )
@@ -198,14 +200,16 @@ def _places(names: Sequence[str], states: list[str]) -> tuple[int, ...]:
     return tuple(sorted({states.index(name) for name in names}))
 
 
-def _search(problem: InnovationsProblem, options: FilterErrorOptions) -> list[DenseEnd]:
+def _search(
+    problem: InnovationsProblem, options: FilterErrorOptions, enough: float
+) -> list[DenseEnd]:
     model = problem.model
     _, limits = limits_of(model, options.maximum_iterations)
     found: list[DenseEnd | str] = []
     for start in draw_starts(model.parameters.free, options.starts, options.seed):
         whole = np.concatenate([start, np.zeros(problem.n_all - problem.n_free)])
         if np.all(np.isfinite(problem.residuals(whole, with_slopes=False)[0])):
-            found.append(minimise(problem, whole, limits))
+            found.append(minimise(problem, whole, limits, enough=enough))
         else:
             found.append("no steady filter at the start")
     return collect(found)

@@ -72,7 +72,8 @@ class RecordInnovations:
     filter: SteadyFilter
 
 
-Filtered = tuple[RecordInnovations, list[SteadyFilter]]
+Filtered = tuple[RecordInnovations, SteadyFilter | None]
+"""A record and the derivatives of its filter, by parameter along a first axis."""
 
 
 @dataclass(frozen=True)
@@ -203,7 +204,7 @@ class InnovationsProblem:
         data: FilteredData,
         held: HeldModel,
         found: SteadyFilter,
-        slopes: list[SteadyFilter],
+        slopes: SteadyFilter,
     ) -> RecordInnovations:
         pushes, through = (part.swapaxes(1, 2) for part in held.driven(data.inputs))
         outputs = data.outputs.T
@@ -273,13 +274,14 @@ class InnovationsProblem:
             n_samples = len(white)
             level += n_samples * float(np.sum(np.log(np.diag(triangle))))
             jacobian = np.tensordot(inverse, each.slopes, axes=(1, 1)).transpose(1, 0, 2)
-            for place, slope in enumerate(slopes):
-                relative = inverse @ slope.innovation @ inverse.T
-                diagonal = np.diag(relative)
-                widened.append(0.5 * np.sqrt(n_samples) * (diagonal - diagonal.mean()))
+            if slopes is not None and count:
+                relative = inverse @ slopes.innovation @ inverse.T
+                diagonal = np.diagonal(relative, axis1=1, axis2=2)
+                mean = diagonal.mean(axis=1, keepdims=True)
+                widened.append(0.5 * np.sqrt(n_samples) * (diagonal - mean))
                 turn = _lower(relative)
-                rise[place] += n_samples * float(np.trace(turn))
-                jacobian[:, :, place] -= white @ turn.T
+                rise += n_samples * np.trace(turn, axis1=1, axis2=2)
+                jacobian -= np.tensordot(white, turn, axes=(1, 2)).transpose(0, 2, 1)
             rows.append(white.ravel())
             jacobians.append(jacobian.reshape(white.size, count))
         factor = np.exp(level / total)
@@ -297,13 +299,14 @@ class InnovationsProblem:
 
 
 def _lower(matrix: Array) -> Array:
-    """Lower triangle with half the diagonal: the slope of a Cholesky factor."""
-    return np.tril(matrix) - 0.5 * np.diag(np.diag(matrix))
+    """Lower triangles with half the diagonal: slopes of a Cholesky factor."""
+    share = np.tril(np.ones(matrix.shape[1:])) - 0.5 * np.eye(matrix.shape[2])
+    return np.asarray(matrix * share)
 
 
 def _slopes(
     found: SteadyFilter,
-    slopes: Sequence[SteadyFilter],
+    slopes: SteadyFilter,
     state: Array,
     seen: Array,
     moved: tuple[Array, Array],
@@ -312,20 +315,17 @@ def _slopes(
 
     `moved` are the derivatives of q and v by the parameters, the first of the slopes.
     """
-    if not slopes:
+    count, n = slopes.closed.shape[:2]
+    if not count:
         return np.zeros((*seen.shape, 0))
-    forcings, direct = [], []
-    for place, slope in enumerate(slopes):
-        forcing = state @ slope.closed.T + seen @ slope.gain.T
-        straight = -state @ slope.c.T
-        if place < len(moved[0]):
-            forcing += moved[0][place] - moved[1][place] @ found.gain.T
-            straight -= moved[1][place]
-        forcings.append(forcing)
-        direct.append(straight)
-    closed, rest = np.ascontiguousarray(found.closed), np.zeros((len(slopes), len(found.closed)))
-    paths = _native.linear_recursion(closed, np.array(forcings), rest)
-    return np.moveaxis(np.array(direct) - paths @ found.c.T, 0, 2)
+    forcings = state @ slopes.closed.swapaxes(1, 2) + seen @ slopes.gain.swapaxes(1, 2)
+    direct = -state @ slopes.c.swapaxes(1, 2)
+    pushed = len(moved[0])
+    forcings[:pushed] += moved[0] - moved[1] @ found.gain.T
+    direct[:pushed] -= moved[1]
+    closed, rest = np.ascontiguousarray(found.closed), np.zeros((count, n))
+    paths = _native.linear_recursion(closed, forcings, rest)
+    return np.moveaxis(direct - paths @ found.c.T, 0, 2)
 
 
 def _run(found: SteadyFilter, runs: Sequence[tuple[Array, Array, Array]], n_samples: int) -> Array:

@@ -19,14 +19,30 @@ from flightid.progress import progress
 Array = NDArray[np.float64]
 TRIAL_ITERATIONS = 12
 """Of each candidate's search, before the best one goes on."""
+CALM = -3.0
+"""Logarithm of all process noise, over its first guess, below which there may be none."""
+NEAR = 1e-8
+"""Share of the cost that a last step gains before gusts are tried: far less than they must."""
+
+
+class _NearEnd(Exception):  # noqa: N818  # no error: the search has come near enough
+    """Steps of a search no longer lower the cost by what matters."""
 
 
 class _LastPoint:
-    """Residuals and Jacobian, computed once where both are asked for at one point."""
+    """Residuals and Jacobian, computed once where both are asked for at one point.
 
-    def __init__(self, problem: InnovationsProblem, advance: Callable[..., None]) -> None:
+    Raises `_NearEnd` where a point lowers the least cost by less than `enough`, as its share.
+    """
+
+    def __init__(
+        self, problem: InnovationsProblem, advance: Callable[..., None], enough: float
+    ) -> None:
         self._problem = problem
         self._advance = advance
+        self._enough = enough
+        self._least = np.inf
+        self.count = 0
         self._x = np.empty(0)
         self._found = (np.empty(0), np.empty((0, 0)))
 
@@ -36,11 +52,21 @@ class _LastPoint:
     def jacobian(self, x: Array) -> Array:
         return self._at(x)[1]
 
+    def end(self) -> DenseEnd:
+        """The last point, as an end that is near."""
+        residuals, jacobian = self._found
+        return DenseEnd(self._x, self._least, self.count, "cost", residuals, jacobian)
+
     def _at(self, x: Array) -> tuple[Array, Array]:
         if not np.array_equal(x, self._x):
             self._found = self._problem.residuals(x, with_slopes=True)
             self._x = x.copy()
+            self.count += 1
             self._advance()
+            cost = float(self._found[0] @ self._found[0])
+            gained, self._least = self._least - cost, min(self._least, cost)
+            if 0.0 <= gained < self._enough * cost:
+                raise _NearEnd
         return self._found
 
 
@@ -50,20 +76,27 @@ def minimise(
     limits: SearchBounds,
     *,
     iterations: int | None = None,
+    enough: float = 0.0,
 ) -> DenseEnd:
-    """Search from one start: parameters inside their bounds, noises inside their reach."""
+    """Search from one start: parameters inside their bounds, noises inside their reach.
+
+    It ends at `iterations`, or where a step lowers the cost by a share of less than `enough`.
+    """
     reach = problem.reach
     with progress(None, "running the filter") as advance:
-        point = _LastPoint(problem, advance)
-        ending = _native.least_squares(
-            point.residuals,
-            point.jacobian,
-            start,
-            np.concatenate([limits.lower, -reach]),
-            np.concatenate([limits.upper, reach]),
-            problem.n_residuals,
-            limits.maximum_iterations if iterations is None else iterations,
-        )
+        point = _LastPoint(problem, advance, enough)
+        try:
+            ending = _native.least_squares(
+                point.residuals,
+                point.jacobian,
+                start,
+                np.concatenate([limits.lower, -reach]),
+                np.concatenate([limits.upper, reach]),
+                problem.n_residuals,
+                limits.maximum_iterations if iterations is None else iterations,
+            )
+        except _NearEnd:
+            return point.end()
     return DenseEnd.of_native(ending)
 
 
@@ -76,13 +109,16 @@ def with_gust(
     end and replaces all others if it gains more than its two unknowns may by chance (BIC). A test
     of the innovations alone would not do: a gust as long as the vehicle's own motion bends its
     derivatives and leaves hardly any colour. Nothing is tried where no state has process noise.
+    An end that is only `NEAR` is followed to its end where no gust replaces it.
 
     Reference
     ---------
     Schwarz (1978), Annals of Statistics 6; Ljung, *System Identification*, 2nd ed., §16.4.
     """
-    end = groups[0][0]
     noisy = slice(problem.n_free, problem.n_free + len(problem.noisy))
+    if np.all(groups[0][0].x[noisy] < CALM):
+        groups = _followed(problem, groups, limits)
+    end = groups[0][0]
     if np.all(end.x[noisy] <= -problem.reach[: len(problem.noisy)] + 1e-6):
         return problem, groups
     filtered = [found for found, _ in problem.records(end.x, with_slopes=False)]
@@ -97,10 +133,19 @@ def with_gust(
         tried = replace(problem, gust=gust)
         trials.append((tried, minimise(tried, start, limits, iterations=TRIAL_ITERATIONS)))
     if not trials:
-        return problem, groups
+        return problem, _followed(problem, groups, limits)
     tried, begun = min(trials, key=lambda trial: trial[1].cost)
     ended = minimise(tried, begun.x, limits)
     total = sum(each.outputs.size for each in problem.data)
     if total * np.log(end.cost / ended.cost) <= GUST_UNKNOWNS * np.log(total):
-        return problem, groups
+        return problem, _followed(problem, groups, limits)
     return tried, [[ended]]
+
+
+def _followed(
+    problem: InnovationsProblem, groups: list[list[DenseEnd]], limits: SearchBounds
+) -> list[list[DenseEnd]]:
+    """The best end itself, where the search had only come near it."""
+    near, rest = groups[0][0], groups[1:]
+    end = minimise(problem, near.x, limits)
+    return [[replace(end, iterations=near.iterations + end.iterations)], *rest]

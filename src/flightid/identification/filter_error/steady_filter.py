@@ -8,6 +8,7 @@ order.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,20 +68,21 @@ class SteadyFilter:
 
 
 def steady_filter(
-    point: ContinuousPoint, slopes: list[ContinuousPoint], sample_time_s: float
-) -> tuple[SteadyFilter, list[SteadyFilter]]:
+    point: ContinuousPoint, slopes: Sequence[ContinuousPoint], sample_time_s: float
+) -> tuple[SteadyFilter, SteadyFilter]:
     """Filter at a point and its derivative by each parameter.
 
     Parameters
     ----------
     point : ContinuousPoint
-    slopes : list of ContinuousPoint
+    slopes : sequence of ContinuousPoint
         Derivatives of every matrix by each parameter.
     sample_time_s : float
 
     Returns
     -------
-    tuple of SteadyFilter and list of SteadyFilter
+    tuple of SteadyFilter and SteadyFilter
+        The second holds the derivatives, by parameter along a first axis of each matrix.
 
     Raises
     ------
@@ -112,31 +114,36 @@ def steady_filter(
     filtered = _symmetric(keep @ predicted)
     gain = phi @ weight
     found = SteadyFilter(phi @ keep, gain, point.c, innovation, predicted)
-    derived = []
-    for slope in slopes:
-        if np.any(slope.a):
-            d_phi = _moved(exponent, slope.a * sample_time_s)
-            widened = _moved(noisy, _noisy(slope, sample_time_s))
-        else:
-            # The upper right block is linear in the noise, all others do not hold it.
-            d_phi = np.zeros((n, n))
-            widened = _native.matrix_exponential(
-                _noisy(replace(point, process=slope.process), sample_time_s)
-            )
-        d_q = _symmetric(d_phi @ spread[:n, n:] + phi @ widened[:n, n:])
-        turned = weight @ slope.c @ predicted @ keep.T
-        kept = weight @ slope.measurement @ weight.T - turned - turned.T
-        carried = d_phi @ filtered @ phi.T
-        source = phi @ kept @ phi.T + carried + carried.T + d_q
-        d_predicted = _lyapunov(found.closed, source)
-        cross = slope.c @ predicted @ point.c.T
-        d_innovation = point.c @ d_predicted @ point.c.T + cross + cross.T + slope.measurement
-        d_product = d_predicted @ point.c.T + predicted @ slope.c.T
-        d_weight = np.linalg.solve(innovation, (d_product - weight @ d_innovation).T).T
-        d_gain = d_phi @ weight + phi @ d_weight
-        d_closed = d_phi - d_gain @ point.c - gain @ slope.c
-        derived.append(SteadyFilter(d_closed, d_gain, slope.c, d_innovation, d_predicted))
-    return found, derived
+    pairs = [_carried(point, noisy, spread, slope, sample_time_s) for slope in slopes]
+    d_phi, d_q = (np.array([pair[k] for pair in pairs]).reshape(-1, n, n) for k in range(2))
+    d_c = np.array([slope.c for slope in slopes]).reshape(-1, *point.c.shape)
+    d_r = np.array([slope.measurement for slope in slopes]).reshape(-1, *innovation.shape)
+    d_q = _symmetric(d_phi @ spread[:n, n:] + phi @ d_q)
+    turned = weight @ d_c @ predicted @ keep.T
+    kept = weight @ d_r @ weight.T - turned - _turned(turned)
+    carried = d_phi @ filtered @ phi.T
+    d_predicted = _lyapunov(found.closed, phi @ kept @ phi.T + carried + _turned(carried) + d_q)
+    cross = d_c @ predicted @ point.c.T
+    d_innovation = point.c @ d_predicted @ point.c.T + cross + _turned(cross) + d_r
+    d_product = d_predicted @ point.c.T + predicted @ _turned(d_c)
+    inverse = np.linalg.inv(innovation)
+    d_gain = d_phi @ weight + phi @ ((d_product - weight @ d_innovation) @ inverse)
+    d_closed = d_phi - d_gain @ point.c - gain @ d_c
+    return found, SteadyFilter(d_closed, d_gain, d_c, d_innovation, d_predicted)
+
+
+def _carried(
+    point: ContinuousPoint, noisy: Array, spread: Array, slope: ContinuousPoint, step: float
+) -> tuple[Array, Array]:
+    """Derivatives of Φ and of the block that spreads the noise."""
+    n = len(point.a)
+    if np.any(slope.a):
+        return _moved(point.a * step, slope.a * step), _moved(noisy, _noisy(slope, step))[:n, n:]
+    if not np.any(slope.process):
+        return np.zeros((n, n)), np.zeros_like(spread[:n, n:])
+    # The upper right block is linear in the noise, all others do not hold it.
+    alone = _noisy(replace(point, process=slope.process), step)
+    return np.zeros((n, n)), _native.matrix_exponential(alone)[:n, n:]
 
 
 def _moved(exponent: Array, direction: Array) -> Array:
@@ -149,7 +156,11 @@ def _moved(exponent: Array, direction: Array) -> Array:
 
 
 def _symmetric(matrix: Array) -> Array:
-    return 0.5 * (matrix + matrix.T)
+    return 0.5 * (matrix + _turned(matrix))
+
+
+def _turned(matrices: Array) -> Array:
+    return np.asarray(matrices.swapaxes(-1, -2))
 
 
 def _noisy(point: ContinuousPoint, step: float) -> Array:
@@ -185,12 +196,13 @@ def _riccati(phi: Array, c: Array, q: Array, r: Array) -> Array:
 
 
 def _lyapunov(closed: Array, source: Array) -> Array:
-    """X = Ā X Āᵀ + S by doubling."""
+    """X = Ā X Āᵀ + S by doubling, for each of the sources S."""
     result, power = _symmetric(source), closed
     for _ in range(_DOUBLINGS):
         change = power @ result @ power.T
         result = result + change
-        if np.abs(change).max(initial=0.0) <= _SETTLED * np.abs(result).max(initial=1e-300):
+        left, size = (np.abs(each).max(axis=(1, 2), initial=0.0) for each in (change, result))
+        if np.all(left <= _SETTLED * np.maximum(size, 1e-300)):
             break
         power = power @ power
     return np.asarray(result)

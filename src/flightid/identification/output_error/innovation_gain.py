@@ -12,6 +12,7 @@ from flightid.models.sampled.recursion import run_recursion, spectral_radius
 
 Array = NDArray[np.float64]
 STEPS, SETTLED = 10, 1e-4
+SHARES = (1.0, 0.5, 0.2, 0.05)
 """Steps of the search for a gain, and the gain in log det below which it ends."""
 SHOWN = 1e-9
 """Singular value, against the largest, below which outputs do not show a state."""
@@ -39,7 +40,7 @@ def innovations(
     size = log_size([each[:, ORDER:] for each in best])
     for _ in range(STEPS):
         step, before = _step(best, systems, gain), size
-        for share in (1.0, 0.5, 0.2, 0.05):
+        for share in SHARES:
             tried = _ahead(residuals, systems, gain + share * step)
             fresh = np.inf if tried is None else log_size([each[:, ORDER:] for each in tried])
             if tried is not None and fresh < size:

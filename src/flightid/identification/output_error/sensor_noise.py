@@ -6,15 +6,18 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 from scipy.special import chdtrc
 
-from flightid.identification.output_error.innovation_gain import ORDER, innovations
+from flightid.identification.output_error.innovation_gain import ORDER, SETTLED, SHARES, STEPS
 
 Array = NDArray[np.float64]
 FALSE_ALARMS = 0.01
 """Share of records with white residuals in which something else is found."""
 DRIFTS = (0.6, 0.8, 0.9, 0.95, 0.98, 0.995, 0.999)
 """Poles of a sensor's drift."""
+MOVES = 0.01 + 1e-12
+"""Variance of a drift's steps where the search for its gain begins, over that of the residual."""
 CROSSED = 25
 """Lags between outputs."""
 
@@ -87,9 +90,38 @@ def is_white(residuals: Sequence[Array]) -> bool:
 
 
 def _drift(rows: Sequence[Array], pole: float) -> Array:
-    system = [(np.array([[pole]]), np.ones((1, 1)))] * len(rows)
-    found = innovations(rows, system)[0]
-    return np.concatenate([each[0, ORDER:] for each in found])
+    """Errors one sample ahead of a drift under white noise: `innovations` of a single state.
+
+    e = v − x and x⁺ = pole x + K e are one filter of v, (1 − pole q⁻¹) / (1 − (pole − K) q⁻¹).
+    """
+    low = 0.5 * (1.0 - pole**2) - MOVES
+    covariance = 0.5 * (np.sqrt(low**2 + 2.0 * MOVES) - low)
+    gain = pole * covariance / (covariance + 0.5)
+    best = _ahead(rows, pole, gain)
+    size = _power(best)
+    for _ in range(STEPS):
+        seen = [lfilter([0.0, 1.0], [1.0, gain - pole], each)[ORDER:] for each in best]
+        cross = sum(float(x @ e[ORDER:]) for x, e in zip(seen, best, strict=True))
+        step, before = cross / (sum(float(x @ x) for x in seen) + 1e-300), size
+        for share in SHARES:
+            tried = gain + share * step
+            if abs(pole - tried) >= 1.0:
+                continue
+            left = _ahead(rows, pole, tried)
+            if _power(left) < size:
+                gain, best, size = tried, left, _power(left)
+                break
+        if np.log(before / size) < SETTLED:
+            break
+    return np.concatenate([each[ORDER:] for each in best])
+
+
+def _ahead(rows: Sequence[Array], pole: float, gain: float) -> list[Array]:
+    return [lfilter([1.0, -pole], [1.0, gain - pole], each[0]) for each in rows]
+
+
+def _power(errors: Sequence[Array]) -> float:
+    return float(np.mean(np.concatenate([each[ORDER:] for each in errors]) ** 2))
 
 
 def _lagged(rows: Array, order: int) -> Array:

@@ -1,16 +1,14 @@
-"""The recursion x(t+1) = A x(t) + w(t) for many forcings at once."""
+"""The recursion x(t+1) = A x(t) + w(t) for many forcings (native: `linear_recursion.rs`)."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-FORGOTTEN = 1e-18
-"""A power of A smaller than this adds nothing in double precision."""
+from flightid import _native
+from flightid.errors import DataError
 
-GROWN = 1e6
-"""A larger power of A belongs to an unstable system, whose sums are not worth the doubling."""
+Array = NDArray[np.float64]
 
 
 def spectral_radius(a: Array) -> float:
@@ -20,9 +18,6 @@ def spectral_radius(a: Array) -> float:
 
 def run_recursion(a: Array, forcing: Array, initial: Array | None = None) -> Array:
     """States of x(t+1) = A x(t) + w(t) from x(0).
-
-    Stable systems are summed by doubling, x over 2s samples from x over s, which is one matrix
-    product for each doubling and ends where A^s has decayed; unstable ones sample by sample.
 
     Parameters
     ----------
@@ -36,28 +31,21 @@ def run_recursion(a: Array, forcing: Array, initial: Array | None = None) -> Arr
     -------
     ndarray, shape of `forcing`
 
-    Reference
-    ---------
-    Hillis & Steele, "Data parallel algorithms", *Communications of the ACM* 29 (1986): prefix sums.
-
     Example
     -------
     >>> run_recursion(np.array([[0.5]]), np.zeros((1, 4)), np.array([8.0]))
     array([[8., 4., 2., 1.]])
     """
-    state = np.zeros_like(forcing, dtype=np.float64)
-    state[..., 1:] = forcing[..., :-1]
-    state[..., 0] = 0.0 if initial is None else initial
-    n_samples = forcing.shape[-1]
-    power, span = np.array(a, dtype=np.float64), 1
-    size = np.abs(power).max(initial=0.0)
-    while span < n_samples and size > FORGOTTEN:
-        if size > GROWN:
-            return _sample_by_sample(a, forcing, state[..., 0])
-        state[..., span:] += power @ state[..., :-span]
-        power, span = power @ power, 2 * span
-        size = np.abs(power).max(initial=0.0)
-    return state
+    *_, n, n_samples = forcing.shape
+    rows = np.asarray(forcing, dtype=np.float64).reshape(-1, n, n_samples).swapaxes(1, 2)
+    first = np.zeros(forcing.shape[:-1]) if initial is None else initial
+    starts = np.broadcast_to(first, forcing.shape[:-1]).reshape(-1, n)
+    given = (np.ascontiguousarray(each, dtype=np.float64) for each in (a, rows, starts))
+    try:
+        return _native.linear_recursion(*given).swapaxes(1, 2).reshape(forcing.shape)
+    except DataError:
+        # It runs away: what is finite of it is wanted all the same.
+        return _sample_by_sample(a, forcing, first)
 
 
 def _sample_by_sample(a: Array, forcing: Array, initial: Array) -> Array:

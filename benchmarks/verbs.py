@@ -1,0 +1,181 @@
+"""Verbs as their users call them, intervals and evidence included: processor time and peak memory.
+
+Each line runs in a process of its own, in turn with a yardstick of NumPy and SciPy alone. Their
+ratio holds on any machine; `history.json` keeps it, and a check compares by it.
+
+Run: python -m benchmarks verbs            the table beside what was kept
+     python -m benchmarks.verbs --check    1 where a line is worse by more than a quarter
+     python -m benchmarks.verbs --keep     keep today's ratios
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+from scipy.signal import lfilter
+
+import flightid as fid
+from benchmarks import output_error, subspace
+from flightid.table import Column, Table
+
+HISTORY = Path(__file__).with_name("history.json")
+WORSE = 1.25
+"""Ratio to what was kept above which a line is worse: twice what repeats differ by."""
+REPEATS, SECONDS = 7, 4.0
+Work = Callable[[], object]
+
+
+def _linear(n_samples: int, **options: object) -> Work:
+    output_error.N = n_samples
+    record, model = output_error.two_rates_record(), output_error.two_rates()
+    return lambda: fid.identify(model, record, **options)
+
+
+def _pitch() -> Work:
+    """Nonlinear pitch in gusts, 4 records of 30 s at 50 Hz."""
+    values = {"Za": -1.2, "Ma": -6.0, "Maa": -60.0, "Mq": -1.8, "Md": -9.0}
+    units = dict(zip(values, ("1/s", "1/s^2", "1/s^2", "1/s", "1/s^2"), strict=True))
+    model = fid.StateSpaceModel(
+        states={"alpha": "rad", "q": "rad/s"},
+        input_units={"de": "rad"},
+        measurements={"alpha": fid.Output("alpha", "rad"), "q": fid.Output("q", "rad/s")},
+        equations={"alpha'": "Za*alpha + q", "q'": "Ma*alpha + Maa*alpha^3 + Mq*q + Md*de"},
+        parameters=fid.Parameters(
+            [fid.Parameter(name, 0.7 * values[name], units[name]) for name in values]
+        ),
+    )
+    random, records = np.random.default_rng(0), []
+    for _ in range(4):
+        steps = 0.25 * np.repeat(random.choice([-1.0, 0.0, 1.0], 50), 30)
+        kicks = random.standard_normal((1500, 2)) * np.array([0.02, 0.2]) * np.sqrt(0.02)
+        path, (alpha, q) = np.empty((2, 1500)), (0.0, 0.0)
+        for k in range(1500):
+            path[:, k] = alpha, q
+            for _ in range(10):
+                turn = values["Ma"] * alpha + values["Maa"] * alpha**3 + values["Mq"] * q
+                rates = values["Za"] * alpha + q, turn + values["Md"] * steps[k]
+                alpha, q = alpha + 0.002 * rates[0], q + 0.002 * rates[1]
+            alpha, q = alpha + kicks[k, 0], q + kicks[k, 1]
+        seen = path + np.array([[0.004], [0.01]]) * random.standard_normal((2, 1500))
+        record = fid.Record.from_arrays(
+            np.arange(1500) * 0.02,
+            inputs={"de": steps},
+            outputs={"alpha": seen[0], "q": seen[1]},
+            units={"de": "rad", "alpha": "rad", "q": "rad/s"},
+            hold="zero",
+            loop="open",
+        )
+        records.append(record)
+    return lambda: fid.identify(model, records, method="filter_error")
+
+
+def _orders(n_samples: int) -> Work:
+    record = subspace.flown(1, n_samples)
+    structure = fid.InnovationsModel.subspace("u", "y", offsets="none")
+    return lambda: fid.identify(structure, record)
+
+
+REST = {"initial_state": "trim", "output_bias": False}
+LINES: dict[str, Callable[[], Work]] = {
+    "output error, 130 s, 8 parameters": lambda: _linear(13_000, **REST),
+    "output error, 20 starts": lambda: _linear(13_000, starts=20, **REST),
+    "output error, 10⁶ samples": lambda: _linear(1_000_000, **REST),
+    "equation error, 130 s": lambda: _linear(13_000, method="equation_error"),
+    "filter error, 130 s": lambda: _linear(13_000, method="filter_error"),
+    "filter error, nonlinear, 4 × 30 s": _pitch,
+    "subspace with order search, 10⁵": lambda: _orders(100_000),
+}
+
+
+def _yardstick() -> object:
+    """Work of the same kinds by NumPy and SciPy alone: factors, filters, and an interpreter."""
+    random = np.random.default_rng(0)
+    np.linalg.qr(random.standard_normal((4000, 60)), mode="r")
+    lfilter([1.0], [1.0, -0.9], random.standard_normal(200_000))
+    return sum(k * k for k in range(50_000))
+
+
+def _taken(work: Work) -> float:
+    begun = time.process_time()
+    work()
+    return time.process_time() - begun
+
+
+def measured(name: str) -> dict[str, float]:
+    """Processor seconds of one line, its ratio to the yardstick, and its peak memory in MB."""
+    work = LINES[name]()
+    work(), _yardstick()
+    pairs: list[tuple[float, float]] = []
+    while len(pairs) < 2 or (len(pairs) < REPEATS and sum(map(sum, pairs)) < SECONDS):
+        pairs.append((_taken(work), _taken(_yardstick)))
+    return {
+        "seconds": median(each for each, _ in pairs),
+        "ratio": median(each for each, _ in pairs) / median(each for _, each in pairs),
+        "megabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
+    }
+
+
+def _apart(name: str) -> dict[str, float]:
+    command = [sys.executable, "-m", "benchmarks.verbs", name]
+    found = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    return dict(json.loads(found))
+
+
+def compared() -> tuple[dict[str, dict[str, float]], Table]:
+    """What every line takes today, and the table of it beside what was kept."""
+    kept = json.loads(HISTORY.read_text()) if HISTORY.exists() else {}
+    today = {name: _apart(name) for name in LINES}
+    rows = []
+    for name, now in today.items():
+        was = kept.get(name)
+        rows.append(
+            (
+                name,
+                1e3 * now["seconds"],
+                now["ratio"],
+                None if was is None else now["ratio"] / was["ratio"],
+                now["megabytes"],
+                None if was is None else now["megabytes"] / was["megabytes"],
+            )
+        )
+    columns = (
+        Column("verb"),
+        Column("processor time", "ms", 4),
+        Column("over the yardstick", digits=4),
+        Column("over history", digits=3),
+        Column("peak memory", "MB", 4),
+        Column("over history", digits=3),
+    )
+    return today, Table("Verbs with intervals and evidence", columns, tuple(rows))
+
+
+def run() -> Table:
+    """The table alone."""
+    return compared()[1]
+
+
+def main(arguments: list[str]) -> int:
+    """One line as JSON, or all of them kept or checked."""
+    if arguments and arguments[0] in LINES:
+        print(json.dumps(measured(arguments[0])))
+        return 0
+    today, table = compared()
+    print(table)
+    if arguments == ["--keep"]:
+        HISTORY.write_text(json.dumps(today, indent=1, ensure_ascii=False) + "\n")
+    worse = [row[0] for row in table.rows if max(row[3] or 0.0, row[5] or 0.0) > WORSE]
+    for name in worse:
+        print(f"worse than kept by more than a quarter: {name}")
+    return 1 if worse and arguments == ["--check"] else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
