@@ -245,7 +245,7 @@ def test_what_an_fmu_cannot_be(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) 
         fid.export(SYSTEM, tmp_path / "plane.zip", "fmu", sample_time_s=STEP_S)
     with pytest.raises(OptionError, match="needs the time of one step"):
         fid.export(SYSTEM, path)
-    with pytest.raises(OptionError, match="interface is not known"):
+    with pytest.raises(OptionError, match="interfaces holds a word that is not known"):
         fid.export(SYSTEM, path, sample_time_s=STEP_S, interfaces=("scheduled",))
     with pytest.raises(ExportError, match="its inputs are delayed"):
         fid.export(DELAYED, path, sample_time_s=STEP_S, interfaces=("model-exchange",))
