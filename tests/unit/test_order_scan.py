@@ -190,6 +190,10 @@ def test_every_kind_is_ranked_by_the_same_free_runs():
             made = fid.predict(trial.model, records[1], settle_s=scan.settle_s)
             assert_close(trial.free_run_rms, made.rms_error["y"], rtol=1e-12, why="one protocol")
             assert made.start == round(scan.settle_s * 10), "the same samples for every kind"
+    # The rig is linear: what NARX delivers says so.
+    assert {t.note for t in scan.trials if t.kind == "NARX"} == {
+        "linear: no nonlinear model beats it"
+    }
     best = fid.predict(scan.best, records[1], settle_s=scan.settle_s).rms_error["y"]
     assert_close(errors[0], best, rtol=1e-12, why="what is ranked is delivered")
     assert {row[0] for row in scan.summary(3).rows} == {each.kind for each in scan.trials}

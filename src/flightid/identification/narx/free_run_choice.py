@@ -27,6 +27,7 @@ from flightid.models.narx.terms import Term
 from flightid.record import Record
 
 Array = NDArray[np.float64]
+LINEAR = "linear-delivered"
 KEPT = 0.3
 """Share of each record, at its end, that judges how many terms there are."""
 PATIENCE = 2
@@ -232,7 +233,7 @@ def _said(
     if best is linear:
         return (
             Finding(
-                "linear-delivered",
+                LINEAR,
                 Light.AMBER,
                 f"in {share} no nonlinear model that was tried beats the linear one ({shown}) by "
                 "more than chance: the linear one is delivered",

@@ -14,6 +14,7 @@ from flightid import _native
 from flightid.errors import DataError, FitError, OptionError
 from flightid.identification.fit import Fit
 from flightid.identification.identify import identify
+from flightid.identification.narx.free_run_choice import LINEAR
 from flightid.identification.prediction.predict import predict
 from flightid.identification.prediction.request import usual_stretch
 from flightid.identification.prediction_error.information_criteria import Criteria, criteria
@@ -273,7 +274,9 @@ def _fitted_trials(structures: Sequence[Structure], scan: _Scan) -> list[OrderTr
         try:
             fit = identify(structure, list(scan.fitted))
             measures = getattr(fit.details, "criteria", None)
-            trial = replace(_judged(structure, fit.model, measures, scan), fit=fit)
+            straight = any(finding.code == LINEAR for finding in fit.findings)
+            note = "linear: no nonlinear model beats it" if straight else ""
+            trial = replace(_judged(structure, fit.model, measures, scan, note), fit=fit)
         except (DataError, FitError, OptionError) as error:
             trials.append(OrderTrial(structure, None, None, None, None, str(error)))
             continue
