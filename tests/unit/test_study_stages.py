@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.conventions import Role
+from flightid.conventions import Light, Role
 from flightid.errors import FlightidError
+from flightid.findings import Finding
 from flightid.report.text import to_text
+from flightid.study.answer import _models
 from flightid.study.settings import Segment
 from flightid.study.stage_runner import digest
 from flightid.study.stages import compare_free_run
@@ -241,3 +244,11 @@ def test_chirps_of_a_log_have_the_names_of_their_segments() -> None:
     assert made["roll chirp"].tolist() == flown["excitation"].tolist()
     assert not made["pitch chirp"].any()
     assert {made.channels[name].role for name in ("roll chirp", "pitch chirp")} == {Role.EXCITATION}
+
+
+def test_no_model_is_none_to_use() -> None:
+    left = Finding("left-out", Light.UNKNOWN, "p/da is left out")
+    item = SimpleNamespace(name="p", fit=None, findings=(left,), on_unseen={}, left_out=(left,))
+    said = _models(SimpleNamespace(identified=[item], faults=(), files=()))  # type: ignore[arg-type]
+    assert said.light is Light.UNKNOWN
+    assert "no model was made" in said.message

@@ -99,6 +99,10 @@ def _models(study: StudyResults) -> Finding:
     lights = [in_short(item) for item in study.identified]
     if not lights:
         return Finding("answer", Light.UNKNOWN, "no model was asked for")
+    if all(item.fit is None for item in study.identified):
+        action = "move the inputs more, over a decade of frequencies: flightid design plans it"
+        said = "no model was made, for the reasons named above: there is nothing to use"
+        return Finding("answer", Light.UNKNOWN, said, action)
     light = worst(lights)
     bad = [each for each in lights if each.light is Light.RED]
     n, first = len(lights), next(each for each in lights if each.light is light)
