@@ -11,9 +11,11 @@ import sys
 from pathlib import Path
 
 from flightid import Noise
+from flightid.control.margins.options import MarginOptions
 from flightid.control.tuning.controller_options import ControllerOptions
 from flightid.control.tuning.options import TuneOptions
 from flightid.control.tuning.requirements import TuningRequirements
+from flightid.dynamics.handling_qualities.options import QualitiesOptions
 from flightid.excitation import Limits, RateAxis
 from flightid.excitation.options import DesignOptions
 from flightid.export.options import FORMATS
@@ -65,6 +67,8 @@ def sections() -> dict[str, type[Options]]:
         "export, FMU": FORMATS["fmu"],
         "export, JSBSim": FORMATS["jsbsim"],
         "fly": FlyOptions,
+        "margins": MarginOptions,
+        "handling_qualities": QualitiesOptions,
         "reduce": ReductionLimits,
         "tune": TuneOptions,
         "tune_controller": ControllerOptions,

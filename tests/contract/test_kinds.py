@@ -65,7 +65,7 @@ def record() -> fid.Record:
 
 @cache
 def fit(kind: str) -> fid.Fit:
-    return fid.identify(STRUCTURES[kind](), record())
+    return fid.identify(STRUCTURES[kind](), record(), loop="open")
 
 
 GREY = ("grey linear", "grey nonlinear", "transfer")

@@ -13,8 +13,10 @@ import pytest
 from tools.options_page import sections
 
 import flightid as fid
-from flightid.cli.option_fields import SHORT, OptionsCommand, flags_of
+from flightid.cli.option_fields import IN_HERTZ, SHORT, OptionsCommand, flags_of, hertz
 from flightid.cli.program import program
+from flightid.control.margins.options import MarginOptions
+from flightid.dynamics.handling_qualities.options import QualitiesOptions
 from flightid.excitation.options import DesignOptions
 from flightid.logs import Log
 from flightid.logs.options import PartOptions
@@ -73,6 +75,8 @@ FIELDS = {each.name for options in sections().values() for each in options_of(op
 VERBS: dict[Callable[..., Any], tuple[type[Options], set[str]]] = {
     fid.estimate_response: (ResponseOptions, set()),
     fid.simulate: (SimulationOptions, set()),
+    fid.margins: (MarginOptions, set()),
+    fid.handling_qualities: (QualitiesOptions, set()),
     fid.verify: (VerifyOptions, set()),
     fid.read_records: (ReadOptions, set()),
     fid.excitation.plan: (DesignOptions, set()),
@@ -106,6 +110,11 @@ def _typed() -> Iterator[tuple[str, str, list[str]]]:
                 yield command, spelled[0].removeprefix("--").replace("-", "_"), spelled
 
 
+def _not_in_hertz() -> Iterator[tuple[str, str, list[str]]]:
+    """The same without the second spelling of a frequency, in hertz."""
+    return (each for each in _typed() if each[1] not in map(hertz, IN_HERTZ))
+
+
 def _keys() -> Iterator[tuple[str, str]]:
     """File and key of everything that a study reads key by key."""
     for path in python_files():
@@ -124,7 +133,7 @@ def test_a_command_says_what_the_fields_say_or_a_word_of_commands() -> None:
     assert len({command for command, _, _ in typed}) > 12
     stray = [
         f"{command}: --{word} is neither a field of options nor a word of commands"
-        for command, word, _ in typed
+        for command, word, _ in _not_in_hertz()
         if word not in FIELDS and word not in OF_COMMANDS
     ]
     assert not stray, "\n".join(stray)
@@ -141,7 +150,7 @@ def test_every_option_is_spelled_alike_in_all_commands() -> None:
 
 
 def test_no_name_is_a_synonym() -> None:
-    names = {word for _, word, _ in _typed()} | FIELDS | {key for _, key in _keys()}
+    names = {word for _, word, _ in _not_in_hertz()} | FIELDS | {key for _, key in _keys()}
     assert len({key for _, key in _keys()}) > 40
     offenders = [f"{name} is called {WORD_OF[name]} here" for name in names if name in WORD_OF]
     assert not offenders, "\n".join(sorted(offenders))
@@ -173,13 +182,13 @@ def test_commands_with_options_of_fields_read_them_all() -> None:
     """No option of a verb is written by hand: the commands of verbs with fields read the fields."""
     reading = {name for name, found in _commands() if isinstance(found, OptionsCommand)}
     assert reading == {
-        "consistency", "design", "export", "fly", "identify", "new", "polynomial", "response",
-        "run", "simulate model", "tune", "verify",
+        "advise", "consistency", "design", "export", "fly", "handling-qualities", "identify",
+        "margins", "new", "polynomial", "response", "run", "simulate model", "tune", "verify",
     }  # fmt: skip
     for name, found in _commands():
         if isinstance(found, OptionsCommand):
             by_hand = {param.name for param in found.params} & FIELDS
-            assert by_hand <= {"axis", "kind", "method", "model"}, (name, by_hand)
+            assert by_hand <= {"axis", "feedback", "kind", "method", "model"}, (name, by_hand)
 
 
 def test_a_word_of_the_dictionary_has_one_name_in_all_places() -> None:

@@ -1,9 +1,11 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from io import StringIO
+from pathlib import Path
 
 import click
 import pytest
@@ -143,3 +145,32 @@ def test_bar_is_quiet_for_short_work_and_vanishes() -> None:
     bar.advance()
     bar.close()
     assert "short" not in stream.getvalue()
+
+
+def _completed(tmp_path: Path, line: str) -> list[str]:
+    """What a bash that has the script offers for the last word of a line."""
+    (tmp_path / "flightid").write_text(f'#!/bin/sh\nexec {sys.executable} -m flightid "$@"\n')
+    (tmp_path / "flightid").chmod(0o755)
+    words = line.split(" ")
+    script = (
+        f'export PATH="{tmp_path}:$PATH"; eval "$(flightid completion bash)"; '
+        f"COMP_WORDS=({' '.join(repr(word) for word in words)}); COMP_CWORD={len(words) - 1}; "
+        '_flightid_completion flightid; printf "%s\\n" "${COMPREPLY[@]}"'
+    )
+    made = subprocess.run(
+        ["bash", "--norc", "-c", script], capture_output=True, text=True, check=True, cwd=tmp_path
+    )
+    return made.stdout.split()
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
+def test_bash_completes_commands_options_words_and_models(tmp_path: Path) -> None:
+    (tmp_path / "rate.toml").touch()
+    assert _completed(tmp_path, "flightid mod") == ["modes"]
+    assert {"--band-rad-s", "--band-hz"} <= set(_completed(tmp_path, "flightid response --band"))
+    assert _completed(tmp_path, "flightid identify x --axis r") == ["roll"]
+    found = _completed(tmp_path, "flightid modes rate")
+    assert found[0] == "rate.toml"
+    assert "rate_motor_lag" in found
+    for shell in ("zsh", "fish"):
+        assert program.run(["completion", shell]) == 0

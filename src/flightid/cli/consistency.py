@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import emit, json_option, leave_by_verdict, level_option, note
+from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
+from flightid.cli.pages import html_option, write_page
 from flightid.cli.records import FILES, read_files, reading
 
 if TYPE_CHECKING:
@@ -26,12 +27,15 @@ def _fields() -> dict[str, type[Options]]:
 @click.option("--estimate", help="Instrument errors, with commas: bias_p,scale_q,delay_phi.")
 @click.option("--write", type=FILE, help="Write the corrected records to this file (*.parquet).")
 @level_option
+@html_option
+@all_option
 @json_option
 def command(
     files: tuple[Path, ...],
     estimate: str | None,
     write: Path | None,
     level: float | None,
+    html: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
@@ -49,6 +53,9 @@ def command(
     found = [check_consistency(record, estimate=wanted) for record in records]
     for result in found:
         emit(result, as_json=as_json, level=level)
+    if html is not None:
+        first, *others = found
+        note(f"Wrote {write_page(first, 'Data compatibility', html, *others)}")
     if write is not None:
         write_records([result.corrected for result in found], write)
         note(f"Wrote {write}")

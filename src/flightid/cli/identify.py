@@ -11,9 +11,10 @@ import click
 
 from flightid.cli.black_boxes import KINDS, black_boxes, structure_of
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import emit, json_option, leave_by_verdict, level_option, note
+from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
+from flightid.cli.pages import html_option, write_page
 from flightid.cli.records import FILES, read_files, reading
-from flightid.cli.sources import AXES
+from flightid.cli.sources import AXES, known_models
 
 if TYPE_CHECKING:
     from flightid.identification import Fit, Reduction
@@ -28,7 +29,12 @@ def _fields() -> dict[str, type[Options]]:
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
 @click.argument("files", type=FILES, nargs=-1, required=True)
-@click.option("--model", "model_name", help="Library name or .toml file of a model's equations.")
+@click.option(
+    "--model",
+    "model_name",
+    shell_complete=known_models,
+    help="Library name or .toml file of a model's equations.",
+)
 @click.option("--kind", type=click.Choice(KINDS), help="Or: the kind of a model without equations.")
 @click.option("--axis", type=AXES, help="Of a library model.")
 @click.option(
@@ -54,6 +60,8 @@ def _fields() -> dict[str, type[Options]]:
     help="Model file (.toml) to write: estimates with covariance and evidence.",
 )
 @level_option
+@html_option
+@all_option
 @json_option
 def command(
     files: tuple[Path, ...],
@@ -66,6 +74,7 @@ def command(
     reduced: bool,
     written: Path | None,
     level: float | None,
+    html: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields of the method's options
 ) -> None:
@@ -77,18 +86,20 @@ def command(
     import flightid
     from flightid.logs import is_log
     from flightid.progress import progress
+    from flightid.uncertainty.quantiles import showing
 
     if (model_name is None) == (kind is None):
         raise click.UsageError("name a model with equations by --model, or a --kind without")
     beside = {"records": records, "span_s": records_span_s}
+    loop = options.pop("loop", None)
     with progress(3, "Identifying") as advance:
         if kind is not None:
             structure, read = structure_of(kind, method, files, options)
             data: Any = read
             advance()
-            fit = flightid.identify(structure, data)
+            fit = flightid.identify(structure, data, loop=loop)
         else:
-            fit, data = _with_equations(str(model_name), axis, method, files, beside, options)
+            fit, data = _with_equations(str(model_name), axis, method, files, beside, options, loop)
         advance()
         result = flightid.reduce(fit, data) if reduced else fit
         for log in filter(is_log, files):
@@ -97,11 +108,13 @@ def command(
     note(repr(result))
     if isinstance(result, flightid.Reduction) and not as_json:
         emit(result.fit, as_json=False, level=level)
-        level = None
     emit(result, as_json=as_json, level=level)
     found = result.fit if isinstance(result, flightid.Reduction) else result
     if written is not None:
         note(f"Wrote {flightid.write_model(found, written)}")
+    if html is not None:
+        with showing(level):
+            note(f"Wrote {write_page(found, found.model.name, html)}")
     leave_by_verdict((*result.findings, *found.evidence.findings))
 
 
@@ -112,6 +125,7 @@ def _with_equations(
     files: Sequence[Path],
     beside: dict[str, Any],
     options: dict[str, Any],
+    loop: Any,  # noqa: ANN401 — open or closed, as the parser has checked
 ) -> tuple[Fit, Any]:
     """Fit of a model with equations, and the data that it was fitted to."""
     import flightid
@@ -132,12 +146,12 @@ def _with_equations(
             "the records stand beside it"
         )
     if way in (ON_RESPONSES, JOINT):
-        data = flightid.estimate_response(read, **channels, **of_response)
+        data = flightid.estimate_response(read, **channels, **of_response, loop=loop)
     if way == JOINT:
         span = {} if beside["span_s"] is None else {"span_s": beside["span_s"]}
         more = read_files(beside["records"], of_files[0], span, **channels, units=model.units)
         data = [data, *more]
-    return flightid.identify(model, data, method=way, **of_method), data
+    return flightid.identify(model, data, method=way, loop=loop, **of_method), data
 
 
 def _methods() -> dict[str, type[Options]]:

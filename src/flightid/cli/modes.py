@@ -2,19 +2,29 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
 
-from flightid.cli.output import emit, json_option, level_option
-from flightid.cli.sources import load_source, model_options
+from flightid.cli.output import all_option, json_option, level_option
+from flightid.cli.pages import html_option, show
+from flightid.cli.sources import load_source, model_argument, model_options
 
 
 @click.command()
-@click.argument("model")
+@model_argument
 @model_options
 @level_option
+@html_option
+@all_option
 @json_option
 def command(
-    model: str, axis: str | None, values: tuple[str, ...], level: float | None, as_json: bool
+    model: str,
+    axis: str | None,
+    values: tuple[str, ...],
+    level: float | None,
+    html: Path | None,
+    as_json: bool,
 ) -> None:
     """Modes of MODEL; of a fitted one with intervals.
 
@@ -23,4 +33,5 @@ def command(
     """
     from flightid import modes
 
-    emit(modes(load_source(model, axis, values)), as_json=as_json, level=level)
+    found = modes(load_source(model, axis, values))
+    show(found, "Modes", as_json=as_json, html=html, level=level)

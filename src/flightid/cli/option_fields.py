@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING
 from functools import partial
@@ -44,6 +45,34 @@ SHORT = {
 """What may be typed for a long name, in every command alike."""
 
 
+IN_HERTZ = (
+    "band_rad_s",
+    "crossover_rad_s",
+    "disturbance_bandwidth_rad_s",
+    "angle_crossover_rad_s",
+)
+"""Frequencies that may be typed in hertz too, in every command alike."""
+
+
+def hertz(name: str) -> str:
+    """A frequency's option in hertz.
+
+    Example
+    -------
+    >>> hertz("band_rad_s")
+    'band_hz'
+    """
+    return name.removesuffix("_rad_s") + "_hz"
+
+
+def _in_hertz(one: click.Option) -> click.Option:
+    name = hertz(str(one.name))
+    text = f"{one.opts[-1]} in Hz, in place of rad/s."
+    return click.Option(
+        [f"--{name.replace('_', '-')}", name], nargs=one.nargs, type=float, help=text
+    )
+
+
 class OptionsCommand(click.Command):
     """A command whose options are those of its own and the fields of some dataclasses.
 
@@ -66,6 +95,18 @@ class OptionsCommand(click.Command):
         self._fields_of = fields_of
         self._made: list[click.Parameter] | None = None
 
+    def invoke(self, ctx: click.Context) -> Any:  # noqa: ANN401 — as click has it
+        """Run the command, frequencies in hertz turned to rad/s."""
+        for name in IN_HERTZ:
+            given = ctx.params.pop(hertz(name), None)
+            if given is None:
+                continue
+            if ctx.params.get(name) is not None:
+                raise click.UsageError(f"give the frequency in rad/s or in Hz, not both: {name}")
+            many = isinstance(given, tuple)
+            ctx.params[name] = tuple(math.tau * f for f in given) if many else math.tau * given
+        return super().invoke(ctx)
+
     @property
     def is_read(self) -> bool:
         """Whether the fields have been read."""
@@ -75,7 +116,8 @@ class OptionsCommand(click.Command):
         """Options of the command, then those of the fields."""
         if self._made is None:
             taken = {param.name for param in self.params}
-            self._made = list(click_options(self._fields_of(), taken))
+            made = list(click_options(self._fields_of(), taken))
+            self._made = [*made, *(_in_hertz(one) for one in made if one.name in IN_HERTZ)]
         # Help stays last.
         *own, last = super().get_params(ctx)
         return [*own, *self._made, last]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -53,6 +54,39 @@ def level_option(function: Function) -> Function:
     return decorate(function)
 
 
+WHOLE = "flightid.whole"
+SHORT = 40
+"""Rows of a table on one screen."""
+
+
+def all_option(function: Function) -> Function:
+    """Add ``--all`` to a command whose tables may be long."""
+
+    def keep(ctx: click.Context, _: click.Parameter, value: bool) -> None:
+        ctx.meta[WHOLE] = value
+
+    decorate = click.option(
+        "--all",
+        is_flag=True,
+        expose_value=False,
+        callback=keep,
+        help=f"Print every line of long tables, not the first {SHORT}.",
+    )
+    return decorate(function)
+
+
+def in_short(table: object) -> str:
+    """A table's first lines, and how to see the others; all where ``--all`` was given."""
+    from flightid.table import Table
+
+    context = click.get_current_context(silent=True)
+    whole = context is None or context.meta.get(WHOLE, True)
+    if whole or not isinstance(table, Table) or len(table.rows) <= SHORT:
+        return str(table)
+    left = f"{len(table.rows) - SHORT} more lines: --all shows them."
+    return str(replace(table, rows=table.rows[:SHORT], notes=(left, *table.notes)))
+
+
 def emit(result: CommandResult, *, as_json: bool, level: float | None = None) -> None:
     """Print a result to standard output.
 
@@ -65,12 +99,10 @@ def emit(result: CommandResult, *, as_json: bool, level: float | None = None) ->
     level : float, optional
         Of the intervals in its text.
     """
-    emit_values(result.to_dict()) if as_json else click.echo(str(at_level(result, level)))
+    from flightid.uncertainty.quantiles import showing
 
-
-def at_level(result: CommandResult, level: float | None) -> object:
-    """The table of a result, its intervals at a level where one was asked for."""
-    return result.summary() if level is None else result.summary(level=level)  # type: ignore[call-arg]
+    with showing(level):
+        emit_values(result.to_dict()) if as_json else click.echo(in_short(result.summary()))
 
 
 def emit_values(values: object) -> None:

@@ -9,7 +9,8 @@ import click
 
 from flightid.cli.black_boxes import channels_of, one_each, only
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import emit, json_option, leave_by_verdict, level_option, note
+from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
+from flightid.cli.pages import html_option, write_page
 from flightid.cli.records import FILES, read_files, reading
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ def _fields() -> dict[str, type[Options]]:
     help="Model file (.toml) to write: estimates with covariance and evidence.",
 )
 @level_option
+@html_option
+@all_option
 @json_option
 def command(
     files: tuple[Path, ...],
@@ -55,6 +58,7 @@ def command(
     validation: tuple[Path, ...],
     written: Path | None,
     level: float | None,
+    html: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
@@ -65,6 +69,7 @@ def command(
     The exit code is 1 where a verdict is red.
     """
     import flightid
+    from flightid.uncertainty.quantiles import showing
 
     named, orders, given, *of_files = parted(options, _fields())
     kind = orders.pop("kind", "armax")
@@ -84,7 +89,7 @@ def command(
         scanned = flightid.scan_orders(
             records, unseen, inputs=inputs, outputs=output, kind=kind, **tried, **given
         )
-        emit(scanned, as_json=as_json)
+        emit(scanned, as_json=as_json, level=level)
         fit, findings = scanned.best, scanned.findings
     elif kind == "any":
         raise click.UsageError("--kind any ranks kinds: add --scan and --validation")
@@ -100,6 +105,9 @@ def command(
         emit(fit, as_json=as_json, level=level)
     if written is not None:
         note(f"Wrote {flightid.write_model(fit, written)}")
+    if html is not None:
+        with showing(level):
+            note(f"Wrote {write_page(fit, fit.model.name, html)}")
     leave_by_verdict((*findings, *fit.evidence.findings))
 
 

@@ -17,6 +17,8 @@ from flightid.errors import FlightidError
 from flightid.surface import speaking
 from flightid.version import VERSION
 
+NAME, COMPLETE = "flightid", "_FLIGHTID_COMPLETE"
+"""The program, and the variable by which a shell asks it for completions."""
 ORDER = (
     "run",
     "tune",
@@ -27,6 +29,9 @@ ORDER = (
     "identify",
     "verify",
     "modes",
+    "margins",
+    "handling-qualities",
+    "compare",
     "simulate",
     "report",
 )
@@ -37,6 +42,7 @@ NOT_VERBS = frozenset(
         "black_boxes",
         "option_fields",
         "output",
+        "pages",
         "pairs",
         "program",
         "proposals",
@@ -53,9 +59,8 @@ class Verbs(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Verbs in the order of the work."""
         del ctx
-        found = {
-            module.name for module in pkgutil.iter_modules([str(Path(__file__).parent)])
-        } - NOT_VERBS
+        here = pkgutil.iter_modules([str(Path(__file__).parent)])
+        found = {module.name.replace("_", "-") for module in here if module.name not in NOT_VERBS}
         ordered = [verb for verb in ORDER if verb in found]
         return [*ordered, *sorted(found - set(ordered))]
 
@@ -63,7 +68,7 @@ class Verbs(click.Group):
         """Command of a verb, or None."""
         if cmd_name not in self.list_commands(ctx):
             return None
-        command = import_module(f"flightid.cli.{cmd_name}").command
+        command = import_module(f"flightid.cli.{cmd_name.replace('-', '_')}").command
         if not isinstance(command, click.Command):
             raise TypeError(f"flightid.cli.{cmd_name}.command is not a click command")
         return command
@@ -87,7 +92,7 @@ class Verbs(click.Group):
     epilog="Exit codes: 0 done; 1 done, and a verdict is red; 2 input cannot be used; "
     "70 a fault in flightid; 130 interrupted.",
 )
-@click.version_option(VERSION, prog_name="flightid")
+@click.version_option(VERSION, prog_name=NAME)
 @click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
 @click.option("--quiet", is_flag=True, help="Show no progress.")
 @click.option(
@@ -126,7 +131,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     given = None if arguments is None else list(arguments)
     try:
         with speaking(as_typed):
-            code = program.main(args=given, prog_name="flightid", standalone_mode=False)
+            code = program.main(
+                args=given, prog_name=NAME, standalone_mode=False, complete_var=COMPLETE
+            )
     except click.ClickException as error:
         error.show()
         return error.exit_code

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,10 +50,12 @@ def taken_study(
     asked: Mapping[str, Any],
     *,
     tune: bool = False,
+    cache: MutableMapping[str, Any] | None = None,
 ) -> tuple[Path, Path | None]:
     """The study that was named, or the one that data ask for, written beside its results.
 
-    Where the data carry no model, what is there is said, and the command ends.
+    What is read and found of a log stands in `cache` for the run of the study. Where the data
+    carry no model, what is there is said, and the command ends.
 
     Returns
     -------
@@ -79,7 +81,7 @@ def taken_study(
     if log is not None:
         raise click.UsageError("--log belongs to a study, and there is none")
     target = study_path(files, output)
-    made = propose(files, target, **asked, tune=tune)
+    made = propose(files, target, **asked, tune=tune, cache=cache)
     if not made.models:
         click.echo(made.refusal())
         click.get_current_context().exit(Exit.RED)

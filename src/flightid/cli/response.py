@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import emit, json_option, leave_by_verdict, note
+from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
+from flightid.cli.pages import html_option
 from flightid.cli.records import FILES, read_files, reading
 
 if TYPE_CHECKING:
@@ -28,11 +29,14 @@ def _fields() -> dict[str, type[Options]]:
 @click.command(cls=OptionsCommand, fields_of=_fields)
 @click.argument("files", type=FILES, nargs=-1, required=True)
 @click.option("--netcdf", type=FILE, help="Write the response to this file.")
-@click.option("--html", type=FILE, help="Write a page with pictures to this file.")
+@level_option
+@html_option
+@all_option
 @json_option
 def command(
     files: tuple[Path, ...],
     netcdf: Path | None,
+    level: float | None,
     html: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
@@ -44,6 +48,7 @@ def command(
     from flightid.progress import progress
     from flightid.responses import estimate_response
     from flightid.responses.store import write_response
+    from flightid.uncertainty.quantiles import showing
 
     channels, of_response, *of_files = parted(options, _fields())
     injected = of_response.get("excitations")
@@ -54,7 +59,8 @@ def command(
     if netcdf is not None:
         note(f"Wrote {write_response(response, netcdf)}")
     if html is not None:
-        note(f"Wrote {_write_page(response, html)}")
+        with showing(level):
+            note(f"Wrote {_write_page(response, html)}")
     leave_by_verdict(response.findings)
 
 
@@ -65,11 +71,12 @@ def _write_page(response: FrequencyResponse, path: Path) -> Path:
     from flightid.report.content import Document, Section
     from flightid.report.figures import figure_block
     from flightid.report.html import to_html
+    from flightid.uncertainty.quantiles import interval_words, shown
 
     pictures = tuple(
         figure_block(
             response_figure(response, [(output, name)]),
-            f"Response of {output} to {name}; bands are 95 % of the random error.",
+            f"Response of {output} to {name}; bands: {interval_words(shown())}.",
         )
         for output, name in leading_pairs(response)
     )

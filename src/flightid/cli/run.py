@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import json_option, leave_by_verdict
+from flightid.cli.output import json_option, leave_by_verdict, level_option
 from flightid.cli.proposals import of_data, show_study, taken_study
 from flightid.cli.records import FILES
 
@@ -30,12 +30,14 @@ from flightid.cli.records import FILES
     help="Log to read instead of the one that the study names.",
 )
 @click.option("--all", "whole", is_flag=True, help="Print the whole report, not one screen of it.")
+@level_option
 @json_option
 def command(
     files: tuple[Path, ...],
     output: Path | None,
     log: Path | None,
     whole: bool,
+    level: float | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
@@ -52,7 +54,8 @@ def command(
     from flightid.study import run_study
 
     (asked,) = parted(options, of_data())
-    study, folder = taken_study(files, output, log, asked)
-    result = run_study(study, output=folder, log=log)
+    cache: dict[str, Any] = {}
+    study, folder = taken_study(files, output, log, asked, cache=cache)
+    result = run_study(study, output=folder, log=log, level=level, cache=cache)
     show_study(result, whole=whole, as_json=as_json)
     leave_by_verdict(result.findings)

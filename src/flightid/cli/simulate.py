@@ -10,7 +10,7 @@ import click
 from flightid.cli.option_fields import OptionsCommand, flags_of, parted
 from flightid.cli.output import emit, json_option, note
 from flightid.cli.records import FILES, read_files, reading
-from flightid.cli.sources import load_source, model_options
+from flightid.cli.sources import load_source, model_argument, model_options
 
 if TYPE_CHECKING:
     from flightid.models import Model
@@ -79,7 +79,7 @@ def _fields() -> dict[str, type[Options]]:
 
 
 @command.command(cls=OptionsCommand, fields_of=_fields)
-@click.argument("model")
+@model_argument
 @click.argument("records", nargs=-1, type=FILES)
 @model_options
 @click.option("--output", "written", type=FILE, help="Write .csv, .parquet or .nc.")

@@ -10,10 +10,38 @@ import click
 from flightid.cli.pairs import numbers
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from flightid.models import Model
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 AXES = click.Choice(["roll", "pitch", "yaw"])
+
+
+def known_models(
+    ctx: click.Context, param: click.Parameter, incomplete: str
+) -> list[CompletionItem]:
+    """Library models, model files and folders that begin so."""
+    del ctx, param
+    from glob import escape, iglob
+    from os.path import isdir
+
+    from click.shell_completion import CompletionItem
+
+    from flightid import library_names
+
+    names = [name for name in library_names() if name.startswith(incomplete)]
+    files = [
+        path
+        for path in sorted(iglob(f"{escape(incomplete)}*"))
+        if isdir(path) or path.endswith((".toml", ".json"))
+    ]
+    return [CompletionItem(name) for name in (*files, *names)]
+
+
+def model_argument(function: Function) -> Function:
+    """Add the argument ``MODEL`` to a command, its names completed by the shell."""
+    return click.argument("model", shell_complete=known_models)(function)
 
 
 def model_options(function: Function) -> Function:

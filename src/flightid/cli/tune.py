@@ -92,8 +92,9 @@ def command(
         from flightid.study import run_study
 
         of_log = options.get("controller") is None
-        path, folder = taken_study(files, output, log, data, tune=of_log)
-        study = run_study(path, output=folder, log=log, tune=asked)
+        cache: dict[str, Any] = {}
+        path, folder = taken_study(files, output, log, data, tune=of_log, cache=cache)
+        study = run_study(path, output=folder, log=log, tune=asked, level=level, cache=cache)
         tuning = study.tuning
         refused = [f"{each.message} ({each.action})" for each in study.faults]
     if tuning is None:

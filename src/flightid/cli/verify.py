@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.option_fields import OptionsCommand, parted
-from flightid.cli.output import emit, emit_values, json_option, leave_by_verdict, note
+from flightid.cli.output import all_option, emit, emit_values, json_option, leave_by_verdict, note
 from flightid.cli.records import FILES, read_files, reading
-from flightid.cli.sources import load_source, model_options
+from flightid.cli.sources import load_source, model_argument, model_options
 
 if TYPE_CHECKING:
     from flightid.options import Options
@@ -25,7 +25,7 @@ def _fields() -> dict[str, type[Options]]:
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
-@click.argument("model")
+@model_argument
 @click.argument("records", nargs=-1, required=True, type=FILES)
 @model_options
 @click.option(
@@ -46,6 +46,7 @@ def _fields() -> dict[str, type[Options]]:
     type=click.Path(dir_okay=False, path_type=Path),
     help="Write a page with pictures to this file.",
 )
+@all_option
 @json_option
 def command(
     model: str,

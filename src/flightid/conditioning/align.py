@@ -17,7 +17,7 @@ from flightid.record.interpolation import windowed_sinc
 from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.quantiles import interval_words, shown
 from flightid.units import require_match
 
 HANN_NEIGHBOURS = 2.000
@@ -68,8 +68,9 @@ class Skew(Result, schema="flightid.skew/1"):
         """Lag of `channel` behind `reference`, s."""
         return self.lag.value
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of the estimate with its interval at a level."""
+        level = shown(level)
         low, high = self.lag.interval(level) or (None, None)
         columns = (
             Column("channel"),

@@ -13,7 +13,7 @@ from flightid.record import Record
 from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.quantiles import interval_words, shown
 
 
 @dataclass(frozen=True)
@@ -71,8 +71,9 @@ class KinematicConsistency(
     corrected: Record
     findings: tuple[Finding, ...]
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of the estimates with their intervals at a level."""
+        level = shown(level)
         columns = (
             Column("parameter"),
             Column("unit"),

@@ -27,7 +27,7 @@ from flightid.models.sampled.discrete_modes import AT_ORIGIN, NO_COUNTERPART
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.quantiles import interval_words, shown
 from flightid.uncertainty.uneven import turned
 
 LIGHT_DAMPING = 0.3
@@ -121,14 +121,15 @@ class Interpretation(Result, schema="flightid.interpretation/1"):
         """What the model says about the vehicle, one sentence for each root."""
         return tuple(_sentence(item) for item in self.roots)
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of poles and zeros with their meaning; transfer functions and findings below.
 
         Parameters
         ----------
-        level : float
+        level : float, optional
             Of the intervals.
         """
+        level = shown(level)
         columns = (
             Column("response"),
             Column("root"),

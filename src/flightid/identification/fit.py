@@ -25,7 +25,7 @@ from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.estimate import Estimate
-from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words
+from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, shown
 from flightid.uncertainty.uncertain import Uncertain
 
 
@@ -210,14 +210,15 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
         """
         return uncertain_model(self.model, self.names, self.carried)
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of the parameters, with costs and findings below.
 
         Parameters
         ----------
-        level : float
+        level : float, optional
             Of the intervals.
         """
+        level = shown(level)
         words = interval_words(level)
         columns = (
             Column("parameter"),
@@ -233,8 +234,8 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
             Column("note"),
         )
         alone = self._by_noise_alone()
-        shown = (self.details or Details()).quantities(self.parameters)
-        rows = [_row(p, level, alone.get(p.name)) for p in shown]
+        quantities = (self.details or Details()).quantities(self.parameters)
+        rows = [_row(p, level, alone.get(p.name)) for p in quantities]
         table = Table(f"Fit of {self.model.name}", columns, tuple(rows), self._notes())
         return table.without_empty_columns().said_once()
 

@@ -11,6 +11,7 @@ from flightid.errors import UnknownNameError
 from flightid.identification import Fit, FittedResponse
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
+from flightid.uncertainty.quantiles import interval_words, shown
 
 ROW_PX = 34
 FRAME_PX = 130
@@ -71,7 +72,7 @@ def parameter_intervals(estimates: Sequence[EstimateBar], *, name: str = "estima
         go.Scatter(
             x=centres,
             y=names,
-            name=f"{name} with 95 % interval",
+            name=f"{name} with {interval_words(shown())} interval",
             mode="markers",
             marker={"color": look.MODEL, "size": 8},
             error_x={
@@ -170,7 +171,7 @@ def estimates_of(fit: Fit, truth: Mapping[str, float] | None = None) -> list[Est
     list of EstimateBar
     """
     return [
-        EstimateBar(p.name, p.value, *p.interval95, (truth or {}).get(p.name))
+        EstimateBar(p.name, p.value, *ends, (truth or {}).get(p.name))
         for p in fit.parameters.values()
-        if p.interval95 is not None and p.value != 0.0
+        if (ends := p.interval(shown())) is not None and p.value != 0.0
     ]

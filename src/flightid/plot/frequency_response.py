@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flightid.errors import DataError
 from flightid.plot import look
 from flightid.responses.response_band import TAKEN_OUT, ResponseIntervals
-from flightid.uncertainty.quantiles import half_width
+from flightid.uncertainty.quantiles import half_width, shown
 
 Array = NDArray[np.float64]
 
@@ -128,7 +128,7 @@ def _add_gain(made: go.Figure, curve: Curve) -> None:
     if curve.intervals is not None:
         low, high = curve.intervals.gain
     elif curve.random_error is not None:
-        wide = half_width() * curve.random_error
+        wide = half_width(shown()) * curve.random_error
         low, high = magnitude * (1 - wide), magnitude * (1 + wide)
     # A lower edge at or below zero gain has no decibels; it is drawn 40 dB down.
     _add_band(made, curve, (_decibel(np.maximum(low, 0.01 * magnitude)), _decibel(high)), 1)
@@ -144,7 +144,7 @@ def _add_phase(made: go.Figure, curve: Curve, phase_deg: NDArray[np.float64]) ->
         turns = 360.0 * np.round((phase_deg - 0.5 * (low + high)) / 360.0)
         low, high = low + turns, high + turns
     elif curve.random_error is not None:
-        wide = np.minimum(np.degrees(half_width() * curve.random_error), 180.0)
+        wide = np.minimum(np.degrees(half_width(shown()) * curve.random_error), 180.0)
         low, high = phase_deg - wide, phase_deg + wide
     _add_band(made, curve, (low, high), 2)
     made.add_trace(_line(curve, phase_deg, legend=False), row=2, col=1)

@@ -16,13 +16,13 @@ from flightid.dynamics.lower_order.result import LowerOrder
 from flightid.errors import DataError
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
+from flightid.uncertainty.quantiles import ellipse_radius, shown
 
 SHADES = ("#b8dfc9", "#f7e3a1", "#f3bfa5", "#d9d9d9")
 """Levels 1, 2, 3 and worse; each is named in the plot too."""
 CELLS = 300
 NARROW = 0.18
 """Share of the width below which a region's name is written upright."""
-CHI_SQUARE_95 = 5.991464547107979
 LOGARITHMIC = {"cap", "n_alpha", "frequency"}
 LEAST_SPAN = {"bandwidth": (0.0, 5.0), "phase_delay": (0.0, 0.2), "damping": (0.0, 1.5)}
 Array = NDArray[np.float64]
@@ -158,9 +158,8 @@ def cutoff_spectrum(found: PilotCutoff) -> go.Figure:
     made.add_hline(50.0, line={"color": look.LINE, "dash": "dot", "width": 1})
     if found.cutoff.value is not None:
         made.add_vline(found.cutoff.value, line={"color": look.MODEL, "width": 1.5})
-    if found.cutoff.interval95 is not None:
-        low, high = found.cutoff.interval95
-        made.add_vrect(low, high, fillcolor=look.MODEL, opacity=0.12, line_width=0)
+    if (ends := found.cutoff.interval(shown())) is not None:
+        made.add_vrect(*ends, fillcolor=look.MODEL, opacity=0.12, line_width=0)
     look.label_axes(made, x="frequency [rad/s]", y=("power below [%]",), log_x=True)
     return made
 
@@ -299,7 +298,7 @@ def _ellipse(rating: Rating) -> tuple[Array, Array] | None:
             drawn[row] = np.log(np.maximum(drawn[row], np.finfo(float).tiny))
     factor = np.linalg.cholesky(np.cov(drawn) + 1e-18 * np.eye(2))
     angle = np.linspace(0.0, 2.0 * np.pi, 121)
-    ring = np.sqrt(CHI_SQUARE_95) * factor @ np.array([np.cos(angle), np.sin(angle)])
+    ring = ellipse_radius(shown()) * factor @ np.array([np.cos(angle), np.sin(angle)])
     ends = drawn.mean(axis=1)[:, None] + ring
     x, y = (np.exp(end) if is_log else end for end, is_log in zip(ends, logs, strict=True))
     return np.asarray(x), np.asarray(y)
@@ -339,7 +338,7 @@ def _marks(made: go.Figure, found: AttitudeBandwidth) -> None:
             row=row,
             col=1,
         )
-    interval = found.bandwidth.interval95
+    interval = found.bandwidth.interval(shown())
     if interval is not None:
         made.add_vrect(*interval, fillcolor=look.MODEL, opacity=0.12, line_width=0)
 

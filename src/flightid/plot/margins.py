@@ -13,7 +13,7 @@ from flightid.control.margins.loop_metrics import DISTURBANCE_LEVEL_DB
 from flightid.control.margins.margins import GAIN_GUIDE_DB, PHASE_GUIDE_DEG, LoopCurve, Margins
 from flightid.plot import look
 from flightid.uncertainty.estimate import Reading
-from flightid.uncertainty.quantiles import half_width
+from flightid.uncertainty.quantiles import half_width, shown
 
 Array = NDArray[np.float64]
 WIDEST_DEG = 180.0
@@ -268,7 +268,7 @@ def _curve(curve: LoopCurve, crossover: Reading) -> tuple[Array, Array, Array]:
 def _add_band(made: go.Figure, omega: Array, values: Array, stderr: Array | None, row: int) -> None:
     if stderr is None:
         return
-    wide = np.minimum(half_width() * np.nan_to_num(stderr, nan=WIDEST_DEG), WIDEST_DEG)
+    wide = np.minimum(half_width(shown()) * np.nan_to_num(stderr, nan=WIDEST_DEG), WIDEST_DEG)
     edges = look.band(NAME, omega, values - wide, values + wide, colour=look.MODEL)
     made.add_traces(edges, rows=row, cols=1)
 
@@ -358,9 +358,7 @@ def _ordered(margins: Margins, decibel: Array, degrees: Array) -> tuple[Array, A
 
 
 def _half(quantity: Reading) -> float | None:
-    if quantity.interval95 is None:
-        return None
-    return 0.5 * (quantity.interval95[1] - quantity.interval95[0])
+    return quantity.half(shown())
 
 
 def _points(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flightid.dynamics.modes.result import Mode, Modes
 from flightid.plot import look
+from flightid.uncertainty.quantiles import ellipse_radius, shown
 
 HEIGHT_PX = 440
 DAMPING_LINES = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -19,8 +20,6 @@ CIRCLES = 5
 SLOW = 0.15
 """Eigenvalues below this share of the largest have a plot of their own beside the whole."""
 MARGIN = 0.12
-CHI_SQUARE_95 = 5.991464547107979
-"""95 % of two normal numbers together."""
 MARKERS = ("x", "circle-open", "diamond-open", "square-open", "triangle-up-open")
 
 Points = NDArray[np.complex128]
@@ -108,10 +107,10 @@ def _region(mode: Mode) -> Points | None:
     if mode.eigenvalue is None or mode.covariance is None:
         return None
     if not mode.is_pair:
-        return np.array(mode.real.interval95 or (), dtype=complex)
+        return np.array(mode.real.interval(shown()) or (), dtype=complex)
     sizes, axes = np.linalg.eigh(mode.covariance)
     turn = np.linspace(0.0, 2.0 * np.pi, 73)
-    half = np.sqrt(np.maximum(sizes, 0.0) * CHI_SQUARE_95)
+    half = ellipse_radius(shown()) * np.sqrt(np.maximum(sizes, 0.0))
     x, y = axes @ (half[:, None] * np.array([np.cos(turn), np.sin(turn)]))
     return np.asarray(mode.eigenvalue + x + 1j * y)
 

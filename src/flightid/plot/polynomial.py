@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 from flightid.identification import Fit, ImpulseResponse
 from flightid.identification.subspace.roots import ALL
 from flightid.plot import look
-from flightid.uncertainty.quantiles import half_width
+from flightid.uncertainty.quantiles import ellipse_radius, half_width, interval_words, shown
 from flightid.validation import OrderScan
 from flightid.validation.order_scan.result import Structure, words_of
 
-CHI2_95_2 = 5.991
-"""95 % point of χ² with two degrees of freedom."""
 HIGHEST = 3.0
 """Errors beyond this many times the smallest are drawn at the upper edge."""
 
@@ -149,7 +147,7 @@ def _ellipse(
     values, vectors = np.linalg.eigh(covariance)
     angle = np.linspace(0.0, 2 * np.pi, 61)
     round_ = np.array([np.cos(angle), np.sin(angle)])
-    x, y = vectors @ (np.sqrt(CHI2_95_2 * np.maximum(values, 0.0))[:, None] * round_)
+    x, y = vectors @ (ellipse_radius(shown()) * np.sqrt(np.maximum(values, 0.0))[:, None] * round_)
     return centre.real + x, centre.imag + sign * y
 
 
@@ -179,8 +177,9 @@ def impulse_response(item: ImpulseResponse, name: str | None = None) -> go.Figur
     for row, (time, values, wide) in enumerate(curves, start=1):
         if wide is not None:
             # The band lies about zero for pulses: outside it, chance does not explain a lag.
-            middle, half = 0.0 * values if row == 1 else values, half_width() * wide[place]
-            for edge in look.band("95 %", time, middle - half, middle + half, colour=look.TRUTH):
+            middle, half = 0.0 * values if row == 1 else values, half_width(shown()) * wide[place]
+            words, ends = interval_words(shown()), (middle - half, middle + half)
+            for edge in look.band(words, time, *ends, colour=look.TRUTH):
                 made.add_trace(edge, row=row, col=1)
         if row == 1:
             bars = go.Bar(x=time, y=values, name="pulse", marker={"color": look.MODEL})

@@ -10,6 +10,7 @@ from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
 from flightid.responses import FrequencyResponse
 from flightid.responses.response_band import response_band
+from flightid.uncertainty.quantiles import shown
 
 
 def response_figure(
@@ -43,7 +44,7 @@ def response_figure(
             look.MEASURED if len(drawn) == 1 else look.SERIES[index % len(look.SERIES)],
             look.DASHES[index % len(look.DASHES)],
             pair.coherence,
-            intervals=response_band(response, pair.input, pair.output),
+            intervals=response_band(response, pair.input, pair.output, level=shown()),
         )
         for index, pair in enumerate(drawn)
     ]

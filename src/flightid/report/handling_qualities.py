@@ -11,6 +11,7 @@ from flightid.plot.handling_qualities import (
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block
 from flightid.report.figures import figure_block
+from flightid.uncertainty.quantiles import interval_words, shown
 
 
 def handling_qualities_blocks(found: HandlingQualities) -> tuple[Block, ...]:
@@ -34,8 +35,9 @@ def _charts(ratings: tuple[Rating, ...]) -> list[Block]:
         if len(chart.axes) != 2:
             continue
         case = f" ({chart.case})" if chart.case else ""
-        shown = f"{chart.standard}: {chart.title}{case}; estimate with its 95 % region. "
-        made.append(figure_block(level_chart(rating), (shown + chart.doubt).strip()))
+        words = interval_words(shown())
+        said = f"{chart.standard}: {chart.title}{case}; estimate with its {words} region. "
+        made.append(figure_block(level_chart(rating), (said + chart.doubt).strip()))
     return made
 
 
@@ -43,8 +45,8 @@ def _curves(found: HandlingQualities) -> list[Block]:
     return [
         figure_block(
             bandwidth_curves(each),
-            f"{axis}: where bandwidth and phase delay are read; the band is the 95 % interval of "
-            "the bandwidth.",
+            f"{axis}: where bandwidth and phase delay are read; the band is the "
+            f"{interval_words(shown())} interval of the bandwidth.",
         )
         for axis, each in found.bandwidths.items()
     ]

@@ -14,6 +14,7 @@ from flightid.plot.margins import (
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, TableBlock
 from flightid.report.figures import figure_block
+from flightid.uncertainty.quantiles import interval_words, shown
 
 if TYPE_CHECKING:
     from flightid.control.margins.disk_margin import DiskMargin
@@ -34,13 +35,14 @@ def margin_blocks(margins: Margins, disk: DiskMargin | None = None) -> tuple[Blo
     -------
     tuple of Block
     """
+    words = interval_words(shown())
     forbidden = "the disk margin's" if disk is not None else "the modulus margin's"
     blocks = (
         *result_blocks(margins),
         TableBlock(margins.crossing_table(), folded=True),
         figure_block(
             loop_bode(margins),
-            "The broken loop with its 95 % band; bars: margins where they are taken.",
+            f"The broken loop with its {words} band; bars: margins where they are taken.",
         ),
         figure_block(
             loop_nyquist(margins, disk),
@@ -48,7 +50,7 @@ def margin_blocks(margins: Margins, disk: DiskMargin | None = None) -> tuple[Blo
         ),
         figure_block(
             loop_nichols(margins),
-            "Gain over phase; shaded: what the guides keep free; bars: 95 % intervals.",
+            f"Gain over phase; shaded: what the guides keep free; bars: {words} intervals.",
         ),
     )
     return blocks if disk is None else (*blocks, *disk_blocks(disk))
@@ -80,5 +82,8 @@ def disturbance_blocks(found: DisturbanceRejection) -> tuple[Block, ...]:
     -------
     tuple of Block
     """
-    caption = "What is left of a disturbance, with its 95 % band; dotted: −3 dB and 0 dB."
+    caption = (
+        f"What is left of a disturbance, with its {interval_words(shown())} band; "
+        "dotted: −3 dB and 0 dB."
+    )
     return (*result_blocks(found), figure_block(disturbance_figure(found), caption))

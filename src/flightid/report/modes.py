@@ -8,14 +8,10 @@ from flightid.plot.modes import pole_map
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, TableBlock
 from flightid.report.figures import figure_block
+from flightid.uncertainty.quantiles import interval_words, shown
 
 if TYPE_CHECKING:
     from flightid.dynamics import ApproximateModes, DerivativeTable, Modes
-
-CAPTION = (
-    "Eigenvalues with their 95 % regions; rays of equal damping ratio ζ, circles of equal natural "
-    "frequency."
-)
 
 
 def modes_blocks(found: Modes) -> tuple[Block, ...]:
@@ -32,7 +28,11 @@ def modes_blocks(found: Modes) -> tuple[Block, ...]:
     """
     blocks: list[Block] = list(result_blocks(found))
     if any(mode.eigenvalue is not None for mode in found):
-        blocks.append(figure_block(pole_map(found), CAPTION))
+        caption = (
+            f"Eigenvalues with their {interval_words(shown())} regions; rays of equal damping "
+            "ratio ζ, circles of equal natural frequency."
+        )
+        blocks.append(figure_block(pole_map(found), caption))
     parts = found.participation_table()
     if parts.rows:
         blocks.append(TableBlock(parts, folded=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -316,6 +317,7 @@ class FrequencyResponse(
             Column("unit"),
             Column("usable from", "rad/s"),
             Column("to", "rad/s"),
+            Column("in Hz"),
             Column("mean coherence"),
             Column("median random error", "%"),
         )
@@ -330,6 +332,9 @@ class FrequencyResponse(
                         name,
                         pair.unit,
                         *(band or (None, None)),
+                        None
+                        if band is None
+                        else f"{band[0] / math.tau:.3g} to {band[1] / math.tau:.3g}",
                         float(np.mean(pair.coherence)),
                         100.0 * float(np.median(pair.random_error)),
                     )

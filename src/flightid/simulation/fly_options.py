@@ -11,6 +11,7 @@ from flightid.options import Options, option
 
 Style = Literal["json", "flightgear"]
 HIGHEST_PORT = 65535
+USUAL_STEP_S = 0.01
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,9 @@ class FlyOptions(Options):
     {'elevator': {'q': 0.2}}
     """
 
-    sample_rate_hz: float = option(100.0, unit="Hz", above=0.0, doc="Frames a second.")
+    sample_rate_hz: float | None = option(
+        None, unit="Hz", above=0.0, doc="Frames a second; default: a sampled model's own, else 100."
+    )
     duration_s: float = option(60.0, unit="s", above=0.0, doc="Length of the flight.")
     feedback: Mapping[str, Any] = option(
         default_factory=dict,
@@ -45,6 +48,13 @@ class FlyOptions(Options):
     style: Style = option(
         "json", choices=("json", "flightgear"), doc="How outputs are told to the cockpit."
     )
+
+    def step_s(self, model: object) -> float:
+        """Time of a frame, s."""
+        if self.sample_rate_hz is not None:
+            return 1.0 / self.sample_rate_hz
+        own = getattr(model, "sample_time_s", None)
+        return USUAL_STEP_S if own is None else float(own)
 
     def __post_init__(self) -> None:
         super().__post_init__()

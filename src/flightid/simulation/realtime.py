@@ -195,12 +195,10 @@ def fly_model(
     -------
     >>> from flightid.models import LinearSystem
     >>> lag = LinearSystem([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ("u",), ("y",))
-    >>> fly_model(lag, FlyOptions(duration_s=0.05)).options["sample_rate_hz"]
-    100.0
+    >>> fly_model(lag, FlyOptions(duration_s=0.05)).options["style"]
+    'json'
     """
-    stepper = Stepper(
-        model, 1.0 / options.sample_rate_hz, feedback=options.gains, limits=options.bounds
-    )
+    stepper = Stepper(model, options.step_s(model), feedback=options.gains, limits=options.bounds)
     heard = None if options.listen is None else (options.host, options.listen)
     with UdpLink(stepper.inputs, listen=heard, send=options.cockpit, style=options.style) as link:
         if say is not None and heard is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError, UnknownNameError
-from flightid.models import LinearSystem, StateSpaceModel
+from flightid.models import LinearSystem, NarxModel, StateSpaceModel
 from flightid.models.model import linear_system
 from flightid.simulation.nonlinear import run_equations, start_of
 
@@ -24,7 +24,7 @@ class Stepper:
 
     Parameters
     ----------
-    model : StateSpaceModel, or what `linear_system` takes
+    model : StateSpaceModel, NarxModel, or what `linear_system` takes
         Nonlinear ones take inputs whole, linear ones as departures.
     sample_time_s : float
         s.
@@ -60,12 +60,7 @@ class Stepper:
         if not (np.isfinite(sample_time_s) and sample_time_s > 0.0):
             raise OptionError("the sample time is not positive", found=sample_time_s)
         self.sample_time_s = sample_time_s
-        is_whole = isinstance(model, StateSpaceModel) and not model.is_linear
-        self._plant = (
-            _Equations(model, sample_time_s)
-            if isinstance(model, StateSpaceModel) and is_whole
-            else _Samples(linear_system(model), sample_time_s)
-        )
+        self._plant = _plant(model, sample_time_s)
         self.inputs, self.outputs = self._plant.inputs, self._plant.outputs
         self.rest = self._plant.rest
         self._gains = np.zeros((len(self.inputs), len(self.outputs)))
@@ -113,6 +108,36 @@ class Stepper:
             raise DataError("the model diverges", found=str(dict(inputs)))
         self._last = found
         return dict(zip(self.outputs, found.tolist(), strict=True))
+
+
+def _plant(model: object, sample_time_s: float) -> _Samples | _Equations | _Recursion:
+    if isinstance(model, NarxModel):
+        return _Recursion(model, sample_time_s)
+    if isinstance(model, StateSpaceModel) and not model.is_linear:
+        return _Equations(model, sample_time_s)
+    return _Samples(linear_system(model), sample_time_s)
+
+
+class _Recursion:
+    """A NARX model, from rest at its training means; inputs are whole."""
+
+    def __init__(self, model: NarxModel, sample_time_s: float) -> None:
+        model.scaling.require_sample_time(sample_time_s)
+        self.inputs, self.outputs = model.inputs, model.outputs
+        self.rest = {name: float(model.scaling.mean[name]) for name in model.inputs}
+        self._model, self._mean = model, float(model.scaling.mean[model.output])
+        self._past: list[float] = []
+        self._moved: list[Array] = []
+
+    def step(self, u: Array) -> Array:
+        memory = self._model.memory
+        self._moved = [*self._moved[-memory:], u] if memory else [u]
+        short = len(self._past) < memory
+        y = self._mean
+        if not short:
+            y = self._model.after(np.column_stack(self._moved), np.array(self._past))
+        self._past = [*self._past, y][-memory:] if memory else []
+        return np.array([y])
 
 
 class _Samples:

@@ -28,6 +28,7 @@ from flightid.study.results import StudyResults
 from flightid.study.truth import recovered
 from flightid.study.tuning import AUTOPILOT_ONLY
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty.quantiles import interval_words, shown
 from flightid.version import VERSION
 
 if TYPE_CHECKING:
@@ -114,20 +115,21 @@ def parameter_table(study: StudyResults) -> Table:
     study : StudyResults
         Results of all stages.
     """
+    words = interval_words(shown())
     columns = [
         Column("model"),
         Column("parameter"),
         Column("value", digits=5),
         Column("unit"),
-        Column("95 % low"),
-        Column("95 % high"),
+        Column(f"{words} low"),
+        Column(f"{words} high"),
     ]
     beside = _beside(study)
     if beside:
         columns += [Column(beside, digits=5), Column("inside")]
     rows: list[tuple[Cell, ...]] = []
     for item, parameter, true_value in _parameters(study):
-        low, high = parameter.interval95 or (None, None)
+        low, high = parameter.interval(shown()) or (None, None)
         row: list[Cell] = [item.settings.name, parameter.name, parameter.value, parameter.unit]
         row += [low, high]
         if beside:
@@ -160,9 +162,10 @@ def _parameters(study: StudyResults) -> Iterator[tuple[ModelResults, Estimate, f
 
 
 def _inside(parameter: Estimate, true_value: float | None) -> bool | None:
-    if parameter.interval95 is None or true_value is None:
+    ends = parameter.interval(shown())
+    if ends is None or true_value is None:
         return None
-    return parameter.interval95[0] <= true_value <= parameter.interval95[1]
+    return ends[0] <= true_value <= ends[1]
 
 
 def _result(study: StudyResults) -> Iterator[Block]:
@@ -253,13 +256,15 @@ def _interval_figure(study: StudyResults) -> tuple[Figure, ...]:
     estimates = [
         EstimateBar(f"{parameter.name}, {item.settings.name}", parameter.value, low, high, true)
         for item, parameter, true in _parameters(study)
-        if parameter.interval95 is not None
-        for low, high in [parameter.interval95]
+        if (ends := parameter.interval(shown())) is not None
+        for low, high in [ends]
     ]
     if not estimates:
         return ()
     reference = _beside(study) or "estimate"
-    caption = f"Estimates with their 95 % intervals, in percent of the {reference}."
+    caption = (
+        f"Estimates with their {interval_words(shown())} intervals, in percent of the {reference}."
+    )
     if any(bar.truth == 0.0 for bar in estimates):
         caption += " Where that is zero, in percent of the estimate."
     return (figure_block(parameter_intervals(estimates), caption),)

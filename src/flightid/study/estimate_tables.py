@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from flightid.identification import PolynomialDetails
 from flightid.models import NarxStructure, PolynomialStructure
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty.quantiles import interval_words, shown
 from flightid.validation import Verdict
 
 if TYPE_CHECKING:
@@ -55,16 +56,15 @@ def estimates_table(item: ModelResults, truth: Truth | None) -> Table:
         cells += [_with_interval(other.parameters[name]) for other in item.fits.values()]
         cells += [known[name]] if known else []
         rows.append(tuple(cells))
-    return Table(
-        "The same model fitted to each estimate, with 95 % intervals", tuple(columns), tuple(rows)
-    )
+    title = f"The same model fitted to each estimate, with {interval_words(shown())} intervals"
+    return Table(title, tuple(columns), tuple(rows))
 
 
 def _with_interval(parameter: Estimate) -> str:
-    if parameter.interval95 is None:
+    ends = parameter.interval(shown())
+    if ends is None:
         return f"{parameter.value:.4g}"
-    low, high = parameter.interval95
-    return f"{parameter.value:.4g} ({low:.4g} … {high:.4g})"
+    return f"{parameter.value:.4g} ({ends[0]:.4g} … {ends[1]:.4g})"
 
 
 def minima_table(fit: Fit) -> Table:
@@ -125,8 +125,8 @@ def model_table(items: Iterable[ModelResults]) -> Table:
     made = Table("Models", columns, rows).without_empty_columns()
     # A note explains a column that is there.
     words = {
-        "modes": "modes: natural frequency in Hz with the half-width of its 95 % interval, and "
-        "damping ratio; 1 is a real pole",
+        "modes": "modes: natural frequency in Hz with the half-width of its "
+        f"{interval_words(shown())} interval, and damping ratio; 1 is a real pole",
         "worst free-run fit": "free runs: on the records of the verification",
     }
     there = {column.name for column in made.columns}
@@ -186,8 +186,7 @@ def modes_words(details: PolynomialDetails) -> str:
         if frequency is None or damping is None:
             continue
         wide = ""
-        if frequency.interval95 is not None:
-            half = 0.5 * (frequency.interval95[1] - frequency.interval95[0])
+        if (half := frequency.half(shown())) is not None:
             wide = f" ± {half * HZ:.2g}"
         said.append(f"{frequency.value * HZ:.3g}{wide} Hz (ζ {damping.value:.2g})")
     return "; ".join(said) or "none"

@@ -33,6 +33,7 @@ from flightid.study.faults import blocks_until, section_of
 from flightid.study.published import published_tables
 from flightid.study.response_figures import response_figures
 from flightid.study.structures import goal_findings
+from flightid.uncertainty.quantiles import interval_words, shown
 
 if TYPE_CHECKING:
     from flightid.identification import Fit
@@ -64,7 +65,8 @@ def _first(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
     if isinstance(fit.details, PolynomialDetails):
         yield figure_block(
             pole_zero(fit),
-            "Poles and zeros in the z plane; 95 % ellipses may be smaller than a mark.",
+            f"Poles and zeros in the z plane; {interval_words(shown())} ellipses may be smaller "
+            "than a mark.",
         )
     elif fit.responses:
         yield from response_figures(item, truth)
@@ -183,7 +185,8 @@ def _beside(item: ModelResults, fit: Fit) -> tuple[Block, ...]:
     except ModelError:
         return ()
     both = {"identified": ours, "reference": theirs}
-    picture = figure_block(pole_map(both), "Eigenvalues with 95 % regions, beside the reference's.")
+    caption = f"Eigenvalues with {interval_words(shown())} regions, beside the reference's."
+    picture = figure_block(pole_map(both), caption)
     return (picture, TableBlock(theirs.table(), folded=True))
 
 

@@ -10,6 +10,7 @@ from flightid.report.content import Figure
 from flightid.report.figures import figure_block
 from flightid.responses.response_band import response_band
 from flightid.study.estimate_tables import WORDS
+from flightid.uncertainty.quantiles import interval_words, shown
 
 if TYPE_CHECKING:
     from flightid.study.identified import ModelResults
@@ -45,6 +46,7 @@ def _figure(item: ModelResults, name: str, truth: Truth | None) -> Figure:
     curves = []
     for number, (method, response) in enumerate(item.responses.items()):
         pair = response.pair(output, source)
+        own = response_band(response, source, output, level=shown()) if number == 0 else None
         curves.append(
             Curve(
                 WORDS[method],
@@ -53,22 +55,22 @@ def _figure(item: ModelResults, name: str, truth: Truth | None) -> Figure:
                 colour=look.MEASURED if number == 0 else look.SERIES[number],
                 dash="solid" if number == 0 else "dash",
                 coherence=pair.coherence,
-                intervals=None if number else response_band(response, source, output),
+                intervals=own,
             )
         )
     omega, fit = curves[0].omega_rad_s, item.fit
-    shown = f"{output} to {source}: {curves[0].name} with its 95 % band"
+    said = f"{output} to {source}: {curves[0].name} with its {interval_words(shown())} band"
     exact = None
     # A NARX model has no frequency response, and inputs without coherence are in no model.
     if fit is not None and source in fit.model.inputs and hasattr(fit.model, "frequency_response"):
         place = fit.model.outputs.index(output), fit.model.inputs.index(source)
         fitted = fit.model.frequency_response(omega)[place]
         curves.append(Curve("model", omega, fitted, colour=look.MODEL))
-        shown += ", and model" if fit.responses else ", and model fitted in time"
+        said += ", and model" if fit.responses else ", and model fitted in time"
         exact = None if truth is None else truth.response(fit.model, omega)
     if exact is not None and fit is not None and len(fit.responses) == 1:
         curves.append(Curve("truth", omega, exact, colour=look.TRUTH, dash="dot"))
-        shown += "; truth dotted"
+        said += "; truth dotted"
     least = item.settings.response.minimum_coherence
     if item.settings.structure is None:
         return figure_block(bode(curves, unit=pair.unit), f"{shown}.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, MutableMapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from flightid.study.tuning import TuneSettings, tune_models
 from flightid.study.uses import use_models
 from flightid.surface import as_key, speaking
 from flightid.vehicles import GainFlight
+from flightid.uncertainty.quantiles import checked_level
 
 
 def _tuning(of_study: TuneSettings | None, asked: bool | Mapping[str, Any]) -> TuneSettings | None:
@@ -46,6 +47,7 @@ def run_study(
     output: str | Path | None = None,
     log: str | Path | None = None,
     tune: bool | Mapping[str, Any] = False,
+    level: float | None = None,
     cache: MutableMapping[str, Any] | None = None,
 ) -> Study:
     """Carry out a study file: log or records, responses, models, verification, report.
@@ -65,6 +67,8 @@ def run_study(
     tune : bool or mapping
         Tune gains with the usual requirements where the study does not say any; a mapping by the
         names of `TuningRequirements` and `TuneOptions` goes before what the study says.
+    level : float, optional
+        Of the intervals that the report shows, in place of the study's; verdicts keep 95 %.
     cache : mutable mapping of str to object, optional
         Results of stages by the hash of all that they depend on. Whoever gives the same mapping
         to the next run pays only for the stages behind what has changed.
@@ -85,7 +89,7 @@ def run_study(
     >>> study.output / "report.html"                                 # doctest: +SKIP
     """
     with speaking(as_key):
-        return _run(Path(path), output, log, tune, cache)
+        return _run(Path(path), output, log, tune, cache, level)
 
 
 def _run(
@@ -94,8 +98,11 @@ def _run(
     log: str | Path | None,
     tune: bool | Mapping[str, Any],
     cache: MutableMapping[str, Any] | None,
+    level: float | None,
 ) -> Study:
     settings = read_settings(source)
+    if level is not None:
+        settings = replace(settings, level=checked_level(level))
     final = Path(output) if output is not None else source.with_name(f"{source.stem}-output")
     reads = (source, *_paths(settings), *(() if log is None else (Path(log),)))
     require_replaceable(final, reads)

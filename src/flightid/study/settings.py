@@ -29,6 +29,7 @@ from flightid.study.response_settings import EXCITATION, ResponseSettings, read_
 from flightid.study.tuning import TuneSettings, read_tune
 from flightid.study.uses_settings import UsesSettings, read_uses
 from flightid.vehicles import GainFlightOptions
+from flightid.uncertainty.quantiles import LEVEL
 
 Value = TypeVar("Value")
 
@@ -69,6 +70,8 @@ class Settings:
     ----------
     title, aircraft, notes : str
         Words for the report.
+    level : float
+        Of every interval that the report shows; verdicts keep 95 %.
     log : Path or None
         Log to read.
     flight : FlightPlan or None
@@ -110,6 +113,7 @@ class Settings:
     title: str
     aircraft: str
     notes: str
+    level: float
     log: Path | None
     flight: FlightPlan | None
     channel_map: str | None
@@ -157,7 +161,7 @@ def read_settings(path: Path) -> Settings:
     root, folder = TableReader(read_toml(path, "the study file", StudyError), TOP), path.parent
     collected = ErrorList()
     tables = partial(collected.read, root.tables, [])
-    words = collected.read(_words, ("", "", ""), root)
+    words = collected.read(_words, ("", "", "", LEVEL), root)
     log, flight = collected.read(_source, (None, None), root, folder)
     mapped, gaps, gap_s, rate = collected.read(_channels, (None, "error", None, None), root, folder)
     segments = collected.each(tables("segment"), _segment)
@@ -235,9 +239,16 @@ def _maybe(
     return root.maybe(lambda given: read(root.table(given), *inputs), key)
 
 
-def _words(root: TableReader) -> tuple[str, str, str]:
+def _words(root: TableReader) -> tuple[str, str, str, float]:
     title = root.table("study")
-    words = (title.text("title"), title.text("aircraft", ""), title.text("notes", ""))
+    words = (
+        *(title.text("title"), title.text("aircraft", ""), title.text("notes", "")),
+        title.number("level", LEVEL),
+    )
+    if not 0.0 < words[-1] < 1.0:
+        raise title.error(
+            "level", "is no probability", found=words[-1], needed="a number above 0 and below 1"
+        )
     title.finish()
     return words
 

@@ -13,6 +13,7 @@ from flightid.study.document import parameter_table, study_document
 from flightid.study.estimate_tables import model_table
 from flightid.study.results import StudyResults
 from flightid.table import Table
+from flightid.uncertainty.quantiles import showing
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -29,12 +30,14 @@ class Study(StudyResults):
     @cached_property
     def document(self) -> Document:
         """The report as a content tree."""
-        return study_document(self)
+        with showing(self.settings.level):
+            return study_document(self)
 
     @cached_property
     def short(self) -> Document:
         """One screen of it: a line a model, gains, and the answer last."""
-        return short_document(self, self.document)
+        with showing(self.settings.level):
+            return short_document(self, self.document)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -43,7 +46,8 @@ class Study(StudyResults):
 
     def summary(self) -> Table:
         """Table of all parameters with their intervals, or of models where none has equations."""
-        return parameter_table(self) if self.has_equations else model_table(self.identified)
+        with showing(self.settings.level):
+            return parameter_table(self) if self.has_equations else model_table(self.identified)
 
     def _computed(self) -> dict[str, object]:
         return {

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Generic, Protocol, TypeVar, cast
 
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words
+from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, shown
 
 if TYPE_CHECKING:
     from typing_extensions import TypeVar as DefaultTypeVar
@@ -230,7 +230,7 @@ def estimate_table(
     estimates: Iterable[Reading],
     notes: tuple[str, ...] = (),
     *,
-    level: float = LEVEL,
+    level: float | None = None,
 ) -> Table:
     """Table of estimates, a line each.
 
@@ -240,7 +240,7 @@ def estimate_table(
     estimates : iterable of Estimate
     notes : tuple of str
         Put below; reasons follow them, each once.
-    level : float
+    level : float, optional
         Of the intervals.
 
     Example
@@ -248,11 +248,13 @@ def estimate_table(
     >>> estimate_table("Margins", [Estimate("gain margin", 9.5, "dB")]).rows[0][:3]
     ('gain margin', 9.5, 'dB')
     """
+    level = shown(level)
     words = interval_words(level)
     columns = (
         Column("quantity"),
         Column("value", digits=4),
         Column("unit"),
+        Column("in Hz", digits=4),
         Column(f"{words} low", digits=4),
         Column(f"{words} high", digits=4),
     )
@@ -260,7 +262,10 @@ def estimate_table(
     reasons: dict[str, list[str]] = {}
     for each in estimates:
         low, high = each.interval(level) or (None, None)
-        rows.append((each.name, each.value, "" if each.unit == "1" else each.unit, low, high))
+        known = each.unit == "rad/s" and each.value is not None
+        hertz = float(cast("float", each.value)) / math.tau if known else None
+        unit = "" if each.unit == "1" else each.unit
+        rows.append((each.name, each.value, unit, hertz, low, high))
         if each.reason:
             reasons.setdefault(each.reason, []).append(each.name)
     why = tuple(f"{', '.join(names)}: {reason}." for reason, names in reasons.items())

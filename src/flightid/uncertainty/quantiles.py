@@ -3,13 +3,65 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 
 from scipy.special import ndtr, ndtri, stdtrit
 
 from flightid.errors import OptionError
 
 LEVEL = 0.95
-"""Level of an interval unless told."""
+"""Level of an interval unless told; verdicts always rest on it."""
+_shown: ContextVar[float] = ContextVar("shown", default=LEVEL)
+
+
+@contextmanager
+def showing(level: float | None) -> Iterator[None]:
+    """Let tables and pictures that are made inside show intervals of a level.
+
+    Verdicts keep `LEVEL`. None changes nothing.
+
+    Raises
+    ------
+    OptionError
+        A level that is no probability.
+    """
+    before = _shown.set(shown(level))
+    try:
+        yield
+    finally:
+        _shown.reset(before)
+
+
+def shown(level: float | None = None) -> float:
+    """The level that a table or a picture shows: the one given, else that of `showing`.
+
+    Raises
+    ------
+    OptionError
+        A level that is no probability.
+
+    Example
+    -------
+    >>> with showing(0.9):
+    ...     shown(), shown(0.5)
+    (0.9, 0.5)
+    """
+    return _shown.get() if level is None else checked_level(level)
+
+
+def ellipse_radius(level: float) -> float:
+    """Semi-axis of the region of two normal numbers together, in standard deviations.
+
+    χ² with two degrees of freedom is exponential: χ²(level) = −2 ln(1 − level).
+
+    Example
+    -------
+    >>> round(ellipse_radius(0.95) ** 2, 6)
+    5.991465
+    """
+    return math.sqrt(-2.0 * math.log1p(-checked_level(level)))
 
 
 def half_width(level: float = LEVEL, freedom: float | None = None) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from operator import methodcaller
 
@@ -12,7 +13,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading
-from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.quantiles import interval_words, shown
 from flightid.uncertainty.uncertain import Uncertain
 
 
@@ -134,20 +135,22 @@ class ClosedLoop(
         names = ", ".join(self.actuators)
         return f"ClosedLoop({n} actuator{'' if n == 1 else 's'} [{names}], {verdict}{pole})"
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of the poles with intervals.
 
         Parameters
         ----------
-        level : float
+        level : float, optional
             Of the intervals.
         """
+        level = shown(level)
         words = interval_words(level)
         columns = (
             Column("real", "rad/s"),
             Column(f"real, {words}"),
             Column("imaginary", "rad/s"),
             Column("frequency", "rad/s"),
+            Column("in Hz"),
             Column(f"frequency, {words}"),
             Column("damping", digits=3),
             Column(f"damping, {words}"),
@@ -155,7 +158,9 @@ class ClosedLoop(
         rows = tuple(
             (
                 *(each.real.value, each.real.range_words(level), each.imaginary.value),
-                *(each.frequency.value, each.frequency.range_words(level)),
+                each.frequency.value,
+                None if each.frequency.value is None else each.frequency.value / math.tau,
+                each.frequency.range_words(level),
                 *(each.damping.value, each.damping.range_words(level)),
             )
             for each in self.poles

@@ -29,7 +29,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
-from flightid.uncertainty.quantiles import LEVEL
+from flightid.uncertainty.quantiles import shown
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -108,8 +108,9 @@ class DiskMargin(Result, schema="flightid.disk_margin/1"):
             f" dB, phase {self.phase.value:.3g} deg)"
         )
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of all numbers with their intervals."""
+        level = shown(level)
         title = f"Disk margin at {', '.join(self.channels)}, skew {self.skew:g}"
         return estimate_table(title, self.quantities, tuple(map(str, self.findings)), level=level)
 

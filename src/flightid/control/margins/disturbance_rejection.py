@@ -19,7 +19,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Reading, estimate_table
-from flightid.uncertainty.quantiles import LEVEL
+from flightid.uncertainty.quantiles import shown
 
 Array = NDArray[np.float64]
 PEAK_GUIDE_DB = 5.0
@@ -80,8 +80,9 @@ class DisturbanceRejection(Result, schema="flightid.disturbance_rejection/1"):
         shown = f"bandwidth {self.bandwidth.text}, peak {self.peak.text}"
         return f"DisturbanceRejection({self.name}: {shown})"
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of all numbers with their intervals."""
+        level = shown(level)
         notes = tuple(map(str, self.findings))
         return estimate_table(
             f"Disturbance rejection of {self.name}", self.quantities, notes, level=level

@@ -23,7 +23,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Column, Table
 from flightid.uncertainty.estimate import Reading, estimate_table
-from flightid.uncertainty.quantiles import LEVEL
+from flightid.uncertainty.quantiles import shown
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -165,8 +165,9 @@ class Margins(Result, schema="flightid.margins/1"):
             f"gain {self.gain_margin.text})"
         )
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of all numbers with their intervals."""
+        level = shown(level)
         notes = tuple(map(str, self.findings))
         return estimate_table(f"Margins of {self.name}", self.quantities, notes, level=level)
 

@@ -26,7 +26,7 @@ from flightid.findings import Finding
 from flightid.models.save import toml_value
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
-from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.quantiles import interval_words, shown
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -167,14 +167,15 @@ class PidDesign(
         made = Table(f"Gains of {self.axis}", columns, tuple(rows), self._words())
         return made if self.flown.has_flown else made.without_empty_columns()
 
-    def promise_table(self, *, level: float = LEVEL) -> Table:
+    def promise_table(self, *, level: float | None = None) -> Table:
         """Margins and bandwidths beside those of the flown gains.
 
         Parameters
         ----------
-        level : float
+        level : float, optional
             Of the intervals; what the worst plant promises has its own confidence.
         """
+        level = shown(level)
         words = interval_words(level)
         columns = (
             Column("loop"),

@@ -12,7 +12,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
-from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.quantiles import interval_words, shown
 
 
 @dataclass(frozen=True)
@@ -124,14 +124,15 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
             needed=", ".join(number.name for number in self.parameters),
         )
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of the common parameters, ratios to the first condition and findings.
 
         Parameters
         ----------
-        level : float
+        level : float, optional
             Of the intervals.
         """
+        level = shown(level)
         notes = [
             f"Only in {name}: {', '.join(alone)}."
             for name, alone in self.only_parameters.items()
@@ -147,14 +148,15 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
         said = [f"Changed beyond noise: {'; '.join(changed)}."] if changed else []
         return (*said, *(str(f) for f in self.findings if f.light is not Light.GREEN))
 
-    def modes_table(self, *, level: float = LEVEL) -> Table:
+    def modes_table(self, *, level: float | None = None) -> Table:
         """Table of the modes that answer to each other.
 
         Parameters
         ----------
-        level : float
+        level : float, optional
             Of the intervals.
         """
+        level = shown(level)
         numbers = [number for mode in self.modes for number in mode.numbers]
         notes = tuple(
             f"Only in {name}: {', '.join(alone)}."

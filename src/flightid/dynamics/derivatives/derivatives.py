@@ -18,7 +18,7 @@ from flightid.models import StateSpaceModel
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate, Reading
-from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.quantiles import interval_words, shown
 from flightid.units import convert, same_dimension
 
 Array = NDArray[np.float64]
@@ -153,8 +153,9 @@ class DerivativeTable(Result, schema="flightid.derivatives/1"):
         found = (each.coefficient for each in self.derivatives)
         return {q.name: q.value for q in found if q is not None and q.value is not None}
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of the derivatives by force and moment, with and without dimensions."""
+        level = shown(level)
         columns = (
             Column("derivative"),
             Column("meaning"),

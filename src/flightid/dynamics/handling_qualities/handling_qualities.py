@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 from flightid.conventions import Light
 from flightid.dynamics.handling_qualities.attitude_bandwidth import attitude_bandwidth
@@ -29,7 +30,7 @@ from flightid.responses import FrequencyResponse
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
-from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.quantiles import interval_words, shown
 
 ATTITUDES = {"roll": ("phi", "p"), "pitch": ("theta", "q"), "yaw": ("psi", "r")}
 CONTROLS = {
@@ -89,14 +90,15 @@ class HandlingQualities(Result, schema="flightid.handling_qualities/1"):
         )
         return f"HandlingQualities({words}" + (f", worst {self.worst})" if self.worst else ")")
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """One table: each number with its interval, and each level with its probability.
 
         Parameters
         ----------
-        level : float
+        level : float, optional
             Of the intervals; what a standard calls a level is not meant.
         """
+        level = shown(level)
         words = interval_words(level)
         columns = (
             Column("what"),
@@ -105,6 +107,7 @@ class HandlingQualities(Result, schema="flightid.handling_qualities/1"):
             Column(f"{words} low"),
             Column(f"{words} high"),
             Column("unit"),
+            Column("in Hz"),
             Column("level"),
             Column("probability of level 1", "%", 3),
             Column("standard"),
@@ -134,7 +137,9 @@ FOR_PILOTS = (
 def _row(what: str, quantity: Reading, rating: Rating | None, level: float) -> tuple[Cell, ...]:
     low, high = quantity.interval(level) or (None, None)
     unit = "" if quantity.unit == "1" else quantity.unit
-    return (what, quantity.name, quantity.value, low, high, unit, *_level(rating))
+    known = unit == "rad/s" and quantity.value is not None
+    hz = float(cast("float", quantity.value)) / math.tau if known else None
+    return (what, quantity.name, quantity.value, low, high, unit, hz, *_level(rating))
 
 
 def _level(rating: Rating | None) -> tuple[Cell, ...]:

@@ -20,7 +20,7 @@ from flightid.responses.spectrum_measures import band_rms, cutoff_frequency
 from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
-from flightid.uncertainty.quantiles import LEVEL
+from flightid.uncertainty.quantiles import shown
 from flightid.uncertainty.uneven import LogarithmicEnds
 
 TAPER = 0.1
@@ -70,8 +70,9 @@ class PilotCutoff(Result, schema="flightid.pilot_cutoff/1"):
         """Channel and cut-off on one line."""
         return f"PilotCutoff({self.channel}, {self.cutoff.text})"
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of cut-off and root mean square."""
+        level = shown(level)
         notes = tuple(map(str, self.findings))
         return estimate_table(
             f"Pilot's use of {self.channel}", (self.cutoff, self.rms), notes, level=level

@@ -14,7 +14,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
-from flightid.uncertainty.quantiles import LEVEL
+from flightid.uncertainty.quantiles import shown
 from flightid.uncertainty.uncertain import LOST, Uncertain
 from flightid.uncertainty.uneven import drawn_estimate
 
@@ -173,8 +173,9 @@ class AttitudeBandwidth(
             f"AttitudeBandwidth({self.name}, {self.bandwidth_rad_s:.4g} rad/s, phase delay {delay})"
         )
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of all values with intervals at a level."""
+        level = shown(level)
         title = f"Attitude bandwidth of {self.name}, {self.response_type} command"
         return estimate_table(title, self.quantities, tuple(map(str, self.findings)), level=level)
 

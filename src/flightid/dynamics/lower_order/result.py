@@ -19,7 +19,7 @@ from flightid.responses import FrequencyResponse
 from flightid.result import Result
 from flightid.table import Table
 from flightid.uncertainty.estimate import Estimate, Reading, estimate_table
-from flightid.uncertainty.quantiles import LEVEL
+from flightid.uncertainty.quantiles import shown
 from flightid.uncertainty.uncertain import LOST, Uncertain
 from flightid.uncertainty.uneven import drawn_estimate
 from flightid.validation.verification.muad import Mismatch
@@ -193,8 +193,9 @@ class LowerOrder(
         """Kind, pair and mismatch on one line."""
         return f"LowerOrder({self.kind}, {self.name}, mismatch {self.mismatch_cost:.1f})"
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of the numbers with intervals at a level."""
+        level = shown(level)
         low, high = self.band_rad_s
         inside = self.mismatch.inside_percent[0]
         notes = [

@@ -20,7 +20,7 @@ from flightid.identification.uncertain_of import source_findings
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate, Reading
-from flightid.uncertainty.quantiles import LEVEL
+from flightid.uncertainty.quantiles import shown
 from flightid.uncertainty.uncertain import Uncertain
 from flightid.units import convert, same_dimension
 
@@ -151,14 +151,15 @@ class ApproximateModes(Result, schema="flightid.approximate_modes/1"):
             needed=", ".join(each.name for each in self.approximations),
         )
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of the approximations beside the full modes, formulas and sources below.
 
         Parameters
         ----------
-        level : float
+        level : float, optional
             Of the intervals.
         """
+        level = shown(level)
         columns = (
             Column("approximation"),
             Column("ω_n or root", "rad/s"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -14,7 +15,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
-from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.quantiles import interval_words, shown
 
 LEAST_SHOWN = 0.01
 """Participation below which the table of participations leaves a state out."""
@@ -257,14 +258,15 @@ class Modes(Result, schema="flightid.modes/1"):
             return all(mode.root.real <= 0.0 for mode in self.modes)
         return all(abs(mode.root) <= 1.0 for mode in self.modes)
 
-    def table(self, *, level: float = LEVEL) -> Table:
+    def table(self, *, level: float | None = None) -> Table:
         """Table of all modes; ± is half an interval, or the interval where it is not even.
 
         Parameters
         ----------
-        level : float
+        level : float, optional
             Of the intervals.
         """
+        level = shown(level)
         columns = (
             Column("mode"),
             Column("real", "rad/s"),
@@ -273,6 +275,7 @@ class Modes(Result, schema="flightid.modes/1"):
             Column("±", "rad/s", 2),
             Column("ω_n", "rad/s"),
             Column("±", "rad/s", 2),
+            Column("f_n", "Hz", 4),
             Column("ζ", digits=3),
             Column("±", digits=2),
             Column("period", "s"),
@@ -298,14 +301,15 @@ class Modes(Result, schema="flightid.modes/1"):
             notes.append(f"From the z plane by s = ln z / T, T = {self.sample_time_s:.4g} s.")
         return (*notes, *map(str, self.findings))
 
-    def participation_table(self, *, level: float = LEVEL) -> Table:
+    def participation_table(self, *, level: float | None = None) -> Table:
         """Table of states by mode: share, and size in the eigenvector with its phase.
 
         Parameters
         ----------
-        level : float
+        level : float, optional
             Of the intervals, half of which is ±.
         """
+        level = shown(level)
         columns = (
             Column("mode"),
             Column("state"),
@@ -335,7 +339,7 @@ class Modes(Result, schema="flightid.modes/1"):
             f"Participation of the states, {self.name}", columns, tuple(rows), notes
         ).without_empty_columns()
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Same as `table`."""
         return self.table(level=level)
 
@@ -363,6 +367,7 @@ def _row(mode: Mode, level: float) -> tuple[Cell, ...]:
     last = mode.time_to_half if mode.time_to_half.value is not None else mode.time_to_double
     interval = last.range_words(level, 3)
     numbers: list[Cell] = []
+    omega = mode.natural_frequency.value
     for each, there in (
         (mode.real, True),
         (mode.imaginary, pair),
@@ -370,6 +375,7 @@ def _row(mode: Mode, level: float) -> tuple[Cell, ...]:
         (mode.damping_ratio, pair),
     ):
         numbers += [each.value, each.half(level)] if there else [None, None]
+    numbers.insert(-2, omega / math.tau if pair and omega is not None else None)
     times = (mode.period, mode.time_constant, mode.time_to_half, mode.time_to_double)
     parts = f": {mode.named.parts}" if mode.named.parts else ""
     words = f"{mode.named.character}{parts}"

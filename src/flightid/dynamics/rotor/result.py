@@ -9,7 +9,7 @@ from flightid.findings import Finding
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Reading
-from flightid.uncertainty.quantiles import LEVEL, interval_words
+from flightid.uncertainty.quantiles import interval_words, shown
 
 THEORY, GIVEN, FULL = "theory", "given", "full model's mode"
 """Where an expected number comes from."""
@@ -87,8 +87,9 @@ class RotorPhysics(Result, schema="flightid.rotor_physics/1"):
             needed=", ".join(fact.identified.name for fact in self.facts),
         )
 
-    def summary(self, *, level: float = LEVEL) -> Table:
+    def summary(self, *, level: float | None = None) -> Table:
         """Table of identified and expected numbers with their ratios."""
+        level = shown(level)
         columns = (
             Column("quantity"),
             Column("formula"),

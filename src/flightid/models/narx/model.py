@@ -175,6 +175,30 @@ class NarxModel(TableView):
         return np.asarray(values * scaling.deviation[self.output] + scaling.mean[self.output])[None]
 
     @property
+    def memory(self) -> int:
+        """Samples back that its longest lag looks."""
+        return max(lag.lag for lag in self.structure.lags)
+
+    def after(self, inputs: Array, outputs: Array) -> float:
+        """The next output of a free run, in its unit.
+
+        Parameters
+        ----------
+        inputs : ndarray, shape (n_inputs, memory + 1)
+            The last ones and that of this instant, in the inputs' units.
+        outputs : ndarray, shape (memory,)
+            The last ones, the latest last, in the output's unit.
+        """
+        scaling, name = self.scaling, self.output
+        past = (outputs - scaling.mean[name]) / scaling.deviation[name]
+        moved = [
+            (row - scaling.mean[channel]) / scaling.deviation[channel]
+            for channel, row in zip(self.inputs, inputs, strict=True)
+        ]
+        values, _, _ = self._run(np.append(past, 0.0), np.array(moved), 0)
+        return float(values[-1] * scaling.deviation[name] + scaling.mean[name])
+
+    @property
     def guard(self) -> tuple[float, float]:
         """Range in which a run is held, in deviations of the output about its mean."""
         low, high = self.scaling.output_range

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, MutableMapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from flightid.conventions import Light
 from flightid.findings import Finding
@@ -21,6 +22,7 @@ from flightid.logs.dataflash.sid_runs import SidRun
 from flightid.models.save import toml_value
 from flightid.study.proposal.manoeuvres import liveliest
 from flightid.study.proposal.proposal import Proposal
+from flightid.study.stage_runner import StageRunner
 
 TEMPLATES = {"roll": "rate_motor_lag", "pitch": "rate_motor_lag", "yaw": "rate_rotor_inertia"}
 """Rate of a multirotor to its mixer's command; in yaw the rotors' own inertia turns it first."""
@@ -86,7 +88,14 @@ class _Axis:
             yield f"response = {{ estimator = {toml_value(self.estimator)} }}"
 
 
-def study_of_log(path: Path, folder: Path, *, model: str | None, tune: bool) -> Proposal:
+def study_of_log(
+    path: Path,
+    folder: Path,
+    *,
+    model: str | None,
+    tune: bool,
+    cache: MutableMapping[str, Any] | None = None,
+) -> Proposal:
     """Study file for a log.
 
     Parameters
@@ -99,9 +108,12 @@ def study_of_log(path: Path, folder: Path, *, model: str | None, tune: bool) -> 
         Template in place of the usual one.
     tune : bool
         Whether gains are wanted.
+    cache : mutable mapping of str to object, optional
+        Takes what was read and inspected, for the run of the study.
     """
-    log = read_log(path)
-    inspection = inspect_log(log)
+    runner = StageRunner(cache)
+    opened = runner.stage("log", read_log, path)
+    log, inspection = opened.value, runner.stage("inspection", inspect_log, opened).value
     axes: list[_Axis] = []
     missed: list[Finding] = []
     for band in inspection.bands:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import MutableMapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from flightid.errors import OptionError
 from flightid.logs import is_log
@@ -22,6 +23,7 @@ def propose_study(
     time_column: str = TIME_COLUMN,
     sample_time_s: float | None = None,
     tune: bool = False,
+    cache: MutableMapping[str, Any] | None = None,
 ) -> Proposal:
     """Write the study that data ask for: what was flown says what can be identified, and how.
 
@@ -42,6 +44,8 @@ def propose_study(
         Time between samples of records without a time column, s.
     tune : bool
         Let the study end in gains of the autopilot that flew.
+    cache : mutable mapping of str to object, optional
+        Takes what is read of a log and found in it; given to `run_study`, nothing is done twice.
 
     Returns
     -------
@@ -76,4 +80,4 @@ def propose_study(
             found=", ".join(path.name for path in paths),
             needed="one log without columns and sample_time_s=, or records from files",
         )
-    return study_of_log(logs[0], Path(folder), model=model, tune=tune)
+    return study_of_log(logs[0], Path(folder), model=model, tune=tune, cache=cache)

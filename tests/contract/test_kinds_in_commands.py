@@ -1,0 +1,80 @@
+"""Model files of every kind in every command that takes one: an answer, or a refusal with why."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import flightid as fid
+from flightid.cli.output import Exit
+from flightid.cli.program import run
+from tests.contract.test_kinds import STRUCTURES, T_S, fit, record
+
+GREY = {"grey linear", "grey nonlinear", "transfer"}
+SAMPLED = set(STRUCTURES) - GREY
+NARX = {"NARX"}
+# Command -> its words after the model, and the kinds that it refuses.
+COMMANDS: dict[str, tuple[list[str], set[str]]] = {
+    "verify": (["{records}"], set()),
+    "simulate model": (["{records}"], set()),
+    "export toml": (["{folder}/x.toml"], set()),
+    "export c": (["{folder}/x.c"], set()),
+    "export mat": (["{folder}/x.mat"], NARX),
+    "export fmu": (["{folder}/x.fmu", "--no-compile"], NARX),
+    "fly": (["--duration", "0.2"], set()),
+    "modes": ([], NARX),
+    "margins": ([], NARX),
+    "margins closed": (["--feedback", "tau_phi=p:0.02"], NARX),
+    "handling-qualities": ([], NARX),
+    "derivatives": ([], {"transfer", *SAMPLED}),
+    "interpret": ([], {*GREY, *NARX}),
+    "compare": (["{other}"], SAMPLED),
+    "tune": (["--controller", "pi", "--controller-rate-hz", "20", "--draws", "10"], NARX),
+}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    made = tmp_path_factory.mktemp("models")
+    for kind in STRUCTURES:
+        fid.write_model(fit(kind), made / f"{kind.replace(' ', '_')}.toml")
+    fid.write_model(fit("transfer"), made / "other.toml")
+    fid.write_records(record(), made / "records.parquet")
+    return made
+
+
+def _words(command: str, kind: str, folder: Path) -> Iterator[str]:
+    told, _ = COMMANDS[command]
+    verb, _, rest = command.partition(" ")
+    yield from [verb, *([rest] if verb == "simulate" else [])]
+    yield str(folder / f"{kind.replace(' ', '_')}.toml")
+    places = {
+        "folder": folder,
+        "records": folder / "records.parquet",
+        "other": folder / "other.toml",
+    }
+    yield from (word.format(**places) for word in told)
+    if kind in GREY and rest in ("c", "fmu"):
+        yield from ("--sample-time-s", str(T_S))
+    yield "--json"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_command_takes_the_file_of_every_kind_or_says_why_not(
+    command: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, refused = COMMANDS[command]
+    offenders = []
+    for kind in STRUCTURES:
+        code = run(list(_words(command, kind, folder)))
+        said = capsys.readouterr()
+        if kind in refused:
+            typed = "needed" in said.err or "Next:" in said.err
+            if code != Exit.UNUSABLE or not typed or "Traceback" in said.err:
+                offenders.append(f"{kind}: {code}: {said.err or said.out[:200]}")
+        elif code not in (Exit.DONE, Exit.RED) or not json.loads(said.out)["schema"]:
+            offenders.append(f"{kind}: {code}: {said.err}")
+    assert not offenders, "\n".join(offenders)
