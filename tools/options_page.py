@@ -34,6 +34,7 @@ from flightid.simulation.options import SimulationOptions
 from flightid.study.fit_settings import VerifySettings
 from flightid.study.proposal.options import ProposalOptions
 from flightid.study.response_settings import ResponseSettings
+from flightid.validation.residuals.options import ResidualTestOptions
 from flightid.validation.verification.options import VerifyOptions
 from flightid.vehicles.gain_flight import GainFlightOptions
 from flightid.vehicles.pilot_inputs import StickOptions
@@ -67,6 +68,7 @@ def sections() -> dict[str, type[Options]]:
         "export, FMU": FORMATS["fmu"],
         "export, JSBSim": FORMATS["jsbsim"],
         "fly": FlyOptions,
+        "residual_tests": ResidualTestOptions,
         "margins": MarginOptions,
         "handling_qualities": QualitiesOptions,
         "reduce": ReductionLimits,

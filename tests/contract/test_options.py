@@ -26,6 +26,7 @@ from flightid.record.options import ReadOptions
 from flightid.responses.options import ResponseOptions
 from flightid.simulation.options import SimulationOptions
 from flightid.study.reading import TableReader
+from flightid.validation.residuals.options import ResidualTestOptions
 from flightid.validation.verification.options import VerifyOptions
 from tests.contract.source import PACKAGE, python_files, tree
 from tests.contract.test_arguments import DICTIONARY, WORD_OF
@@ -75,6 +76,7 @@ FIELDS = {each.name for options in sections().values() for each in options_of(op
 VERBS: dict[Callable[..., Any], tuple[type[Options], set[str]]] = {
     fid.estimate_response: (ResponseOptions, set()),
     fid.simulate: (SimulationOptions, set()),
+    fid.residual_tests: (ResidualTestOptions, set()),
     fid.margins: (MarginOptions, set()),
     fid.handling_qualities: (QualitiesOptions, set()),
     fid.verify: (VerifyOptions, set()),

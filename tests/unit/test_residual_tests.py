@@ -379,3 +379,31 @@ def test_what_its_own_past_foretells_is_the_power_that_a_filter_takes_out() -> N
     test = fid.residual_tests(fid.verify(lag, spoiled)).test("εε", "y")
     share = 0.8 * np.std(e) / np.std(spoiled["y"])
     assert_close(test.worth_percent, 100.0 * share, rtol=0.03, why="0.64 of an AR(1)'s power")
+
+
+def test_in_a_loop_the_residual_is_tested_against_what_was_injected() -> None:
+    """x' = −2x + 2u, u = r − 1.5 y, coloured noise on y: the true model is red against u alone."""
+    rng = np.random.default_rng(1)
+    noise, x = 0.0, 0.0
+    held, u, y = np.repeat(rng.choice([-1.0, 1.0], 150), 20), np.zeros(3000), np.zeros(3000)
+    a = np.exp(-0.04)
+    for k in range(3000):
+        noise = 0.95 * noise + 0.1 * rng.standard_normal()
+        y[k] = x + noise
+        u[k] = held[k] - 1.5 * y[k]
+        x = a * x + (1.0 - a) * u[k]
+    time_s = np.arange(3000) * 0.02
+    flown = fid.Record.from_arrays(
+        time_s, inputs={"u": u}, outputs={"y": y}, excitations={"r": held}, hold="zero"
+    )
+    truth = fid.LinearSystem([[-2.0]], [[2.0]], [[1.0]], [[0.0]], ("u",), ("y",))
+    missed = fid.LinearSystem([[-3.5]], [[2.0]], [[1.0]], [[0.0]], ("u",), ("y",))
+    tests = fid.residual_tests(fid.verify(truth, flown))
+    assert tests.inputs == ("r",)
+    assert tests.test("uε", "y", "r").verdict == "pass"
+    assert "Tested against the injected r" in tests.predictor
+    assert fid.residual_tests(fid.verify(missed, flown)).test("uε", "y", "r").verdict == "fail"
+    assert (
+        fid.residual_tests(fid.verify(truth, flown), ["u"]).test("uε", "y", "u").verdict == "fail"
+    )
+    assert fid.residual_tests(fid.verify(truth, flown), loop="open").inputs == ("u",)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.cli.output import Exit
 from flightid.cli.program import run as command
 from flightid.errors import StudyError
 from flightid.report.text import to_text
@@ -98,7 +99,8 @@ def test_commands_take_the_files(
     flown = str(folder / "flown.parquet")
     for name in ("roll_slow", "recursion"):
         file = str(study.output / "models" / f"{name}.toml")
-        assert command(["--quiet", "modes", file, "--json"]) == 0
+        # Red where the fit is: its modes rest on it.
+        assert command(["--quiet", "modes", file, "--json"]) in (Exit.DONE, Exit.RED)
         assert json.loads(capsys.readouterr().out)["modes"]
         assert command(["--quiet", "verify", file, flown]) == 0
         assert "Theil coefficient" in capsys.readouterr().out

@@ -63,7 +63,7 @@ def read_files(
     for file in track(list(files), "Reading"):
         if is_log(file):
             _refuse(of_tables, f"tables, and {file.name} is a log")
-            found.append(_from_log(file, of_logs, inputs, outputs))
+            found.append(_from_log(file, of_logs, inputs, outputs, excitations))
             continue
         _refuse({"sid_run": None} if "sid_run" in of_logs else {}, "logs")
         found += _from_table(file, of_tables, of_logs, inputs, outputs, excitations)
@@ -80,11 +80,12 @@ def _from_log(
     of_logs: Mapping[str, Any],
     inputs: Sequence[str] | None,
     outputs: Sequence[str] | None,
+    excitations: Sequence[str] | None,
 ) -> Record:
     from flightid import read_log
 
-    names = [*(inputs or ()), *(outputs or ())]
-    return read_log(file).record(names=names or None, **of_logs)
+    names = [*(inputs or ()), *(outputs or ()), *(excitations or ())]
+    return read_log(file).record(names=list(dict.fromkeys(names)) or None, **of_logs)
 
 
 def _from_table(

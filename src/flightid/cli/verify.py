@@ -19,9 +19,15 @@ if TYPE_CHECKING:
 
 def _fields() -> dict[str, type[Options]]:
     from flightid.record.options import ComparedOptions
+    from flightid.validation.residuals.options import ResidualTestOptions
     from flightid.validation.verification.options import VerifyOptions
 
-    return {"channels": ComparedOptions, "the prediction": VerifyOptions, **reading()}
+    return {
+        "channels": ComparedOptions,
+        "the prediction": VerifyOptions,
+        "residual tests": ResidualTestOptions,
+        **reading(),
+    }
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
@@ -39,7 +45,7 @@ def _fields() -> dict[str, type[Options]]:
     "--residual-tests",
     "with_residuals",
     is_flag=True,
-    help="Test measured minus predicted for independence of the inputs (loop taken as open).",
+    help="Test measured minus predicted for independence of the inputs, or of what was injected.",
 )
 @click.option(
     "--html",
@@ -70,17 +76,20 @@ def command(
 
     chosen = load_source(model, axis, values)
     models = [chosen, *(load_source(rival, axis) for rival in rivals)]
-    channels, given, *of_files = parted(options, _fields())
+    channels, given, of_tests, *of_files = parted(options, _fields())
+    if of_tests and not with_residuals:
+        raise click.UsageError("--excitation, --loop and --maximum-lag are of --residual-tests")
     shared = [name for name in chosen.outputs if all(name in m.outputs for m in models)]
     compared = channels.get("outputs") or shared
     flown = read_files(
-        records, *of_files, inputs=chosen.inputs, outputs=compared, units=chosen.units
-    )
+        records, *of_files, inputs=chosen.inputs, outputs=compared, units=chosen.units,
+        excitations=of_tests.get("excitations"),
+    )  # fmt: skip
     result: Verification | Comparison = verify(
         models if rivals else chosen, flown, outputs=compared, **given
     )
     on_trial = result.first if isinstance(result, Comparison) else result
-    tests = residual_tests(on_trial) if with_residuals else None
+    tests = residual_tests(on_trial, **of_tests) if with_residuals else None
     if as_json:
         extra = {} if tests is None else {"residual_tests": tests.to_dict()}
         emit_values(result.to_dict() | extra)

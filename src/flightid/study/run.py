@@ -29,8 +29,8 @@ from flightid.study.task import load_task
 from flightid.study.tuning import TuneSettings, tune_models
 from flightid.study.uses import use_models
 from flightid.surface import as_key, speaking
-from flightid.vehicles import GainFlight
 from flightid.uncertainty.quantiles import checked_level
+from flightid.vehicles import GainFlight
 
 
 def _tuning(of_study: TuneSettings | None, asked: bool | Mapping[str, Any]) -> TuneSettings | None:

@@ -28,8 +28,8 @@ from flightid.study.references import require_conditions, require_references
 from flightid.study.response_settings import EXCITATION, ResponseSettings, read_response
 from flightid.study.tuning import TuneSettings, read_tune
 from flightid.study.uses_settings import UsesSettings, read_uses
-from flightid.vehicles import GainFlightOptions
 from flightid.uncertainty.quantiles import LEVEL
+from flightid.vehicles import GainFlightOptions
 
 Value = TypeVar("Value")
 

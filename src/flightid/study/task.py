@@ -41,9 +41,13 @@ class Task:
 
 
 def narrowed(record: Record, inputs: Sequence[str], outputs: Sequence[str]) -> Record:
-    """The channels of a model, in its roles: another model may see them otherwise."""
+    """The channels of a model, in its roles: another model may see them otherwise.
+
+    Injected signals stay beside them: residuals of a closed loop are tested against those.
+    """
     roles = {**dict.fromkeys(inputs, Role.INPUT), **dict.fromkeys(outputs, Role.OUTPUT)}
-    return record.select(roles).with_roles(**roles)
+    beside = [name for name in record.excitations if name not in roles]
+    return record.select([*roles, *beside]).with_roles(**roles)
 
 
 def load_task(settings: ModelSettings, others: tuple[str, ...] = ()) -> Task:

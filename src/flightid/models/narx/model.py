@@ -195,7 +195,7 @@ class NarxModel(TableView):
             (row - scaling.mean[channel]) / scaling.deviation[channel]
             for channel, row in zip(self.inputs, inputs, strict=True)
         ]
-        values, _, _ = self._run(np.append(past, 0.0), np.array(moved), 0)
+        values, _, _ = self.run_scaled(np.array(moved), np.append(past, 0.0), 0)
         return float(values[-1] * scaling.deviation[name] + scaling.mean[name])
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -46,6 +46,7 @@ from flightid.validation.residuals.data import Inputs, ResidualData, Residuals, 
 from flightid.validation.residuals.findings import residual_findings
 from flightid.validation.residuals.obstacles import obstacle
 from flightid.validation.residuals.result import ResidualTests
+from flightid.validation.verification.result import Verification
 
 Choice = TypeVar("Choice", Horizon, Loop)
 
@@ -58,6 +59,7 @@ def residual_tests(
     inputs: Inputs | None = None,
     *,
     outputs: Iterable[str] | None = None,
+    excitations: Iterable[str] | None = None,
     horizon: Horizon | str | None = None,
     loop: Loop | str | None = None,
     maximum_lag: int = 25,
@@ -74,8 +76,8 @@ def residual_tests(
 
     Assumes stationary residuals. Biased when inputs are not persistent (a doublet): correlations
     with few independent samples leave the bands in either direction. A loop that is closed around
-    a free run makes residual and input dependent for every model; then give the injected
-    excitation as input.
+    a free run, or not known to be open, makes residual and input dependent for every model: the
+    injected excitation then stands in place of the inputs where records hold it, and is named.
 
     Parameters
     ----------
@@ -87,6 +89,9 @@ def residual_tests(
         With records: channel names; default: their inputs. Else samples as for `residuals`.
     outputs : iterable of str, optional
         Channels of records to test; default: all outputs.
+    excitations : iterable of str, optional
+        Injected signals, independent of noise, that free runs are tested against where a loop was
+        closed; default: the records' channels of that role.
     horizon : {"one step ahead", "free run"}
         Which predictor made the residuals; a fit or verification knows.
     loop : {"open", "closed", "closed within the sample"}, optional
@@ -131,6 +136,14 @@ def residual_tests(
     fitted_noise = data.fitted_noise if fitted_noise is None else fitted_noise
     fitted_input = data.fitted_input if fitted_input is None else fitted_input
     how, feedback = _loop(data, loop or _known_loop(residuals))
+    injected = _injected(residuals, excitations)
+    bent = data.horizon is Horizon.FREE_RUN and feedback.loop != "open"
+    if inputs is None and injected and bent:
+        data = gather_residuals(residuals, injected, outputs, data.horizon)
+        said = f"Tested against the injected {', '.join(injected)}, which no loop moves."
+        data = replace(data, predictor=f"{data.predictor} {said}")
+        # What was injected is independent of the noise at every lag.
+        how = Loop.OPEN
     setup = _Setup(data, how, maximum_lag, fitted_noise, fitted_input)
     _require_lags(setup)
     tests = tuple(
@@ -155,17 +168,32 @@ def residual_tests(
     )
 
 
+def _measured(residuals: Residuals) -> list[Record]:
+    """The records behind residuals, where there are any."""
+    if isinstance(residuals, Verification):
+        return [each.measured for each in residuals.predictions]
+    listed = residuals if isinstance(residuals, list | tuple) else [residuals]
+    fitted = [part.measured for each in listed if isinstance(each, Fit) for part in each.records]
+    return fitted or [each for each in listed if isinstance(each, Record)]
+
+
 def _known_loop(residuals: Residuals) -> str | None:
     """What a fit was told of the loop, else what the records behind residuals know."""
     if isinstance(residuals, Fit):
         told = residuals.provenance.get("told")
         if isinstance(told, Mapping) and told.get("loop") in LOOPS:
             return str(told["loop"])
-        records = [each.measured for each in residuals.records]
-    else:
-        listed = residuals if isinstance(residuals, list | tuple) else [residuals]
-        records = [each for each in listed if isinstance(each, Record)]
-    return common_loop([each.input_shape for each in records])
+    return common_loop([each.input_shape for each in _measured(residuals)])
+
+
+def _injected(residuals: Residuals, named: Iterable[str] | None) -> tuple[str, ...]:
+    """Excitations that all records hold: those that are named, else those of that role."""
+    records = _measured(residuals)
+    if named is not None:
+        return (named,) if isinstance(named, str) else tuple(named)
+    if not records:
+        return ()
+    return tuple(name for name in records[0].excitations if all(name in r for r in records))
 
 
 def _loop(data: ResidualData, declared: Loop | str | None) -> tuple[Loop, FeedbackTest]:
