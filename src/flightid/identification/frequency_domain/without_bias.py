@@ -41,7 +41,8 @@ NOISE = 1.1
 """Ratio of the cost with the estimator inside to that without, up to which it may be noise."""
 CHANCE = 4.0
 """Mean square of misfits over their errors up to which a cost that rose is chance: neighbouring
-points share their errors, so few of them are independent."""
+points share their errors, so few of them are independent. Not where errors are those of what the
+model leaves: a wrong model has large ones."""
 MISFIT = 10.0
 """Mean square of misfits over their errors from which on another start is tried."""
 
@@ -102,7 +103,7 @@ def take_out(
     except (FitError, *OUTSIDE) as error:
         return not_done(str(error))
     best = _Judgement.of(objective, ends[0].found)
-    if best.found.end.cost > NOISE * plain.cost and best.misfit > CHANCE:
+    if best.found.end.cost > NOISE * plain.cost and not best.is_chance:
         return not_done(
             f"it would raise the cost from {plain.cost:.3g} to {best.found.end.cost:.3g}: the "
             "model does not hold what the records do, or the search met a wrong minimum"
@@ -137,6 +138,12 @@ class _Judgement:
     found: SearchOutcome
     errors: ErrorModel
     misfit: float
+    of_residuals: bool
+
+    @property
+    def is_chance(self) -> bool:
+        """Whether errors that do not come from this model explain its misfits."""
+        return not self.of_residuals and self.misfit <= CHANCE
 
     @classmethod
     def of(cls, objective: Objective, found: SearchOutcome) -> _Judgement:
@@ -154,7 +161,7 @@ class _Judgement:
             if variance is not None
         ]
         misfit = float(np.mean(np.concatenate(shares))) if shares else np.inf
-        return cls(found, errors, misfit)
+        return cls(found, errors, misfit, known is not None)
 
 
 def _searches(objective: Objective, minimum: Sequence[DenseEnd]) -> list[_Minimum]:
