@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 ABSENT = "absent"
 """Key that says why a value of `to_dict` is None, by the way to it."""
+PLAIN = frozenset({str, bool, int, float, type(None)})
 
 
 class TableView(ABC):
@@ -138,7 +139,9 @@ class Result(TableView):
 
 def _plain(value: object, way: str, absent: dict[str, str]) -> Any:  # noqa: ANN401 — plain values
     """Value as JSON holds it; `absent` takes what no JSON number can say."""
-    value = _opened(value)
+    if _is_plain_array(value):
+        return value.tolist()  # type: ignore[attr-defined]  # thousands of numbers at once
+    value = value if type(value) in PLAIN else _opened(value)
     if isinstance(value, float) and not math.isfinite(value):
         absent[way] = "not determined" if math.isnan(value) else "infinite"
         return None
@@ -149,6 +152,13 @@ def _plain(value: object, way: str, absent: dict[str, str]) -> Any:  # noqa: ANN
     if isinstance(value, list | tuple | set | frozenset):
         return [_plain(item, f"{way}[{i}]", absent) for i, item in enumerate(value)]
     raise TypeError(f"{way} is a {type(value).__name__}, which has no plain values")
+
+
+def _is_plain_array(value: object) -> bool:
+    """Whether it is an array of real numbers that JSON can say, every one."""
+    if not isinstance(value, np.ndarray):
+        return False
+    return value.dtype.kind in "biu" or (value.dtype.kind == "f" and bool(np.isfinite(value).all()))
 
 
 def _values(thing: object) -> dict[str, object]:

@@ -139,12 +139,14 @@ def label_axes(
     log_x : bool
         Logarithmic frequency axis.
     """
-    for row, title in enumerate(y, start=1):
-        made.update_yaxes(title_text=title, row=row, col=column)
-    if log_x:
-        made.update_xaxes(type="log", tickvals=LOG_TICKS, ticktext=LOG_LABELS, col=column)
-        made.update_xaxes(minor={"showgrid": False}, tickfont={"size": 11}, col=column)
-    made.update_xaxes(title_text=x, row=len(y), col=column)
+    # Axes are set one by one: `update_xaxes` takes ten times as long as the rest of a picture.
+    for title, axis in zip(y, made.select_yaxes(col=column), strict=False):
+        axis.title.text = title
+    below = list(made.select_xaxes(col=column))
+    for axis in below if log_x else ():
+        axis.type, axis.tickvals, axis.ticktext = "log", LOG_TICKS, LOG_LABELS
+        axis.minor.showgrid, axis.tickfont.size = False, 11
+    below[len(y) - 1].title.text = x
 
 
 def line(
