@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.plot.modes import CHI_SQUARE_95, pole_map
+from flightid.plot.modes import pole_map
 from flightid.report.content import Document, Figure, Lights, TableBlock
 from flightid.report.html import to_html
 from flightid.report.modes import modes_blocks, physics_blocks
@@ -45,7 +45,7 @@ def test_regions_hold_95_percent_and_slow_modes_are_drawn_again() -> None:
     away = np.array([ellipse.x, ellipse.y]) - np.array([[roll.root.real], [roll.root.imag]])
     assert roll.covariance is not None
     squares = np.einsum("an,ab,bn->n", away, np.linalg.inv(roll.covariance), away)
-    assert_close(squares, CHI_SQUARE_95, rtol=1e-9, why="one level of the density")
+    assert_close(squares, -2.0 * np.log(0.05), rtol=1e-9, why="the 95 % quantile of chi-square 2")
     bars = [t for t in made.data if t.mode == "lines" and t.line.width == 5]
     assert_close(
         bars[0].x, found.modes[0].real.interval95, rtol=1e-12, why="a real eigenvalue has a bar"
