@@ -11,11 +11,17 @@ import sys
 from pathlib import Path
 
 from flightid import Noise
-from flightid.control.margins.options import MarginOptions
+from flightid.control.margins.options import (
+    DiskMarginOptions,
+    DisturbanceOptions,
+    MarginOptions,
+)
 from flightid.control.tuning.controller_options import ControllerOptions
 from flightid.control.tuning.options import TuneOptions
 from flightid.control.tuning.requirements import TuningRequirements
-from flightid.dynamics.handling_qualities.options import QualitiesOptions
+from flightid.dynamics.handling_qualities.options import CutoffOptions, QualitiesOptions
+from flightid.dynamics.lower_order.options import LowerOrderOptions
+from flightid.dynamics.rotor.options import RotorOptions
 from flightid.excitation import Limits, RateAxis
 from flightid.excitation.options import DesignOptions
 from flightid.export.options import FORMATS
@@ -70,6 +76,11 @@ def sections() -> dict[str, type[Options]]:
         "fly": FlyOptions,
         "residual_tests": ResidualTestOptions,
         "margins": MarginOptions,
+        "disk_margin": DiskMarginOptions,
+        "disturbance_rejection": DisturbanceOptions,
+        "lower_order": LowerOrderOptions,
+        "rotor_physics": RotorOptions,
+        "pilot_cutoff": CutoffOptions,
         "handling_qualities": QualitiesOptions,
         "reduce": ReductionLimits,
         "tune": TuneOptions,

@@ -15,9 +15,16 @@ from tools.options_page import sections
 import flightid as fid
 from flightid.cli.option_fields import IN_HERTZ, SHORT, OptionsCommand, flags_of, hertz
 from flightid.cli.program import program
-from flightid.control.margins.options import MarginOptions
-from flightid.dynamics.handling_qualities.options import QualitiesOptions
+from flightid.control.margins.options import (
+    DiskMarginOptions,
+    DisturbanceOptions,
+    MarginOptions,
+)
+from flightid.dynamics.handling_qualities.options import CutoffOptions, QualitiesOptions
+from flightid.dynamics.lower_order.options import LowerOrderOptions
+from flightid.dynamics.rotor.options import RotorOptions
 from flightid.excitation.options import DesignOptions
+from flightid.identification.prediction.request import PredictionOptions
 from flightid.logs import Log
 from flightid.logs.options import PartOptions
 from flightid.models.polynomial.orders import ScanOptions
@@ -78,6 +85,12 @@ VERBS: dict[Callable[..., Any], tuple[type[Options], set[str]]] = {
     fid.simulate: (SimulationOptions, set()),
     fid.residual_tests: (ResidualTestOptions, set()),
     fid.margins: (MarginOptions, set()),
+    fid.disk_margin: (DiskMarginOptions, set()),
+    fid.disturbance_rejection: (DisturbanceOptions, set()),
+    fid.lower_order: (LowerOrderOptions, set()),
+    fid.rotor_physics: (RotorOptions, set()),
+    fid.pilot_cutoff: (CutoffOptions, set()),
+    fid.predict: (PredictionOptions, set()),
     fid.handling_qualities: (QualitiesOptions, set()),
     fid.verify: (VerifyOptions, set()),
     fid.read_records: (ReadOptions, set()),
@@ -184,8 +197,10 @@ def test_commands_with_options_of_fields_read_them_all() -> None:
     """No option of a verb is written by hand: the commands of verbs with fields read the fields."""
     reading = {name for name, found in _commands() if isinstance(found, OptionsCommand)}
     assert reading == {
-        "advise", "consistency", "design", "export", "fly", "handling-qualities", "identify",
-        "margins", "new", "polynomial", "response", "run", "simulate model", "tune", "verify",
+        "advise", "consistency", "design", "disk-margin", "disturbance-rejection", "export", "fly",
+        "handling-qualities", "identify", "lower-order", "margins", "new", "pilot-cutoff",
+        "polynomial", "predict", "response", "rotor-physics", "run", "simulate model", "tune",
+        "verify",
     }  # fmt: skip
     for name, found in _commands():
         if isinstance(found, OptionsCommand):

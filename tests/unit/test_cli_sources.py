@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.cli.output import Exit
 from flightid.cli.program import run
 from flightid.errors import FileFormatError, ModelError
 from tests.closeness import assert_close
@@ -152,3 +153,30 @@ def test_units_of_a_table(saved: Path, tmp_path: Path, capsys: pytest.CaptureFix
     assert "head the column 'p [rad/s]' in the file, or read it with --units p=rad/s" in said
     assert run(["verify", str(saved / "roll.toml"), table("p [m]")]) == 2
     assert "found m; needed rad/s" in capsys.readouterr().err
+
+
+def test_the_cut_off_of_a_control_is_that_of_what_was_flown(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    hands = np.random.default_rng(1).standard_normal(6000)
+    flown = fid.Record.from_arrays(np.arange(6000) * 0.02, inputs={"lat": hands})
+    fid.write_records(flown, tmp_path / "flight.parquet")
+    words = ["pilot-cutoff", str(tmp_path / "flight.parquet"), "--channel", "lat", "--json"]
+    assert run(words) == Exit.DONE
+    told = json.loads(capsys.readouterr().out)
+    # White: half of the power lies below half of Nyquist's frequency.
+    assert told["cutoff"]["value"] == pytest.approx(0.5 * np.pi / 0.02, rel=0.05)
+
+
+def test_disk_margins_of_feedback_are_those_of_its_broken_loop(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    model = fid.load_model("rate_motor_lag")
+    words = ["rate_motor_lag", "--feedback", "tau_phi=p:0.02", "--json"]
+    assert run(["disk-margin", *words]) in (Exit.DONE, Exit.RED)
+    told = json.loads(capsys.readouterr().out)
+    assert told["alpha"]["value"] == fid.disk_margin(model, controller=0.02).alpha.value
+    run(["disturbance-rejection", *words])
+    told = json.loads(capsys.readouterr().out)
+    expected = fid.disturbance_rejection(model, controller=0.02).peak.value
+    assert told["peak"]["value"] == pytest.approx(expected, rel=1e-6)

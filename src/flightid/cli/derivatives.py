@@ -2,27 +2,10 @@
 
 from __future__ import annotations
 
-import click
+from flightid.cli.model_commands import model_command
 
-from flightid.cli.output import all_option, json_option, level_option
-from flightid.cli.pages import show
-from flightid.cli.sources import load_source, model_argument, model_options
-
-
-@click.command()
-@model_argument
-@model_options
-@level_option
-@all_option
-@json_option
-def command(
-    model: str, axis: str | None, values: tuple[str, ...], level: float | None, as_json: bool
-) -> None:
-    """Stability and control derivatives of MODEL; of a fitted one with intervals.
-
-    MODEL is a .toml file, the folder of a study with one model, the JSON of a fit, or the name of a
-    library model.
-    """
-    from flightid import derivatives
-
-    show(derivatives(load_source(model, axis, values)), "Derivatives", as_json=as_json, level=level)
+command = model_command(
+    "derivatives",
+    "Derivatives",
+    "Stability and control derivatives of MODEL; of a fitted one with intervals.",
+)

@@ -253,6 +253,9 @@ def _numbers(each: Option, forms: set[Form]) -> click.ParamType[Any]:
     low, high = each.minimum, each.maximum
     if WORD in forms:
         return click.STRING
+    bounds = (low, high, each.above, each.below)
+    if not any(bound is not None for bound in bounds):
+        return click.INT if WHOLE in forms else click.FLOAT if NUMBER in forms else click.STRING
     if WHOLE in forms:
         return click.IntRange(
             None if low is None else int(low), None if high is None else int(high)

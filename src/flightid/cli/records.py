@@ -122,3 +122,21 @@ def _in_units(record: Record, units: Mapping[str, str]) -> Record:
     for name, unit in wanted.items():
         note(f"{record.name or 'Record'}: {name} converted from {record.unit(name)} to {unit}")
     return record.to_units(**wanted) if wanted else record
+
+
+def write_out(records: Sequence[Record], path: Path) -> Path:
+    """Write records in the format that the file's name says.
+
+    Raises
+    ------
+    click.UsageError
+        Several records for one sheet.
+    """
+    from flightid import write_records
+    from flightid.record.sheet import write_sheet
+
+    if path.suffix.lower() != ".csv":
+        return write_records(records, path)
+    if len(records) > 1:
+        raise click.UsageError("a .csv holds one record: write .parquet or .nc")
+    return write_sheet(records[0], path)

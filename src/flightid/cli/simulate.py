@@ -9,7 +9,7 @@ import click
 
 from flightid.cli.option_fields import OptionsCommand, flags_of, parted
 from flightid.cli.output import emit, json_option, note
-from flightid.cli.records import FILES, read_files, reading
+from flightid.cli.records import FILES, read_files, reading, write_out
 from flightid.cli.sources import load_source, model_argument, model_options
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def model(
             made.append(simulate(chosen, record, units=chosen.units, noise=added, **of_run))
             advance()
     if written is not None:
-        note(f"Wrote {_write(written, made)}")
+        note(f"Wrote {write_out(made, written)}")
     if html is not None:
         note(f"Wrote {_page(html, model, made, driven)}")
     for flown in made:
@@ -145,17 +145,6 @@ def _driving(
     is_whole = not getattr(model, "is_linear", True)
     trim = {n: v for n, v in getattr(model, "trim", {}).items() if n in inputs}
     return [stick_record(units, stick.pop("inputs"), **stick, trim=trim if is_whole else {})]
-
-
-def _write(path: Path, records: list[Record]) -> Path:
-    from flightid import write_records
-    from flightid.record.sheet import write_sheet
-
-    if path.suffix.lower() != ".csv":
-        return write_records(records, path)
-    if len(records) > 1:
-        raise click.UsageError("a .csv holds one record: write .parquet or .nc")
-    return write_sheet(records[0], path)
 
 
 def _page(path: Path, name: str, made: list[Record], driven: list[Record]) -> Path:

@@ -58,3 +58,19 @@ class QualitiesOptions(Options):
         if self.axes is not None:
             pairs = {axis: tuple(text.split("/")) for axis, text in self.axes.items()}
         return {**vars(self), "axes": pairs}
+
+
+@dataclass(frozen=True)
+class CutoffOptions(Options):
+    """Which control, and which of its power counts; see `flightid.pilot_cutoff`.
+
+    Example
+    -------
+    >>> CutoffOptions(channel="lat").band_rad_s is None
+    True
+    """
+
+    channel: str = option(doc="Control as the pilot moved it.")
+    band_rad_s: tuple[float, float] | None = option(
+        None, unit="rad/s", above=0.0, doc="Band whose power counts, above slow trim changes."
+    )

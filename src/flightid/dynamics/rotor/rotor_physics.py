@@ -90,7 +90,11 @@ def rotor_physics(
     """
     model = source.model if isinstance(source, Fit) else source
     if not isinstance(model, StateSpaceModel):
-        raise ModelError("rotor physics needs a state-space model", found=type(model).__name__)
+        raise ModelError(
+            "rotor physics needs a state-space model",
+            found=type(model).__name__,
+            needed="equations with rotor flapping, such as r50_hover",
+        )
     if not rotor_speed_rad_s > 0.0:
         raise OptionError("the rotor speed is not positive", found=rotor_speed_rad_s)
     unknown = set(names or {}) - set(NAMES)
