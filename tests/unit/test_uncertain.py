@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import flightid as fid
 from flightid import errors
+from flightid.identification.fit import uncertain_model
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.uncertainty.estimate import Estimate, estimate_table
 from flightid.uncertainty.uncertain import Uncertain
@@ -74,6 +77,21 @@ def test_draws_have_the_covariance_and_keep_the_bounds() -> None:
     assert inside.max() <= 2.1
     never = Uncertain(np.zeros(1), np.eye(1), lambda x: x, (np.full(1, 99.0), np.full(1, 99.0)))
     assert never.draws(1)[0] == 99.0
+
+
+def test_no_draw_or_step_of_a_black_box_leaves_what_searches_hold_stable() -> None:
+    """A pole beside its zero is hardly known, but had it grown the fit would have seen it."""
+    model = fid.PolynomialModel(("u",), "y", 0.1, b=[[1.0, 0.9]], f=[[1.0, 0.91]])
+    spread = np.diag([1e-4, 1e-4, 0.1])
+    plain = uncertain_model(model, tuple(model.parameters), spread)
+    wild = replace(plain, allowed=None)
+    sizes = [[abs(each.f[0][1]) for each in some.draws(300)] for some in (plain, wild)]
+    assert max(sizes[0]) < 1.0 < max(sizes[1])
+    ends = [abs(each.f[0][1]) for pair in plain.steps(2.0) for each in pair]
+    assert max(ends) < 1.0 < max(abs(e.f[0][1]) for pair in wild.steps(2.0) for e in pair)
+    # One that is unstable itself may be so.
+    growing = fid.PolynomialModel(("u",), "y", 0.1, b=[[1.0]], f=[[1.0, -1.05]])
+    assert uncertain_model(growing, ("b1", "f1"), np.eye(2)).allowed is None
 
 
 def test_what_is_not_known_says_why() -> None:

@@ -15,6 +15,7 @@ from flightid.findings import Finding
 from flightid.identification.details import Details
 from flightid.identification.fitted_record import FittedRecord
 from flightid.identification.fitted_response import FittedResponse
+from flightid.identification.held_stable import held_stable
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.model_error import ModelErrorBound, model_errors
 from flightid.identification.training import TrainingChannel, training_channels
@@ -297,4 +298,6 @@ def uncertain_model(
     def make(values: NDArray[np.float64]) -> Model:
         return model.with_values(dict(zip(names, map(float, values), strict=True)))
 
-    return Uncertain(numbers, covariance, make, bounds)
+    stable = held_stable(model)
+    allowed = None if stable is None else lambda values: stable(make(values))
+    return Uncertain(numbers, covariance, make, bounds, allowed=allowed)

@@ -51,6 +51,8 @@ class Uncertain(Generic[T]):
         What is known of where it comes from; what is computed from it is no better.
     valid_rad_s : tuple of float or None
         Frequencies in which it is known, rad/s.
+    allowed : callable, optional
+        Whether numbers are some that their estimator could have given; others are not drawn.
 
     Example
     -------
@@ -67,6 +69,7 @@ class Uncertain(Generic[T]):
     reason: str = ""
     findings: tuple[Finding, ...] = ()
     valid_rad_s: tuple[float, float] | None = None
+    allowed: Callable[[Array], bool] | None = None
 
     @classmethod
     def exact(cls, thing: T, reason: str = "") -> Uncertain[T]:
@@ -148,12 +151,10 @@ class Uncertain(Generic[T]):
     def steps(self, scale: float = 1.0) -> Iterator[tuple[T, T]]:
         """Pairs of things one standard deviation up and down each independent direction.
 
-        One that would leave the bounds stops at them.
+        One that would leave the bounds stops at them; a step that is not allowed is halved.
         """
-        for direction in self.directions:
-            ends = (self.numbers + scale * direction, self.numbers - scale * direction)
-            if self.bounds is not None:
-                ends = (np.clip(ends[0], *self.bounds), np.clip(ends[1], *self.bounds))
+        for move in scale * self.directions:
+            ends = (self._held(self.numbers + move), self._held(self.numbers - move))
             yield self.make(ends[0]), self.make(ends[1])
 
     def slopes(self, function: Callable[[T], ArrayLike]) -> Array:
@@ -225,7 +226,7 @@ class Uncertain(Generic[T]):
         return replace(found, findings=self.findings, valid_rad_s=self.valid_rad_s)
 
     def draws(self, count: int, seed: int = 0) -> list[T]:
-        """Things drawn from the normal distribution of the estimate, inside the bounds.
+        """Things drawn from the normal distribution of the estimate, inside bounds and class.
 
         Parameters
         ----------
@@ -235,8 +236,9 @@ class Uncertain(Generic[T]):
         Returns
         -------
         list
-            Empty where there is no covariance. A draw outside the bounds is drawn again; after
-            many it is moved to them.
+            Empty where there is no covariance. A draw outside the bounds, or not `allowed`, is
+            drawn again; after many it is moved to the bounds, and halfway to the estimate until it
+            is allowed.
 
         Raises
         ------
@@ -251,12 +253,27 @@ class Uncertain(Generic[T]):
         return [self.make(self._drawn_inside(random)) for _ in range(count)]
 
     def _drawn_inside(self, random: np.random.Generator) -> Array:
-        low, high = self.bounds or (np.full(1, -np.inf), np.full(1, np.inf))
         for _ in range(TRIES):
             numbers = self.numbers + random.standard_normal(len(self.directions)) @ self.directions
-            if np.all((numbers >= low) & (numbers <= high)):
-                return np.asarray(numbers)
-        return np.asarray(np.clip(numbers, low, high))
+            if self._allows(numbers):
+                break
+        return self._held(numbers)
+
+    def _held(self, numbers: Array) -> Array:
+        """The same inside the bounds, and as near to the estimate as it has to be."""
+        if self.bounds is not None:
+            numbers = np.clip(numbers, *self.bounds)
+        for _ in range(TRIES):
+            if self._allows(numbers):
+                break
+            numbers = (numbers + self.numbers) / 2.0
+        return numbers
+
+    def _allows(self, numbers: Array) -> bool:
+        """Whether these are inside the bounds, and what their estimator could have given."""
+        low, high = self.bounds or (-np.inf, np.inf)
+        inside = bool(np.all((numbers >= low) & (numbers <= high)))
+        return inside and (self.allowed is None or self.allowed(numbers))
 
     def then(self, function: Callable[[T], Made]) -> Uncertain[Made]:
         """What is made of the thing, as uncertain as it is: a loop made of a model."""
@@ -269,6 +286,7 @@ class Uncertain(Generic[T]):
             self.reason,
             self.findings,
             self.valid_rad_s,
+            self.allowed,
         )
 
 
