@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from flightid import Study
+from flightid.study.output import SCHEMA
 from tests.examples import PROFILE
 
 REPOSITORY = Path(__file__).parent.parent
@@ -32,6 +34,16 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip("the shared data folder is not here (set FLIGHTID_DATA to name it)")
     return folder
+
+
+@pytest.fixture
+def no_report(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Studies of this test write no report: it takes longer than most of their stages."""
+
+    def results_alone(_: Study, folder: Path) -> None:
+        (folder / "results.json").write_text(f'{{"schema": "{SCHEMA}"}}', encoding="utf-8")
+
+    monkeypatch.setattr("flightid.study.run._write", results_alone)
 
 
 @pytest.fixture(scope="session")

@@ -48,6 +48,7 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         flightid.nonsense  # noqa: B018
 
 
+@pytest.mark.nightly
 def test_a_room_does_not_hide_a_verb_of_its_name() -> None:
     code = (
         "import importlib, flightid\n"

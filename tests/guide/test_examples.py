@@ -83,6 +83,7 @@ def test_the_rig_flight_is_kept_as_a_log(tmp_path: Path) -> None:
     assert (tmp_path / "flight.BIN").read_bytes()[:2] == b"\xa3\x95"
 
 
+@pytest.mark.nightly
 def test_the_instrument_is_less_biased_than_the_direct_estimate(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -96,6 +97,7 @@ def test_the_instrument_is_less_biased_than_the_direct_estimate(
     assert sum(instrument) < 0.4 * sum(direct)
 
 
+@pytest.mark.nightly
 def test_the_dryer_study_prints_published_values_beside_ours(tmp_path: Path) -> None:
     # A stand-in with the noise-free output-error model whose coefficients the study expects.
     truth = fid.PolynomialModel(

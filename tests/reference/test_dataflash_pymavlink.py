@@ -37,7 +37,7 @@ def _our_counts(path: Path) -> Counter[str]:
     return Counter({m.name: m.count for m in fid.read_log(path).messages.values()})
 
 
-@pytest.mark.parametrize("name", LOGS)
+@pytest.mark.parametrize("name", [LOGS[0], pytest.param(LOGS[1], marks=NIGHTLY)])
 def test_every_count_number_and_text_equals_pymavlinks(shared_data: Path, name: str) -> None:
     # pymavlink applies the scale of the storage (hundredths, 1e-7 deg) but not the multipliers of
     # the MULT table, so ours are divided out; both are then the same doubles to rounding.
@@ -86,7 +86,7 @@ def _multipliers(path: Path) -> dict[tuple[str, str], float]:
     return found
 
 
-@pytest.mark.parametrize("name", LOGS)
+@pytest.mark.parametrize("name", [pytest.param(LOGS[0], marks=NIGHTLY), LOGS[1]])
 @pytest.mark.parametrize("fraction", FRACTIONS)
 def test_counts_of_a_truncated_log_equal_pymavlinks(
     shared_data: Path, tmp_path: Path, name: str, fraction: float

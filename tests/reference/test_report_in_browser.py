@@ -39,7 +39,7 @@ def _drawn(page: Path, profile: Path) -> str:
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine")
-@pytest.mark.parametrize("packed", [True, False])
+@pytest.mark.parametrize("packed", [True, pytest.param(False, marks=pytest.mark.nightly)])
 def test_plots_draw_from_disk(tmp_path: Path, packed: bool) -> None:
     made = look.figure()
     made.add_trace(look.line("roll rate", np.arange(9.0), np.arange(9.0) ** 2, colour=look.MODEL))

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 import flightid as fid
 from flightid.conventions import Light
 
 
+@pytest.mark.nightly
 def test_a_log_without_a_flight_gives_no_model(
     shared_data: Path, repository: Path, tmp_path: Path
 ) -> None:

@@ -123,6 +123,7 @@ def test_skew_is_found_to_a_hundredth_of_a_sample_and_removed(lag: float) -> Non
     assert estimate._repr_html_().startswith("<table>")
 
 
+@pytest.mark.nightly
 def test_skew_interval_covers_the_truth() -> None:
     inside = 0
     for seed in range(40):

@@ -225,6 +225,7 @@ def test_measured_disk_has_intervals():
     assert found.to_dict()["schema"] == "flightid.disk_margin/1"
 
 
+@pytest.mark.nightly
 def test_two_measured_loops_have_intervals_that_draws_confirm():
     plant = fid.LinearSystem(
         [[-1.0, 0.3], [0.0, -2.0]],

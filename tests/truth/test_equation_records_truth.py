@@ -116,6 +116,7 @@ def unstable_flight(seed, noise=1.0, seconds=28.0):
     return model, fly_closed_loop(model, pilot, excitation, conditions=conditions, seed=seed)
 
 
+@pytest.mark.nightly
 def test_unstable_short_period_is_recovered_from_a_long_record():
     model, record = unstable_flight(1, noise=1e-7, seconds=120.0)
     growth = 120.0 * model.eigenvalues().real.max()

@@ -76,6 +76,7 @@ def test_truth_is_recovered_without_noise(way: str) -> None:
     assert [f.light.value for f in fit.findings if f.code == "estimator-bias"] == ["green"]
 
 
+@pytest.mark.nightly
 def test_inputs_that_are_smooth_between_samples() -> None:
     fine = fid.simulate(MODEL, sweep(16 * RATE_HZ), units={"p": "rad/s"})
     step = slice(None, None, 16)
@@ -124,6 +125,7 @@ def test_closed_loop_by_instrument() -> None:
     assert_recovered(fit, TRUTH, 1e-5, "steps between samples, delay without their half sample")
 
 
+@pytest.mark.nightly
 def test_closed_loop_with_little_noise_lies_in_its_errors() -> None:
     for seed in range(3):
         fit = fid.identify(START, loop_response(loop_flight(0.002, seed)), hold="zero")
@@ -195,6 +197,7 @@ def test_the_functional_is_the_derivative_of_a_single_window_estimate() -> None:
         response.linear.apply([change])
 
 
+@pytest.mark.nightly
 def test_where_nothing_is_known_the_fit_says_why(tmp_path: Path) -> None:
     response = estimated(flown(0.001))
     cases = {
@@ -311,7 +314,7 @@ def _standard_scores(noise: float, seed: int) -> NDArray[np.float64]:
     return np.array([(p.value - value) / (p.stderr or np.nan) for p, value in pairs])
 
 
-@pytest.mark.parametrize("noise", [0.02, 0.0002])
+@pytest.mark.parametrize("noise", [0.02, pytest.param(0.0002, marks=pytest.mark.nightly)])
 def test_one_sweep_lies_in_its_errors(noise: float) -> None:
     scores = np.array([_standard_scores(noise, seed) for seed in range(4)])
     assert np.all(np.abs(scores) < 3.8), scores

@@ -99,7 +99,7 @@ def test_slowest_mode_of_the_loop() -> None:
 
 def test_random_error_of_a_plan_by_hand() -> None:
     made = excitation.multisine(
-        band_rad_s=(1.0, 30.0), amplitude=0.1, period_s=60.0, sample_rate_hz=200.0
+        band_rad_s=(1.0, 30.0), amplitude=0.1, period_s=60.0, sample_rate_hz=200.0, starts=1
     )
     axis = RateAxis(gain=2.0, time_constant_s=0.001, noise_rad_s=0.5)
     plan = excitation.assess(made, axis, n_records=3)

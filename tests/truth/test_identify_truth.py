@@ -55,7 +55,9 @@ def measured(
 
 
 @pytest.mark.parametrize("name", TRUTH)
-@pytest.mark.parametrize("cost", ["coherence", "likelihood"])
+@pytest.mark.parametrize(
+    "cost", [pytest.param("coherence", marks=pytest.mark.nightly), "likelihood"]
+)
 def test_noise_free_recovery(name: str, cost: str) -> None:
     truth = fid.load_model(name).with_values(TRUTH[name])
     fit = fid.identify(

@@ -148,5 +148,6 @@ def test_intervals_hold_the_truth_in_95_of_100_flights(colour: float, records: i
     assert 0.93 <= own <= 0.97
 
 
+@pytest.mark.nightly
 def test_intervals_do_not_ignore_the_colour() -> None:
     assert _coverage(12, colour=0.9, records=1)[0] > 0.8

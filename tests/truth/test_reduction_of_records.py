@@ -10,7 +10,14 @@ from tests.roll_and_yaw import REAL, lateral
 
 STEP_S = 0.02
 NOISE = {"p": 0.02, "r": 0.01}
-METHODS = ("output_error", "equation_error", "fourier_regression", "filter_error")
+METHODS = (
+    "output_error",
+    *(
+        pytest.param(method, marks=pytest.mark.nightly)
+        for method in ("equation_error", "fourier_regression")
+    ),
+    "filter_error",
+)
 
 
 def flight(seed: int) -> fid.Record:

@@ -94,6 +94,7 @@ def test_a_gust_that_is_no_white_noise_widens_the_intervals() -> None:
     assert gust.parameters["Malpha"].freedom < 0.2 * white.parameters["Malpha"].freedom
 
 
+@pytest.mark.nightly
 def test_filter_error_beats_output_error_in_turbulence() -> None:
     model = short_period(tau=0.02)
     calm = fly(model)

@@ -54,6 +54,7 @@ def _share(runs: list[ResidualTests], kind: str) -> tuple[float, float, float]:
     )
 
 
+@pytest.mark.nightly
 def test_white_residuals_leave_the_band_at_five_percent_of_lags() -> None:
     runs = _runs(lambda rng: (_white(rng), _uniform(rng)), 60, horizon=STEP)
     for kind in KINDS:

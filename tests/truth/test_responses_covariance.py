@@ -91,8 +91,8 @@ def _predicted(response: FrequencyResponse, kind: str) -> np.ndarray:
     return replace(response, errors=errors).covariance_at(response.omega_rad_s)[0]
 
 
-# The same estimator with two inputs, which is harder, is in every run.
-NIGHTLY = {*CASES} - {"nothing removed", "two inputs", "instrument", "local polynomial, two inputs"}
+# Each estimator is in every run, the plain one with two inputs, which is harder.
+NIGHTLY = {*CASES} - {"two inputs", "instrument", "local polynomial"}
 IN_EVERY_RUN = [
     pytest.param(case, marks=pytest.mark.nightly if case in NIGHTLY else ()) for case in CASES
 ]

@@ -69,6 +69,7 @@ def test_sensitivity_peak_of_integrator_and_delay(peak: float) -> None:
     assert_close(found.gains[0], exact, rtol=5e-4, why="grid of the loop")
 
 
+@pytest.mark.nightly
 def test_the_search_finds_the_optimum_that_a_slower_one_finds() -> None:
     problem = _one(("P", "I", "D"), noise_growth=None, band_factor=None)
 
@@ -219,6 +220,7 @@ def test_steps_are_those_of_the_recursion() -> None:
     assert_close(values[0], rates, atol=2e-4, why="a span of 8 s that leaves slow modes 1e-4")
 
 
+@pytest.mark.nightly
 @given(
     effect=st.floats(20.0, 800.0),
     damping=st.floats(-10.0, 5.0),

@@ -117,6 +117,7 @@ def test_other_rates_are_refused(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.nightly
 def test_pymavlink_reads_the_same(log: Log) -> None:
     reader = mavutil.mavlink_connection(str(log.path))
     targets = []

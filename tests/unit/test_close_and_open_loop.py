@@ -151,6 +151,7 @@ def test_errors_of_opened_responses_are_those_of_draws() -> None:
     assert_close(covariance[first, second] / size, wanted / size, atol=0.06, why="1500 draws")
 
 
+@pytest.mark.nightly
 def test_a_fit_gives_intervals_and_says_when_its_vehicles_are_unstable() -> None:
     truth = fid.load_model("rate_first_order").with_values({"Lp": -3.0, "Ltphi": 60.0, "tau": 0.03})
     omega = np.geomspace(0.5, 30.0, 40)

@@ -97,6 +97,7 @@ def _unsound(count: int, longest: int) -> list[int]:
     return offenders
 
 
+@pytest.mark.nightly
 def test_no_residual_makes_a_standard_error_zero_or_endless() -> None:
     assert _unsound(180, 45) == []
 

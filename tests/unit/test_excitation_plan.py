@@ -128,11 +128,11 @@ def test_weak_slow_short_and_narrow_designs_are_told() -> None:
 
 
 def test_correlated_inputs_are_red_and_orthogonal_ones_green() -> None:
-    good = excitation.plan("multisine", AXIS, band_rad_s=(1.0, 30.0), inputs=("a", "b"))
+    good = excitation.plan("multisine", AXIS, band_rad_s=(2.0, 12.0), inputs=("a", "b"))
     assert _findings(good, "design-inputs-correlated")[0].startswith("[green]")
     one = good.excitation.signals[0]
     twin = excitation.Excitation(
-        np.vstack([one, one]), good.excitation.sample_time_s, ("a", "b"), "1", "copy", (1.0, 30.0)
+        np.vstack([one, one]), good.excitation.sample_time_s, ("a", "b"), "1", "copy", (2.0, 12.0)
     )
     bad = excitation.assess(twin, {"a": AXIS, "b": AXIS})
     assert _findings(bad, "design-inputs-correlated")[0].startswith("[red]")
@@ -263,7 +263,7 @@ def test_csv_reads_back_to_twelve_digits(tmp_path: Path) -> None:
 
 
 def test_pictures_show_every_input() -> None:
-    plan = excitation.plan("multisine", AXIS, band_rad_s=(2.0, 20.0), inputs=("a", "b"))
+    plan = excitation.plan("multisine", AXIS, band_rad_s=(2.0, 12.0), inputs=("a", "b"))
     assert [trace.name for trace in excitation_history(plan.excitation).data] == ["a", "b"]
     made = plan_spectrum(plan)
     assert len(made.data) == 6

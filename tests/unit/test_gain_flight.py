@@ -54,6 +54,7 @@ def test_the_flight_shows_the_loops_that_the_true_model_promises(tuning: fid.Tun
     assert "Promised and flown" in str(flown.summary())
 
 
+@pytest.mark.nightly
 def test_gains_that_the_vehicle_does_not_stand_are_red(tuning: fid.Tuning) -> None:
     flown = fly_gains(_with_gains(tuning, 6.0), options=SHORT)
     red = {finding.code for finding in flown.findings if finding.light is Light.RED}
@@ -61,6 +62,7 @@ def test_gains_that_the_vehicle_does_not_stand_are_red(tuning: fid.Tuning) -> No
     assert not any(finding.code == "requirements-flown" for finding in flown.findings)
 
 
+@pytest.mark.nightly
 def test_a_requirement_that_the_flight_breaks_is_red(tuning: fid.Tuning) -> None:
     (design,) = tuning.designs
     asked = dataclasses.replace(design.requirements, phase_margin_deg=75.0)

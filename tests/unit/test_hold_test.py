@@ -121,6 +121,7 @@ def test_a_black_box_has_no_hold_to_forget() -> None:
     assert fit.evidence.check("input hold") is None
 
 
+@pytest.mark.nightly
 def test_bars_reach_what_an_unknown_hold_decides() -> None:
     told, untold = (
         _fit("steps", told=each, method="equation_error").parameters["tau"]
@@ -133,6 +134,6 @@ def test_bars_reach_what_an_unknown_hold_decides() -> None:
 
 def test_a_model_that_runs_away_is_asked_nothing_of_its_hold() -> None:
     record = holds.flight(0, "steps", told=True)
-    model = holds.model().with_values({"Md": -9e5})
+    model = holds.model().with_values({"Md": 9e5})
     with pytest.raises(fid.FlightidError, match="leads away"):
         held_outputs(model, [record], {}, ["zero", "first"])

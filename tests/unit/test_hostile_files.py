@@ -147,6 +147,7 @@ def test_csv_as_the_world_writes_it(tmp_path: Path, encoding: str) -> None:
     assert record["day"].tolist() == [0.0, 1.0, 2.0]
 
 
+@pytest.mark.nightly
 def test_a_heading_without_end_is_refused_and_many_columns_are_read(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("a" * (2 << 20) + ",b\n1,2\n")
     with pytest.raises(FileFormatError, match=r"line 1 of a\.csv is longer than a row can be"):

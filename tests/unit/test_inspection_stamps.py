@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -44,6 +45,7 @@ def test_what_is_believed_increases(stamps: list[float]) -> None:
     assert np.all(np.diff(values[believable(values)]) > 0)
 
 
+@pytest.mark.nightly
 def test_a_damaged_log_gets_the_same_verdict(tmp_path: Path) -> None:
     path = SweepFlight(sweep_s=20.0).write(tmp_path)
     intact = fid.inspect_log(path)

@@ -114,7 +114,7 @@ def test_margins_are_those_of_the_continuous_loop() -> None:
     assert margin >= 45.0
 
 
-@pytest.mark.parametrize("factor", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("factor", [1e-3, pytest.param(1.0, marks=pytest.mark.nightly), 1e3])
 def test_slow_and_fast_plants_have_gains_of_their_own_time(factor: float) -> None:
     plant = LinearSystem(
         [[-5.0 * factor]], [[factor]], [[10.0]], [[0.0]], ("u",), ("y",), (0.02 / factor,)

@@ -64,6 +64,7 @@ def test_a_transient_is_taken_out_where_plain_division_keeps_it() -> None:
     assert np.max(np.abs(found.response[0, 0] / exact - 1.0)) < 0.1 * rough
 
 
+@pytest.mark.nightly
 def test_errors_are_those_of_repeated_flights() -> None:
     found = [estimated(record(4, 0.5, seed)) for seed in range(150)]
     exact = truth(found[0].omega_rad_s)

@@ -110,6 +110,7 @@ def test_a_use_that_fails_costs_itself_alone(folder: Path, monkeypatch: pytest.M
     assert results["uses"]["files"] == {"Roll": "models/roll.toml"}
 
 
+@pytest.mark.usefixtures("no_report")
 def test_outputs_free_a_model_from_the_other_columns(folder: Path) -> None:
     with_load = MODEL.replace(
         'p = "p"\n[par', 'p = "p"\nay = { expression = "p*3", unit = "1/s" }\n[par'
@@ -143,6 +144,7 @@ def test_all_errors_of_a_study_file_are_told_at_once(folder: Path) -> None:
     assert "the file of record 'a' is not there" in str(raised.value)
 
 
+@pytest.mark.usefixtures("no_report")
 def test_what_holds_for_all_records_is_said_once(folder: Path) -> None:
     told = STUDY.replace("[[record]]", '[defaults.record]\nunits = { p = "rad/s" }\n[[record]]')
     settings = study_settings(folder, told.replace('hold = "zero"\n', ""))
@@ -162,6 +164,8 @@ def study_settings(folder: Path, text: str) -> Settings:
     return read_settings(folder / "study.toml")
 
 
+@pytest.mark.nightly
+@pytest.mark.usefixtures("no_report")
 def test_one_record_may_stand_for_several_files(folder: Path) -> None:
     (folder / "a2.csv").write_bytes((folder / "a.csv").read_bytes())
     (folder / "study.toml").write_text(STUDY.replace('"a.csv"', '"a*.csv"'), "utf-8")
@@ -173,6 +177,7 @@ def test_one_record_may_stand_for_several_files(folder: Path) -> None:
         study_settings(folder, STUDY.replace('"a.csv"', '"z*.csv"'))
 
 
+@pytest.mark.usefixtures("no_report")
 def test_data_compatibility_is_checked_and_applied(folder: Path) -> None:
     time_s = 0.02 * np.arange(1000)
     bias = 0.02

@@ -51,6 +51,7 @@ def _rig(folder: Path, name: str = "rig.csv", seed: int = 0) -> Path:
     return path
 
 
+@pytest.mark.nightly
 def test_records_become_the_study_of_their_structure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -70,6 +71,7 @@ def test_records_become_the_study_of_their_structure(
     assert first == (tmp_path / "again" / "report.txt").read_text().split("Parameters")[0]
 
 
+@pytest.mark.nightly
 def test_a_controller_of_a_study_is_written_as_code(tmp_path: Path) -> None:
     _rig(tmp_path)
     study = tmp_path / "study.toml"

@@ -143,6 +143,7 @@ def test_a_balanced_choice_takes_the_noise_model_that_whitens(study: fid.Study) 
 
 
 @pytest.mark.parametrize("choose", ["free_run", "simplest", "bic"])
+@pytest.mark.usefixtures("no_report")
 def test_the_other_rules_choose_as_they_say(choose: str, folder: Path) -> None:
     text = units_in_mat(LINEAR).replace("na = ", f'choose = "{choose}"\nna = ')
     found = fid.run_study(written(folder, text), output=folder / "rules")
@@ -174,6 +175,7 @@ stop = "bic"
 """
 
 
+@pytest.mark.usefixtures("no_report")
 def test_a_narx_model_is_searched_and_tested(folder: Path) -> None:
     head = units_in_mat(LINEAR).split("structure")[0]
     found = fid.run_study(written(folder, head + NARX), output=folder / "narx")
@@ -190,6 +192,8 @@ def test_a_narx_model_is_searched_and_tested(folder: Path) -> None:
     assert "NARX" in text
 
 
+@pytest.mark.nightly
+@pytest.mark.usefixtures("no_report")
 def test_one_structure_needs_no_choice(folder: Path) -> None:
     text = units_in_mat(LINEAR).replace('select = "choice"\n', "")
     text = re.sub(r"na = .*\nnb = .*\nnc = .*\nnk = .*", "na = 2\nnb = 1\nnc = 2\nnk = 2", text)
@@ -198,6 +202,7 @@ def test_one_structure_needs_no_choice(folder: Path) -> None:
     assert item.fit is not None
 
 
+@pytest.mark.usefixtures("no_report")
 def test_nothing_coherent_leaves_the_model_out_without_a_fault(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -208,6 +213,7 @@ def test_nothing_coherent_leaves_the_model_out_without_a_fault(
     assert "left out" in said
 
 
+@pytest.mark.usefixtures("no_report")
 def test_models_with_equations_may_use_record_files(folder: Path) -> None:
     head = units_in_mat(LINEAR).split("structure")[0]
     text = (
@@ -278,6 +284,8 @@ def test_a_missing_file_is_named(folder: Path) -> None:
         fid.run_study(written(folder, text), output=folder / "gone")
 
 
+@pytest.mark.nightly
+@pytest.mark.usefixtures("no_report")
 def test_a_file_with_a_gap_needs_a_decision(folder: Path) -> None:
     lines = (folder / "rig.csv").read_text(encoding="utf-8").split("\n")
     (folder / "gap.csv").write_text("\n".join(lines[:300] + lines[330:]), encoding="utf-8")

@@ -129,7 +129,9 @@ def test_a_second_run_on_the_written_log_finds_the_same(
     assert values["models"] == json.loads(json.dumps(first["models"]))
 
 
-@pytest.mark.parametrize("failure", [RuntimeError, KeyboardInterrupt])
+@pytest.mark.parametrize(
+    "failure", [pytest.param(RuntimeError, marks=pytest.mark.nightly), KeyboardInterrupt]
+)
 def test_a_run_that_breaks_off_leaves_nothing(
     study: fid.Study,
     tmp_path: Path,
@@ -176,7 +178,10 @@ TWO_RESPONSES = (
 )
 
 
-@pytest.mark.parametrize("wanted", ['"coherent"', '["p/tau_phi"]'])
+@pytest.mark.parametrize(
+    "wanted", ['"coherent"', pytest.param('["p/tau_phi"]', marks=pytest.mark.nightly)]
+)
+@pytest.mark.usefixtures("no_report")
 def test_of_several_responses_those_asked_for_are_fitted(
     study: fid.Study, tmp_path: Path, wanted: str
 ) -> None:

@@ -21,6 +21,7 @@ from flightid.study.stages import compare_free_run
 from flightid.study.taking import _with_injected
 from tests.unit.test_study_records import OWN, rig
 
+pytestmark = pytest.mark.usefixtures("no_report")
 STUDY = """
 [study]
 title = "Rig"
@@ -139,6 +140,7 @@ def test_a_change_runs_what_lies_behind_it(
     assert set(found.carried_out) == rerun | beside
 
 
+@pytest.mark.nightly
 def test_a_changed_file_is_read_again(folder: Path, cache: dict[str, Any]) -> None:
     own = folder / "own.toml"
     own.write_text(OWN.replace("value = 3.0", "value = 2.5"), encoding="utf-8")

@@ -55,6 +55,7 @@ def study(tmp_path: Path) -> Path:
     return path
 
 
+@pytest.mark.nightly
 def test_a_study_is_tuned_from_its_log_and_its_models_beside_it(
     study: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

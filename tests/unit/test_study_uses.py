@@ -132,6 +132,7 @@ def test_exports_loops_and_conditions_stand_in_the_report(study: fid.Study) -> N
     assert list(uses["loops"]) == ["Rate feedback"]
 
 
+@pytest.mark.nightly
 def test_a_controller_of_blocks_and_its_qualities_are_stages(
     folder: Path, study: fid.Study
 ) -> None:

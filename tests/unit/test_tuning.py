@@ -117,6 +117,7 @@ def test_the_result_shows_itself(design: fid.PidDesign) -> None:
         design.response("luck")
 
 
+@pytest.mark.nightly
 def test_a_target_is_reached_with_all_the_margin_there_is(fit: fid.Fit) -> None:
     need = dataclasses.replace(NEED, crossover_rad_s=12.0)
     design = fid.tune_pid(fit, gains=FLOWN, requirements=need, draws=20, angle_loop=False)
@@ -126,6 +127,7 @@ def test_a_target_is_reached_with_all_the_margin_there_is(fit: fid.Fit) -> None:
     assert (design.promise("rate loop", "phase margin").worst or 0.0) > 60.0
 
 
+@pytest.mark.nightly  # test_tuning_axes.py holds that none are written, in every run
 def test_hopeless_plants_have_no_gains_and_it_is_said_why() -> None:
     slow = _fit(tau=0.2)
     need = dataclasses.replace(NEED, crossover_rad_s=15.0)
@@ -157,6 +159,7 @@ def test_models_without_errors_are_refused_or_taken_as_they_are(fit: fid.Fit) ->
     assert "errors are not known" in str(design.promise_table())
 
 
+@pytest.mark.nightly
 def test_a_crossover_where_little_was_measured_is_red() -> None:
     omega = np.geomspace(0.5, 90.0, 40)
     options = {"gains": FLOWN, "requirements": NEED, "draws": 5, "angle_loop": False}
@@ -211,6 +214,7 @@ def test_what_the_model_leaves_unexplained_is_refused_or_stands_in_the_result(
     assert "# RED, accepted by the user: " in path.read_text()
 
 
+@pytest.mark.nightly
 def test_a_structure_that_its_data_contradict_lowers_what_is_promised(fit: fid.Fit) -> None:
     errors = fit.model_errors["p/tau_phi"]
     assert_close(errors.bound.max(), 0.06, atol=0.03, why="two deviations of random errors of 3 %")
@@ -259,6 +263,7 @@ def test_discrete_models_need_the_samples_of_the_loop() -> None:
         fid.tune_pid(system, gains=FLOWN, nominal=True, band_rad_s=BAND)
 
 
+@pytest.mark.nightly
 def test_noise_bounds_the_gains(fit: fid.Fit) -> None:
     options = {"gains": FLOWN, "draws": 8, "angle_loop": False}
     free = fid.tune_pid(fit, requirements=dataclasses.replace(NEED, noise_growth=None), **options)
@@ -308,6 +313,7 @@ def test_a_preset_moves_what_is_left_as_usual() -> None:
         TuningRequirements(preset="brave")
 
 
+@pytest.mark.nightly
 def test_the_integral_keeps_the_ratio_of_the_autopilot(fit: fid.Fit) -> None:
     options = {"gains": FLOWN, "draws": 8, "angle_loop": False}
     ratios = []

@@ -126,6 +126,7 @@ def test_coupling_costs_what_designing_alone_does_not_see(tuning: fid.Tuning) ->
     assert abs(ratio - 1.0) > 0.02
 
 
+@pytest.mark.nightly
 def test_flown_gains_are_judged_with_the_other_axes_flown_gains(tuning: fid.Tuning) -> None:
     slow = fid.tune(
         {"roll": _FIXED, "pitch": _FIXED},
@@ -174,6 +175,7 @@ def _slow_yaw() -> fid.LinearSystem:
     return fid.LinearSystem([[-1.0]], [[140.0]], [[1.0]], [[0.0]], ("tau_psi",), ("r",), [0.4])
 
 
+@pytest.mark.nightly
 def test_a_refused_axis_leaves_the_others_and_their_files(
     tuning: fid.Tuning, tmp_path: Path
 ) -> None:
@@ -197,6 +199,7 @@ def test_a_refused_axis_leaves_the_others_and_their_files(
     assert next(f for f in made.findings if f.code == "axis-refused").light is Light.RED
 
 
+@pytest.mark.nightly
 def test_axes_of_one_model_are_written_together_or_not_at_all(tmp_path: Path) -> None:
     fast = dataclasses.replace(NEED, crossover_rad_s=60.0)
     plant = fid.load_model("rate_integrator", axis="yaw").with_values({"Ntpsi": 40.0, "tau": 0.03})
@@ -220,6 +223,7 @@ def test_no_axis_that_may_be_tuned_is_an_error() -> None:
         fid.tune({"yaw": turned}, gains=_loops("yaw"), nominal=True, band_rad_s=(0.5, 60.0))
 
 
+@pytest.mark.nightly
 def test_axes_designed_alone_are_refused_where_the_coupling_breaks_them(tmp_path: Path) -> None:
     options = {"requirements": NEED, "gyro": "raw", "band_rad_s": (0.5, 60.0), "nominal": True}
     fits = {"roll": _FIXED, "pitch": _FIXED}
