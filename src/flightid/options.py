@@ -349,7 +349,11 @@ def read_options(
         if problem is not None:
             raise error(f"{where}: {problem}", found=repr(table[name]), needed=each.needed)
         values[name] = value
-    return options(**values)
+    try:
+        return options(**values)
+    except OptionError as said:
+        problem = f"{where}: {said.problem}"
+        raise error(problem, found=said.found, needed=said.needed, action=said.action) from said
 
 
 def read_value(wanted: Option, value: object) -> object:

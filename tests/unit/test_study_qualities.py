@@ -81,7 +81,7 @@ def test_axes_are_a_models_own_or_refused_before_any_work(study: Path) -> None:
     )
     settings = read_settings(study).qualities
     assert settings is not None
-    assert (settings.axes, settings.signs) == ({"roll": ("phi", "tau_phi")}, {"roll": -1})
+    assert (settings.pairs, settings.signs) == ({"roll": ("phi", "tau_phi")}, {"roll": -1})
     found = fid.run_study(study).qualities["Roll"]
     # Read with the wrong sign the phase begins half a turn off, and no bandwidth is left.
     assert not found.bandwidths
@@ -100,21 +100,21 @@ def test_models_without_equations_are_not_rated(study: Path) -> None:
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        ('category = "B"', "there is no key 'category'"),
-        ('speed = "fast"', "speed does not fit"),
-        ('vehicle = "boat"', "vehicle does not fit"),
-        ("n_alpha = 5", "there is no key 'n_alpha'"),
-        ('axes.roll = ["phi"]', "roll does not fit"),
-        ('axes.heave = ["w", "col"]', "there is no key 'heave'"),
-        ("signs.roll = 2", "roll does not fit"),
-        ("signs.rol = 1", "there is no key 'rol'"),
+        ('category = "B"', "category is of the standards of vehicle"),
+        ('speed = "fast"', "speed is not known"),
+        ('vehicle = "boat"', "vehicle is not known"),
+        ("n_alpha = 5", "n_alpha is of the standards of vehicle"),
+        ('axes.roll = ["phi"]', "channels of roll do not fit"),
+        ('axes.heave = ["w", "col"]', "axis is not known"),
+        ("signs.roll = 2", "sign of roll does not fit"),
+        ("signs.rol = 1", "axis is not known"),
     ],
 )
 def test_settings_are_checked_to_the_last_key(tmp_path: Path, lines: str, message: str) -> None:
     with pytest.raises(StudyError, match=message):
         read_settings(written(tmp_path, STUDY + lines + "\n"))
     low = STUDY.replace("[0.5, 60.0]", "[0.0, 60.0]")
-    with pytest.raises(StudyError, match="band_rad_s does not fit"):
+    with pytest.raises(StudyError, match="band_rad_s is too small"):
         read_settings(written(tmp_path, low))
 
 
@@ -122,8 +122,8 @@ def test_an_aeroplane_is_rated_by_its_category(tmp_path: Path) -> None:
     text = STUDY.replace('task = "tracking"', 'vehicle = "aeroplane"\naircraft_class = "II"')
     asked = read_settings(written(tmp_path, text + 'n_alpha = 8\ncharts = "own.toml"\n')).qualities
     assert asked is not None
-    assert asked.conditions == {"category": "A", "aircraft_class": "II"}
-    assert (asked.n_alpha, asked.charts) == (8.0, tmp_path / "own.toml")
+    assert (asked.category, asked.aircraft_class) == ("A", "II")
+    assert (asked.n_alpha, asked.charts) == (8.0, str(tmp_path / "own.toml"))
 
 
 def test_closed_loops_are_told_with_poles_blocks_and_margins() -> None:

@@ -10,6 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid.errors import StudyError
+from flightid.study.conditioning import read_conditioning
+from flightid.study.reading import TableReader
 from flightid.study.settings import read_settings
 
 GOOD = """
@@ -119,7 +121,7 @@ def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> 
         ("[fit]", "[fit", "the study file is no TOML"),
         ("cramer_rao_percent = 30", "cramer_rao_percent = 0", "needed a number above 0"),
         ("maximum_cramer_rao", "maximum_cramer_raw", "Next: write 'maximum_cramer_rao_percent'"),
-        ("_percent = 30", '_percent = 30\nafter_rise = "hope"', "needed one of 'stop', 'next'"),
+        ("_percent = 30", '_percent = 30\nafter_rise = "hope"', "needed 'stop' or 'next'"),
         ("[reduce]\nmaximum_cramer_rao_percent = 30", "", "there is no key 'keep'"),
         ("seed = 7", "seed = 7\nwindow_s = []", "[fit]: there is no key 'window_s'"),
         ('compare = ["composite"]', "window_s = []", "window_s has no meaning: found []"),
@@ -158,3 +160,19 @@ def test_any_text_is_a_study_error(tmp_path_factory: pytest.TempPathFactory, tex
     path.write_bytes(text.encode("utf-8", "replace"))
     with pytest.raises(StudyError):
         read_settings(path)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("m", 0.3048), ("cm", 30.48), ("mm", 304.8), ("ft", 1.0), ("in", 12.0)]
+)
+def test_positions_of_sensors_are_told_in_any_length(key: str, value: float) -> None:
+    told = TableReader({f"accelerometers_{key}": [value, 0.0, -value]}, "[[conditioning]]")
+    position = read_conditioning(told).positions["accelerometers"]
+    assert position == pytest.approx((0.3048, 0.0, -0.3048), rel=1e-12)
+    assert read_conditioning(TableReader({}, "[[conditioning]]")).positions == {}
+
+
+def test_a_position_is_told_once() -> None:
+    twice = {"velocities_m": [1.0, 0.0, 0.0], "velocities_ft": [3.0, 0.0, 0.0]}
+    with pytest.raises(StudyError, match="velocities_ft tells a position twice"):
+        read_conditioning(TableReader(twice, "[[conditioning]]"))

@@ -46,6 +46,8 @@ def command(
     from flightid import handling_qualities
     from flightid.dynamics.handling_qualities.options import QualitiesOptions
 
-    asked = QualitiesOptions(**given_options(QualitiesOptions, options, "handling qualities"))
+    given = given_options(QualitiesOptions, options, "handling qualities")
+    asked = QualitiesOptions(**given)
+    asked.require_case(given)
     rated = handling_qualities(load_source(model, axis, values), **asked.of_verb())
     show(rated, "Handling qualities", as_json=as_json, html=html, level=level)

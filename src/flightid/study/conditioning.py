@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 from flightid.conditioning import (
     accelerations_at_cg,
@@ -21,28 +21,32 @@ from flightid.conditioning import (
 )
 from flightid.conditioning.consistency_result import KinematicConsistency
 from flightid.conditioning.detrend import Trend
-from flightid.conditioning.filter import FilterDesign
+from flightid.conditioning.options import FilterOptions, OutlierOptions
 from flightid.conditioning.sensor_position import RATES
 from flightid.conventions import AxisConversion
 from flightid.errors import StudyError
+from flightid.options import Options, option
 from flightid.record import Record
 from flightid.simulation import actuator_positions
-from flightid.study.reading import TableReader
+from flightid.study.reading import TableReader, read_each
 from flightid.study.record_files import RecordFile
+from flightid.units import convert
 
 Position = tuple[float, float, float]
 Move = Callable[[Record, Position], Record]
 SENSORS: dict[str, tuple[Move, tuple[str, str, str]]] = {
-    "accelerometers_m": (accelerations_at_cg, ("ax", "ay", "az")),
-    "velocities_m": (velocities_at_cg, ("u", "v", "w")),
-    "air_data_m": (air_data_at_cg, ("V", "alpha", "beta")),
+    "accelerometers": (accelerations_at_cg, ("ax", "ay", "az")),
+    "velocities": (velocities_at_cg, ("u", "v", "w")),
+    "air_data": (air_data_at_cg, ("V", "alpha", "beta")),
 }
-"""Keys of sensor positions: the verb that moves them to the centre of gravity, and its channels."""
-BANDS = ("lowpass", "highpass", "bandpass", "bandstop")
+"""Sensors by key: the verb that moves them to the centre of gravity, and its channels."""
+LENGTHS = ("m", "cm", "mm", "ft", "in")
+"""Units that a position may be told in, behind the sensor's key: ``accelerometers_ft``."""
+Made = TypeVar("Made", bound=Options)
 
 
 @dataclass(frozen=True)
-class ConsistencyStep:
+class ConsistencyStep(Options):
     """A check of data compatibility; see `flightid.conditioning.check_consistency`.
 
     Attributes
@@ -55,9 +59,13 @@ class ConsistencyStep:
         Whether records go on without the errors that were found.
     """
 
-    channels: tuple[str, ...] = ("phi", "theta")
-    estimate: tuple[str, ...] | None = None
-    apply: bool = False
+    channels: tuple[str, ...] = option(
+        ("phi", "theta"), doc="Attitudes, accelerations and velocities beside the rates."
+    )
+    estimate: tuple[str, ...] | None = option(
+        None, doc="Instrument errors to estimate; default: the usual ones."
+    )
+    apply: bool = option(False, doc="Records go on without the errors that were found.")
 
 
 @dataclass(frozen=True)
@@ -76,16 +84,14 @@ class Conditioning:
         Conversion of rates and accelerations.
     skews_s : mapping of str to float
         Lag of a channel that is taken out, s.
-    outliers : mapping or None
-        Options of `flightid.conditioning.remove_outliers`.
+    outliers : OutlierOptions or None
     actuators : mapping of str to float
         Bandwidth of the known actuator behind an input, rad/s.
     positions : mapping of str to tuple of float
         Position of sensors from the centre of gravity, m, by key of `SENSORS`.
     consistency : ConsistencyStep or None
         Check of rates against attitudes and velocities, and whether its errors are taken out.
-    filter : mapping or None
-        Options of `flightid.conditioning.filter_record`.
+    filter : FilterOptions or None
     resample_to_s : float or None
         New sample time, s.
     detrend : str or None
@@ -97,11 +103,11 @@ class Conditioning:
     flip: tuple[str, ...] = ()
     axes: str | None = None
     skews_s: Mapping[str, float] = field(default_factory=dict)
-    outliers: Mapping[str, Any] | None = None
+    outliers: OutlierOptions | None = None
     actuators: Mapping[str, float] = field(default_factory=dict)
     positions: Mapping[str, Position] = field(default_factory=dict)
     consistency: ConsistencyStep | None = None
-    filter: Mapping[str, Any] | None = None
+    filter: FilterOptions | None = None
     resample_to_s: float | None = None
     detrend: str | None = None
 
@@ -111,7 +117,7 @@ class Conditioning:
         moved = [name for key in self.positions for name in SENSORS[key][1]]
         needed = [*moved, *RATES] if moved else []
         if self.axes is not None:
-            needed += [*RATES, *SENSORS["accelerometers_m"][1]]
+            needed += [*RATES, *SENSORS["accelerometers"][1]]
         if self.consistency is not None:
             needed += [*RATES, *self.consistency.channels]
         return tuple(dict.fromkeys(needed))
@@ -133,11 +139,11 @@ def read_conditioning(reader: TableReader) -> Conditioning:
             lambda key: reader.choice(key, [str(each) for each in AxisConversion]), "axes"
         ),
         _numbers(reader, "skews_s"),
-        reader.maybe(lambda key: _outliers(reader.table(key)), "outliers"),
+        _options(reader, "outliers", OutlierOptions),
         _numbers(reader, "actuators"),
         _positions(reader),
-        reader.maybe(lambda key: _consistency(reader.table(key)), "consistency"),
-        reader.maybe(lambda key: _filter(reader.table(key)), "filter"),
+        _options(reader, "consistency", ConsistencyStep),
+        _options(reader, "filter", FilterOptions),
         reader.maybe(reader.positive, "resample_to_s"),
         reader.maybe(lambda key: reader.choice(key, [str(each) for each in Trend]), "detrend"),
     )
@@ -185,10 +191,11 @@ def outliers_first(
             f"study file, [[conditioning]]: outliers of record {file.name!r} are taken off twice",
             needed="one step with outliers for a record that is resampled as it is read",
         )
-    if not meant or "channels" not in meant[0]:
-        return meant[0] if meant else None
+    if not meant:
+        return None
     held = set(channels)
-    return {**meant[0], "channels": [name for name in meant[0]["channels"] if name in held]}
+    chosen = meant[0].channels
+    return vars(meant[0]) | {"channels": chosen and [name for name in chosen if name in held]}
 
 
 def condition(
@@ -210,13 +217,13 @@ def _apply(record: Record, step: Conditioning, checks: list[KinematicConsistency
     if flipped:
         record = flip_sign(record, flipped)
     if step.axes is not None:
-        vectors = [each for each in (RATES, SENSORS["accelerometers_m"][1]) if each[0] in record]
+        vectors = [each for each in (RATES, SENSORS["accelerometers"][1]) if each[0] in record]
         record = convert_axes(record, step.axes, vectors)
     skews = {name: skew for name, skew in step.skews_s.items() if name in record}
     if skews:
         record = align(record, skews)
     if step.outliers is not None:
-        record = remove_outliers(record, **step.outliers)
+        record = remove_outliers(record, **vars(step.outliers))
     driven = {name: rate for name, rate in step.actuators.items() if name in record}
     if driven:
         record = actuator_positions(record, driven)
@@ -236,10 +243,18 @@ def _apply(record: Record, step: Conditioning, checks: list[KinematicConsistency
             record = record.segment(first, last + 0.5 * record.sample_time_s)
             record = record.replace(corrected, step=found.corrected.history[-1])
     if step.filter is not None:
-        record = filter_record(record, **step.filter)
+        record = filter_record(record, **step.filter.of_verb())
     if step.resample_to_s is not None:
         record = resample(record, step.resample_to_s)
     return record if step.detrend is None else detrend(record, step.detrend)
+
+
+def _options(reader: TableReader, key: str, kind: type[Made]) -> Made | None:
+    """A table in the table as options; None where it is not there."""
+    if key not in reader:
+        return None
+    made: list[Made] = read_each((kind,), reader.table(key))
+    return made[0]
 
 
 def _texts(reader: TableReader, key: str) -> dict[str, str]:
@@ -253,46 +268,16 @@ def _numbers(reader: TableReader, key: str) -> dict[str, float]:
 
 
 def _positions(reader: TableReader) -> dict[str, Position]:
-    found = {}
-    for key in SENSORS:
-        given = reader.maybe(lambda name: reader.numbers(name, length=3), key)
-        if given is not None:
-            found[key] = (given[0], given[1], given[2])
+    """Positions in m, from whichever unit the key names."""
+    found: dict[str, Position] = {}
+    for sensor in SENSORS:
+        for unit in LENGTHS:
+            key = f"{sensor}_{unit}"
+            given = reader.maybe(lambda name: reader.numbers(name, length=3), key)
+            if given is None:
+                continue
+            if sensor in found:
+                raise reader.error(key, "tells a position twice", found=given, needed="one unit")
+            x, y, z = convert(given, unit, "m").tolist()
+            found[sensor] = (x, y, z)
     return found
-
-
-def _consistency(reader: TableReader) -> ConsistencyStep:
-    usual = ConsistencyStep()
-    made = ConsistencyStep(
-        reader.names("channels", usual.channels),
-        reader.maybe(reader.names, "estimate"),
-        reader.flag("apply", usual.apply),
-    )
-    reader.finish()
-    return made
-
-
-def _outliers(reader: TableReader) -> dict[str, Any]:
-    given = {
-        "deviations": reader.maybe(reader.positive, "deviations"),
-        "half_width": reader.maybe(lambda key: reader.integer(key, minimum=1), "half_width"),
-        "channels": reader.maybe(reader.names, "channels"),
-    }
-    reader.finish()
-    return {key: value for key, value in given.items() if value is not None}
-
-
-def _filter(reader: TableReader) -> dict[str, Any]:
-    edges = reader.numbers("cutoff_hz")
-    if len(edges) > 2:
-        raise reader.error("cutoff_hz", "does not fit", found=edges, needed="one number or two")
-    given: dict[str, Any] = {
-        "cutoff_hz": edges[0] if len(edges) == 1 else edges,
-        "kind": reader.choice("kind", BANDS, BANDS[0]),
-        "design": reader.choice("design", [str(each) for each in FilterDesign], "butterworth"),
-        "order": reader.integer("order", 4, minimum=1),
-        "zero_phase": reader.flag("zero_phase", True),
-        "channels": reader.maybe(reader.names, "channels"),
-    }
-    reader.finish()
-    return given

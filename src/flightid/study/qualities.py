@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -39,7 +39,7 @@ def require_pairs(tasks: Iterable[Task], settings: QualitiesSettings) -> None:
             found="none in the study",
             action="take [handling_qualities] out, or call flightid.handling_qualities",
         )
-    for axis, (output, control) in (settings.axes or {}).items():
+    for axis, (output, control) in (settings.pairs or {}).items():
         if not any(output in model.outputs and control in model.inputs for model in models):
             raise StudyError(
                 f"study file, [handling_qualities.axes]: no model gives {output} from {control}",
@@ -78,7 +78,8 @@ def rate_models(
         keys[item.name] = each.key
         if item.fit is None or item.settings.structure is not None:
             continue
-        asked = replace(settings, conditions={**settings.conditions, **item.settings.qualities})
+        cases: Mapping[str, Any] = item.settings.qualities
+        asked = replace(settings, **cases)
         beside = {"fit": item.fit, "reference": item.reference, "response": item.response}
         for kind, source in beside.items():
             if kind in settings.sources and source is not None:
@@ -102,7 +103,7 @@ def _staged(
 
 
 def _rated(source: Any, settings: QualitiesSettings) -> HandlingQualities:  # noqa: ANN401
-    axes = settings.axes
+    axes = settings.pairs
     if axes is not None:
         model = uncertain_of(source).value if not isinstance(source, FrequencyResponse) else source
         axes = {
@@ -110,14 +111,4 @@ def _rated(source: Any, settings: QualitiesSettings) -> HandlingQualities:  # no
             for axis, pair in axes.items()
             if pair[0] in model.outputs and pair[1] in model.inputs
         }
-    return handling_qualities(
-        source,
-        axes=axes,
-        signs=settings.signs,
-        vehicle=settings.vehicle,
-        response_type=settings.response_type,
-        band_rad_s=settings.band_rad_s,
-        n_alpha=settings.n_alpha,
-        charts=None if settings.charts is None else str(settings.charts),
-        **settings.conditions,
-    )
+    return handling_qualities(source, **{**settings.of_verb(), "axes": axes})

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, replace
+from typing import cast
 
 from flightid.identification.reduction.reduce import AFTER_RISE
 from flightid.identification.reduction.rules import ReductionLimits
-from flightid.study.reading import TableReader
+from flightid.options import Options, option
+from flightid.study.reading import TableReader, read_each
 
 
 @dataclass(frozen=True)
-class ReduceSettings:
+class ReduceSettings(Options):
     """How structures are reduced; see `flightid.reduce`.
 
     Attributes
@@ -26,9 +28,11 @@ class ReduceSettings:
         Parameters that stay, or go first; each model says its own.
     """
 
-    limits: ReductionLimits
-    after_rise: str
-    rough: bool = False
+    limits: ReductionLimits = field(default_factory=ReductionLimits)
+    after_rise: str = option(
+        AFTER_RISE[0], choices=AFTER_RISE, doc="What follows a step whose cost rises markedly."
+    )
+    rough: bool = option(False, doc="Steps without intervals, one full fit at the end.")
     keep: tuple[str, ...] = ()
     drop: tuple[str, ...] = ()
 
@@ -41,14 +45,5 @@ def read_reduce(reader: TableReader) -> ReduceSettings:
     StudyError
         A key is unknown, or a value does not fit.
     """
-    usual = ReductionLimits()
-    limits = ReductionLimits(
-        **{
-            each.name: reader.positive(each.name, getattr(usual, each.name))
-            for each in fields(usual)
-        }
-    )
-    after_rise = reader.choice("after_rise", AFTER_RISE, AFTER_RISE[0])
-    rough = reader.flag("rough", False)
-    reader.finish()
-    return ReduceSettings(limits, after_rise, rough)
+    limits, made = read_each((ReductionLimits, ReduceSettings), reader)
+    return replace(cast("ReduceSettings", made), limits=limits)

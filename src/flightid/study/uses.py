@@ -116,14 +116,7 @@ def use_models(
 
 
 def _rotor(fits: Mapping[str, Fit], asked: RotorSettings) -> RotorPhysics:
-    return rotor_physics(
-        _fit(fits, asked.model),
-        asked.rotor_speed_rad_s,
-        lock_number=asked.lock_number,
-        bar_lock_number=asked.bar_lock_number,
-        expected=dict(asked.expected) or None,
-        names=dict(asked.names) or None,
-    )
+    return rotor_physics(_fit(fits, asked.model), **vars(asked.options))
 
 
 def _closed(

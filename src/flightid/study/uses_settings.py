@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from flightid.control.closed_loop.close_loop import DRAWS
+from flightid.dynamics.rotor.options import RotorOptions
 from flightid.errors import StudyError
 from flightid.export.options import FORMATS
 from flightid.export.to_file import format_of
@@ -45,18 +46,11 @@ class RotorSettings:
     Attributes
     ----------
     model : str
-    rotor_speed_rad_s : float
-    lock_number, bar_lock_number : float or None
-    expected : mapping of str to float
-    names : mapping of str to str
+    options : RotorOptions
     """
 
     model: str
-    rotor_speed_rad_s: float
-    lock_number: float | None = None
-    bar_lock_number: float | None = None
-    expected: Mapping[str, float] = field(default_factory=dict)
-    names: Mapping[str, str] = field(default_factory=dict)
+    options: RotorOptions
 
 
 @dataclass(frozen=True)
@@ -154,17 +148,9 @@ def _export(reader: TableReader) -> ExportSettings:
 
 
 def _rotor(reader: TableReader) -> RotorSettings:
-    expected, names = reader.table("expected"), reader.table("names")
-    made = RotorSettings(
-        reader.text("model"),
-        reader.positive("rotor_speed_rad_s"),
-        reader.maybe(reader.positive, "lock_number"),
-        reader.maybe(reader.positive, "bar_lock_number"),
-        {key: expected.number(key) for key in reader.values("expected")},
-        {key: names.text(key) for key in reader.values("names")},
-    )
-    reader.finish()
-    return made
+    model = reader.text("model")
+    (options,) = read_each((RotorOptions,), reader)
+    return RotorSettings(model, options)
 
 
 def _loop(reader: TableReader) -> LoopSettings:
