@@ -93,3 +93,51 @@ def test_refusals() -> None:
     )
     with pytest.raises(DataError, match="cannot be told apart"):
         estimated(twice)
+
+
+def test_inputs_that_repeat_choose_it_by_themselves() -> None:
+    given = record(5, 0.05)
+    found = fid.estimate_response(given, band_rad_s=(1.0, 12.0))
+    told = fid.estimate_response(given, band_rad_s=(1.0, 12.0), estimator="periodic")
+    assert found.estimator == "periodic"
+    assert_close(found.response, told.response, rtol=1e-12, why="the same estimate")
+    (said,) = [each.message for each in found.findings if each.code == "periodic"]
+    assert "repeat every 10 s" in said
+    assert "left out" not in said
+
+
+@pytest.mark.parametrize(
+    ("given", "options"),
+    [
+        (record(2, 0.05), {}),
+        (record(5, 0.05).replace({"u": multisine(5) + 1e-3 * np.arange(1000)}), {}),
+        (record(5, 0.05), {"window_s": 20.0}),
+        (record(5, 0.05), {"omega_rad_s": [1.0, 2.0, 3.0]}),
+    ],
+)
+def test_windows_are_kept_where_nothing_repeats_or_they_are_asked_for(
+    given: fid.Record, options: dict[str, object]
+) -> None:
+    band = {} if "omega_rad_s" in options else {"band_rad_s": (1.0, 12.0)}
+    assert fid.estimate_response(given, **band, **options).estimator == "composite"
+
+
+def _started(periods: int, decay: float) -> fid.Record:
+    given = record(periods, 0.05)
+    start = 30.0 * decay ** np.arange(periods * PERIOD)
+    return given.replace({"y": given["y"] + start})
+
+
+def test_periods_of_a_start_are_left_out() -> None:
+    found = fid.estimate_response(_started(6, 0.98), band_rad_s=(1.0, 12.0))
+    (said,) = [each.message for each in found.findings if each.code == "periodic"]
+    assert "4 whole periods; 2 before them left out" in said
+    assert found.linear is not None
+    assert found.linear.output_records[0].shape[1] == 4 * PERIOD
+
+
+def test_a_start_that_never_dies_out_is_said_or_left_to_windows() -> None:
+    given = _started(4, 0.999)
+    assert fid.estimate_response(given, band_rad_s=(1.0, 12.0)).estimator == "composite"
+    (said,) = [each for each in estimated(given).findings if each.code == "periods-unsettled"]
+    assert said.light.value == "amber"

@@ -95,7 +95,7 @@ def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> 
         (
             'estimator = "instrument"',
             'estimator = "magic"',
-            "estimator is not known: found 'magic'; needed 'composite'",
+            "estimator is not known: found 'magic'; needed 'auto' or 'composite'",
         ),
         (
             'compare = ["composite"]',

@@ -54,9 +54,9 @@ na = 2
 nb = 1
 nk = 2
 """
-LAG = {"response: Lag, composite", "fit: Lag", "verification: Lag, unseen"}
+LAG = {"response: Lag, auto", "fit: Lag", "verification: Lag, unseen"}
 BLACK = {
-    "response: Black, composite",
+    "response: Black, auto",
     "coherence: Black",
     "fit: Black",
     "residual tests: Black",
@@ -85,7 +85,7 @@ def cache(folder: Path) -> dict[str, Any]:
     path.write_text(STUDY, encoding="utf-8")
     first = fid.run_study(path, output=folder / "out", cache=made)
     # Both models fly the same inputs in the same band: the response is estimated once.
-    assert set(first.carried_out) == RECORDS | LAG | BLACK - {"response: Black, composite"}
+    assert set(first.carried_out) == RECORDS | LAG | BLACK - {"response: Black, auto"}
     return made
 
 
@@ -111,8 +111,8 @@ def test_nothing_changed_runs_nothing(folder: Path, cache: dict[str, Any]) -> No
     [
         ('title = "Rig"', 'title = "Another"', set()),
         ('name = "Lag"', 'name = "Grey"', {"verification: Grey, unseen"}),
-        ("na = 2", "na = 1", BLACK - {"coherence: Black", "response: Black, composite"}),
-        ("starts = 1", "starts = 2", LAG - {"response: Lag, composite"}),
+        ("na = 2", "na = 1", BLACK - {"coherence: Black", "response: Black, auto"}),
+        ("starts = 1", "starts = 2", LAG - {"response: Lag, auto"}),
         (
             "[40.0, 80.0]",
             "[40.0, 70.0]",
@@ -144,7 +144,7 @@ def test_a_change_runs_what_lies_behind_it(
 def test_a_changed_file_is_read_again(folder: Path, cache: dict[str, Any]) -> None:
     own = folder / "own.toml"
     own.write_text(OWN.replace("value = 3.0", "value = 2.5"), encoding="utf-8")
-    assert set(run(folder, STUDY, cache).carried_out) == LAG - {"response: Lag, composite"}
+    assert set(run(folder, STUDY, cache).carried_out) == LAG - {"response: Lag, auto"}
     own.write_text(OWN, encoding="utf-8")
 
 

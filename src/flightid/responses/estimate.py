@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from flightid.conventions import Light
 from flightid.errors import DataError
@@ -18,7 +18,7 @@ from flightid.record.hold import InputShape, Loop, common_hold, common_loop
 from flightid.record.several import as_records
 from flightid.responses.errors.linear_estimate import LinearEstimate, WindowedWeights
 from flightid.responses.estimators.local_polynomial import estimate_local_polynomial
-from flightid.responses.estimators.periodic import estimate_periodic
+from flightid.responses.estimators.periodic import estimate_periodic, estimate_repeating
 from flightid.responses.estimators.prewhitened import PREWHITENED, estimate_prewhitened
 from flightid.responses.estimators.windowed import (
     estimate_windowed,
@@ -46,7 +46,7 @@ def estimate_response(
     n_omega: int = DEFAULT_FREQUENCIES,
     omega_rad_s: ArrayLike | None = None,
     window_s: str | float | Sequence[float] = "auto",
-    estimator: str = "composite",
+    estimator: str = "auto",
     overlap: float = DEFAULT_OVERLAP,
     detrend: str = "mean",
     covariance: bool = True,
@@ -75,7 +75,9 @@ def estimate_response(
     excitations : str or iterable of str, optional
         Channels of injected signals that are independent of the noise; needed by "instrument".
         Default for that method: the channels with the role excitation.
-    estimator : {"composite", "instrument", "local_polynomial", "periodic", "prewhitened"}
+    estimator : {"auto", "composite", "instrument", "local_polynomial", "periodic", "prewhitened"}
+        "auto": "periodic" where all inputs repeat exactly over three settled periods or more and
+        neither windows nor frequencies are asked for, else "composite".
         "composite": directly from inputs to outputs. "instrument": for records with a loop closed,
         by way of the excitation. "local_polynomial": without windows, for short records.
         "periodic": at the harmonics of inputs that repeat (`Record.period_s`), whole periods alone.
@@ -146,16 +148,15 @@ def estimate_response(
             needed="a channel with the role excitation, or excitations=…",
             action="log the injected signal, or use estimator='composite' and mind its bias",
         )
+    free = window_s == "auto" and detrend == "mean" and omega_rad_s is None
     omega = plan_frequencies(omega_rad_s, band_rad_s, n_omega, samples)
     options: dict[str, Cell] = {"estimator": estimator, "detrend": detrend}
-    if estimator == "local_polynomial":
-        step = Step("estimate_response", options, VERSION)
-        response = estimate_local_polynomial(samples, omega, step, covariance=covariance)
-        return _with_inputs(response, samples, listed, loop)
-    if estimator == "periodic":
-        step = Step("estimate_response", options, VERSION)
-        response = estimate_periodic(samples, listed, omega, step, covariance=covariance)
-        return _with_inputs(response, samples, listed, loop)
+    if estimator in ("local_polynomial", "periodic") or (estimator == "auto" and free):
+        whole = _of_whole_records(estimator, samples, listed, omega, options, covariance=covariance)
+        if whole is not None:
+            return _with_inputs(whole, samples, listed, loop)
+    if estimator == "auto":
+        options["estimator"] = estimator = "composite"
     plans = plan_windows(window_s, samples, float(omega[-1]), shifts_of(overlap))
     _require_motion_in_windows(samples, max(plan.length for plan in plans))
     lengths = ", ".join(f"{plan.length * samples.sample_time_s:.6g}" for plan in plans)
@@ -177,6 +178,24 @@ def estimate_response(
         return replace(response, findings=(*response.findings, missing))
     linear = LinearEstimate.of(samples, WindowedWeights(errors), omega)
     return replace(response, errors=errors, linear=linear)
+
+
+def _of_whole_records(
+    estimator: str,
+    samples: Samples,
+    records: Sequence[Record],
+    omega: NDArray[np.float64],
+    options: Mapping[str, Cell],
+    *,
+    covariance: bool,
+) -> FrequencyResponse | None:
+    """An estimate without windows; None where inputs do not ask for one."""
+    found = "periodic" if estimator == "auto" else estimator
+    step = Step("estimate_response", {**options, "estimator": found}, VERSION)
+    if estimator == "local_polynomial":
+        return estimate_local_polynomial(samples, omega, step, covariance=covariance)
+    make = estimate_repeating if estimator == "auto" else estimate_periodic
+    return make(samples, records, omega, step, covariance=covariance)
 
 
 def _with_inputs(

@@ -9,7 +9,7 @@ from flightid.options import Options, option
 from flightid.record.hold import LOOPS, Loop
 from flightid.responses.windows.defaults import DEFAULT_FREQUENCIES, DEFAULT_OVERLAP
 
-ESTIMATORS = ("composite", "instrument", "local_polynomial", "periodic", "prewhitened")
+ESTIMATORS = ("auto", "composite", "instrument", "local_polynomial", "periodic", "prewhitened")
 DETRENDS = ("none", "mean", "line")
 
 
@@ -30,10 +30,10 @@ class ResponseOptions(Options):
         None, choices=LOOPS, doc="Whether a loop was closed; default: a test decides."
     )
     estimator: str = option(
-        "composite",
+        "auto",
         choices=ESTIMATORS,
-        doc="Direct; by way of the excitation, for closed loops; without windows; at harmonics; or "
-        "with a model of the noise, for loops whose excitation was not logged.",
+        doc="Found from the inputs; direct; by way of the excitation, for closed loops; without "
+        "windows; at harmonics; or with a model of the noise, for loops without an excitation.",
     )
     n_omega: int = option(DEFAULT_FREQUENCIES, minimum=2, doc="Log-spaced frequencies in the band.")
     window_s: str | float | Sequence[float] = option(
