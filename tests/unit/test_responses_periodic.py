@@ -136,8 +136,8 @@ def test_periods_of_a_start_are_left_out() -> None:
     assert found.linear.output_records[0].shape[1] == 4 * PERIOD
 
 
-def test_a_start_that_never_dies_out_is_said_or_left_to_windows() -> None:
-    given = _started(4, 0.999)
+def test_a_start_that_outlasts_the_periods_is_said_or_left_to_windows() -> None:
+    given = _started(4, 0.995)
     assert fid.estimate_response(given, band_rad_s=(1.0, 12.0)).estimator == "composite"
     (said,) = [each for each in estimated(given).findings if each.code == "periods-unsettled"]
     assert said.light.value == "amber"
