@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 HZ = 1 / (2 * math.pi)
 WORDS = {
-    "auto": "direct estimate",
     "composite": "direct estimate",
     "local_polynomial": "local polynomial estimate",
     "periodic": "estimate at harmonics",

@@ -158,14 +158,15 @@ def _examined(item: ModelResults, inspection: Inspection | None) -> ModelResults
 def _responses(
     task: Task, records: Records, runner: StageRunner
 ) -> dict[str, StageResult[FrequencyResponse]]:
+    """By what made them, what counts first."""
     settings = task.settings
     if settings.band_rad_s is None or (task.model is not None and not settings.fit.on_responses):
         return {}
     asked = settings.response
     flown = [records[name] for name in settings.flown]
-    found = {}
+    found: dict[str, StageResult[FrequencyResponse]] = {}
     for estimator in asked.estimators:
-        found[estimator] = runner.stage(
+        made = runner.stage(
             f"response: {settings.name}, {estimator}",
             estimate,
             flown,
@@ -176,6 +177,7 @@ def _responses(
             estimator,
             asked.of_estimates,
         )
+        found.setdefault(made.value.estimator, made)
     return found
 
 
