@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -11,6 +12,7 @@ import flightid as fid
 from flightid.identification.innovation_tests import InnovationTests, innovation_tests
 from flightid.identification.multistart import End, best_first
 from tests.strangers import black_boxes as flights
+from tests.strangers import rig_gains
 
 CODES = {"errors-not-white", "inputs-in-errors"}
 
@@ -32,6 +34,34 @@ def test_tests_tell_white_coloured_and_driven_errors_apart() -> None:
     assert "inputs still foretell" in missing.why_biased
     assert innovation_tests([0.0 * e], [u], [e], (1, 1)) == InnovationTests(None, None)
     assert innovation_tests([e[:, :20]], [u[:, :20]], [e[:, :20]], (1, 1)).white is None
+
+
+def test_slight_colour_makes_bars_longer_and_missing_dynamics_leave_none() -> None:
+    slight = InnovationTests(1e-3, 0.5, 0.0, 1.0, (24.0, 0.0))
+    assert slight.widening(biased=True) == 5.0
+    assert slight.widening(biased=False) == 1.0
+    assert replace(slight, excess=(200.0, 0.0)).widening(biased=True) is None
+    assert replace(slight, past_percent=12.0).widening(biased=True) is None
+    chance = InnovationTests(0.5, 1e-5, 0.0, 0.0, (0.0, 35.0))
+    assert chance.widening(biased=False) == 6.0
+    assert "nothing that can be told from chance" in chance.why_biased
+    assert replace(chance, worth_percent=0.5).widening(biased=False) is None
+
+
+@pytest.mark.parametrize(("seed", "method"), [(52, "armax"), (230, "subspace")])
+def test_gains_of_a_right_black_box_survive_slight_colour(seed: int, method: str) -> None:
+    """A true structure that a whiteness test calls wrong, as it may, keeps (longer) bars."""
+    rig = rig_gains.drawn(seed)
+    assert rig.right
+    assert rig.method == method
+    fit = fid.identify(rig.structure, rig_gains.record(rig, seed))
+    (said,) = [each.message for each in fit.findings if each.code == "errors-not-white"]
+    assert "times as long" in said
+    (steady,) = fit.details.gains.values()
+    low, high = steady.interval95 or (None, None)
+    truth = rig.b.sum() / rig.a.sum()
+    assert low < truth < high
+    assert high - low < abs(truth)
 
 
 @pytest.mark.parametrize("structure", [flights.ARX, flights.SUBSPACE], ids=["arx", "subspace"])

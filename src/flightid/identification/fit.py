@@ -29,6 +29,9 @@ from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, shown
 from flightid.uncertainty.uncertain import Uncertain
 
+WITHHOLDING = ("errors-not-white", "inputs-in-errors", "order-too-high")
+"""Findings that say why a fit has no covariance."""
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time histories"}):
@@ -209,7 +212,8 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
         >>> fid.identify(truth, data).uncertain()
         Uncertain(3 numbers, covariance known)
         """
-        return uncertain_model(self.model, self.names, self.carried)
+        said = [each.message for each in self.findings if each.code in WITHHOLDING]
+        return uncertain_model(self.model, self.names, self.carried, "; ".join(said))
 
     def summary(self, *, level: float | None = None) -> Table:
         """Table of the parameters, with costs and findings below.
@@ -286,11 +290,11 @@ def _row(p: Estimate, level: float, alone: float | None) -> tuple[Cell, ...]:
 
 
 def uncertain_model(
-    model: Model, names: Sequence[str], covariance: NDArray[np.float64] | None
+    model: Model, names: Sequence[str], covariance: NDArray[np.float64] | None, reason: str = ""
 ) -> Uncertain[Model]:
-    """A model with the covariance of some of its parameters, inside their bounds."""
+    """A model with the covariance of some of its parameters, inside their bounds; or why not."""
     if covariance is None:
-        return Uncertain.exact(model, "the fit knows no errors of its data")
+        return Uncertain.exact(model, reason or "the fit knows no errors of its data")
     free = [model.parameters[name] for name in names]
     bounds = np.array([p.minimum for p in free]), np.array([p.maximum for p in free])
     numbers = np.array([p.value for p in free], dtype=np.float64)

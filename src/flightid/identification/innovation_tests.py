@@ -1,11 +1,16 @@
 """Whether prediction errors are what intervals of a black box assume: white, and new to the inputs.
 
-Where the errors of a model whose noise shares its poles are not white, its estimates are biased,
-and no covariance mends that. Where inputs still foretell the errors, dynamics are missing.
+Where the errors of a model whose noise shares its poles are not white, its estimates are biased;
+where inputs still foretell the errors, dynamics are missing. A part m of the errors that should not
+be there moves estimates, in units of their standard errors s, by no more than |m|/s in any
+direction; a portmanteau tells |m|²/s² beside chance, of what the fit left of it. Bars longer by as
+much hold the bias of coloured errors. Missing dynamics keep their sign over a band and move
+estimates further, so there are no bars where inputs tell more than chance does.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -15,7 +20,12 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.uncertainty.agreement import Agreement
-from flightid.uncertainty.foretold import is_material, percent_of_output, share_from_inputs
+from flightid.uncertainty.foretold import (
+    is_material,
+    percent_of_output,
+    share_from_inputs,
+    share_from_past,
+)
 from flightid.uncertainty.residual_correlation import (
     Series,
     autocorrelation,
@@ -34,6 +44,8 @@ FEWEST_LAGS = 5
 ROUNDING = 1e-8
 """Errors over outputs below which there is rounding alone."""
 ORDERS = "raise the orders of the input's part, check its delay, or look for feedback"
+WIDEST = 10.0
+"""Times a standard error by which a bias may widen it before there is none."""
 TINY = float(np.finfo(float).tiny)
 
 
@@ -49,11 +61,19 @@ class InnovationTests:
         That past inputs do not foretell the errors.
     worth_percent : float or None
         Most of an output that an input still foretells, rms in percent of the output's.
+    past_percent : float or None
+        The same of the errors' own past.
+    excess : tuple of float
+        By how much the statistics of whiteness and of independence exceed their mean by chance,
+        summed over outputs and inputs: squared size, in standard deviations of the errors, of what
+        should not be there.
     """
 
     white: float | None
     independent: float | None
     worth_percent: float | None = None
+    past_percent: float | None = None
+    excess: tuple[float, float] = (0.0, 0.0)
 
     @property
     def is_white(self) -> bool:
@@ -76,6 +96,11 @@ class InnovationTests:
         """
         if not self.is_independent:
             worth = self.worth_percent
+            if worth == 0.0:
+                return (
+                    f"inputs seem to foretell the prediction errors (p = {self.independent:.2g}), "
+                    "though by nothing that can be told from chance"
+                )
             size = "" if worth is None else f", worth {worth:.2g} % of the output"
             return (
                 f"inputs still foretell the prediction errors (p = {self.independent:.2g}{size}): "
@@ -86,27 +111,53 @@ class InnovationTests:
             return f"prediction errors are not white {chance}, which biases the estimates"
         return ""
 
+    def widening(self, *, biased: bool) -> float | None:
+        """Times by which standard errors have to be longer to hold a bias; None: no bars hold it.
+
+        `biased` says whether coloured errors bias estimates of this structure.
+
+        Example
+        -------
+        >>> InnovationTests(1e-3, 0.5, 0.0, 0.2, (24.0, 0.0)).widening(biased=True)
+        5.0
+        """
+        size, material = 1.0, False
+        if biased and not self.is_white:
+            size += self.excess[0]
+            material = is_material(self.past_percent)
+        if not self.is_independent:
+            size += self.excess[1]
+            material = material or self.worth_percent != 0.0
+        return None if material or size > WIDEST**2 else math.sqrt(size)
+
     def beside(self, agreement: Agreement | None) -> InnovationTests:
         """The tests of a mean vehicle: where records differ, inputs tell how; scatter counts."""
         if agreement is None or agreement.freedom is None:
             return self
         return replace(self, independent=None)
 
-    def findings(self, *, biased: bool, action: str = ORDERS) -> list[Finding]:
+    def findings(
+        self, *, biased: bool, action: str = ORDERS, times: float | None = None
+    ) -> list[Finding]:
         """Verdicts; `biased` says whether coloured errors bias estimates of this structure.
 
-        `action` is what to do where inputs foretell the errors.
+        `action` is what to do where inputs foretell the errors, `times` how much longer standard
+        errors were made to hold a bias.
         """
+        bars = "they have no intervals"
+        if times is not None:
+            bars = f"intervals are {times:.2g} times as long, to hold that"
         if not self.is_independent:
             light = Light.RED if is_material(self.worth_percent) else Light.AMBER
-            return [Finding("inputs-in-errors", light, self.why_biased, action)]
+            words = self.why_biased if times is None else f"{self.why_biased}; {bars}"
+            return [Finding("inputs-in-errors", light, words, action)]
         if self.is_white or not biased:
             return []
         return [
             Finding(
                 "errors-not-white",
                 Light.AMBER,
-                f"{self.why_biased}; they have no intervals",
+                f"{self.why_biased}; {bars}",
                 "fit a noise model that is large enough, or one that shares no poles with the "
                 "vehicle (output error, Box-Jenkins; method='iv4' for ARX)",
             )
@@ -144,33 +195,36 @@ def innovation_tests(
     lags = min(LAGS + max(spent), shortest // 4)
     if lags < first:
         return InnovationTests(None, None)
-    own: list[float] = []
-    driven: list[tuple[float, float]] = []
+    own: list[tuple[float, float, float]] = []
+    driven: list[tuple[float, float, float]] = []
     for place in range(len(errors[0])):
         e = tuple(row[place] for row in errors)
         ratio = _size(e) / max(_size(tuple(row[place] for row in outputs)), TINY)
         if ratio <= ROUNDING:
             continue
         past = cross_correlation(e, e, lags)[lags + 1 :]
-        own.append(white_portmanteau(past, n, spent[0])[2])
+        statistic, degrees, p_value = white_portmanteau(past, n, spent[0])
+        share = share_from_past(past, n)
+        own.append((p_value, percent_of_output(share, ratio, 1.0) or 0.0, statistic - degrees))
         for channel in range(len(inputs[0])):
             u = tuple(row[channel] for row in inputs)
             if _size(u) > 0.0:
                 driven += _independence(u, e, lags, spent[1], ratio)
-    worth = max((percent for _, percent in driven), default=None)
-    return InnovationTests(_smallest(own), _smallest([p for p, _ in driven]), worth)
+    (white, past_percent, old), (independent, worth, new) = _joined(own), _joined(driven)
+    return InnovationTests(white, independent, worth, past_percent, (old, new))
 
 
 def _independence(
     u: Series, e: Series, lags: int, spent: int, ratio: float
-) -> list[tuple[float, float]]:
-    """Chance, and worth in percent of the output; empty where there is no test."""
+) -> list[tuple[float, float, float]]:
+    """Chance, worth in percent of the output, and excess; empty where there is no test."""
     n = sum(row.size for row in e)
     values = cross_correlation(u, e, lags)[lags:]
     covariance = lag_covariance(u, e, lags + 1)
-    _, degrees, p_value = independence_portmanteau(values, covariance, n, spent)
+    statistic, degrees, p_value = independence_portmanteau(values, covariance, n, spent)
     share = share_from_inputs(values, autocorrelation(u, lags + 1), covariance, n)
-    return [(p_value, percent_of_output(share, ratio, 1.0) or 0.0)] if degrees >= 1 else []
+    worth = percent_of_output(share, ratio, 1.0) or 0.0
+    return [(p_value, worth, statistic - degrees)] if degrees >= 1 else []
 
 
 def _size(series: Series) -> float:
@@ -178,6 +232,11 @@ def _size(series: Series) -> float:
     return float(np.sqrt(np.mean(whole**2)))
 
 
-def _smallest(found: Sequence[float]) -> float | None:
-    """Bonferroni's p-value of several tests."""
-    return min(1.0, len(found) * min(found)) if found else None
+def _joined(
+    found: Sequence[tuple[float, float, float]],
+) -> tuple[float | None, float | None, float]:
+    """Bonferroni's p-value of several tests, the largest worth, and the excess of all."""
+    if not found:
+        return None, None, 0.0
+    chances, worths, excesses = zip(*found, strict=True)
+    return min(1.0, len(found) * min(chances)), max(worths), sum(max(e, 0.0) for e in excesses)

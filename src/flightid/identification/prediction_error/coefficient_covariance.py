@@ -111,9 +111,16 @@ def compared(
         if not tests.is_white and not shares_poles(structure):
             found = _by_colour(structure, found, agreed.covariance, blocks)
     tests = tests.beside(found.agreement)
-    if not tests.is_independent or (not tests.is_white and shares_poles(structure)):
+    times = tests.widening(biased=shares_poles(structure))
+    if times is None:
         return replace(found, covariance=None, reason=tests.why_biased)
-    return found
+    return found if times == 1.0 else widened(found, times)
+
+
+def widened(found: SearchResult, times: float) -> SearchResult:
+    """The same with standard errors so many times as long."""
+    known = found.covariance
+    return found if known is None else replace(found, covariance=times**2 * known)
 
 
 def _by_colour(

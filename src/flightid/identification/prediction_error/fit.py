@@ -268,7 +268,10 @@ def _assemble(
         findings=(
             *judge_polynomial(structure, model, parameters, roots, minima, n_counted),
             *colour_findings(*found.colour),
-            *tests.findings(biased=shares_poles(structure)),
+            *tests.findings(
+                biased=shares_poles(structure),
+                times=tests.widening(biased=shares_poles(structure)),
+            ),
         ),
         provenance=_provenance(structure, records, data),
         details=PolynomialDetails(

@@ -121,7 +121,8 @@ def _assemble(
     )
     spent = (2 * model.order, model.order)
     tests = innovation_tests(found.errors, data.inputs, data.outputs, spent)
-    covariance = None if spare or tests.why_biased else _in_units(structure, found, size)
+    times = None if spare else tests.widening(biased=True)
+    covariance = None if times is None else _in_units(structure, found, size, times)
     spread = Errors(model.sample_time_s, covariance, found.degrees)
     roots = innovations_roots(model, spread, direct=bool(structure.direct))
     measures = determinant_criteria(joint, size[:, None], structure.n_parameters(model.order))
@@ -138,7 +139,7 @@ def _assemble(
         noise_covariance=np.asarray(model.noise_covariance),
         findings=(
             *judge_innovations(structure, model, choice, roots, found.termination, spare),
-            *tests.findings(biased=True),
+            *tests.findings(biased=True, times=times),
         ),
         provenance=_provenance(structure, records, data),
         details=SubspaceDetails(
@@ -163,14 +164,17 @@ def _parameters(model: InnovationsModel) -> dict[str, Estimate]:
     }
 
 
-def _in_units(structure: SubspaceStructure, found: RefinementResult, size: Array) -> Array | None:
+def _in_units(
+    structure: SubspaceStructure, found: RefinementResult, size: Array, times: float
+) -> Array | None:
+    """Covariance in the outputs' units, of standard errors so many times as long."""
     if found.covariance is None:
         return None
     a, b, c, d, k = (np.ones_like(matrix) for matrix in found.matrices)
     parts = [a, b, size[:, None] * c, size[:, None] * d, k / size]
     if not structure.direct:
         del parts[3]
-    factor = np.concatenate([part.ravel() for part in parts])
+    factor = times * np.concatenate([part.ravel() for part in parts])
     return np.asarray(factor[:, None] * found.covariance * factor)
 
 
