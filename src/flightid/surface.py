@@ -23,6 +23,8 @@ PAIR = re.compile(r"\{'(?P<key>[^']*)': '(?P<value>[^']*)'\}")
 """One entry of a table."""
 ANY = re.compile(r"…|\.\.\.|[\[{(]\W*[\]})]|<.*>|")
 """Values that stand for whatever the user will give."""
+FIXED = re.compile(r"model\.with_fixed(?:\((?P<names>[^)]*)\))?")
+"""How Python holds parameters."""
 
 
 @contextmanager
@@ -50,6 +52,22 @@ def spoken(text: str) -> str:
     return text if speaker is None or not isinstance(text, str) else speaker(text)
 
 
+def held_in(text: str, place: str) -> str:
+    """Python's way to hold parameters as the key of a file.
+
+    Example
+    -------
+    >>> held_in("fix with model.with_fixed(Lp=..., tau=...)", "[model.parameters]")
+    'fix with free = false of Lp, tau in [model.parameters]'
+    """
+
+    def key(found: re.Match[str]) -> str:
+        names = ", ".join(re.findall(r"(\w+)=", found["names"] or ""))
+        return f"free = false{f' of {names}' if names else ''} in {place}"
+
+    return FIXED.sub(key, text)
+
+
 def as_key(text: str) -> str:
     """Options as keys of a study file."""
 
@@ -62,4 +80,4 @@ def as_key(text: str) -> str:
         plain = {"True": "true", "False": "false", "None": '"none"'}.get(value, value)
         return f"{name} = " + plain.replace("'", '"')
 
-    return GIVEN.sub(key, text)
+    return GIVEN.sub(key, held_in(text, "[model.parameters]"))

@@ -24,6 +24,7 @@ from flightid.options import Options, option
 from flightid.study import fit_settings
 from flightid.study.fit_settings import read_fit
 from flightid.study.reading import TableReader
+from flightid.surface import as_key, speaking, spoken
 
 
 @dataclass(frozen=True)
@@ -150,3 +151,12 @@ def test_every_method_is_reached_from_the_command_line(
         assert f'"method": "{method}"' in capsys.readouterr().out
     assert run([*words, "output_error", "--half-width", "3"]) == 2
     assert "--half-width is no option of output_error" in capsys.readouterr().err
+
+
+def test_held_parameters_are_told_as_a_file_has_them() -> None:
+    with speaking(as_key):
+        assert spoken("fix with model.with_fixed(Lp=..., tau=...)") == (
+            "fix with free = false of Lp, tau in [model.parameters]"
+        )
+        assert "with_fixed" not in spoken("fix one of a, b with model.with_fixed, or excite them")
+    assert spoken("fix with model.with_fixed(a=...)") == "fix with model.with_fixed(a=...)"

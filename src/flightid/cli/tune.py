@@ -96,7 +96,7 @@ def command(
         path, folder = taken_study(files, output, log, data, tune=of_log, cache=cache)
         study = run_study(path, output=folder, log=log, tune=asked, level=level, cache=cache)
         tuning = study.tuning
-        refused = [f"{each.message} ({each.action})" for each in study.faults]
+        refused = [str(each).partition("] ")[2] for each in study.faults]
     if tuning is None:
         nothing = "there is no model of a rate that can be tuned"
         raise click.ClickException("; ".join(refused) or nothing)

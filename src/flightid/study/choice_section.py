@@ -8,6 +8,7 @@ from flightid.plot.polynomial import order_scan
 from flightid.report.blocks import result_blocks
 from flightid.report.content import Block, Lights, Paragraph, TableBlock
 from flightid.report.figures import figure_block
+from flightid.study.structures import ranked
 from flightid.table import Table
 from flightid.validation import OrderScan
 from flightid.validation.order_scan.result import words_of
@@ -41,6 +42,11 @@ def choice_blocks(item: ModelResults) -> tuple[Block, ...]:
         words += (
             ". Free runs do not see the noise model; so of all structures whose free-run error "
             "lies within 10 % of the smallest the one with the smallest BIC is taken"
+        )
+    if taken is not None and taken is not ranked(choice, structure.choose)[0]:
+        words += (
+            ". Those before it have a pole and a zero that cancel within their errors, or that fit "
+            "an offset of the record"
         )
     lights = (Lights(item.choice_findings),) if item.choice_findings else ()
     table = choice.summary()

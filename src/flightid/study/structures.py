@@ -8,6 +8,7 @@ from typing import Any
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification import Fit, identify
+from flightid.identification.prediction_error.findings import NEEDLESS
 from flightid.models import InnovationsModel, NarxStructure, PolynomialModel
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
@@ -18,6 +19,8 @@ from flightid.validation.order_scan.scan_orders import fit_of
 Choice = OrderScan | NarxSearch
 AS_GOOD = 0.10
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
+TRIED = 4
+"""Structures that are fitted whole, at most, for one without a pole and a zero too many."""
 
 
 def fit_structure(
@@ -59,19 +62,37 @@ def _polynomial(
         return identify(asked, flown), None
     tried: dict[str, Any] = {"kind": settings.kind, **settings.orders, **settings.options}
     scan = scan_orders(flown, unseen, outputs=output, inputs=inputs, **tried)
-    chosen = _chosen(scan, settings.choose)
-    return (scan.best if chosen is scan.trials[0] else fit_of(chosen, flown)), scan
+    fits = (
+        scan.best if trial is scan.trials[0] else fit_of(trial, flown)
+        for trial in ranked(scan, settings.choose)[:TRIED]
+    )
+    first = next(fits)
+    if not _has_needless(first):
+        return first, scan
+    # A pole and its zero that cancel, or fit an offset of the record, leave the steady gain open.
+    return next((fit for fit in fits if not _has_needless(fit)), first), scan
 
 
-def _chosen(scan: OrderScan, how: str) -> OrderTrial:
-    """The trial that a rule takes."""
+def _has_needless(fit: Fit) -> bool:
+    return any(finding.code in NEEDLESS for finding in fit.findings)
+
+
+def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
+    """Trials that a rule takes: first, second, … of those whose free run is as good.
+
+    Parameters
+    ----------
+    scan : OrderScan
+    how : str
+        One of `CHOICES`.
+    """
     first = scan.trials[0]
     if how == "simplest":
-        return scan.simplest
+        return [scan.simplest]
     if how == "bic":
-        return scan.smallest("bic")
-    if how == "free_run" or first.free_run_rms is None:
-        return first
+        return [scan.smallest("bic")]
+    if first.free_run_rms is None:
+        return [first]
     limit = (1 + AS_GOOD) * first.free_run_rms
     alike = [
         (trial.criteria.bic, place)
@@ -80,7 +101,8 @@ def _chosen(scan: OrderScan, how: str) -> OrderTrial:
         and trial.free_run_rms is not None
         and trial.free_run_rms <= limit
     ]
-    return scan.trials[min(alike)[1]] if alike else first
+    order = sorted(alike) if how == "balanced" else alike
+    return [scan.trials[place] for _, place in order] or [first]
 
 
 def _narx(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from flightid.conventions import Light
@@ -25,6 +26,10 @@ QUANTILE = half_width(LEVEL)
 HARDLY_SEEN = 0.5
 """Largest share by which a pole and its zero may change the response anywhere and still be said to
 cancel; a pair that may change it by more was not shown to."""
+
+CANCELLATION, PAIR_AT_ONE = "pole-zero-cancellation", "pole-zero-at-one"
+NEEDLESS = frozenset({CANCELLATION, PAIR_AT_ONE})
+"""Codes of findings that say a pole and a zero too many."""
 
 
 def judge_polynomial(
@@ -137,10 +142,22 @@ def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[F
             statistic = float(distance @ np.linalg.pinv(errors) @ distance)
             spread = QUANTILE * float(np.sqrt(np.max(np.linalg.eigvalsh(errors))))
             seen = (abs(gap) + spread) / abs(1.0 - abs(pole.z))
-            if statistic < chdtri(n, 0.05) and seen < HARDLY_SEEN:
+            together = statistic < chdtri(n, 0.05)
+            if together and seen >= HARDLY_SEEN and _is_at_one(pole, covariance):
                 found.append(
                     Finding(
-                        "pole-zero-cancellation",
+                        PAIR_AT_ONE,
+                        Light.AMBER,
+                        f"{pole.response}: pole {pole.z:.4g} and zero {zero.z:.4g} lie together at "
+                        "z = 1 within their errors: they fit an offset or a drift, and leave the "
+                        "steady gain open",
+                        "lower na or nf and nb by 1",
+                    )
+                )
+            if together and seen < HARDLY_SEEN:
+                found.append(
+                    Finding(
+                        CANCELLATION,
                         Light.AMBER,
                         f"{pole.response}: pole {pole.z:.4g} and zero {zero.z:.4g} cancel within "
                         f"their errors and change the response by {100 * seen:.2g} % at most",
@@ -148,6 +165,13 @@ def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[F
                     )
                 )
     return found
+
+
+def _is_at_one(root: FittedRoot, covariance: NDArray[np.float64]) -> bool:
+    rate = root.gradient
+    if rate is None or root.z.imag != 0.0:
+        return False
+    return bool(abs(root.z - 1.0) < QUANTILE * np.sqrt(rate.real @ covariance @ rate.real))
 
 
 def _overfit(
