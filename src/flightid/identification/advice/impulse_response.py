@@ -14,7 +14,12 @@ from scipy.special import chdtrc
 from flightid.errors import DataError, OptionError
 from flightid.identification.advice.delays import InputDelay, find_delays
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
-from flightid.identification.prediction_error.linear_regression import regress, regress_lags
+from flightid.identification.prediction_error.linear_regression import (
+    LinearRegression,
+    inverse_square,
+    regress,
+    regress_lags,
+)
 from flightid.models.polynomial.structure import KERNELS
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
@@ -266,22 +271,26 @@ def _until_ended(
     What a response does after the last lag goes into the lags before, as far as inputs are
     coloured; so lags are doubled until the last of them are zero or the records are used up.
     """
+    first = _lagged(data, n)
     while True:
-        found = _estimate(data, n, kernel)
+        found = _estimate(data, n, kernel, first)
         parts = [slice(i * n, (i + 1) * n) for i in range(count)]
         if all(_ends(found[0][part], found[1][part, part], count) for part in parts):
             return n, found, True
         longer = 2 * n
         room = sum(max(0, length - longer - WHITENER) for length in data.lengths)
         short = room < SAMPLES_PER_COEFFICIENT * longer * count
-        if short or min(data.lengths) <= longer + WHITENER or not _determined(data, longer):
+        if short or min(data.lengths) <= longer + WHITENER:
+            return n, found, False
+        first = _lagged(data, longer)
+        # Inputs may hold fewer frequencies than so many lags need.
+        if first.dependent is not None:
             return n, found, False
         n = longer
 
 
-def _determined(data: SampledChannels, n: int) -> bool:
-    """Whether the inputs hold as many frequencies as so many lags need."""
-    return regress_lags(data.output, data.inputs, data.lengths, n, n - 1).dependent is None
+def _lagged(data: SampledChannels, n: int) -> LinearRegression:
+    return regress_lags(data.output, data.inputs, data.lengths, n, n - 1)
 
 
 def _ends(values: Array, covariance: Array, count: int) -> bool:
@@ -334,12 +343,13 @@ def _shifted(data: SampledChannels, negative: int) -> SampledChannels:
     return SampledChannels(output, inputs, lengths, data.offsets, data.units, data.sample_time_s)
 
 
-def _estimate(data: SampledChannels, n: int, kernel: str | None) -> tuple[Array, Array, int]:
-    first = regress_lags(data.output, data.inputs, data.lengths, n, n - 1)
-    left = np.array(data.output)
+def _estimate(
+    data: SampledChannels, n: int, kernel: str | None, first: LinearRegression
+) -> tuple[Array, Array, int]:
+    left, start = np.array(data.output), first.shortest
     for i, row in enumerate(data.inputs):
         for span in data.spans:
-            left[span] -= lfilter(first.shortest[i * n : (i + 1) * n], [1.0], row[span])
+            left[span] -= lfilter(start[i * n : (i + 1) * n], [1.0], row[span])
     inside = np.concatenate([left[span][n - 1 :] for span in data.spans])
     lengths = [length - n + 1 for length in data.lengths]
     noise = regress(inside, np.empty((0, inside.size)), lengths, WHITENER, [], []).shortest
@@ -358,5 +368,4 @@ def _estimate(data: SampledChannels, n: int, kernel: str | None) -> tuple[Array,
         smooth = kernel_estimate(final, [n] * len(data.inputs), kernel)
         return smooth.theta, smooth.covariance, final.n_rows
     variance = final.sum_of_squares / (final.n_rows - final.theta.size)
-    inverse = np.linalg.inv(final.factor)
-    return final.theta, np.asarray(variance * inverse @ inverse.T), final.n_rows
+    return final.theta, variance * inverse_square(final.factor), final.n_rows

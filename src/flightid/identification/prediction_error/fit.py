@@ -35,7 +35,11 @@ from flightid.identification.prediction_error.findings import judge_polynomial
 from flightid.identification.prediction_error.information_criteria import criteria
 from flightid.identification.prediction_error.instrumental_variables import four_stage
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
-from flightid.identification.prediction_error.linear_regression import regress, require_independent
+from flightid.identification.prediction_error.linear_regression import (
+    inverse_square,
+    regress,
+    require_independent,
+)
 from flightid.identification.prediction_error.part_blocks import BEFORE, errors_at
 from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
 from flightid.identification.prediction_error.starts import polynomial_starts
@@ -108,7 +112,7 @@ def _regression(structure: PolynomialStructure, data: SampledChannels) -> Search
         theta, known = four_stage(structure, data)
         found = _linear(structure, theta, known.covariance, degrees, "instruments", skip)
         return replace(found, freedom=known.freedom, colour=known.colour, agreement=known.agreement)
-    covariance = made.sum_of_squares / degrees * _inverse_square(made.factor)
+    covariance = made.sum_of_squares / degrees * inverse_square(made.factor)
     return _linear(structure, made.theta, covariance, degrees, "regression", skip)
 
 
@@ -123,12 +127,6 @@ def _linear(
     values = dict(zip(structure.names, theta.tolist(), strict=True))
     minimum = LocalMinimum(0.0, 1, values, ending)
     return SearchResult(theta, covariance, degrees, (minimum,), 0, [], skip)
-
-
-def _inverse_square(factor: Array) -> Array:
-    """(RᵀR)⁻¹ of a triangle, through R⁻¹."""
-    inverse = np.linalg.inv(factor)
-    return np.asarray(inverse @ inverse.T)
 
 
 def _iterate(
@@ -170,7 +168,7 @@ def _iterate(
     factor = flat.reshape(theta.size, theta.size).T
     covariance = None
     if _is_determined(factor):
-        covariance = squares / degrees * _inverse_square(factor)
+        covariance = squares / degrees * inverse_square(factor)
     return SearchResult(
         theta, covariance, degrees, _minima(structure, ends), iterations, memory, skip
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dpotri, dtrcon
 
 from flightid import _native
 from flightid.errors import DataError
@@ -47,6 +48,9 @@ class LinearRegression:
         """Shortest coefficients among those that fit best: safe where regressors are collinear."""
         scale = np.linalg.norm(self.factor, axis=0)
         scale[scale == 0.0] = 1.0
+        # No singular value is less than this bound, times √n, over the largest: none is left out.
+        if dtrcon(self.factor / scale)[0] > len(scale) * SMALLEST:
+            return self.theta
         wanted = -self.triangle[:-1, -1]
         return np.asarray(np.linalg.lstsq(self.factor / scale, wanted, rcond=SMALLEST)[0] / scale)
 
@@ -123,6 +127,12 @@ def _products(output: Array, inputs: Array, n: int, skip: int) -> Array:
             found[mine, j * n : (j + 1) * n] = block
             found[j * n : (j + 1) * n, mine] = block.T
     return found
+
+
+def inverse_square(factor: Array) -> Array:
+    """(RᵀR)⁻¹ of a triangle, shape (n, n)."""
+    upper = np.triu(dpotri(factor)[0])
+    return np.asarray(upper + np.triu(upper, 1).T)
 
 
 def require_independent(regression: LinearRegression, structure: PolynomialStructure) -> None:
