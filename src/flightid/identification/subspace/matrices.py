@@ -86,7 +86,7 @@ def feedthrough(
         count = y.shape[1]
         columns = np.zeros((n_free + n * records, p, count))
         for j in range(m):
-            passed = adjoint_run(closed, c, u[j])
+            passed = adjoint_run(closed, c, u[j : j + 1])[0]
             columns[j : n * m : m] = passed
             if direct:
                 for o in range(p):
@@ -108,7 +108,7 @@ def feedthrough(
     return found[: n * m].reshape(n, m), d
 
 
-def adjoint_run(a: Array, c: Array, signal: Array) -> Array:
-    """C (q - A)⁻¹ applied to one signal entering each state, shape (n, p, n_samples)."""
-    forcing = c[:, :, None] * signal
-    return np.moveaxis(run_recursion(a.T, forcing), 0, 1)
+def adjoint_run(a: Array, c: Array, signals: Array) -> Array:
+    """C (q - A)⁻¹ applied to each signal entering each state, (n_signals, n, p, n_samples)."""
+    forcing = signals[:, None, None] * c[:, :, None]
+    return run_recursion(a.T, forcing).swapaxes(1, 2)

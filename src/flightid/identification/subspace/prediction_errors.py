@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array, Array, Array]
 DISTINCT = 1e-12
 """Least share of an error that the other outputs do not hold, below which it is rounding."""
+BATCH = 2**20
+"""Numbers of runs that are made at once: long records are run signal by signal."""
 ROUNDS = 12
 SETTLED = 1e-10
 """Relative change of the log determinant of the innovations between rounds."""
@@ -71,8 +73,10 @@ class Predictor:
     def unpack(self, theta: Array) -> Matrices:
         """A, B, C, D, K from their entries."""
         n, p, m = self.shapes[0][0], self.data.n_outputs, self.data.n_inputs
-        parts = np.split(theta, np.cumsum([r * c for r, c in self.shapes])[:-1])
-        found = [part.reshape(shape) for part, shape in zip(parts, self.shapes, strict=True)]
+        found, first = [], 0
+        for rows, columns in self.shapes:
+            found.append(theta[first : first + rows * columns].reshape(rows, columns))
+            first += rows * columns
         if not self.direct:
             found.insert(3, np.zeros((p, m)))
         a, b, c, d, k = found
@@ -89,10 +93,12 @@ class Predictor:
         a, b, c, d, k = matrices
         closed, found = a - k @ c, []
         for y, u in zip(self.data.outputs, self.data.inputs, strict=True):
-            state = run_recursion(closed, (b - k @ d) @ u + k @ y)
-            error = y - c @ state - d @ u
             n = a.shape[0]
-            moved = run_recursion(closed, np.zeros((n, n, y.shape[1])), np.eye(n))
+            forcing = np.zeros((n + 1, n, y.shape[1]))
+            forcing[n] = (b - k @ d) @ u + k @ y
+            runs = run_recursion(closed, forcing, np.eye(n + 1, n))
+            moved, state = runs[:n], runs[n]
+            error = y - c @ state - d @ u
             found.append((error, state, moved))
         return found
 
@@ -156,18 +162,19 @@ class Predictor:
         slopes = [each.reshape(*s, -1) for each, s in zip(by, self.shapes, strict=True)]
         da, db, dc = slopes[:3]
         dk = slopes[-1]
-        groups = [(state, da - np.tensordot(k, dc, axes=1), dc), (error, dk, None)]
+        entering = [da - np.tensordot(k, dc, axes=1), dk, db]
         if self.direct:
-            dd = slopes[3]
-            groups.append((u, db - np.tensordot(k, dd, axes=1), dd))
-        else:
-            groups.append((u, db, None))
-        for signal, entering, straight in groups:
-            for j, row in enumerate(signal):
-                passed = adjoint_run(closed, c, row)
-                made -= np.tensordot(entering[:, j].T, passed, axes=1)
-                if straight is not None:
-                    made -= straight[:, j].T[:, :, None] * row
+            entering[2] = db - np.tensordot(k, slopes[3], axes=1)
+        wide, rows = np.concatenate(entering, axis=1).T, np.concatenate([state, error, u])
+        together = max(BATCH // (c.size * rows.shape[1]), 1)
+        for first in range(0, len(rows), together):
+            some = slice(first, first + together)
+            # Every signal enters every state: one product over both.
+            passed = adjoint_run(closed, c, rows[some]).reshape(-1, made[0].size)
+            made -= (wide[:, some].reshape(len(made), -1) @ passed).reshape(made.shape)
+        made -= np.tensordot(dc, state, axes=(1, 0)).swapaxes(0, 1)
+        if self.direct:
+            made -= np.tensordot(slopes[3], u, axes=(1, 0)).swapaxes(0, 1)
 
 
 def refine(
