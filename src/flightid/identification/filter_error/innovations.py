@@ -56,7 +56,7 @@ class RecordInnovations:
     states : ndarray, shape (n_samples, n_states)
         Predicted one sample ahead.
     slopes : ndarray, shape (n_samples, n_outputs, n_all)
-        Derivatives of the innovations; constants of the record taken out.
+        Derivatives of the whitened innovations; constants of the record taken out.
     constants : ndarray
         Initial state, then output biases, then input shifts.
     space : ndarray, shape (n_samples · n_outputs, rank)
@@ -228,13 +228,11 @@ class InnovationsProblem:
                 through + (steady[1] @ shift)[:, None],
             )
         seen = outputs - through[0]
-        slope = _slopes(found, slopes, state, seen, (pushes[1:], through[1:]))
-        white = (slope.swapaxes(1, 2) @ whitener.T).swapaxes(1, 2)
-        kept = nuisance.removed_from(white.reshape(flat.shape[1], -1)).reshape(white.shape)
-        triangle = np.linalg.inv(whitener)
-        slope = (kept.swapaxes(1, 2) @ triangle.T).swapaxes(1, 2)
+        slope = _slopes(found, slopes, state, seen, (pushes[1:], through[1:])) @ whitener.T
+        white = nuisance.removed_from(slope.reshape(len(slope), flat.shape[1]).T)
+        kept = white.reshape(n_samples, p, len(slope))
         innovations = seen - state @ found.c.T
-        return RecordInnovations(innovations, state, slope, nuisance.values, nuisance.space, found)
+        return RecordInnovations(innovations, state, kept, nuisance.values, nuisance.space, found)
 
     def _constants(
         self, n: int, p: int, steady: tuple[Array, Array]
@@ -273,7 +271,7 @@ class InnovationsProblem:
             white = each.innovations @ inverse.T
             n_samples = len(white)
             level += n_samples * float(np.sum(np.log(np.diag(triangle))))
-            jacobian = np.tensordot(inverse, each.slopes, axes=(1, 1)).transpose(1, 0, 2)
+            jacobian = each.slopes
             if slopes is not None and count:
                 relative = inverse @ slopes.innovation @ inverse.T
                 diagonal = np.diagonal(relative, axis1=1, axis2=2)
@@ -281,7 +279,7 @@ class InnovationsProblem:
                 widened.append(0.5 * np.sqrt(n_samples) * (diagonal - mean))
                 turn = _lower(relative)
                 rise += n_samples * np.trace(turn, axis1=1, axis2=2)
-                jacobian -= np.tensordot(white, turn, axes=(1, 2)).transpose(0, 2, 1)
+                jacobian = jacobian - np.tensordot(white, turn, axes=(1, 2)).transpose(0, 2, 1)
             rows.append(white.ravel())
             jacobians.append(jacobian.reshape(white.size, count))
         factor = np.exp(level / total)
@@ -311,13 +309,13 @@ def _slopes(
     seen: Array,
     moved: tuple[Array, Array],
 ) -> Array:
-    """Derivatives of the innovations, (n_samples, n_outputs, n_slopes): one more run for each.
+    """Derivatives of the innovations, (n_slopes, n_samples, n_outputs): one more run for each.
 
     `moved` are the derivatives of q and v by the parameters, the first of the slopes.
     """
     count, n = slopes.closed.shape[:2]
     if not count:
-        return np.zeros((*seen.shape, 0))
+        return np.zeros((0, *seen.shape))
     forcings = state @ slopes.closed.swapaxes(1, 2) + seen @ slopes.gain.swapaxes(1, 2)
     direct = -state @ slopes.c.swapaxes(1, 2)
     pushed = len(moved[0])
@@ -325,7 +323,7 @@ def _slopes(
     direct[:pushed] -= moved[1]
     closed, rest = np.ascontiguousarray(found.closed), np.zeros((count, n))
     paths = _native.linear_recursion(closed, forcings, rest)
-    return np.moveaxis(direct - paths @ found.c.T, 0, 2)
+    return np.asarray(direct - paths @ found.c.T)
 
 
 def _run(found: SteadyFilter, runs: Sequence[tuple[Array, Array, Array]], n_samples: int) -> Array:

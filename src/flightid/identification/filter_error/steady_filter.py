@@ -173,12 +173,13 @@ def _noisy(point: ContinuousPoint, step: float) -> Array:
 
 def _riccati(phi: Array, c: Array, q: Array, r: Array) -> Array:
     """Stabilising P = Φ (P − P Cᵀ (C P Cᵀ + R)⁻¹ C P) Φᵀ + Q by doubling."""
-    n = len(phi)
+    n, one = len(phi), np.eye(len(phi))
     a, g, h = phi.T.copy(), c.T @ np.linalg.solve(r, c), q.copy()
+    size = float(np.abs(h).max(initial=0.0))
     for _ in range(_DOUBLINGS):
-        if not float(np.abs(h).max(initial=0.0)) < _LARGEST:
+        if not size < _LARGEST:
             break
-        both = np.linalg.solve(np.eye(n) + g @ h, np.hstack([a, g]))
+        both = np.linalg.solve(one + g @ h, np.concatenate([a, g], axis=1))
         turned, shared = both[:, :n], both[:, n:]
         change = a.T @ h @ turned
         g = _symmetric(g + a @ shared @ a.T)
