@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.identification.hold_likelihood import held_outputs
+from flightid.identification.hold_likelihood import HeldOutputs, held_outputs
 from flightid.identification.hold_test import OtherHold, judged
 from flightid.models import load_model
 from tests.closeness import assert_close
@@ -68,6 +68,10 @@ def test_likelihood_under_another_hold_is_what_a_fit_under_it_finds() -> None:
     record = holds.flight(0, "straight", told=False)
     fit, other = (fid.identify(holds.model(), record, hold=hold) for hold in ("zero", "first"))
     here, there = held_outputs(fit.model, [record], {}, ["zero", "first"])
+    # The fit itself is where least squares on its records lead, so it is not made again.
+    as_fitted, spread = HeldOutputs.of(fit), [fit.parameters[n].stderr or 0.0 for n in fit.names]
+    assert np.all(np.abs(as_fitted.values - here.values) < 1e-2 * np.array(spread))
+    assert_close(here.gain_over(as_fitted), 0.0, atol=1e-2, why="what a search leaves")
     wanted = np.array([other.parameters[name].value for name in fit.names])
     assert_close(there.values, wanted, rtol=1e-3, why="two steps from half a sample away")
     ratios = [other.costs[name] / fit.costs[name] for name in fit.costs]

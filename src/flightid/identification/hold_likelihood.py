@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.identification.fit import Fit
 from flightid.identification.output_error.distinct import run_with_slopes
 from flightid.identification.output_error.equation_records import (
     EquationRuns,
@@ -49,6 +50,12 @@ class HeldOutputs:
 
     values: Array
     left: list[Array]
+
+    @classmethod
+    def of(cls, fit: Fit) -> HeldOutputs:
+        """A fit as it is: least squares on its records lead nowhere else."""
+        values = [float(parameter.value or 0.0) for parameter in fit.model.parameters.free]
+        return cls(np.array(values), [record.residuals for record in fit.records])
 
     def gain_over(self, other: HeldOutputs) -> float:
         """Logarithm of this likelihood over another: ½ Σ n ln(power left there / here)."""

@@ -19,7 +19,11 @@ from flightid.evidence.gather import CONVERGED
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.frequency_domain.estimator_bias import Correction
-from flightid.identification.hold_likelihood import held_outputs, independent_share
+from flightid.identification.hold_likelihood import (
+    HeldOutputs,
+    held_outputs,
+    independent_share,
+)
 from flightid.identification.methods import Method, flat
 from flightid.identification.rival_fits import estimates_alone
 from flightid.record import Record
@@ -137,6 +141,13 @@ class _Rivals:
         """Whether residuals in time can prefer one hold to another."""
         return bool(self.fit.records) and self.fit.residual_horizon != 1
 
+    @property
+    def is_likeliest(self) -> bool:
+        """Whether the fit's estimates are those of least squares on the records by themselves."""
+        plain = not {"loss", "noise_covariance", "record_parameters"} & set(self.given)
+        by_records = self.method.name == "output_error" and plain
+        return by_records and self.fit.termination in CONVERGED
+
     def under(self, holds: Sequence[InputHold]) -> list[OtherHold]:
         """The fits; none where one of them says nothing."""
         with estimates_alone():
@@ -149,7 +160,9 @@ class _Rivals:
     def by_likelihood(self, holds: Sequence[InputHold]) -> list[OtherHold]:
         """What the records alone say of other holds, without a fit."""
         records = [each for each in flat(self.data) if isinstance(each, Record)]
-        here, *others = held_outputs(self.fit.model, records, self.given, [self.assumed, *holds])
+        asked = holds if self.is_likeliest else [self.assumed, *holds]
+        found = held_outputs(self.fit.model, records, self.given, asked)
+        here, *others = [HeldOutputs.of(self.fit), *found] if self.is_likeliest else found
         free = [parameter.name for parameter in self.fit.model.parameters.free]
         places = [free.index(name) for name in self.fit.names]
         return [

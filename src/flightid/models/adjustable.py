@@ -18,6 +18,9 @@ class Adjustable:
         # Every model is a dataclass; this base alone is not.
         return cast("Self", replace(cast("Any", self), parameters=parameters, estimated=None))
 
+    def _with_new_values(self, parameters: Parameters) -> Self:
+        return self._with_parameters(parameters)
+
     def with_values(self, values: Mapping[str, float]) -> Self:
         """Copy with other parameter values.
 
@@ -28,7 +31,7 @@ class Adjustable:
         ModelError
             A parameter is tied, or a value lies outside its bounds.
         """
-        return self._with_parameters(self.parameters.with_values(values))
+        return self._with_new_values(self.parameters.with_values(values))
 
     def with_fixed(self, **values: float) -> Self:
         """Copy with parameters fixed at values, given as ``name=value``."""

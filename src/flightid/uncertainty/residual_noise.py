@@ -279,11 +279,13 @@ def noise_models(
     ]
     lost = np.zeros_like(seen)
     models: list[Autoregression] = []
-    for _ in range(RESTORATIONS + 1):
+    for round_ in range(RESTORATIONS + 1):
         models = [
             autoregression(power, total, None if known is None else known[o], length)
             for o, power in enumerate(seen + lost)
         ]
+        if round_ == RESTORATIONS:
+            break
         lost = _lost(models, directions, lengths, [each.own.shape[2] for each in taken])
         for o, model in enumerate(models):
             spectrum = model.spectrum()
