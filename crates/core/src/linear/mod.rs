@@ -2,6 +2,7 @@
 
 pub(crate) mod block_recursion;
 pub mod discretisation;
+pub mod drift_errors;
 pub mod hold_integrals;
 pub mod linear_recursion;
 pub mod linear_response;

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 from scipy.special import chdtrc
 
+from flightid import _native
 from flightid.identification.output_error.innovation_gain import ORDER, SETTLED, SHARES, STEPS
 
 Array = NDArray[np.float64]
@@ -96,32 +96,12 @@ def _drift(rows: Sequence[Array], pole: float) -> Array:
     """
     low = 0.5 * (1.0 - pole**2) - MOVES
     covariance = 0.5 * (np.sqrt(low**2 + 2.0 * MOVES) - low)
-    gain = pole * covariance / (covariance + 0.5)
-    best = _ahead(rows, pole, gain)
-    size = _power(best)
-    for _ in range(STEPS):
-        seen = [lfilter([0.0, 1.0], [1.0, gain - pole], each)[ORDER:] for each in best]
-        cross = sum(float(x @ e[ORDER:]) for x, e in zip(seen, best, strict=True))
-        step, before = cross / (sum(float(x @ x) for x in seen) + 1e-300), size
-        for share in SHARES:
-            tried = gain + share * step
-            if abs(pole - tried) >= 1.0:
-                continue
-            left = _ahead(rows, pole, tried)
-            if _power(left) < size:
-                gain, best, size = tried, left, _power(left)
-                break
-        if np.log(before / size) < SETTLED:
-            break
-    return np.concatenate([each[ORDER:] for each in best])
-
-
-def _ahead(rows: Sequence[Array], pole: float, gain: float) -> list[Array]:
-    return [lfilter([1.0, -pole], [1.0, gain - pole], each[0]) for each in rows]
-
-
-def _power(errors: Sequence[Array]) -> float:
-    return float(np.mean(np.concatenate([each[ORDER:] for each in errors]) ** 2))
+    gain = float(pole * covariance / (covariance + 0.5))
+    lengths = [each.shape[1] for each in rows]
+    search = (STEPS, SETTLED, list(SHARES))
+    return _native.drift_errors(
+        np.concatenate(rows, axis=1)[0], lengths, (pole, gain), ORDER, search
+    )
 
 
 def _lagged(rows: Array, order: int) -> Array:
