@@ -72,7 +72,13 @@ def _words(command: str, kind: str, folder: Path) -> Iterator[str]:
     yield "--json"
 
 
-@pytest.mark.parametrize("command", COMMANDS)
+# Gains take a second a kind: the tests of `tune` hold them in every run, the kinds at night.
+IN_EVERY_RUN = [
+    pytest.param(each, marks=pytest.mark.nightly if each == "tune" else ()) for each in COMMANDS
+]
+
+
+@pytest.mark.parametrize("command", IN_EVERY_RUN)
 def test_a_command_takes_the_file_of_every_kind_or_says_why_not(
     command: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
