@@ -64,6 +64,7 @@ BELONGS = {
     "process-noise": RESIDUALS,
     "errors-not-white": RESIDUALS,
     "inputs-in-errors": RESIDUALS,
+    "nothing-told": BAND,
 }
 
 

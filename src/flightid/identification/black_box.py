@@ -20,6 +20,7 @@ from flightid.record import Channel, Record, Step
 from flightid.uncertainty import correlation
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.version import VERSION
 
 Array = NDArray[np.float64]
@@ -56,6 +57,7 @@ class BlackBoxEstimates:
     covariance: Array | None
     source: str = WHITE
     agreement: Agreement | None = None
+    correlations: tuple[FittedCorrelation, ...] = ()
 
 
 def black_box_fit(
@@ -103,6 +105,7 @@ def black_box_fit(
         residual_horizon=1 if runs.white else "free_run",
         details=details,
         agreement=estimates.agreement,
+        input_correlations=estimates.correlations,
     )
 
 

@@ -26,6 +26,7 @@ from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, shown
 from flightid.uncertainty.uncertain import Uncertain
 
@@ -34,7 +35,14 @@ WITHHOLDING = ("errors-not-white", "inputs-in-errors", "order-too-high")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
-class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time histories"}):
+class Fit(
+    Result,
+    schema="flightid.fit/1",
+    untold={
+        "prediction_errors": "time histories",
+        "input_correlations": "residual_tests tells them",
+    },
+):
     """Result of `flightid.identify`.
 
     Attributes
@@ -89,6 +97,8 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
         What was examined of data and fit, and the light that follows.
     agreement : Agreement or None
         Of records and of their halves, in the order of `names`.
+    input_correlations : tuple of FittedCorrelation
+        Of inputs with residuals, by what the fit leaves of noise; empty where it is not known.
 
     Example
     -------
@@ -129,6 +139,7 @@ class Fit(Result, schema="flightid.fit/1", untold={"prediction_errors": "time hi
     details: Any = None
     evidence: Evidence = field(default_factory=Evidence)
     agreement: Agreement | None = None
+    input_correlations: tuple[FittedCorrelation, ...] = ()
 
     @property
     def residuals(self) -> tuple[Record, ...]:

@@ -27,9 +27,9 @@ from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.record.hold import InputHold
 from flightid.uncertainty.blocks import RecordBlock
+from flightid.uncertainty.foretold import likelihood_gain
 
 Array = NDArray[np.float64]
-TINY = float(np.finfo(float).tiny)
 FAR = 100.0
 """Residual over an output's deviation beyond which a model follows nothing."""
 STEPS = 2
@@ -59,26 +59,12 @@ class HeldOutputs:
 
     def gain_over(self, other: HeldOutputs) -> float:
         """Logarithm of this likelihood over another: ½ Σ n ln(power left there / here)."""
-        total = 0.0
-        for output in range(len(self.left[0])):
-            here, there = ([each[output] for each in one.left] for one in (self, other))
-            power = [max(sum(float(row @ row) for row in rows), TINY) for rows in (there, here)]
-            count = sum(len(row) * independent_share(row) for row in there)
-            total += 0.5 * count * float(np.log(power[0] / power[1]))
-        return total
-
-
-def independent_share(row: Array) -> float:
-    """Share of samples that count, by the first autocorrelation.
-
-    Example
-    -------
-    >>> round(independent_share(np.tile([1.0, -1.0], 50)), 3)
-    1.0
-    """
-    power = float(row @ row)
-    first = float(row[1:] @ row[:-1]) / power if power > 0.0 else 0.0
-    return (1.0 - max(first, 0.0)) / (1.0 + max(first, 0.0))
+        return sum(
+            likelihood_gain(
+                [each[output] for each in other.left], [each[output] for each in self.left]
+            )
+            for output in range(len(self.left[0]))
+        )
 
 
 def held_outputs(

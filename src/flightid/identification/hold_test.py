@@ -22,7 +22,6 @@ from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.hold_likelihood import (
     HeldOutputs,
     held_outputs,
-    independent_share,
 )
 from flightid.identification.methods import Method, flat
 from flightid.identification.rival_fits import estimates_alone
@@ -31,6 +30,7 @@ from flightid.record.chosen_hold import ASSUMED, DECLARED, RECORDED, ChosenHold
 from flightid.record.hold import BETWEEN, FROM_LOG, HOLDS, InputHold
 from flightid.record.repeats import found_staircase
 from flightid.responses import FrequencyResponse
+from flightid.uncertainty.foretold import likelihood_gain
 
 Data = Any
 NEGLIGIBLE = 0.3
@@ -299,16 +299,14 @@ def _corrected(data: Data, hold: InputHold, fit: Fit) -> Data:
 
 
 def _gain(other: Fit, fit: Fit) -> float | None:
-    """½ Σ n ln(power left before / after), n the independent samples of each output's residuals."""
+    """By the residuals of all outputs in time; None where a fit has none."""
     if not fit.records or fit.responses:
         return None
-    total = 0.0
-    for name, cost in fit.costs.items():
-        rows = [each.residual(name) for each in fit.records]
-        count = sum(len(row) * independent_share(row) for row in rows)
-        tiny = np.finfo(float).tiny
-        total += 0.5 * count * float(np.log(max(cost, tiny) / max(other.costs[name], tiny)))
-    return total
+    rows = [
+        [[each.residual(name) for each in one.records] for name in one.costs]
+        for one in (fit, other)
+    ]
+    return sum(likelihood_gain(*pair) for pair in zip(*rows, strict=True))
 
 
 def judged(others: Sequence[OtherHold], assumed: InputHold) -> Finding:

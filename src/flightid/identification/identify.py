@@ -13,6 +13,7 @@ from flightid.identification.fit_evidence import evidence_of
 from flightid.identification.held_inputs import hold_for, with_hold_said
 from flightid.identification.hold_test import with_hold_tested
 from flightid.identification.methods import flat, method_of
+from flightid.identification.residual_evidence import in_doubt, with_residuals_judged
 from flightid.models import GreyBoxModel
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.narx.structure import NarxStructure
@@ -186,6 +187,8 @@ def identify(
     fit = replace(fit, provenance={**fit.provenance, "told": told})
     if held is not None:
         fit = with_hold_said(*with_hold_tested(fit, chosen, data, given, held))
+    if not in_doubt(fit.findings):
+        fit = with_residuals_judged(fit)
     return replace(fit, evidence=evidence_of(fit, flat(data), loop))
 
 

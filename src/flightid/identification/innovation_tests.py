@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.uncertainty.agreement import Agreement
+from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.uncertainty.foretold import (
     is_material,
     percent_of_output,
@@ -129,6 +130,21 @@ class InnovationTests:
             size += self.excess[1]
             material = material or self.worth_percent != 0.0
         return None if material or size > WIDEST**2 else math.sqrt(size)
+
+    def fitted(
+        self, correlations: Sequence[FittedCorrelation], ratios: Sequence[float]
+    ) -> InnovationTests:
+        """Inputs tested by what the fit leaves; `ratios` are residuals over outputs, by output.
+
+        As they are where there are no such correlations.
+        """
+        if not correlations:
+            return self
+        worth = [
+            percent_of_output(each.share, ratios[each.output], 1.0) or 0.0 for each in correlations
+        ]
+        chance = min(1.0, len(correlations) * min(each.p_value for each in correlations))
+        return replace(self, independent=chance, worth_percent=max(worth))
 
     def beside(self, agreement: Agreement | None) -> InnovationTests:
         """The tests of a mean vehicle: where records differ, inputs tell how; scatter counts."""

@@ -79,7 +79,7 @@ def flights_of(apart: Sequence[Array], blocks: Sequence[RecordBlock]) -> list[Re
     return [_flight(each.sum(axis=0), block) for each, block in zip(apart, blocks, strict=True)]
 
 
-def _levels(blocks: Sequence[RecordBlock]) -> Array:
+def levels(blocks: Sequence[RecordBlock]) -> Array:
     """Residual variance of each record and output over that of all, (n_records, n_outputs).
 
     Records of one colour need not be of one level: a harder manoeuvre may be a noisier one.
@@ -140,7 +140,7 @@ def noise_heard(models: Sequence[Autoregression], blocks: Sequence[RecordBlock])
     return [
         level[:, None, None]
         * np.array([noise.squared(part) for noise, part in zip(models, _halves(each), strict=True)])
-        for each, level in zip(blocks, _levels(blocks), strict=True)
+        for each, level in zip(blocks, levels(blocks), strict=True)
     ]
 
 

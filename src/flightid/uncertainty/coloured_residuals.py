@@ -29,6 +29,7 @@ from flightid.uncertainty.blocks import (
     noise_heard,
     rest_of,
 )
+from flightid.uncertainty.fitted_correlation import FitResponse, FittedCorrelation
 from flightid.uncertainty.input_noise import InputNoise
 from flightid.uncertainty.residual_noise import (
     Autoregression,
@@ -40,6 +41,8 @@ from flightid.uncertainty.residual_noise import (
 Array = NDArray[np.float64]
 ROUNDING = 1e-9
 """Share of the variance for white residuals below which there is rounding alone."""
+BLIND = 1e-12
+"""Effect of a combination of parameters over the largest, below which its bar is rounding."""
 DRAWS = 32
 """Draws of random walks."""
 COLOURED = 1.5
@@ -66,6 +69,8 @@ class ResidualCovariance:
         Of the outputs' noise models.
     agreement : Agreement
         Of records, and of halves of each.
+    correlations : tuple of FittedCorrelation
+        Of inputs with residuals, where inputs were given.
     """
 
     covariance: Array
@@ -75,6 +80,7 @@ class ResidualCovariance:
     crossed: tuple[Array, ...]
     orders: tuple[int, ...]
     agreement: Agreement
+    correlations: tuple[FittedCorrelation, ...] = ()
 
     @property
     def ratios(self) -> Array:
@@ -142,6 +148,7 @@ def residual_covariance(
     blocks: Sequence[RecordBlock],
     beside: JointResiduals | None = None,
     noise: tuple[InputNoise, Array] | None = None,
+    inputs: Sequence[Array] | None = None,
 ) -> ResidualCovariance:
     """Covariance of estimates by the colour of their residuals.
 
@@ -154,6 +161,8 @@ def residual_covariance(
     noise : tuple of InputNoise and ndarray (n_outputs,), optional
         Noise of the inputs, which reaches the outputs as random walks, and what whitens the
         outputs; of one record alone.
+    inputs : sequence of ndarray, shape (n_inputs, n_samples), optional
+        By record: tested for what they foretell of the residuals.
 
     Returns
     -------
@@ -219,6 +228,7 @@ def residual_covariance(
     # Random walks from noise of inputs join whatever parts a record is cut into.
     compared = flights_of(apart, blocks) if noise is None else []
     rest = rest_of(compared, beside)
+    tested = () if inputs is None else _tested(blocks, models, answers, turned, beside, inputs)
     agreed = compare_parts(compared, turned, _lifted(shared, white), freedom, rest)
     return ResidualCovariance(
         agreed.covariance,
@@ -228,7 +238,21 @@ def residual_covariance(
         tuple(crossed),
         tuple(model.weights.size for model in models),
         agreed.agreement,
+        tested,
     )
+
+
+def _tested(
+    blocks: Sequence[RecordBlock],
+    models: Sequence[Autoregression],
+    answers: Sequence[Array],
+    gain: Array,
+    beside: JointResiduals | None,
+    inputs: Sequence[Array],
+) -> tuple[FittedCorrelation, ...]:
+    brought = np.zeros_like(gain) if beside is None else beside.slopes.T @ beside.slopes
+    whole = [each.sum(axis=0) for each in answers]
+    return FitResponse(blocks, models, whole, gain, brought).correlations(inputs)
 
 
 def white_covariance(
@@ -279,10 +303,12 @@ def _inverse_root(triangle: Array) -> Array:
             needed="residuals that answer to each",
             action="lower the orders, or look for outliers and unlike scales in the records",
         )
-    if not np.all(np.diag(triangle)):
+    sizes = np.linalg.svd(triangle / size, compute_uv=False)
+    blind = int(np.sum(sizes <= BLIND * sizes.max(initial=0.0)))
+    if blind:
         raise FitError(
             "the data cannot tell parameters apart",
-            found=f"{int(np.sum(np.diag(triangle) == 0.0))} combinations without effect",
+            found=f"{blind} combinations without effect beyond rounding",
             needed="residuals that answer to each by itself",
             action="lower the orders, or leave out a channel that repeats another",
         )

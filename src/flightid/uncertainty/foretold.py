@@ -7,6 +7,7 @@ worth is the part of the residual that could have been foretold, beside the size
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +115,39 @@ def is_material(percent: float | None) -> bool:
     (False, True, True)
     """
     return percent is None or percent >= MATERIAL_PERCENT
+
+
+def independent_share(row: Array) -> float:
+    """Share of samples that count, by the first autocorrelation.
+
+    Example
+    -------
+    >>> round(independent_share(np.tile([1.0, -1.0], 50)), 3)
+    1.0
+    """
+    power = float(row @ row)
+    first = float(row[1:] @ row[:-1]) / power if power > 0.0 else 0.0
+    return (1.0 - max(first, 0.0)) / (1.0 + max(first, 0.0))
+
+
+def likelihood_gain(before: Sequence[Array], after: Sequence[Array]) -> float:
+    """½ n ln(power before / after), n the independent samples of what is left after.
+
+    Parameters
+    ----------
+    before, after : sequence of ndarray, shape (n_samples,)
+        Residuals of one output, by record.
+
+    Example
+    -------
+    >>> white = np.random.default_rng(0).standard_normal(2000)
+    >>> round(likelihood_gain([2.0 * white], [white]) / 2000.0, 1)
+    0.7
+    """
+    tiny = float(np.finfo(float).tiny)
+    power = [max(sum(float(row @ row) for row in rows), tiny) for rows in (before, after)]
+    count = sum(row.size * independent_share(row) for row in after)
+    return 0.5 * count * math.log(power[0] / power[1])
 
 
 def _within(share: float) -> float:

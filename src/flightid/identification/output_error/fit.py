@@ -369,6 +369,7 @@ def _assemble(
         records=records,
         noise_covariance=best.noise,
         agreement=found.agreement,
+        input_correlations=found.correlations,
     )
 
 

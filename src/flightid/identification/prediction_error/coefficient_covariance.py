@@ -9,19 +9,22 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.identification.innovation_tests import InnovationTests, innovation_tests
+from flightid.identification.innovation_tests import ROUNDING, InnovationTests, innovation_tests
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.coloured_errors import (
     has_noise_model,
     output_error_covariance,
 )
 from flightid.identification.prediction_error.part_blocks import errors_at, part_blocks
+from flightid.identification.residual_evidence import NOTHING, least_gain
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.coloured_residuals import residual_covariance, white_covariance
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.fitted_correlation import FittedCorrelation
+from flightid.uncertainty.foretold import likelihood_gain
 
 Array = NDArray[np.float64]
 UNDETERMINED = "the data do not tell the coefficients apart"
@@ -44,6 +47,7 @@ class SearchResult:
     agreement: Agreement | None = None
     reason: str = UNDETERMINED
     noise_reason: str = ""
+    correlations: tuple[FittedCorrelation, ...] = ()
 
 
 def shares_poles(structure: PolynomialStructure) -> bool:
@@ -99,6 +103,7 @@ def compared(
             freedom=known.freedom,
             colour=known.colour,
             agreement=known.agreement,
+            correlations=known.correlations,
         )
     elif found.agreement is None:
         at = partial(errors_at, structure, data, found.memory)
@@ -109,8 +114,10 @@ def compared(
             found, covariance=agreed.covariance, freedom=freedom, agreement=agreed.agreement
         )
         if not tests.is_white and not shares_poles(structure):
-            found = _by_colour(structure, found, agreed.covariance, blocks)
-    tests = tests.beside(found.agreement)
+            found = _by_colour(structure, data, found, agreed.covariance, blocks)
+    tests = judged_tests(tests, data, found, errors)
+    if not has_noise_model(structure) and _tells_nothing(data, errors, plain):
+        return replace(found, covariance=None, reason=NOTHING)
     times = tests.widening(biased=shares_poles(structure))
     if times is None:
         return replace(found, covariance=None, reason=tests.why_biased)
@@ -123,8 +130,27 @@ def widened(found: SearchResult, times: float) -> SearchResult:
     return found if known is None else replace(found, covariance=times**2 * known)
 
 
+def _tells_nothing(data: SampledChannels, errors: Array, plain: Array) -> bool:
+    """Whether inputs explain no more of the output than chance does."""
+    about = [data.output[span] - data.output[span].mean() for span in data.spans]
+    gain = likelihood_gain(about, [errors[span] for span in data.spans])
+    return gain < least_gain(len(plain))
+
+
+def judged_tests(
+    tests: InnovationTests, data: SampledChannels, found: SearchResult, errors: Array
+) -> InnovationTests:
+    """The tests as they count: by the fit's own projection where errors are coloured."""
+    spans = data.spans
+    about = np.concatenate([data.output[span] - data.output[span].mean() for span in spans])
+    ratio = float(np.sqrt(errors @ errors / max(about @ about, np.finfo(float).tiny)))
+    seen = found.correlations if ratio > ROUNDING else ()
+    return tests.fitted(seen, [ratio]).beside(found.agreement)
+
+
 def _by_colour(
     structure: PolynomialStructure,
+    data: SampledChannels,
     found: SearchResult,
     white: Array,
     blocks: Sequence[RecordBlock],
@@ -144,7 +170,8 @@ def _by_colour(
                 block.residual,
             )
             for block in blocks
-        ]
+        ],
+        inputs=[data.inputs[:, span][:, found.skip :] for span in data.spans],
     )
     covariance = np.where(np.outer(~places, ~places), white, 0.0)
     covariance[np.ix_(places, places)] = known.covariance
@@ -156,6 +183,7 @@ def _by_colour(
         freedom=freedom,
         colour=known.colour,
         agreement=known.agreement,
+        correlations=known.correlations,
         noise_reason=NOISE_MODEL,
     )
 

@@ -78,7 +78,8 @@ def output_error_covariance(
                 shared[None, skip:] / size, own[None, skip:], errors[None, span][:, skip:] / size
             )
         )
-    return residual_covariance(blocks)
+    inputs = [data.inputs[:, span][:, skip:] for span in data.spans]
+    return residual_covariance(blocks, inputs=inputs)
 
 
 def _sensitivities(

@@ -25,6 +25,7 @@ from flightid.identification.prediction_error.coefficient_covariance import (
     SearchResult,
     compared,
     is_white,
+    judged_tests,
     printed,
     shares_poles,
     spent,
@@ -43,6 +44,7 @@ from flightid.identification.prediction_error.linear_regression import (
 from flightid.identification.prediction_error.part_blocks import BEFORE, errors_at
 from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
 from flightid.identification.prediction_error.starts import polynomial_starts
+from flightid.identification.residual_evidence import nothing_told
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.prediction import free_run
 from flightid.models.polynomial.structure import PolynomialStructure
@@ -220,7 +222,7 @@ def _assemble(
     counted = tuple(errors[span][found.skip :] for span in data.spans)
     tests = tests_of(structure, data, counted, found.skip)
     found = compared(structure, data, found, errors, tests)
-    tests = tests.beside(found.agreement)
+    tests = judged_tests(tests, data, found, errors)
     squares = float(sum(row @ row for row in counted))
     n_counted = sum(row.size for row in counted)
     model = PolynomialModel.from_theta(
@@ -259,6 +261,7 @@ def _assemble(
             printed(found.covariance, parameters),
             WHITE if is_white(structure, tests) else COLOURED,
             found.agreement,
+            found.correlations,
         ),
         minima,
         iterations=found.iterations,
@@ -270,6 +273,7 @@ def _assemble(
                 biased=shares_poles(structure),
                 times=tests.widening(biased=shares_poles(structure)),
             ),
+            *nothing_told(found.reason),
         ),
         provenance=_provenance(structure, records, data),
         details=PolynomialDetails(

@@ -26,6 +26,7 @@ from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import JointResiduals, RecordBlock
 from flightid.uncertainty.coloured_residuals import residual_covariance, triangle_of
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.fitted_correlation import FittedCorrelation
 
 Array = NDArray[np.float64]
 Own = tuple[dict[str, Estimate], dict[str, Estimate], dict[str, Estimate]]
@@ -52,6 +53,8 @@ class RecordStatistics:
         Of records and of their halves.
     bias : ndarray, shape (n,), or None
         Of the estimates, by what was fitted beside the records; the covariance holds its square.
+    correlations : tuple of FittedCorrelation
+        Of inputs with residuals.
     """
 
     parameters: Mapping[str, Estimate]
@@ -62,6 +65,7 @@ class RecordStatistics:
     colour: tuple[float, float]
     agreement: Agreement
     bias: Array | None = None
+    correlations: tuple[FittedCorrelation, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +125,7 @@ def record_statistics(
     other = None if beside is None else beside.of(inner)
     triangle = triangle_of(blocks, None if other is None else other.slopes)
     require_identifiable(names, triangle)
-    known = residual_covariance(blocks, other)
+    known = residual_covariance(blocks, other, inputs=[each[0] for each in prepared.arrays])
     covariance = known.covariance + _of_starts(starts, blocks, whitener, known.white)
     moved = None
     if other is not None and other.bias is not None:
@@ -153,6 +157,7 @@ def record_statistics(
         known.colour,
         known.agreement,
         moved,
+        known.correlations,
     )
 
 

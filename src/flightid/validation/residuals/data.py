@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,6 +12,7 @@ from flightid.errors import DataError, OptionError, ShapeError
 from flightid.identification import Fit
 from flightid.models import Model
 from flightid.record import Record
+from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.uncertainty.residual_correlation import Series
 from flightid.validation.residuals.correlation_result import Horizon
 from flightid.validation.verification.result import Verification
@@ -51,6 +52,8 @@ class ResidualData:
         Which predictor made the residuals, in words.
     fitted_noise, fitted_input : int
         Parameters that were fitted to these samples, as `residual_tests` counts them.
+    fitted : mapping of (output, input) to FittedCorrelation
+        Of a fit that knows what it leaves of its residuals' noise.
     """
 
     residuals: Mapping[str, Series]
@@ -60,6 +63,7 @@ class ResidualData:
     predictor: str
     fitted_noise: int = 0
     fitted_input: int = 0
+    fitted: Mapping[tuple[str, str], FittedCorrelation] = field(default_factory=dict)
 
     @property
     def lengths(self) -> tuple[int, ...]:
@@ -195,6 +199,11 @@ def _of_fits(
         checked,
         fitted_noise=max(noise for noise, _ in spent),
         fitted_input=max(count for _, count in spent),
+        fitted={
+            (fit.model.outputs[each.output], fit.model.inputs[each.input]): each
+            for fit in fits
+            for each in fit.input_correlations
+        },
     )
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flightid.errors import DataError, OptionError
 from flightid.identification import Fit
@@ -15,43 +14,23 @@ from flightid.record import Record
 from flightid.record.hold import LOOPS, common_loop
 from flightid.record.repeats import found_period
 from flightid.uncertainty.feedback import FeedbackTest, declared_loop, find_feedback
-from flightid.uncertainty.foretold import (
-    percent_of_output,
-    share_from_inputs,
-    share_from_past,
-    share_of_lags,
-)
 from flightid.uncertainty.residual_correlation import (
-    Series,
-    autocorrelation,
     centred,
-    cross_correlation,
-    exceedance_limit,
-    independence_portmanteau,
-    lag_covariance,
-    pointwise_factor,
-    simultaneous_factor,
-    white_portmanteau,
 )
 from flightid.validation.residuals.correlation_result import (
-    NEEDS_ONE_STEP,
-    CorrelationTest,
     Horizon,
     Kind,
     Loop,
-    Verdict,
-    passes,
 )
+from flightid.validation.residuals.correlation_setup import CorrelationSetup
 from flightid.validation.residuals.data import Inputs, ResidualData, Residuals, gather_residuals
 from flightid.validation.residuals.findings import residual_findings
-from flightid.validation.residuals.obstacles import obstacle
 from flightid.validation.residuals.result import ResidualTests
 from flightid.validation.verification.result import Verification
 
 Choice = TypeVar("Choice", Horizon, Loop)
 
 SAMPLES_PER_LAG = 4
-FIRST_JUDGED_LAG = {Loop.CLOSED: 0, Loop.CLOSED_WITHIN_SAMPLE: 1}
 
 
 def residual_tests(
@@ -72,7 +51,8 @@ def residual_tests(
     residual), and for each input φ_uε, φ_(u²)'ε, φ_(u²)'ε² and φ_ε(εu), about means, in
     units of the standard deviations. Whiteness takes the Ljung–Box statistic, independence a
     quadratic form in the inverse of the correlations' own covariance, which knows the colour of
-    input and residual. `CorrelationTest` states the pass rule.
+    input and residual and, of output-error fits in an open loop, what the fit took out: lags
+    from zero to 25 are judged then. `CorrelationTest` states the pass rule.
 
     Assumes stationary residuals. Biased when inputs are not persistent (a doublet): correlations
     with few independent samples leave the bands in either direction. A loop that is closed around
@@ -144,7 +124,7 @@ def residual_tests(
         data = replace(data, predictor=f"{data.predictor} {said}")
         # What was injected is independent of the noise at every lag.
         how = Loop.OPEN
-    setup = _Setup(data, how, maximum_lag, fitted_noise, fitted_input)
+    setup = CorrelationSetup(data, how, maximum_lag, fitted_noise, fitted_input)
     _require_lags(setup)
     tests = tuple(
         setup.test(kind, output, name)
@@ -217,150 +197,6 @@ def _kinds(data: ResidualData, output: str) -> list[tuple[Kind, str | None]]:
     return [(Kind.WHITENESS, None), *others, *pairs]
 
 
-@dataclass(frozen=True)
-class _Setup:
-    data: ResidualData
-    loop: Loop
-    maximum_lag: int
-    fitted_noise: int
-    fitted_input: int
-
-    @property
-    def n_samples(self) -> int:
-        return sum(self.data.lengths)
-
-    @property
-    def first_judged(self) -> int:
-        return FIRST_JUDGED_LAG.get(self.loop, -self.maximum_lag)
-
-    def test(self, kind: Kind, output: str, name: str | None) -> CorrelationTest:
-        """One test, or why it cannot be made."""
-        e = self.data.residuals[output]
-        group = self.data.residuals if kind is Kind.CROSS else self.data.inputs
-        u = e if name is None else group[name]
-        counts = self.data.horizon is Horizon.ONE_STEP or kind not in NEEDS_ONE_STEP
-        scale = self.data.scale.get(output, 0.0)
-        open_loop = self.data.horizon is not Horizon.FREE_RUN or self.loop is Loop.OPEN
-        reason = obstacle(kind, e, u, scale=scale, open_loop=open_loop)
-        if reason:
-            return _not_testable(kind, output, name, counts, reason)
-        note = "" if counts else "a free run need not leave white residuals; shown, not counted"
-        if kind in NEEDS_ONE_STEP:
-            return self._white(kind, output, name, counts, note)
-        return self._independent(kind, output, name, note)
-
-    def _white(
-        self, kind: Kind, output: str, name: str | None, counts: bool, note: str
-    ) -> CorrelationTest:
-        """Whiteness, φ_ε′ε and φ_ε(εu): successive lags are independent for a good model."""
-        e = self.data.residuals[output]
-        lags = np.arange(1, self.maximum_lag + 1)
-        first, fitted = e, self.fitted_noise
-        if kind is Kind.CROSS:
-            first, fitted = self.data.residuals[name or ""], 0
-        elif name is not None:
-            # φ_ε(εu)(τ) pairs ε(t) with the product at t − 1 − τ: lag τ + 1 of the product.
-            lags, fitted = np.arange(self.maximum_lag + 1), 0
-            u = centred(self.data.inputs[name])
-            first = tuple(x * y for x, y in zip(centred(e), u, strict=True))
-        every = cross_correlation(first, e, self.maximum_lag + 1)
-        # Lag one stands there for φ_ε(εu)'s τ = 0 too.
-        values = every[self.maximum_lag + 2 :][: lags.size]
-        measures = white_portmanteau(values, self.n_samples, fitted)
-        judged = np.ones(lags.size, dtype=np.bool_)
-        share = (share_from_past if kind is Kind.WHITENESS else share_of_lags)(
-            values, self.n_samples
-        )
-        return self._judged(
-            _CorrelationValues(kind, output, name, counts, note, lags, values, judged, share),
-            1.0,
-            measures,
-        )
-
-    def _independent(self, kind: Kind, output: str, name: str | None, note: str) -> CorrelationTest:
-        e = self.data.residuals[output]
-        u = self.data.inputs[name or ""]
-        a = u if kind is Kind.INDEPENDENCE else _squared(u)
-        b = _squared(e) if kind is Kind.EVEN_SQUARED else e
-        lags = np.arange(-self.maximum_lag, self.maximum_lag + 1)
-        values = cross_correlation(a, b, self.maximum_lag)
-        judged = lags >= self.first_judged
-        covariance = lag_covariance(a, b, lags.size)
-        fitted = self.fitted_input if kind is Kind.INDEPENDENCE else 0
-        measures = independence_portmanteau(values[judged], covariance, self.n_samples, fitted)
-        if measures[1] < 1:
-            reason = "the input's band is too narrow for so many fitted parameters; use more lags"
-            return _not_testable(kind, output, name, True, reason)
-        own = autocorrelation(a, lags.size)
-        share = share_from_inputs(values[judged], own, covariance, self.n_samples)
-        found = _CorrelationValues(kind, output, name, True, note, lags, values, judged, share)
-        return self._judged(found, float(covariance[0]), measures)
-
-    def _judged(
-        self, found: _CorrelationValues, variance: float, measures: tuple[float, int, float]
-    ) -> CorrelationTest:
-        error = float(np.sqrt(max(variance, 0.0) / self.n_samples))
-        sizes = np.abs(found.values[found.judged])
-        pointwise, whole = pointwise_factor(), simultaneous_factor(sizes.size)
-        outside = int(np.count_nonzero(sizes > pointwise * error))
-        limit = exceedance_limit(sizes.size)
-        statistic, degrees, p_value = measures
-        inside = bool(np.all(sizes <= whole * error))
-        good = passes(p_value, outside, limit, all_inside=inside)
-        return CorrelationTest(
-            found.kind,
-            found.output,
-            found.input,
-            Verdict.PASS if good else Verdict.FAIL,
-            found.counts,
-            found.note,
-            found.lags,
-            found.values,
-            found.judged,
-            error,
-            pointwise / float(np.sqrt(self.n_samples)),
-            pointwise * error,
-            whole * error,
-            statistic,
-            degrees,
-            p_value,
-            outside,
-            limit,
-            self._worth(found.output, found.share),
-        )
-
-    def _worth(self, output: str, share: float) -> float | None:
-        size = float(np.std(np.concatenate(centred(self.data.residuals[output]))))
-        return percent_of_output(share, size, self.data.scale.get(output, 0.0))
-
-
-@dataclass(frozen=True)
-class _CorrelationValues:
-    kind: Kind
-    output: str
-    input: str | None
-    counts: bool
-    note: str
-    lags: NDArray[np.int64]
-    values: NDArray[np.float64]
-    judged: NDArray[np.bool_]
-    share: float
-
-
-def _squared(series: Series) -> Series:
-    return tuple(record**2 for record in centred(series))
-
-
-def _not_testable(
-    kind: Kind, output: str, name: str | None, counts: bool, reason: str
-) -> CorrelationTest:
-    nothing = np.empty(0)
-    return CorrelationTest(
-        kind, output, name, Verdict.NOT_TESTABLE, counts, reason,
-        nothing.astype(np.int64), nothing, nothing.astype(np.bool_),
-    )  # fmt: skip
-
-
 def _choice(kind: type[Choice], value: str) -> Choice:
     try:
         return kind(value)
@@ -372,7 +208,7 @@ def _choice(kind: type[Choice], value: str) -> Choice:
         ) from None
 
 
-def _require_lags(setup: _Setup) -> None:
+def _require_lags(setup: CorrelationSetup) -> None:
     lags = setup.maximum_lag
     if lags < 1:
         raise OptionError("the largest lag is below one sample", found=lags, needed="1 or more")

@@ -1,0 +1,87 @@
+"""What residuals of a free run say against its intervals: inputs still in them, or nothing told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.identification.fit import Fit
+from flightid.identification.innovation_tests import ROUNDING, InnovationTests
+from flightid.identification.withheld_intervals import without_intervals
+from flightid.uncertainty.foretold import likelihood_gain
+
+MISSING = (
+    "add the lag, delay or state that the model lacks, check how inputs are held, or look for "
+    "feedback"
+)
+LEAST_GAIN = 6.0
+"""Logarithm of a likelihood, beyond that of chance, that inputs must bring to a fit."""
+DOUBTED = ("hold-contradicted", "hold-unknown")
+NOTHING = "what inputs explain of the outputs is within chance: nothing of the vehicle is told"
+
+
+def with_residuals_judged(fit: Fit) -> Fit:
+    """The fit without intervals where its residuals refute them; as it is elsewhere.
+
+    Parameters
+    ----------
+    fit : Fit
+        Of a model with equations. Black boxes, whose errors are white or not, have judged theirs.
+
+    Assumes
+    -------
+    Bars of a model that lacks dynamics hold nothing, however small the part of the outputs that is
+    missed: noise of that size averages out over the record, a misfit does not. Where another hold
+    is in doubt, it may be what inputs foretell: its bars reach that.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., section 16.6.
+    """
+    if fit.details is not None or not fit.records or fit.residual_horizon != "free_run":
+        return fit
+    if not fit.responses and _gain(fit) < least_gain(len(fit.names)):
+        return _withheld(fit, NOTHING, *nothing_told(NOTHING))
+    ratios = [float(np.sqrt(cost / 100.0)) for cost in fit.costs.values()]
+    # What rounding leaves follows the inputs too.
+    seen = [each for each in fit.input_correlations if ratios[each.output] > ROUNDING]
+    tests = InnovationTests(None, None).fitted(seen, ratios)
+    tests = tests.beside(fit.agreement)
+    if tests.is_independent:
+        return fit
+    (said,) = tests.findings(biased=False, action=MISSING)
+    return _withheld(fit, tests.why_biased, said)
+
+
+def least_gain(n_parameters: int) -> float:
+    """What inputs must bring, of a likelihood's logarithm, to tell so many parameters."""
+    return LEAST_GAIN + 2.0 * n_parameters
+
+
+def nothing_told(reason: str) -> list[Finding]:
+    """The finding that goes with the reason `NOTHING`; none with any other."""
+    action = "excite the vehicle more, or fly longer"
+    return [Finding("nothing-told", Light.RED, NOTHING, action)] if reason == NOTHING else []
+
+
+def in_doubt(findings: tuple[Finding, ...]) -> bool:
+    """Whether how inputs are held is in doubt."""
+    return any(each.code in DOUBTED and each.light is Light.AMBER for each in findings)
+
+
+def _withheld(fit: Fit, reason: str, said: Finding) -> Fit:
+    bare = without_intervals(fit, reason) if fit.covariance is not None else fit
+    return replace(bare, findings=(*bare.findings, said))
+
+
+def _gain(fit: Fit) -> float:
+    """What the model brings over constants."""
+    total = 0.0
+    for name in fit.costs:
+        left = [each.residual(name) for each in fit.records]
+        about = [each.measured[name] - np.mean(each.measured[name]) for each in fit.records]
+        total += max(likelihood_gain(about, [row - np.mean(row) for row in left]), 0.0)
+    return total

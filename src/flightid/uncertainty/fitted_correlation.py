@@ -1,0 +1,193 @@
+"""Whether inputs foretell the residuals of a fit, which has taken out what its parameters could.
+
+Least squares leave residuals that are orthogonal to the sensitivities, whatever the noise: their
+correlations with an input lie below what independent series give, and coloured noise that the fit
+follows comes back turned. With U the input at neighbouring lags, P the projection of the fit and Ω
+the noise's covariance, the correlations Uᵀe have the covariance Uᵀ(I − P) Ω (I − P)ᵀU.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc
+
+from flightid.uncertainty.blocks import RecordBlock, levels
+from flightid.uncertainty.residual_noise import Autoregression
+
+Array = NDArray[np.float64]
+LAGS = 25
+SMALLEST = 1e-3
+"""Directions of lags with a smaller share of the largest variance carry no evidence."""
+
+
+@dataclass(frozen=True, eq=False)
+class FittedCorrelation:
+    """Correlations of one input with the residual of one output of a fit.
+
+    Attributes
+    ----------
+    output, input : int
+        Places.
+    lags : ndarray of int, shape (n_lags,)
+        Samples by which the input leads.
+    values, errors : ndarray, shape (n_lags,)
+        Normalised correlations, and their standard errors for a model that lacks nothing.
+    statistic : float
+        Quadratic form in the inverse of their covariance.
+    degrees : int
+    p_value : float
+    share : float
+        Of the residual's power that these lags foretell, less what chance gives; 0 to 1.
+    """
+
+    output: int
+    input: int
+    lags: NDArray[np.int64]
+    values: Array
+    errors: Array
+    statistic: float
+    degrees: int
+    p_value: float
+    share: float
+
+
+@dataclass(frozen=True, eq=False)
+class FitResponse:
+    """How residuals of a fit answer to noise.
+
+    Attributes
+    ----------
+    blocks : sequence of RecordBlock
+    models : sequence of Autoregression
+        Noise of each output.
+    answers : sequence of ndarray, shape (m + n, m + n)
+        XᵀΩX of each record, X its own numbers' basis and the projected sensitivities.
+    gain : ndarray, shape (n, n)
+        From scores to changes of the shared parameters.
+    beside : ndarray, shape (n, n)
+        Covariance of the scores that other data brought.
+    """
+
+    blocks: Sequence[RecordBlock]
+    models: Sequence[Autoregression]
+    answers: Sequence[Array]
+    gain: Array
+    beside: Array
+
+    def correlations(self, inputs: Sequence[Array]) -> tuple[FittedCorrelation, ...]:
+        """Of every input with every output; those that do not change are left out.
+
+        Parameters
+        ----------
+        inputs : sequence of ndarray, shape (n_inputs, n_samples)
+            By record.
+
+        Assumes
+        -------
+        Inputs without feedback from the residuals.
+
+        Reference
+        ---------
+        Ljung, *System Identification*, 2nd ed., section 16.6; Box & Pierce (1970), J. American
+        Statistical Association 65, for what estimated parameters take out.
+        """
+        shortest = min(block.residual.shape[1] for block in self.blocks)
+        lags = np.arange(min(LAGS, shortest // 4) + 1)
+        moving = [j for j in range(len(inputs[0])) if any(np.ptp(each[j]) > 0.0 for each in inputs)]
+        if not moving or lags.size < 2:
+            return ()
+        lagged = [
+            np.concatenate([_lagged(each[j], lags) for j in moving], axis=1) for each in inputs
+        ]
+        found = []
+        for output in range(len(self.models)):
+            raw, covariance, plain = self._of_output(output, lagged)
+            power = sum(
+                float(block.residual[output] @ block.residual[output]) for block in self.blocks
+            )
+            for place, j in enumerate(moving):
+                span = slice(place * lags.size, (place + 1) * lags.size)
+                found += self._judged(
+                    (output, j), lags, raw[span], covariance[span, span], plain[span, span], power
+                )
+        return tuple(found)
+
+    def _of_output(self, output: int, lagged: Sequence[Array]) -> tuple[Array, Array, Array]:
+        """Uᵀe, its covariance, and UᵀU."""
+        n = len(self.gain)
+        parts = [_parts(block, output) for block in self.blocks]
+        raw = sum(
+            u.T @ block.residual[output] for u, block in zip(lagged, self.blocks, strict=True)
+        )
+        scores = sum(x[:, x.shape[1] - n :].T @ u for x, u in zip(parts, lagged, strict=True))
+        through = self.gain.T @ scores
+        covariance = through.T @ self.beside @ through
+        noise = self.models[output]
+        for x, u, answer, level in zip(
+            parts, lagged, self.answers, levels(self.blocks)[:, output], strict=True
+        ):
+            taken = np.vstack([x[:, : x.shape[1] - n].T @ u, through])
+            square = level * noise.squared(np.concatenate([u, x], axis=1))
+            k = u.shape[1]
+            cross = square[:k, k:] @ taken
+            covariance = covariance + square[:k, :k] - cross - cross.T + taken.T @ answer @ taken
+        plain = sum(u.T @ u for u in lagged)
+        return np.asarray(raw), np.asarray(covariance), np.asarray(plain)
+
+    def _judged(
+        self,
+        places: tuple[int, int],
+        lags: NDArray[np.int64],
+        raw: Array,
+        covariance: Array,
+        plain: Array,
+        power: float,
+    ) -> list[FittedCorrelation]:
+        size = np.sqrt(np.maximum(np.diag(plain), np.finfo(float).tiny))
+        spread, axes = np.linalg.eigh(covariance / np.outer(size, size))
+        kept = spread > SMALLEST * spread[-1]
+        degrees = int(np.count_nonzero(kept))
+        if not (power > 0.0 and spread[-1] > 0.0 and np.all(np.isfinite(spread))):
+            return []
+        along = axes[:, kept].T @ (raw / size)
+        statistic = float(np.sum(along**2 / spread[kept]))
+        sizes, turned = np.linalg.eigh(plain / np.outer(size, size))
+        sound = sizes > SMALLEST * sizes[-1]
+        seen = (turned[:, sound].T @ (raw / size)) ** 2
+        by_chance = np.sum(
+            turned[:, sound] * (covariance / np.outer(size, size) @ turned[:, sound]), axis=0
+        )
+        share = float(np.sum((seen - by_chance) / sizes[sound])) / power
+        scale = size[0] * np.sqrt(power)
+        return [
+            FittedCorrelation(
+                *places,
+                lags,
+                raw / scale,
+                np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale,
+                statistic,
+                degrees,
+                float(chdtrc(degrees, statistic)),
+                min(max(share, 0.0), 1.0),
+            )
+        ]
+
+
+def _parts(block: RecordBlock, output: int) -> Array:
+    """Rows of one output: basis of the own numbers, then projected sensitivities."""
+    whole = np.concatenate([block.basis, block.projected], axis=1)
+    return np.asarray(whole.reshape(*block.residual.shape, -1)[output])
+
+
+def _lagged(samples: Array, lags: NDArray[np.int64]) -> Array:
+    """The centred samples at each lag, zero before the record, means taken out; (n, n_lags)."""
+    n = samples.size
+    about = samples - samples.mean()
+    columns = np.zeros((n, lags.size))
+    for place, lag in enumerate(lags):
+        columns[lag:, place] = about[: n - lag]
+    return np.asarray(columns - columns.mean(axis=0))

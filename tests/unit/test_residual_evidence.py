@@ -1,0 +1,81 @@
+"""Residuals against intervals: what inputs foretell of them, and inputs that tell nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.uncertainty.blocks import RecordBlock
+from flightid.uncertainty.coloured_residuals import residual_covariance
+from flightid.uncertainty.fitted_correlation import LAGS
+from tests.closeness import assert_close
+from tests.strangers import noises
+from tests.strangers.output_error import COLOURS, flight, late, model
+
+N = 4000
+
+
+def _tested(shared: np.ndarray, residual: np.ndarray, u: np.ndarray) -> object:
+    block = RecordBlock.of(shared[None], np.zeros((1, N, 0)), residual[None])
+    (found,) = residual_covariance([block], inputs=[u[None]]).correlations
+    return found
+
+
+def test_without_influence_of_the_fit_errors_are_those_of_independent_series() -> None:
+    random = np.random.default_rng(0)
+    u, e, other = random.standard_normal((3, N))
+    found = _tested(other[:, None], e, u)
+    assert found.degrees == LAGS + 1
+    assert_close(found.errors, np.full(LAGS + 1, N**-0.5), rtol=0.03, why="a sample of N(0, 1)")
+    wanted = np.array([u[: N - k] @ e[k:] for k in range(LAGS + 1)]) / np.sqrt((u @ u) * (e @ e))
+    assert_close(found.values, wanted, atol=1e-3, why="means of finite samples")
+
+
+def test_lags_that_the_fit_takes_out_carry_no_evidence() -> None:
+    random = np.random.default_rng(1)
+    u, e = random.standard_normal((2, N))
+    u -= u.mean()
+    shared = np.column_stack([u, np.r_[0.0, u[:-1]]])
+    left = e - shared @ np.linalg.lstsq(shared, e)[0]
+    found = _tested(shared, left, u)
+    assert found.degrees == LAGS - 1
+    assert_close(found.errors[:2], np.zeros(2), atol=1e-3, why="orthogonal but for means")
+
+
+@pytest.mark.parametrize("colour", COLOURS)
+def test_a_true_model_keeps_its_bars_in_every_colour(colour: str) -> None:
+    fit = fid.identify(model(), flight(1, COLOURS[colour]), method="output_error")
+    assert fit.covariance is not None
+    test = fid.residual_tests(fit, loop="open").test("uε", "p", "da")
+    assert str(test.verdict) == "pass"
+    assert test.p_value == fit.input_correlations[0].p_value
+    assert test.lags[0] == 0
+
+
+def test_a_missing_lag_has_no_bars_and_says_why() -> None:
+    fit = fid.identify(model(), late(0, 0.04, 0.1, noises.white), method="output_error")
+    (said,) = [each for each in fit.findings if each.code == "inputs-in-errors"]
+    assert "dynamics are missing" in said.message
+    assert "lag" in said.action
+    assert fit.covariance is None
+    assert fit.parameters["Lp"].reason == said.message
+
+
+@pytest.mark.parametrize("method", ["output_error", "equation_error", "fourier_output_error", None])
+def test_noise_alone_has_no_bars(method: str | None) -> None:
+    random = np.random.default_rng(0)
+    record = fid.Record.from_arrays(
+        np.arange(1500) * 0.02,
+        inputs={"da": 0.05 * random.standard_normal(1500)},
+        outputs={"p": 0.01 * random.standard_normal(1500)},
+        units={"da": "rad", "p": "rad/s"},
+        hold="zero",
+    )
+    if method is None:
+        fit = fid.identify(fid.PolynomialModel.oe("da", "p", nb=1, nf=1), record, loop="open")
+    else:
+        fit = fid.identify(model(), record, method=method, loop="open")
+    assert all(each.stderr is None for each in fit.parameters.values())
+    assert str(fit.evidence.light) == "red"
+    assert "nothing-told" in [each.code for each in fit.findings]
