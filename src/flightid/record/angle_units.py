@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -58,7 +59,9 @@ def spread_ratio(moved: Array, turned: Array) -> tuple[float, float] | None:
 
 
 def angle_unit_faults(
-    channels: Mapping[str, tuple[Array, Array]], units: Mapping[str, str]
+    channels: Mapping[str, tuple[Array, Array]],
+    units: Mapping[str, str],
+    taken: Collection[str] | None = None,
 ) -> list[SampleFault]:
     """Pairs of an angle and a rate that is its derivative but for the factor 57.3.
 
@@ -67,11 +70,13 @@ def angle_unit_faults(
     channels : mapping of str to (time_s, values)
     units : mapping of str to str
         As declared.
+    taken : collection of str, optional
+        Channels that become a record; the others only bear witness. Default: all.
 
     Returns
     -------
     list of SampleFault
-        Named by the rate; each rate once.
+        Named by the rate, or by the angle where only that is taken; each channel once.
 
     Example
     -------
@@ -86,10 +91,12 @@ def angle_unit_faults(
     angles = [name for name in moving if is_convertible(units[name], "rad")]
     rates = [name for name in moving if is_convertible(units[name], "rad/s")]
     found: dict[str, SampleFault] = {}
+    known = set(channels) if taken is None else set(taken)
     for angle, rate in product(angles, rates):
-        fault = _pair(angle, rate, moving, units)
+        named = rate if rate in known else angle
+        fault = _pair(angle, rate, moving, units) if named in known else None
         if fault is not None:
-            found.setdefault(fault.channel, fault)
+            found.setdefault(named, replace(fault, channel=named))
     return list(found.values())
 
 

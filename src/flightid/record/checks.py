@@ -45,8 +45,14 @@ def fault_steps(faults: Iterable[SampleFault]) -> tuple[Step, ...]:
     )
 
 
-def entry_steps(entering: Sequence[tuple[Channel, Array, Array]]) -> tuple[Step, ...]:
-    """What channels show as they enter, each on its own stamps, as steps of a history."""
+def entry_steps(
+    entering: Sequence[tuple[Channel, Array, Array]],
+    beside: Sequence[tuple[Channel, Array, Array]] = (),
+) -> tuple[Step, ...]:
+    """What channels show as they enter, each on its own stamps, as steps of a history.
+
+    Channels beside them, which nobody takes, bear witness to the units of those that enter.
+    """
     found = [
         fault
         for channel, time_s, samples in entering
@@ -54,9 +60,11 @@ def entry_steps(entering: Sequence[tuple[Channel, Array, Array]]) -> tuple[Step,
             channel.name, time_s, samples, unit=channel.unit, role=channel.role
         )
     ]
-    pairs = {channel.name: (time_s, samples) for channel, time_s, samples in entering}
-    units = {channel.name: channel.unit for channel, _, _ in entering}
-    return fault_steps(found + angle_unit_faults(pairs, units))
+    known = (*entering, *beside)
+    pairs = {channel.name: (time_s, samples) for channel, time_s, samples in known}
+    units = {channel.name: channel.unit for channel, _, _ in known}
+    taken = [channel.name for channel, _, _ in entering]
+    return fault_steps(found + angle_unit_faults(pairs, units, taken))
 
 
 def checked_history(record: Record) -> tuple[Step, ...]:

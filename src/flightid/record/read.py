@@ -28,6 +28,7 @@ from flightid.record.stamps import mean_spacing_s
 from flightid.record.store import RECORD_COLUMN, stored_records
 from flightid.record.timebase import to_uniform
 from flightid.record.validation import require_period, unknown_channel
+from flightid.record.witnesses import turning_columns
 from flightid.table import Cell
 from flightid.units import canonical
 from flightid.version import VERSION
@@ -162,6 +163,8 @@ def read_records(
                 found=f"{columns[item.channel.name].size} samples",
                 needed=f"{stamps.size}",
             )
+    taken = {item.column: item.channel for item in wanted}
+    witnesses = turning_columns(table, taken, stamps.size)
     base = _Base(resample_to_s, interpolation, outliers, hold, time_column)
     options: dict[str, Cell] = {
         "file": source.name,
@@ -176,7 +179,8 @@ def read_records(
             options["row_spacing_s"] = mean_spacing_s(stamps[part])
         history = (Step("read_records", dict(options), VERSION),)
         rows = {name: values[part] for name, values in columns.items()}
-        for grid, samples, more in _pieces(stamps[part], rows, wanted, base):
+        beside = [(channel, stamps[part], values[part]) for channel, values in witnesses]
+        for grid, samples, more in _pieces(stamps[part], rows, wanted, base, beside):
             records.append(_record(grid, samples, wanted, label or source.stem, (*history, *more)))
     if len(records) > 1 and len({item.name for item in records}) == 1:
         records = [item.replace(name=f"{item.name}[{index}]") for index, item in enumerate(records)]
@@ -316,13 +320,14 @@ def _pieces(
     rows: dict[str, NDArray[np.float64]],
     wanted: Sequence[_ChannelColumn],
     base: _Base,
+    beside: Sequence[tuple[Channel, NDArray[np.float64], NDArray[np.float64]]],
 ) -> list[tuple[NDArray[np.float64], Mapping[str, NDArray[np.float64]], tuple[Step, ...]]]:
     """The rows of a manoeuvre without outliers, on the grid that was asked for."""
     steps: tuple[Step, ...] = ()
     if base.outliers is not None:
         rows, step = _without_outliers(stamps, rows, wanted, base.outliers)
         steps = (step,)
-    steps += entry_steps([(c.channel, stamps, rows[c.channel.name]) for c in wanted])
+    steps += entry_steps([(c.channel, stamps, rows[c.channel.name]) for c in wanted], beside)
     if base.resample_to_s is None:
         return [(stamps, rows, steps)]
     require_sensible_base(stamps, base.resample_to_s, base.time_column)

@@ -6,14 +6,15 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from flightid.evidence import Check, Evidence, inspection_check, residual_check
-from flightid.evidence.data_checks import band_checks
-from flightid.evidence.evidence import GUIDELINES, LOOP, PREDICTION, RESIDUALS
+from flightid.evidence.data_checks import band_checks, sample_checks
+from flightid.evidence.evidence import GUIDELINES, LOOP, PREDICTION, RESIDUALS, SAMPLES
 from flightid.evidence.gather import loop_of_residuals, worse
 from flightid.findings import Finding, worst
 from flightid.identification import Fit
 from flightid.inspection import Inspection
 from flightid.responses import FrequencyResponse
 from flightid.study.identified import ModelResults
+from flightid.study.stages import NOT_TESTED
 from flightid.validation import Verification
 
 
@@ -42,6 +43,13 @@ def examined(fit: Fit, item: ModelResults, inspection: Inspection | None) -> Fit
         checks.append(worse(fit.evidence.check(RESIDUALS), residuals))
         loop = loop_of_residuals(item.tests.feedback, item.tests.findings)
         checks += [] if loop is None else [worse(fit.evidence.check(LOOP), loop)]
+    for missed in item.untested:
+        if missed.code != NOT_TESTED:
+            continue
+        check = Check(RESIDUALS, missed.light, missed.message, missed.action)
+        checks.append(worse(fit.evidence.check(RESIDUALS), check))
+    damage = sample_checks(item.unfitted, {*fit.model.inputs, *fit.model.outputs})
+    checks += [worse(fit.evidence.check(SAMPLES), each) for each in damage]
     if item.on_unseen:
         said = [each for run in item.verifications.values() for each in run.findings]
         checks.append(prediction_check(item.on_unseen, (*said, *item.reduction_judged)))

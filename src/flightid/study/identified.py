@@ -70,6 +70,10 @@ class ModelResults:
         Whether the reduced model predicts unseen records as the full one does.
     training : tuple of Record
         What a structure without equations was fitted to.
+    unfitted : tuple of Record
+        What chose the structure and what verifies: damage in them counts as in the others.
+    untested : tuple of Finding
+        Why there are no residual tests or spectra, where they were asked for.
     """
 
     settings: ModelSettings
@@ -82,6 +86,8 @@ class ModelResults:
     reference: Model | None = None
     reduction_judged: tuple[Finding, ...] = ()
     training: tuple[Record, ...] = ()
+    unfitted: tuple[Record, ...] = ()
+    untested: tuple[Finding, ...] = ()
 
     @property
     def name(self) -> str:
@@ -160,7 +166,7 @@ class ModelResults:
         path = () if self.reduction is None else self.reduction.path_findings
         found = (each for part in parts if part is not None for each in part.findings)
         chosen = (*self.left_out, *self.choice_findings, *goal_findings(self.fit))
-        return (*first, *chosen, *path, *self.reduction_judged, *found)
+        return (*first, *chosen, *path, *self.reduction_judged, *self.untested, *found)
 
     def to_dict(self) -> dict[str, object]:
         """Plain values of every result."""

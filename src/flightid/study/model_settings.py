@@ -103,6 +103,11 @@ class ModelSettings:
         return (*self.identify, *self.joint, *self.verify, *beside)
 
     @property
+    def unfitted(self) -> tuple[str, ...]:
+        """Records that choose a structure or verify, and are not fitted."""
+        return (*(self.structure.select if self.structure else ()), *self.verify)
+
+    @property
     def flown(self) -> tuple[str, ...]:
         """Records of the frequency responses."""
         return self.identify if self.structure is None else self.structure.coherence

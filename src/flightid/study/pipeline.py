@@ -259,7 +259,14 @@ def _examine(
             f"spectra: {settings.name}", compare_free_run, counts, first, settings.check.options
         ).value
     verified = _verifications(part, counts, records, fitted, runner)
-    found = replace(found, tests=tests, spectra=spectra, verifications=verified)
+    found = replace(
+        found,
+        tests=None if isinstance(tests, Finding) else tests,
+        untested=tuple(each for each in (tests, spectra) if isinstance(each, Finding)),
+        spectra=None if isinstance(spectra, Finding) else spectra,
+        verifications=verified,
+        unfitted=tuple(each for name in settings.unfitted for each in records[name].value),
+    )
     if found.reduction is None or not found.reduction.dropped:
         return found
     start = StageResult(found.reduction.start, f"start of {part.fitted.key}")

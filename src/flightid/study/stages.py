@@ -42,6 +42,7 @@ MUCH_WORSE = 1.5
 """Ratio of mean square errors from which a reduction has cost the model its prediction."""
 BASELINE = "linear, same lags"
 """Name of the linear model that stands beside a NARX model."""
+NOT_TESTED = "residuals-not-tested"
 
 
 def flat(groups: Sequence[Group]) -> list[Record]:
@@ -294,13 +295,29 @@ def judge_reduction(
     return Finding("reduction-predicts", light, said, "keep what the prediction needs")
 
 
-def examine_residuals(fitted: Fit) -> ResidualTests | None:
-    """Residual tests of a fit to records; a fit of responses alone has no residuals."""
-    return residual_tests(fitted) if fitted.records else None
+def examine_residuals(fitted: Fit) -> ResidualTests | Finding | None:
+    """Residual tests of a fit to records, or why there are none; responses alone have no residuals.
+
+    Records that are too short for a test end no study: what it would have said stays unknown.
+    """
+    if not fitted.records:
+        return None
+    try:
+        return residual_tests(fitted)
+    except DataError as error:
+        return _unexamined(NOT_TESTED, "residuals were not tested", error)
 
 
-def compare_free_run(fitted: Fit, records: Group, options: Mapping[str, Any]) -> SpectrumComparison:
-    """The spectrum of a free run through the first record beside the measured one.
+def _unexamined(code: str, what: str, error: DataError) -> Finding:
+    return Finding(
+        code, Light.UNKNOWN, f"{what}, {error.problem}: {error.found}", error.action or ""
+    )
+
+
+def compare_free_run(
+    fitted: Fit, records: Group, options: Mapping[str, Any]
+) -> SpectrumComparison | Finding:
+    """The spectrum of a free run through the first record beside the measured one, or why not.
 
     The stretch that settles a verification belongs to its own records, not to those of the fit.
     """
@@ -308,4 +325,8 @@ def compare_free_run(fitted: Fit, records: Group, options: Mapping[str, Any]) ->
     record = records[0]
     held = [output for output in fitted.model.outputs if output in record]
     seen = narrowed(record, fitted.model.inputs, held)
-    return compare_spectra(verify(fitted, seen, outputs=held, **options))
+    made = verify(fitted, seen, outputs=held, **options)
+    try:
+        return compare_spectra(made)
+    except DataError as error:
+        return _unexamined("spectra-not-compared", "spectra were not compared", error)

@@ -13,14 +13,15 @@ from flightid.models import InnovationsModel, NarxStructure, PolynomialModel
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
 from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
-from flightid.validation.order_scan.result import OrderTrial
+from flightid.validation.order_scan.result import OrderTrial, is_settled
 from flightid.validation.order_scan.scan_orders import fit_of
 
 Choice = OrderScan | NarxSearch
 AS_GOOD = 0.10
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
 TRIED = 4
-"""Structures that are fitted whole, at most, for one without a pole and a zero too many."""
+"""Structures that are fitted whole, at most, for one that ended well and has no pole
+and zero too many."""
 
 
 def fit_structure(
@@ -67,14 +68,15 @@ def _polynomial(
         for trial in ranked(scan, settings.choose)[:TRIED]
     )
     first = next(fits)
-    if not _has_needless(first):
+    if _is_clean(first):
         return first, scan
-    # A pole and its zero that cancel, or fit an offset of the record, leave the steady gain open.
-    return next((fit for fit in fits if not _has_needless(fit)), first), scan
+    # A search that ended at no minimum, or a pole and its zero that cancel or fit an offset of the
+    # record, leave the steady gain open.
+    return next((fit for fit in fits if _is_clean(fit)), first), scan
 
 
-def _has_needless(fit: Fit) -> bool:
-    return any(finding.code in NEEDLESS for finding in fit.findings)
+def _is_clean(fit: Fit) -> bool:
+    return is_settled(fit) and not any(finding.code in NEEDLESS for finding in fit.findings)
 
 
 def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
@@ -98,6 +100,7 @@ def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
         (trial.criteria.bic, place)
         for place, trial in enumerate(scan.trials)
         if trial.criteria is not None
+        and trial.settled
         and trial.free_run_rms is not None
         and trial.free_run_rms <= limit
     ]

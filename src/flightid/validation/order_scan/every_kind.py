@@ -10,7 +10,7 @@ from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.narx.structure import SIMULATION, NarxStructure
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.structure import PolynomialOptions, PolynomialStructure
-from flightid.validation.order_scan.result import OrderTrial, Range, error_of, whole_numbers
+from flightid.validation.order_scan.result import OrderTrial, Range, rank_of, whole_numbers
 
 SEARCHED = ("arx", "armax", "oe")
 """Kinds whose orders are all tried."""
@@ -19,7 +19,7 @@ SEARCHED = ("arx", "armax", "oe")
 def _best(trials: Sequence[OrderTrial], kinds: Sequence[str]) -> PolynomialStructure | None:
     """Structure of these kinds with the least error in free run."""
     found = [
-        (error_of(trial), place)
+        (rank_of(trial), place)
         for place, trial in enumerate(trials)
         if trial.free_run_rms is not None and trial.kind in kinds
     ]

@@ -34,7 +34,8 @@ class OrderTrial:
     """One structure: its model and criteria, and its free run on the validation records.
 
     `free_run_rms` is in the output's unit; None where `note` says why there is none. `criteria` are
-    of polynomials. `fit` is kept of the best of a kind alone.
+    of polynomials. A fit that is not `settled` ended at no minimum and stands behind all others.
+    `fit` is kept of the best of a kind alone.
 
     Example
     -------
@@ -50,6 +51,7 @@ class OrderTrial:
     free_run_rms: float | None
     fit_percent: float | None
     note: str = ""
+    settled: bool = True
     fit: Fit | None = field(default=None, repr=False)
 
     @property
@@ -68,9 +70,15 @@ class OrderTrial:
         return None if self.model is None else len(self.model.parameters)
 
 
-def error_of(trial: OrderTrial) -> float:
-    """Free-run error to rank by; infinite where there is none."""
-    return np.inf if trial.free_run_rms is None else trial.free_run_rms
+def rank_of(trial: OrderTrial) -> tuple[bool, float]:
+    """What trials are ranked by: whether the fit settled, then its free-run error."""
+    unranked = trial.free_run_rms is None
+    return unranked or not trial.settled, np.inf if unranked else trial.free_run_rms or 0.0
+
+
+def is_settled(fit: Fit) -> bool:
+    """Whether a search ended at a minimum of its cost."""
+    return all(finding.code != "not-converged" for finding in fit.findings)
 
 
 def whole_numbers(name: str, item: Range) -> list[int]:
@@ -142,7 +150,7 @@ class OrderScan(Result, schema="flightid.order_scan/1"):
         alike = [
             t
             for t in self.trials
-            if t.free_run_rms is not None and t.free_run_rms <= least * (1 + ALIKE)
+            if t.settled and t.free_run_rms is not None and t.free_run_rms <= least * (1 + ALIKE)
         ]
         return min(alike or self.trials[:1], key=lambda t: t.n_parameters or 0)
 

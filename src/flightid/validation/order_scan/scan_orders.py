@@ -38,7 +38,8 @@ from flightid.validation.order_scan.result import (
     OrderTrial,
     Range,
     Structure,
-    error_of,
+    is_settled,
+    rank_of,
     whole_numbers,
 )
 
@@ -276,11 +277,13 @@ def _fitted_trials(structures: Sequence[Structure], scan: _Scan) -> list[OrderTr
             measures = getattr(fit.details, "criteria", None)
             straight = any(finding.code == LINEAR for finding in fit.findings)
             note = "linear: no nonlinear model beats it" if straight else ""
-            trial = replace(_judged(structure, fit.model, measures, scan, note), fit=fit)
+            trial = _ended(
+                replace(_judged(structure, fit.model, measures, scan, note), fit=fit), fit
+            )
         except (DataError, FitError, OptionError) as error:
             trials.append(OrderTrial(structure, None, None, None, None, str(error)))
             continue
-        if best is None or error_of(trial) < error_of(trials[best]):
+        if best is None or rank_of(trial) < rank_of(trials[best]):
             if best is not None:
                 trials[best] = replace(trials[best], fit=None)
             best = len(trials)
@@ -301,6 +304,13 @@ def _judged(
     return OrderTrial(
         structure, model, measures, rms, float(fit_percent(measured, predicted)), note
     )
+
+
+def _ended(trial: OrderTrial, fit: Fit) -> OrderTrial:
+    """The trial, told apart where its fit ended at no minimum."""
+    if is_settled(fit):
+        return trial
+    return replace(trial, settled=False, note=trial.note or f"ended by {fit.termination}")
 
 
 def _settle_s(structures: Sequence[PolynomialStructure], unseen: Sequence[Record]) -> float:
@@ -326,11 +336,11 @@ def _delivered(trials: Sequence[OrderTrial], scan: _Scan) -> tuple[list[OrderTri
     Where a full fit moves the optimum it is ranked anew, so that the first trial is always the fit
     that is delivered.
     """
-    waiting = sorted(trials, key=error_of)
+    waiting = sorted(trials, key=rank_of)
     made: list[tuple[OrderTrial, Fit]] = []
     failed: list[OrderTrial] = []
     reason = "collinear regressors throughout"
-    while waiting and (not made or error_of(waiting[0]) < min(error_of(each) for each, _ in made)):
+    while waiting and (not made or rank_of(waiting[0]) < min(rank_of(each) for each, _ in made)):
         trial = waiting.pop(0)
         if trial.model is None:
             reason = trial.note or reason
@@ -343,13 +353,13 @@ def _delivered(trials: Sequence[OrderTrial], scan: _Scan) -> tuple[list[OrderTri
             failed.append(replace(trial, free_run_rms=None, fit_percent=None, note=reason))
             continue
         judged = _judged(trial.structure, fit.model, trial.criteria, scan, trial.note)
-        made.append((judged, fit))
+        made.append((_ended(judged, fit), fit))
     if not made:
         raise FitError(
             "no structure of the scan could be fitted",
             found=reason,
             action="scan lower orders, or use longer or richer records",
         )
-    made.sort(key=lambda each: error_of(each[0]))
-    rest = sorted([each for each, _ in made[1:]] + waiting + failed, key=error_of)
+    made.sort(key=lambda each: rank_of(each[0]))
+    rest = sorted([each for each, _ in made[1:]] + waiting + failed, key=rank_of)
     return [made[0][0], *(replace(each, fit=None) for each in rest)], made[0][1]

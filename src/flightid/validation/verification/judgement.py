@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from flightid.conventions import Light
@@ -11,9 +13,11 @@ from flightid.identification.prediction.result import Prediction
 from flightid.identification.prediction.weights import guide_factor, guide_weights, is_vehicle
 from flightid.simulation import metrics
 from flightid.validation.verification.muad import Mismatch
+from flightid.validation.verification.of_the_fit import weighed
 from flightid.validation.verification.result import Verification
 
 THEIL_GUIDE = (0.25, 0.30)
+THEIL = "verification-theil"
 J_RMS_GUIDE = (1.0, 2.0)
 
 GROWTH_E_FOLDS = 4.6
@@ -25,8 +29,12 @@ def judge(
     compared: tuple[str, ...],
     request: Request,
     mismatch: Mismatch | None,
+    own: Mapping[str, float],
 ) -> Verification:
-    """Numbers by output over all records together, and verdicts against the guides."""
+    """Numbers by output over all records together, and verdicts against the guides.
+
+    `own` are errors of the fitted model in the records of its fit, by output, where it has any.
+    """
     numbers: dict[str, dict[str, float]] = {
         key: {} for key in ("theil", "rms_error", "mse", "fit_percent", "vaf", "r_squared")
     }
@@ -56,6 +64,7 @@ def judge(
     overall = float(error / (seen + said))
     guided = j_rms if is_vehicle([first.unit(name) for name in compared]) else None
     verdicts = _findings(overall, numbers["theil"], guided, predictions)
+    verdicts = weighed(verdicts, THEIL, numbers["rms_error"], own)
     return Verification(
         outputs=compared,
         predictions=predictions,
@@ -91,7 +100,7 @@ def _theil_findings(overall: float, theil: dict[str, float]) -> list[Finding]:
         action = "" if light is Light.GREEN else "look where the prediction parts from the record"
         found.append(
             Finding(
-                "verification-theil",
+                THEIL,
                 light,
                 f"{name}: Theil coefficient {value:.3f}, guide at most {THEIL_GUIDE[0]:g} "
                 f"to {THEIL_GUIDE[1]:g}",

@@ -29,8 +29,9 @@ from flightid.record.several import as_records
 from flightid.responses import FrequencyResponse
 from flightid.validation.verification.baseline import baseline_findings
 from flightid.validation.verification.comparison import Comparison, compared
-from flightid.validation.verification.judgement import judge
+from flightid.validation.verification.judgement import THEIL_GUIDE, judge
 from flightid.validation.verification.muad import mismatch
+from flightid.validation.verification.of_the_fit import left_by_fit
 from flightid.validation.verification.result import Verification
 
 
@@ -191,7 +192,8 @@ def verify(
         several, models, requests, _scored_alike(runs), holds, strict=True
     ):
         seen = None if responses is None else mismatch(model, responses)
-        judged = judge(tuple(made), chosen, request, seen)
+        own = left_by_fit(each, THEIL_GUIDE[0])
+        judged = judge(tuple(made), chosen, request, seen, own)
         beside = baseline_findings(each, made, request)
         said = held.findings if way is predict_continuous else ()
         said = (*said, *_at_mean(each, flown))

@@ -1,0 +1,61 @@
+"""Lights of strangers' records: what nobody takes bears witness, ends off a minimum rank last."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.record.checks import record_findings
+from flightid.study.stages import NOT_TESTED, examine_residuals
+from flightid.validation.order_scan.result import OrderTrial, rank_of
+from flightid.validation.verification.of_the_fit import weighed
+
+TIME_S = np.arange(600) / 50.0
+
+
+@pytest.mark.parametrize(("taken", "wrong"), [("p", True), ("phi", True), ("p", False)])
+def test_a_channel_that_nobody_takes_tells_the_units(
+    tmp_path: Path, taken: str, *, wrong: bool
+) -> None:
+    rate = np.cos(2.0 * TIME_S) * (180.0 / np.pi if wrong else 1.0)
+    rows = np.column_stack([TIME_S, np.sin(TIME_S), rate, 0.5 * np.sin(2.0 * TIME_S)])
+    heading = "time [s],da [rad],p [rad/s],phi [rad]"
+    np.savetxt(tmp_path / "roll.csv", rows, "%.9g", ",", header=heading, comments="")
+    (record,) = fid.read_records(tmp_path / "roll.csv", "da", taken)
+    said = [each.code for each in record_findings(record, ["da", taken])]
+    assert ("units-swapped" in said) is wrong
+
+
+def test_a_fit_that_ended_at_no_minimum_ranks_behind_all_others() -> None:
+    asked = fid.PolynomialModel.oe("u", "y", nb=1, nf=1)
+    stalled = OrderTrial(asked, None, None, 0.1, 90.0, settled=False)
+    settled = OrderTrial(asked, None, None, 0.2, 80.0)
+    failed = OrderTrial(asked, None, None, None, None, "diverged")
+    assert sorted([failed, stalled, settled], key=rank_of) == [settled, stalled, failed]
+
+
+@pytest.mark.parametrize(
+    ("error", "own", "light"),
+    [(1.1, {"y": 1.0}, Light.AMBER), (1.3, {"y": 1.0}, Light.RED), (1.1, {}, Light.RED)],
+)
+def test_a_prediction_as_good_as_the_fit_is_not_red(
+    error: float, own: dict[str, float], light: Light
+) -> None:
+    (found,) = weighed([Finding("theil", Light.RED, "y", "look")], "theil", {"y": error}, own)
+    assert found.light is light
+
+
+def test_too_few_samples_for_residual_tests_end_no_study() -> None:
+    u, noise = np.random.default_rng(0).standard_normal((2, 30))
+    record = fid.Record.from_arrays(
+        TIME_S[:30], inputs={"u": u}, outputs={"y": 0.1 * noise + np.roll(u, 1)}
+    )
+    fit = fid.identify(fid.PolynomialModel.arx("u", "y", na=1, nb=1), record)
+    found = examine_residuals(fit)
+    assert isinstance(found, Finding)
+    assert (found.code, found.light) == (NOT_TESTED, Light.UNKNOWN)
