@@ -4,6 +4,7 @@ A stage is loaded when its first name is used: add a public name to the three li
 """
 
 import sys
+from difflib import get_close_matches
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -267,9 +268,17 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     if (home := _HOMES.get(name)) is None:
-        raise AttributeError(f"module 'flightid' has no attribute {name!r}")
+        raise AttributeError(f"module 'flightid' has no attribute {name!r}{_nearest(name)}")
     module = import_module(home)
     return module if home == f"flightid.{name}" else getattr(module, name)
+
+
+def _nearest(name: str) -> str:
+    """Public names that hold the name or are spelt like it."""
+    asked = name.lower()
+    holding = [each for each in __all__ if asked in each.lower().split("_")]
+    near = dict.fromkeys([*holding, *get_close_matches(name, __all__)])
+    return f"; nearest: {', '.join(near)}" if near else "; dir(flightid) lists the names"
 
 
 def __dir__() -> list[str]:

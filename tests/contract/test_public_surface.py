@@ -46,6 +46,10 @@ def test_every_name_is_where_it_is_said_to_be() -> None:
 def test_an_unknown_name_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="has no attribute 'nonsense'"):
         flightid.nonsense  # noqa: B018
+    with pytest.raises(AttributeError, match="nearest: inspect_log"):
+        flightid.inspect  # noqa: B018
+    with pytest.raises(AttributeError, match=r"nearest: identify$"):
+        flightid.identfy  # noqa: B018
 
 
 @pytest.mark.nightly
