@@ -25,6 +25,8 @@ ANY = re.compile(r"…|\.\.\.|[\[{(]\W*[\]})]|<.*>|")
 """Values that stand for whatever the user will give."""
 FIXED = re.compile(r"model\.with_fixed(?:\((?P<names>[^)]*)\))?")
 """How Python holds parameters."""
+ANY_NAME = "NAME"
+"""Stands for one of the parameters that the sentence has named."""
 
 
 @contextmanager
@@ -62,7 +64,8 @@ def held_in(text: str, place: str) -> str:
     """
 
     def key(found: re.Match[str]) -> str:
-        names = ", ".join(re.findall(r"(\w+)=", found["names"] or ""))
+        held = re.findall(r"(\w+)=", found["names"] or "")
+        names = ", ".join(name for name in held if name != ANY_NAME)
         return f"free = false{f' of {names}' if names else ''} in {place}"
 
     return FIXED.sub(key, text)

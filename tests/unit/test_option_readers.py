@@ -158,5 +158,7 @@ def test_held_parameters_are_told_as_a_file_has_them() -> None:
         assert spoken("fix with model.with_fixed(Lp=..., tau=...)") == (
             "fix with free = false of Lp, tau in [model.parameters]"
         )
-        assert "with_fixed" not in spoken("fix one of a, b with model.with_fixed, or excite them")
+        assert spoken("fix one of a, b with model.with_fixed(NAME=VALUE), or excite them") == (
+            spoken("fix one of a, b with model.with_fixed, or excite them")
+        )
     assert spoken("fix with model.with_fixed(a=...)") == "fix with model.with_fixed(a=...)"

@@ -199,9 +199,11 @@ def _own_name(
 
 
 def _action(model: GreyBoxModel, free: Sequence[str], biased: set[str]) -> str:
-    fix = f"fix one of {', '.join(free)} with model.with_fixed" if len(free) > 1 else (
-        f"fix {free[0]} with model.with_fixed"
-    )  # fmt: skip
+    fix = (
+        f"fix one of {', '.join(free)} with model.with_fixed(NAME=VALUE)"
+        if len(free) > 1
+        else f"fix {free[0]} with model.with_fixed({free[0]}=...)"
+    )
     if not biased:
         return f"{fix}, tie one to another, or excite them apart"
     kept = [name for name in model.outputs if name not in biased]
