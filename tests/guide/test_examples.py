@@ -264,7 +264,7 @@ def test_a_small_error_and_a_wrong_model(rig: Path) -> None:
     assert run.returncode == 1, run.stdout[-3000:] + run.stderr[-3000:]
     results = json.loads((rig / "motors" / "results.json").read_text("utf-8"))
     fits = [model["fits"]["output_error"]["parameters"] for model in results["models"]]
-    damping = [next(p["value"] for p in each if p["name"] == "Lp") for each in fits]
+    damping = [each["Lp"]["value"] for each in fits]
     truth = rate_truth("roll").damping_1_s
     assert damping[0] / truth < 0.6
     assert abs(damping[2] / truth - 1.0) < 0.1
@@ -329,8 +329,9 @@ def test_the_linear_twin_rotor_study_finds_the_published_modes(tmp_path: Path) -
     for item in folder.glob("*.toml"):
         (tmp_path / item.name).write_bytes(item.read_bytes())
     run = _run(FLIGHTID, "--quiet", "run", "study.toml", "--output", "out", folder=tmp_path)
-    # Red is the pitch model's free run, 69 % of a doublet: the rig has dry friction.
-    assert run.returncode == 1, run.stdout[-3000:] + run.stderr[-3000:]
+    # Amber is the pitch model's free run, two thirds of a doublet: the rig has dry friction, and
+    # the record of the fit is explained no better.
+    assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]
     results = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
     boxes = {box["name"]: box for box in results["models"]}
     left = boxes.pop("Pitch from the tail rotor")
