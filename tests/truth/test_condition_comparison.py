@@ -124,6 +124,22 @@ def test_ratios_without_an_answer() -> None:
     assert holm({"a": 0.02, "b": 0.04}) == {"a", "b"}
 
 
+def test_a_withheld_interval_is_not_an_exact_number() -> None:
+    known = Estimate("a", 2.0, "1", 0.1)
+    bare = Estimate("b", 3.0, "1", None, "errors are not white")
+    fixed = Estimate("c", 3.0, "1", None, "fixed")
+    for pair in ((known, bare), (bare, known), (bare, fixed)):
+        ratio = ratio_of(*pair)
+        assert (ratio.interval95, ratio.reason) == (None, "errors are not white")
+        assert ratio.value is not None
+        assert chance_of(*pair) is None
+    exact = ratio_of(known, fixed).interval95
+    assert exact is not None
+    half = 1.959963984540054 * 0.1
+    assert_close(exact, [(2.0 - half) / 3.0, (2.0 + half) / 3.0], rtol=1e-12, why="one factor")
+    assert chance_of(known, fixed) is not None
+
+
 def test_refused(compared: fid.ConditionComparison) -> None:
     with pytest.raises(errors.OptionError, match="a comparison needs two conditions"):
         fid.compare_conditions({"hover": fid.load_model("r50_hover")})

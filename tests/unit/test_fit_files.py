@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import flightid as fid
+from flightid.conventions import Light
 from flightid.errors import DataError, ModelError
 from flightid.evidence import Evidence
+from flightid.findings import Finding
 from flightid.identification import uncertain_of
+from flightid.identification.withheld_intervals import without_intervals
 from flightid.models.kinds import model_from_description, model_to_description
+from flightid.result import Result
 from tests.contract.test_kinds import STRUCTURES, fit
 
 KINDS = [kind for kind in STRUCTURES if kind != "NARX"]
@@ -48,6 +54,30 @@ def test_margins_and_matrices_of_the_file_are_as_uncertain(tmp_path: Path) -> No
     back = fid.load_model(fid.write_model(made, tmp_path / "model.toml"))
     assert fid.margins(back).phase_margin.stderr == fid.margins(made).phase_margin.stderr
     assert fid.export(back, tmp_path / "model.mat").files
+
+
+@pytest.mark.parametrize("level", [0.95, 0.8])
+@pytest.mark.parametrize("withheld", [False, True])
+@pytest.mark.parametrize("kind", ["grey linear", "transfer"])
+def test_a_fit_and_its_file_print_the_same_tables(
+    kind: str, withheld: bool, level: float, tmp_path: Path
+) -> None:
+    made = fit(kind)
+    if withheld:
+        doubt = Finding("inputs-in-errors", Light.AMBER, "inputs are left in the errors")
+        made = replace(without_intervals(made, doubt.message), findings=(doubt,))
+    back = fid.load_model(fid.write_model(made, tmp_path / "model.toml"))
+    verbs: dict[str, Callable[[object], Result]] = {
+        "modes": fid.modes,
+        "margins": fid.margins,
+        "compare": lambda it: fid.compare_conditions({"it": it, "flown": made}),
+    }
+    if kind != "transfer":
+        verbs["derivatives"] = fid.derivatives
+    for name, verb in verbs.items():
+        of_fit, of_file = (each.summary(level=level).to_text() for each in (verb(made), verb(back)))
+        assert of_file == of_fit, name
+        assert ("inputs are left in the errors" in of_file) is withheld, name
 
 
 def test_changed_numbers_are_no_fits_any_more(tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import takewhile
 from pathlib import Path
 
 import click
@@ -30,7 +32,42 @@ def command(models: tuple[str, ...], axis: str | None, level: float | None, as_j
 
     if len(set(models)) < len(models):
         raise click.UsageError("a model is named twice")
-    short = [Path(name).stem for name in models]
-    names = short if len(set(short)) == len(short) else list(models)
-    sources = {n: load_source(model, axis) for n, model in zip(names, models, strict=True)}
+    sources = {
+        n: load_source(model, axis) for n, model in zip(short_names(models), models, strict=True)
+    }
     show(compare_conditions(sources), "Comparison", as_json=as_json, level=level)
+
+
+def short_names(paths: Sequence[str]) -> list[str]:
+    """Stems of files, or, of files with one stem, what tells their paths apart.
+
+    Example
+    -------
+    >>> short_names(["/log/monday/models/roll.toml", "/log/tuesday/models/roll.toml"])
+    ['monday', 'tuesday']
+    """
+    whole = [Path(path).parts for path in paths]
+    bare = [(*Path(path).parts[:-1], Path(path).stem) for path in paths]
+    for parts in ([row[-1:] for row in bare], _without_common(bare), _after_common(bare)):
+        if all(parts) and len(set(parts)) == len(parts):
+            return [str(Path(*row)) for row in parts]
+    return [str(Path(*row)) for row in _after_common(whole)]
+
+
+def _after_common(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """Parts of paths after the folders that all share."""
+    same = _shared([row[:-1] for row in rows])
+    return [row[same:] for row in rows]
+
+
+def _without_common(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """Parts of paths between what all share before and behind."""
+    same = _shared([row[::-1] for row in rows])
+    cut = [row[: len(row) - same] for row in rows]
+    return _after_common(cut)
+
+
+def _shared(rows: Sequence[tuple[str, ...]]) -> int:
+    """How many parts all begin with."""
+    alike = (len(set(column)) == 1 for column in zip(*rows, strict=False))
+    return sum(1 for _ in takewhile(bool, alike))

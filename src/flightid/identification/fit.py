@@ -190,7 +190,14 @@ class Fit(
             self.evidence.to_dict(),
             self.provenance,
             {name: each.to_dict() for name, each in self.model_errors.items()},
+            self.withheld,
         )
+
+    @property
+    def withheld(self) -> str:
+        """Why there is no covariance, where findings say it; else empty."""
+        said = [each.message for each in self.findings if each.code in WITHHOLDING]
+        return "; ".join(said) if self.covariance is None else ""
 
     @property
     def carried(self) -> NDArray[np.float64] | None:
@@ -223,8 +230,7 @@ class Fit(
         >>> fid.identify(truth, data).uncertain()
         Uncertain(3 numbers, covariance known)
         """
-        said = [each.message for each in self.findings if each.code in WITHHOLDING]
-        return uncertain_model(self.model, self.names, self.carried, "; ".join(said))
+        return uncertain_model(self.model, self.names, self.carried, self.withheld)
 
     def summary(self, *, level: float | None = None) -> Table:
         """Table of the parameters, with costs and findings below.

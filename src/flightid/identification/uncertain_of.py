@@ -111,7 +111,7 @@ def _of_numbers(source: object, output: str | None, input: str | None) -> Uncert
         return source.uncertain()
     known = getattr(source, "estimated", None)
     if isinstance(source, Model) and known is not None:
-        return uncertain_model(source, known.names, known.covariance)
+        return uncertain_model(source, known.names, known.covariance, known.withheld)
     if isinstance(source, PolynomialModel) and source.covariance is not None:
         return uncertain_model(source, source.names, source.covariance)
     if isinstance(source, FrequencyResponse):

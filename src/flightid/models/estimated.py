@@ -23,7 +23,7 @@ from flightid.models.language.reading import (
 Array = NDArray[np.float64]
 _KEYS = {
     "names", "covariance", "method", "intervals_from", "bands", "evidence", "provenance",
-    "model_errors",
+    "model_errors", "withheld",
 }  # fmt: skip
 
 
@@ -49,6 +49,8 @@ class EstimateProvenance:
         Hash of the data, options, version.
     model_errors : mapping of str to mapping
         Plain values of the fit's `ModelErrorBound` by response.
+    withheld : str
+        Why there is no covariance; empty where there is one or the data's errors are not known.
 
     Example
     -------
@@ -64,6 +66,7 @@ class EstimateProvenance:
     evidence: Mapping[str, object] = field(default_factory=dict)
     provenance: Mapping[str, object] = field(default_factory=dict)
     model_errors: Mapping[str, Any] = field(default_factory=dict)
+    withheld: str = ""
 
     def __repr__(self) -> str:
         """Size and method on one line."""
@@ -82,6 +85,8 @@ class EstimateProvenance:
             "provenance": _plain(self.provenance),
             "model_errors": _plain(self.model_errors),
         }
+        if self.withheld:
+            table["withheld"] = self.withheld
         if self.covariance is not None:
             table["covariance"] = self.covariance.tolist()
         return table
@@ -121,6 +126,7 @@ class EstimateProvenance:
             read_table(content, "evidence", required=False),
             read_table(content, "provenance", required=False),
             read_table(content, "model_errors", required=False),
+            read_text(content.get("withheld", ""), "withheld"),
         )
 
 

@@ -21,8 +21,9 @@ from flightid.errors import ModelError, OptionError
 from flightid.findings import Finding
 from flightid.identification import Fit
 from flightid.identification.uncertain_of import source_findings
+from flightid.identification.uncertain_parameters import parameter_estimates
 from flightid.models import StateSpaceModel, TransferFunctionModel
-from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.estimate import Reading
 
 ALIKE = 0.3
 """Least common participation of two modes that are taken for the same one."""
@@ -130,13 +131,9 @@ def _condition(name: str, source: object) -> _Condition:
             found=type(model).__name__,
             needed="a fit or model of transfer functions or equations",
         )
-    if isinstance(source, Fit):
-        values: dict[str, Reading] = {key: p.as_reading() for key, p in source.parameters.items()}
-    else:
-        values = {
-            key: Estimate(key, p.value, p.unit, None, "the model was not fitted")
-            for key, p in model.parameters.items()
-        }
+    values: dict[str, Reading] = {
+        key: p.as_reading() for key, p in parameter_estimates(source).items()
+    }
     return _Condition(name, values, modes(source))
 
 

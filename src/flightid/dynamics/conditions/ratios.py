@@ -5,9 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from flightid.dynamics.modes.modes import UNFITTED
+from flightid.identification.uncertain_of import NO_COVARIANCE
 from flightid.uncertainty.estimate import Estimate, Interval, Reading
 from flightid.uncertainty.quantiles import half_width, two_sided_chance
 
+EXACT = ("", "exact", "fixed", "same fit", UNFITTED, NO_COVARIANCE)
+"""Reasons of a number without an interval that was declared, so that it counts as exact."""
 UNBOUNDED = "the interval of the denominator holds zero: no bound"
 
 
@@ -57,19 +61,33 @@ def even_error(estimate: Reading) -> float | None:
     return None if half is None else half / half_width()
 
 
+def withheld(*estimates: Reading) -> str:
+    """Why there is no interval of what is estimated, not declared; empty where there is one.
+
+    Example
+    -------
+    >>> withheld(Estimate("a", 2.0, "1", None, "fixed"))
+    ''
+    >>> withheld(Estimate("a", 2.0, "1", None, "errors are not white"))
+    'errors are not white'
+    """
+    bare = (each.reason for each in estimates if each.interval95 is None)
+    return "; ".join(dict.fromkeys(reason for reason in bare if reason not in EXACT))
+
+
 def ratio_of(above: Reading, below: Reading, name: str = "ratio") -> Reading:
     """Ratio of two independent estimates with its 95 % interval.
 
     Parameters
     ----------
     above, below : Estimate
-        In the same unit; one without an interval counts as exact where the other has one.
+        In the same unit; one that was declared counts as exact where the other has an interval.
     name : str
 
     Returns
     -------
     Estimate
-        Without an interval where that of the denominator holds zero.
+        Without an interval where that of the denominator holds zero, or where either was withheld.
 
     Example
     -------
@@ -82,6 +100,9 @@ def ratio_of(above: Reading, below: Reading, name: str = "ratio") -> Reading:
     if a == 0.0:
         return Estimate(name, None, "1", None, "the denominator is zero")
     errors = even_error(above), even_error(below)
+    reason = withheld(above, below)
+    if reason:
+        return Estimate(name, b / a, "1", None, reason)
     if errors == (None, None):
         return Estimate(name, b / a, "1", None, above.reason or below.reason)
     ends = RatioEnds(b, errors[0] or 0.0, a, errors[1] or 0.0)
@@ -100,7 +121,7 @@ def chance_of(first: Reading, second: Reading) -> float | None:
     Returns
     -------
     float or None
-        None where neither has an error.
+        None where neither has an error, or where that of either was withheld.
 
     Example
     -------
@@ -110,6 +131,8 @@ def chance_of(first: Reading, second: Reading) -> float | None:
     """
     errors = [even_error(first), even_error(second)]
     if first.value is None or second.value is None or errors == [None, None]:
+        return None
+    if withheld(first, second):
         return None
     total = math.hypot(*(error or 0.0 for error in errors))
     if total == 0.0:

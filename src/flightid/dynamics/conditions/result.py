@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from flightid.conventions import Light
@@ -191,6 +191,7 @@ class ConditionComparison(Result, schema="flightid.condition_comparison/1"):
         said: tuple[str, ...] = ("chance: of so large a difference between equal truths.",)
         if not any(number.chances for number in numbers):
             said = ()
+        said = (*said, *_withheld(numbers))
         return Table(title, tuple(columns), tuple(rows), (*said, *notes)).without_empty_columns()
 
     def __repr__(self) -> str:
@@ -218,3 +219,14 @@ def _ratio(ratio: Reading | None, level: float) -> list[Cell]:
     if ratio is None or ratio.value is None:
         return [None, ""]
     return [ratio.value, ratio.range_words(level, 3)]
+
+
+def _withheld(numbers: Iterable[ComparedNumber]) -> Iterator[str]:
+    """Why ratios have no interval, each reason once."""
+    reasons: dict[str, dict[str, None]] = {}
+    for number in numbers:
+        for ratio in number.ratios.values():
+            if ratio.reason and ratio.interval95 is None:
+                reasons.setdefault(ratio.reason, {})[number.name] = None
+    for reason, names in reasons.items():
+        yield f"No interval of the ratio of {', '.join(names)}: {reason}."

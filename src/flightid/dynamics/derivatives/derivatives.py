@@ -14,6 +14,7 @@ from flightid.errors import ModelError, UnitError
 from flightid.findings import Finding
 from flightid.identification import Fit
 from flightid.identification.uncertain_of import source_findings
+from flightid.identification.uncertain_parameters import parameter_estimates
 from flightid.models import StateSpaceModel
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
@@ -53,7 +54,7 @@ class Derivative:
     coefficient : Estimate or None
         Without dimensions, where a normalisation was given that knows it.
     status : str
-        ``"free"``, ``"fixed"``, ``"tied"`` or ``"at bound"``.
+        ``"free"``, ``"fixed"``, ``"tied"``, ``"at bound"`` or ``"not seen"``.
     note : str
         The parameter's.
 
@@ -203,7 +204,7 @@ def derivatives(source: object, normalisation: Normalisation | None = None) -> D
     Parameters
     ----------
     source : Fit or StateSpaceModel
-        A model alone has no intervals.
+        A model from the file of a fit has its intervals, one alone has none.
     normalisation : FixedWing or Rotorcraft, optional
         Mass, geometry and condition for coefficients without dimensions. Taken as known exactly.
 
@@ -259,6 +260,7 @@ def derivatives(source: object, normalisation: Normalisation | None = None) -> D
 def _found(
     source: object, model: StateSpaceModel, normalisation: Normalisation | None
 ) -> Iterator[Derivative]:
+    known = parameter_estimates(source)
     slopes = model.with_free(*model.parameters).matrix_derivatives()
     owners = _owners(model)
     states, inputs = list(model.states), list(model.inputs)
@@ -276,12 +278,12 @@ def _found(
         kind = RATE if column >= len(states) + len(inputs) else kind
         if (parameter.status != "free" or kind == RATE) and not conventional:
             continue
-        value = _value(source, model, name)
+        value = known[name].as_reading()
         si = _in_si(value, axis, variable, model)
-        status = source.parameters[name].status if isinstance(source, Fit) else parameter.status
         yield Derivative(
             name, axis, variable, kind, value, si,
-            _coefficient(si, axis, variable, kind, normalisation), status, parameter.note,
+            _coefficient(si, axis, variable, kind, normalisation),
+            known[name].status, parameter.note,
         )  # fmt: skip
 
 
@@ -292,13 +294,6 @@ def _owners(model: StateSpaceModel) -> list[str]:
     _, columns = linear_sum_assignment(cost)
     states = list(model.states)
     return [states[k] for k in columns]
-
-
-def _value(source: object, model: StateSpaceModel, name: str) -> Reading:
-    parameter = model.parameters[name]
-    if isinstance(source, Fit):
-        return source.parameters[name].as_reading()
-    return Estimate(name, parameter.value, parameter.unit, None, "the model was not fitted")
 
 
 def _in_si(value: Reading, axis: str, variable: str, model: StateSpaceModel) -> Reading:

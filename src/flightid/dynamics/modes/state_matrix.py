@@ -123,7 +123,7 @@ def _directions(source: object) -> tuple[Array | None, str]:
     model = model_of(source)
     known = source if isinstance(source, Fit) else getattr(model, "estimated", None)
     if known is not None and isinstance(model, StateSpaceModel):
-        return _exact_directions(model, known.names, np.asarray(known.covariance)), ""
+        return _exact_directions(model, known.names, uncertain.covariance), ""
     order = linear_system(source).order
     slopes = uncertain.slopes(lambda model: np.asarray(linear_system(model).a).ravel())
     return slopes.reshape(-1, order, order), ""

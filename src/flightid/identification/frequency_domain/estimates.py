@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,6 +213,32 @@ def fitted_parameters(
     """
     bounds = dict(zip(names, cramer_rao(weighted, names), strict=True)) if names else {}
     slack = dict(zip(names, insensitivity(weighted, names), strict=True)) if names else {}
+    found = known_parameters(fitted, names, covariance, freedom, withheld=withheld)
+    return {
+        name: replace(
+            each,
+            cramer_rao_percent=_percent(bounds.get(name), each.value),
+            insensitivity_percent=_percent(slack.get(name), each.value),
+        )
+        for name, each in found.items()
+    }
+
+
+def known_parameters(
+    fitted: GreyBoxModel,
+    names: tuple[str, ...],
+    covariance: Array | None,
+    freedom: Array | None = None,
+    *,
+    withheld: str = "",
+) -> dict[str, Estimate]:
+    """Every parameter with its error by the covariance, or why it has none, without percentages.
+
+    Parameters
+    ----------
+    fitted, names, covariance, freedom, withheld
+        As `fitted_parameters` takes them.
+    """
     errors = _standard_errors(fitted, names, covariance)
     degrees = {} if freedom is None else dict(zip(names, map(float, freedom), strict=True))
     result = {}
@@ -230,8 +256,6 @@ def fitted_parameters(
             else _reason(parameter, bound, covariance is not None, value, withheld),
             degrees.get(name),
             status="at bound" if bound else "not seen" if left else parameter.status,
-            cramer_rao_percent=_percent(bounds.get(name), value),
-            insensitivity_percent=_percent(slack.get(name), value),
         )
     return result
 
