@@ -195,9 +195,12 @@ class Fit(
 
     @property
     def withheld(self) -> str:
-        """Why there is no covariance, where findings say it; else empty."""
+        """Why there is no covariance, as findings or else the parameters say it; may be empty."""
+        if self.covariance is not None:
+            return ""
         said = [each.message for each in self.findings if each.code in WITHHOLDING]
-        return "; ".join(said) if self.covariance is None else ""
+        bare = [self.parameters[name].reason for name in self.names if name in self.parameters]
+        return "; ".join(dict.fromkeys(said or filter(None, bare)))
 
     @property
     def carried(self) -> NDArray[np.float64] | None:

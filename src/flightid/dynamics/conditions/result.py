@@ -226,7 +226,7 @@ def _withheld(numbers: Iterable[ComparedNumber]) -> Iterator[str]:
     reasons: dict[str, dict[str, None]] = {}
     for number in numbers:
         for ratio in number.ratios.values():
-            if ratio.reason and ratio.interval95 is None:
+            if ratio.reason not in ("", "fixed") and ratio.interval95 is None:
                 reasons.setdefault(ratio.reason, {})[number.name] = None
     for reason, names in reasons.items():
         yield f"No interval of the ratio of {', '.join(names)}: {reason}."
