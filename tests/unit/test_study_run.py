@@ -10,9 +10,12 @@ import pytest
 
 import flightid as fid
 from flightid.cli.program import run
+from flightid.conventions import Light
 from flightid.errors import StudyError
+from flightid.findings import Finding
 from flightid.report.html import to_html
 from flightid.report.text import to_text
+from flightid.study import answer
 from flightid.study import run as running
 
 STUDY = """
@@ -207,3 +210,12 @@ def test_a_folder_of_other_content_is_refused_before_the_work(
     (tmp_path / "mine.txt").touch()
     assert run(["run", str(study.output.parent / "study.toml"), "--output", str(tmp_path)]) == 2
     assert "holds something else" in capsys.readouterr().err
+
+
+def test_the_next_step_names_the_study_as_it_was_given(
+    study: fid.Study, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(answer, "_models", lambda _, source: Finding("answer", Light.GREEN, source))
+    asked = str(study.output.with_name("study.toml"))
+    assert asked in re.sub(r"\s", "", to_text(answer.short_document(study, study.document)))
+    assert answer.answer_of(study).findings[0].message == "study.toml"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from shlex import quote
 from typing import TYPE_CHECKING
 
 from flightid.control.autopilots.pid_loop import PidLoop
@@ -40,14 +41,18 @@ class StudyAnswer:
     tables: tuple[Table, ...] = ()
 
 
-def answer_of(study: StudyResults) -> StudyAnswer:
+def answer_of(study: StudyResults, *, source: str | None = None) -> StudyAnswer:
     """Say in a sentence each what the models are worth, and the gains.
 
     Parameters
     ----------
     study : StudyResults
+    source : str, optional
+        Study file as the reader has to write it; default: its name, which holds in any folder.
     """
-    findings = [_models(study)]
+    if source is None:
+        source = next((name for name in study.files if name.endswith(".toml")), "STUDY")
+    findings = [_models(study, source)]
     tuning = study.tuning
     if tuning is None:
         return StudyAnswer(tuple(findings))
@@ -79,7 +84,7 @@ def short_document(study: StudyResults, document: Document) -> Document:
     document : Document
         The whole report, whose verdicts count.
     """
-    answer = answer_of(study)
+    answer = answer_of(study, source=None if study.source is None else quote(str(study.source)))
     models = Lights(tuple(map(in_short, study.identified)), repeats=True)
     faults = (Lights(study.faults),) if study.faults else ()
     tables = tuple(map(TableBlock, answer.tables))
@@ -94,7 +99,7 @@ def short_document(study: StudyResults, document: Document) -> Document:
     return Document(document.title, document.subtitle, sections)
 
 
-def _models(study: StudyResults) -> Finding:
+def _models(study: StudyResults, source: str) -> Finding:
     """What the models are worth together."""
     lights = [in_short(item) for item in study.identified]
     if not lights:
@@ -126,14 +131,13 @@ def _models(study: StudyResults) -> Finding:
         said += f", for the reasons named with them: {', '.join(named)}"
     if light is Light.AMBER:
         said += "; each says what is to be doubted"
-    return Finding("answer", light, said, first.action if bad else _next(study))
+    return Finding("answer", light, said, first.action if bad else _next(study, source))
 
 
-def _next(study: StudyResults) -> str:
+def _next(study: StudyResults, source: str) -> str:
     """What to do with models that serve."""
     if study.tuning is not None or any(each.code == CODE for each in study.faults):
         return ""
-    source = next((name for name in study.files if name.endswith(".toml")), "STUDY")
     if study.inspection is not None:
         return f"for gains: flightid tune {source}"
     return f"for gains of a PID: flightid tune {source} --controller pi_d"

@@ -33,6 +33,7 @@ class StudyResults(
         "qualities": "told as handling_qualities",
         "carried_out": "of this run",
         "from_cache": "of this run",
+        "source": "of this run",
     },
 ):
     """Results of every stage of a study.
@@ -67,6 +68,8 @@ class StudyResults(
         Data compatibility of records, where the conditioning asks for it.
     carried_out, from_cache : tuple of str
         Stages that this run carried out, and those whose results the cache held.
+    source : Path or None
+        Study file as this run was given it.
     """
 
     settings: Settings
@@ -84,6 +87,7 @@ class StudyResults(
     consistency: Mapping[str, KinematicConsistency] = field(default_factory=dict)
     carried_out: tuple[str, ...] = ()
     from_cache: tuple[str, ...] = ()
+    source: Path | None = None
 
     @property
     def has_equations(self) -> bool:

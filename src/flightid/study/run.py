@@ -156,6 +156,7 @@ def _run(
             taken.checks,
             tuple(runner.carried_out),
             tuple(runner.from_cache),
+            source,
         )
         _write(study, folder)
         advance()
