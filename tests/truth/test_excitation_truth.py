@@ -8,7 +8,7 @@ from scipy.integrate import quad
 from scipy.signal import correlate
 
 from flightid import _native, excitation
-from flightid.excitation.multistep import DOUBLET, MODIFIED_3211, THREE_TWO_ONE_ONE
+from flightid.excitation.multistep import MULTISTEPS
 from flightid.excitation.phases import Lines, relative_peak_factor, schroeder_phases
 from flightid.excitation.sweep import sweep_phase
 from tests.closeness import assert_close
@@ -50,15 +50,15 @@ def test_sweep_phase_is_the_integral_of_its_frequency() -> None:
 
 
 # Peak and half-energy edges, in units of the step (computed independently).
-MULTISTEPS = [
-    (DOUBLET, 1.14, 2.331, 3.65, 0.0),
+BANDS = [
+    (MULTISTEPS["doublet"][:2], 1.14, 2.331, 3.65, 0.0),
     (((1.0, 2.0, 1.0), (1.0, -1.0, 1.0)), 1.15, 1.803, 2.44, 0.0),
-    (THREE_TWO_ONE_ONE, 0.28, None, 2.65, 1.0),
-    (MODIFIED_3211, 0.31, 1.584, 2.76, 0.0),
+    (MULTISTEPS["3211"][:2], 0.28, None, 2.65, 1.0),
+    (MULTISTEPS["modified_3211"][:2], 0.31, 1.584, 2.76, 0.0),
 ]
 
 
-@pytest.mark.parametrize(("shape", "low", "peak", "high", "mean"), MULTISTEPS)
+@pytest.mark.parametrize(("shape", "low", "peak", "high", "mean"), BANDS)
 def test_multistep_bands(
     shape: tuple[tuple[float, ...], tuple[float, ...]],
     low: float,
@@ -91,7 +91,10 @@ def test_sampled_multistep_has_the_exact_energy_spectrum() -> None:
     # A held sample adds the transform of its rectangle: then nothing is approximate.
     held = np.abs(dt * np.sinc(omega * dt / (2 * np.pi)) * raw) ** 2
     exact = excitation.multistep_energy(
-        omega, widths=MODIFIED_3211[0], levels=MODIFIED_3211[1], step_s=0.2
+        omega,
+        widths=MULTISTEPS["modified_3211"].widths,
+        levels=MULTISTEPS["modified_3211"].levels,
+        step_s=0.2,
     )
     assert_close(held, exact, rtol=1e-10, atol=1e-14, why="same piecewise constant signal")
 

@@ -378,4 +378,4 @@ def test_command_leaves_with_one_for_no_go(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_command_offers_every_kind() -> None:
-    assert set(design_command.KINDS) == set(KINDS)
+    assert set(design_command.Kinds().choices) == set(KINDS)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,16 +16,6 @@ if TYPE_CHECKING:
     from flightid.logs import Log
     from flightid.options import Options
 
-KINDS = (
-    "sweep",
-    "ardupilot_chirp",
-    "doublet",
-    "3211",
-    "modified_3211",
-    "prbs",
-    "noise",
-    "multisine",
-)
 MIXER_ROLL = 10
 MIXER_AXES = {MIXER_ROLL: "roll", 11: "pitch", 12: "yaw"}
 """SID_AXIS that inject at the mixer, behind the controllers."""
@@ -39,8 +30,22 @@ def _fields() -> dict[str, type[Options]]:
     return {"the design": DesignOptions, "the guess": RateAxis, "the limits": Limits}
 
 
+class Kinds(click.Choice[str]):
+    """Kinds of design, read when they are asked for: the list of all commands costs nothing."""
+
+    def __init__(self) -> None:
+        self.case_sensitive = True
+
+    @cached_property
+    def choices(self) -> tuple[str, ...]:  # type: ignore[override]  # click sets it at once
+        """Names that `flightid.excitation.plan` takes."""
+        from flightid.excitation.design import KINDS
+
+        return tuple(KINDS)
+
+
 @click.command(cls=OptionsCommand, fields_of=_fields)
-@click.argument("kind", type=click.Choice(KINDS))
+@click.argument("kind", type=Kinds())
 @click.option("--csv", "csv_file", type=FILE, help="Write the samples to this file.")
 @click.option("--param", type=FILE, help="Write ArduPilot parameters (kind ardupilot_chirp).")
 @click.option("--params", type=FILE, help="Write PX4 parameters: logging, and what it can inject.")

@@ -99,8 +99,7 @@ def model(
 
     MODEL is a .toml file, the folder of a study with one model, the JSON of a fit, or the name of a
     library model. Linear models are departures from their trim; nonlinear ones take inputs whole,
-    and shapes are added to their trim. Shapes: step:A[:START], pulse:A:WIDTH[:START],
-    doublet:A:WIDTH[:START], 3211:A:WIDTH[:START], sine:A:RAD_PER_S[:START], sweep:A:LOW:HIGH.
+    and shapes are added to their trim.
     """
     from flightid import Noise, simulate
     from flightid.progress import progress

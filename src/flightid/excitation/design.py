@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from flightid.errors import OptionError
 from flightid.excitation.assess import assess
 from flightid.excitation.excitation import Excitation
 from flightid.excitation.multisine import multisine
-from flightid.excitation.multistep import doublet, modified_3211, multistep
+from flightid.excitation.multistep import MULTISTEPS, Steps, multistep
 from flightid.excitation.noise import noise
 from flightid.excitation.options import DesignOptions
 from flightid.excitation.plan import Limits, Plan
@@ -20,8 +20,6 @@ from flightid.excitation.vehicle import RateAxis
 from flightid.excitation.verdicts import MARGIN
 
 CYCLES_AT_LOWEST = 5.0
-DOUBLET_PEAK, PEAK_3211 = 2.331, 1.584
-"""Frequency of most energy, times the step."""
 LONGEST_RECORD_S = 600.0
 
 
@@ -90,15 +88,18 @@ def _step_s(request: DesignRequest, peak: float) -> float:
     return samples / request.sample_rate_hz
 
 
-def _steps(make: Callable[..., Excitation], peak: float) -> Callable[[DesignRequest], Excitation]:
+def _steps(shape: Steps) -> Callable[[DesignRequest], Excitation]:
     def made(request: DesignRequest) -> Excitation:
-        return make(
+        steps = multistep(
             amplitude=request.amplitude,
-            step_s=_step_s(request, peak),
+            step_s=_step_s(request, shape.peak),
             sample_rate_hz=request.sample_rate_hz,
+            widths=shape.widths,
+            levels=shape.levels,
             name=request.one_name,
             unit=request.unit,
         )
+        return replace(steps, kind=shape.label)
 
     return made
 
@@ -153,9 +154,7 @@ def _multisine(request: DesignRequest) -> Excitation:
 KINDS: dict[str, Callable[[DesignRequest], Excitation]] = {
     "sweep": _sweep,
     "ardupilot_chirp": _chirp,
-    "doublet": _steps(doublet, DOUBLET_PEAK),
-    "3211": _steps(multistep, PEAK_3211),
-    "modified_3211": _steps(modified_3211, PEAK_3211),
+    **{name: _steps(shape) for name, shape in MULTISTEPS.items()},
     "prbs": _prbs,
     "noise": _noise,
     "multisine": _multisine,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,10 +15,33 @@ from flightid.excitation.checks import require_not_negative, require_positive, w
 from flightid.excitation.excitation import Excitation
 from flightid.table import Cell
 
-DOUBLET = ((1.0, 1.0), (1.0, -1.0))
-THREE_TWO_ONE_ONE = ((3.0, 2.0, 1.0, 1.0), (1.0, -1.0, 1.0, -1.0))
-MODIFIED_3211 = ((3.0, 2.0, 1.0, 1.0), (0.8, -1.2, 1.1, -1.1))
-"""Widths in steps and levels over the amplitude; the modified levels lower the mean."""
+
+class Steps(NamedTuple):
+    """A shape of steps.
+
+    Attributes
+    ----------
+    widths, levels : tuple of float
+        Lengths in steps, and levels; the largest becomes the amplitude.
+    peak : float
+        Frequency of most energy (of its second lobe where the first holds the mean), times the
+        length of a step.
+    label : str
+        Kind of the excitation.
+    """
+
+    widths: tuple[float, ...]
+    levels: tuple[float, ...]
+    peak: float
+    label: str
+
+
+MULTISTEPS = {
+    "doublet": Steps((1.0, 1.0), (1.0, -1.0), 2.331, "doublet"),
+    "3211": Steps((3.0, 2.0, 1.0, 1.0), (1.0, -1.0, 1.0, -1.0), 1.584, "multistep 3-2-1-1"),
+    "modified_3211": Steps((3.0, 2.0, 1.0, 1.0), (0.8, -1.2, 1.1, -1.1), 1.584, "modified 3-2-1-1"),
+}
+"""Shapes by the name that designs, shapes of inputs and commands take: a further one is a line."""
 
 
 def doublet(
@@ -59,8 +83,9 @@ def doublet(
     >>> doublet(amplitude=0.1, step_s=0.5, sample_rate_hz=50.0).kind
     'doublet'
     """
+    widths, levels, _, label = MULTISTEPS["doublet"]
     return _build(
-        *DOUBLET, amplitude, step_s, sample_rate_hz, lead_s, tail_s, name, unit, "doublet"
+        widths, levels, amplitude, step_s, sample_rate_hz, lead_s, tail_s, name, unit, label
     )
 
 
@@ -69,7 +94,7 @@ def multistep(
     amplitude: float,
     step_s: float,
     sample_rate_hz: float,
-    widths: Sequence[float] = THREE_TWO_ONE_ONE[0],
+    widths: Sequence[float] = MULTISTEPS["3211"].widths,
     levels: Sequence[float] | None = None,
     lead_s: float = 1.0,
     tail_s: float = 5.0,
@@ -172,16 +197,9 @@ def modified_3211(
     >>> modified_3211(amplitude=0.12, step_s=0.2, sample_rate_hz=50.0).signals[0, 50]
     np.float64(0.08)
     """
+    widths, levels, _, label = MULTISTEPS["modified_3211"]
     return _build(
-        *MODIFIED_3211,
-        amplitude,
-        step_s,
-        sample_rate_hz,
-        lead_s,
-        tail_s,
-        name,
-        unit,
-        "modified 3-2-1-1",
+        widths, levels, amplitude, step_s, sample_rate_hz, lead_s, tail_s, name, unit, label
     )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flightid.errors import OptionError, UnknownNameError
 from flightid.excitation import sweep
+from flightid.excitation.multistep import MULTISTEPS, Steps
 from flightid.options import Options, option
 from flightid.record import Record
 
@@ -20,17 +21,11 @@ START_S = 1.0
 MAXIMUM_SAMPLES = 50_000_000
 SHAPES = {
     "step": "step:AMPLITUDE[:START]",
-    "pulse": "pulse:AMPLITUDE:WIDTH[:START]",
-    "doublet": "doublet:AMPLITUDE:WIDTH[:START]",
-    "3211": "3211:AMPLITUDE:WIDTH[:START]",
+    **{name: f"{name}:AMPLITUDE:WIDTH[:START]" for name in ("pulse", *MULTISTEPS)},
     "sine": "sine:AMPLITUDE:RAD_PER_S[:START]",
     "sweep": "sweep:AMPLITUDE:LOW:HIGH, rad/s",
 }
-_LEVELS = {
-    "pulse": (1.0,),
-    "doublet": (1.0, -1.0),
-    "3211": (1.0, 1.0, 1.0, -1.0, -1.0, 1.0, -1.0),
-}
+_PULSE = Steps((1.0,), (1.0,), 0.0, "pulse")
 
 
 @dataclass(frozen=True)
@@ -44,7 +39,8 @@ class StickOptions(Options):
     """
 
     inputs: Mapping[str, str] = option(
-        default_factory=dict, doc="Shape by input, for example lat=step:0.1."
+        default_factory=dict,
+        doc=f"Shape by input, for example lat=step:0.1. Shapes: {'; '.join(SHAPES.values())}.",
     )
     duration_s: float = option(10.0, unit="s", above=0.0, doc="Length of the shapes' record.")
     sample_rate_hz: float = option(100.0, unit="Hz", above=0.0, doc="Of the shapes' record.")
@@ -141,8 +137,9 @@ def _shape(text: str, time_s: Array, sample_rate_hz: float) -> Array:
         return np.where(since >= 0.0, numbers[0] * np.sin(numbers[1] * since), 0.0)
     if kind == "step":
         return np.where(since >= 0.0, numbers[0], 0.0)
-    levels = np.array([0.0, *_LEVELS[kind], 0.0])
+    shape = MULTISTEPS.get(kind, _PULSE)
     if not numbers[1] > 0.0:
         raise OptionError("an input shape has no meaning", found=text, needed=SHAPES[kind])
-    places = np.clip(np.floor(since / numbers[1]) + 1, 0, len(levels) - 1).astype(int)
-    return np.asarray(numbers[0] * levels[places])
+    edges = numbers[1] * np.cumsum([0.0, *shape.widths])
+    levels = np.array([0.0, *shape.levels, 0.0]) / max(map(abs, shape.levels))
+    return np.asarray(numbers[0] * levels[np.searchsorted(edges, since, side="right")])
