@@ -251,6 +251,7 @@ def test_chirps_of_a_log_have_the_names_of_their_segments() -> None:
 def test_no_model_is_none_to_use() -> None:
     left = Finding("left-out", Light.UNKNOWN, "p/da is left out")
     item = SimpleNamespace(name="p", fit=None, findings=(left,), on_unseen={}, left_out=(left,))
-    said = _models(SimpleNamespace(identified=[item], faults=(), files=()))  # type: ignore[arg-type]
+    study = SimpleNamespace(identified=[item], faults=(), files=())
+    said = _models(study, "study.toml")  # type: ignore[arg-type]
     assert said.light is Light.UNKNOWN
     assert "no model was made" in said.message
