@@ -140,7 +140,9 @@ def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[F
             errors = rows @ covariance @ rows.T
             distance = np.array([gap.real, gap.imag][:n])
             statistic = float(distance @ np.linalg.pinv(errors) @ distance)
-            spread = QUANTILE * float(np.sqrt(np.max(np.linalg.eigvalsh(errors))))
+            # Rounding leaves a pair that cannot move apart a variance below zero.
+            widest = max(float(np.max(np.linalg.eigvalsh(errors))), 0.0)
+            spread = QUANTILE * float(np.sqrt(widest))
             seen = (abs(gap) + spread) / abs(1.0 - abs(pole.z))
             together = statistic < chdtri(n, 0.05)
             if together and seen >= HARDLY_SEEN and _is_at_one(pole, covariance):
