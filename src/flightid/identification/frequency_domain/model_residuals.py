@@ -272,7 +272,7 @@ class ModelResiduals:
         motions, free = [], []
         for each in systems_of(model):
             modes = split_modes(each, n * step)
-            inputs = [self.linear.inputs.index(name) for name in each.inputs]
+            inputs = self._columns(each.inputs)
             rows = [k for k in kept if self.outputs[k] in each.outputs]
             places = [each.outputs.index(self.outputs[k]) for k in rows]
             motions.append(_SystemRun(modes, inputs, rows, places))
@@ -284,6 +284,19 @@ class ModelResiduals:
         if not np.all(np.isfinite(together)):
             raise self._diverges(kept, "a simulation without bounds")
         return motions, together
+
+    def _columns(self, names: Sequence[str]) -> list[int]:
+        """Places of inputs in the records; what one that is not there did, nobody knows."""
+        held = self.linear.inputs
+        missing = [name for name in names if name not in held]
+        if missing:
+            raise DataError(
+                "the model cannot be followed over the records of the response",
+                found=f"no samples of its input {', '.join(missing)}",
+                needed=f"every input of the model; the response holds {', '.join(held)}",
+                action="estimate the response with all inputs, or leave these out of the model",
+            )
+        return [held.index(name) for name in names]
 
     def _check(self, kept: Places, left: Array, measured: Array) -> None:
         for row in kept:
