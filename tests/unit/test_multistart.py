@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flightid.identification.multistart import draw_starts
+from flightid.identification.multistart import DenseEnd, draw_starts
 from flightid.models import Parameter
+from tests.closeness import assert_close
 
 
 def test_starts_keep_sign_and_scale_where_bounds_are_open() -> None:
@@ -23,3 +24,15 @@ def test_starts_keep_sign_and_scale_where_bounds_are_open() -> None:
         assert 0.3 < np.max(np.abs(wide[:, column] / value - 1.0)) <= 0.6
     assert 0.1 <= drawn[:, 2].min() < 0.3 < 4.0 < drawn[:, 2].max() <= 10.0
     assert np.max(np.abs(drawn[:, 3])) <= 1.0
+
+
+def test_a_search_takes_its_jacobian_in_any_order_of_memory() -> None:
+    slopes = np.array([[1.0, 2.0], [0.0, 1.0], [3.0, 0.0]])
+    truth, open_ = np.array([0.5, -2.0]), np.full(2, np.inf)
+    by_columns = DenseEnd.searched(
+        lambda x: slopes @ (x - truth),
+        lambda _: np.asfortranarray(slopes),
+        *(np.zeros(2), -open_, open_, 3, 50),
+    )
+    assert_close(by_columns.x, truth, rtol=1e-9, why="a linear problem")
+    assert_close(by_columns.jacobian, slopes, rtol=1e-12, why="a copy")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.errors import FitError, OptionError
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.models import Parameter
@@ -53,6 +54,28 @@ class DenseEnd(End):
         """From the native half's order."""
         x, cost, residuals, jacobian, iterations, termination = found
         return cls(x, cost, iterations, termination, residuals, jacobian)
+
+    @classmethod
+    def searched(
+        cls,
+        residuals: Callable[[Array], Array],
+        jacobian: Callable[[Array], Array],
+        start: Array,
+        lower: Array,
+        upper: Array,
+        n_residuals: int,
+        maximum_iterations: int,
+    ) -> DenseEnd:
+        """Of bounded Levenberg–Marquardt on callables, their Jacobian in any order of memory."""
+
+        def by_rows(x: Array) -> Array:
+            # The native half reads rows of C order.
+            return np.ascontiguousarray(jacobian(x))
+
+        found = _native.least_squares(
+            residuals, by_rows, start, lower, upper, n_residuals, maximum_iterations
+        )
+        return cls.of_native(found)
 
 
 E = TypeVar("E", bound=End)

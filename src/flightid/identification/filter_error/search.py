@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid import _native
 from flightid.identification.filter_error.gusts import GUST_UNKNOWNS, candidates
 from flightid.identification.filter_error.innovations import InnovationsProblem
 from flightid.identification.multistart import DenseEnd
@@ -86,7 +85,7 @@ def minimise(
     with progress(None, "running the filter") as advance:
         point = _LastPoint(problem, advance, enough)
         try:
-            ending = _native.least_squares(
+            return DenseEnd.searched(
                 point.residuals,
                 point.jacobian,
                 start,
@@ -97,7 +96,6 @@ def minimise(
             )
         except _NearEnd:
             return point.end()
-    return DenseEnd.of_native(ending)
 
 
 def with_gust(

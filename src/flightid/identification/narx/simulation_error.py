@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dtbtrs
 
-from flightid import _native
+from flightid.identification.multistart import DenseEnd
 from flightid.models.narx.model import NarxModel
 from flightid.models.narx.terms import Lag, Term
 
@@ -97,8 +97,7 @@ class SimulationError:
             vectors = lag_vectors(model, simulated, inputs, start)
             direct, slopes = self._derivatives(model, vectors)
             rows.append(_through_recursion(direct, slopes))
-        # The native half reads rows of C order.
-        return np.ascontiguousarray(np.concatenate(rows))
+        return np.concatenate(rows)
 
     def _derivatives(self, model: NarxModel, vectors: Array) -> tuple[Array, Array]:
         """Of one step: by values (n_values, n), and by past outputs (n_y, n)."""
@@ -123,11 +122,11 @@ class SimulationError:
         """The model of the least sum of squares; that sum, steps and how the search ended."""
         start = self.start
         free = np.full(start.size, np.inf)
-        found = _native.least_squares(
+        end = DenseEnd.searched(
             self.residuals, self.jacobian, start, -free, free, sum(self.counts), maximum_iterations
         )
-        left = self.residuals(found[0])
-        return self.at(found[0]), float(left @ left), found[4], found[5]
+        left = self.residuals(end.x)
+        return self.at(end.x), float(left @ left), end.iterations, end.termination
 
 
 LARGEST_LOG_WIDTH = 7.0

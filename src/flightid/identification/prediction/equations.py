@@ -151,11 +151,10 @@ def predict_equations(
 
         def jacobian(x: Array) -> Array:
             slopes = scale[..., None] * run.outputs(run.start.filled(x))[1][:, told]
-            return np.ascontiguousarray(slopes.reshape(size, n_free))
+            return np.asarray(slopes.reshape(size, n_free))
 
         open_ = np.full(n_free, np.inf)
-        found = _native.least_squares(residuals, jacobian, start, -open_, open_, size, MOST_STEPS)
-        end = DenseEnd.of_native(found)
+        end = DenseEnd.searched(residuals, jacobian, start, -open_, open_, size, MOST_STEPS)
         best, rank = run.start.filled(end.x), _rank(end.jacobian)
     predicted, _ = run.outputs(best)
     shifts = Shifts(

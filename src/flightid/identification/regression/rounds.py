@@ -9,7 +9,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid import _native
 from flightid.identification.multistart import DenseEnd
 
 Array = NDArray[np.float64]
@@ -111,7 +110,7 @@ def solve(
         size = np.linalg.norm(residuals) + np.linalg.norm(slopes @ step)
         if np.linalg.norm(after - residuals - slopes @ step) <= _LINEAR * size:
             return DenseEnd(direct, float(after @ after), 1, "gradient", after, jacobian), rows
-    ending = _native.least_squares(
+    end = DenseEnd.searched(
         lambda theta: stacked(theta)[1],
         lambda theta: stacked(theta)[2],
         start,
@@ -120,7 +119,6 @@ def solve(
         len(residuals),
         limits.maximum_iterations,
     )
-    end = DenseEnd.of_native(ending)
     return end, stacked(end.x)[0]
 
 

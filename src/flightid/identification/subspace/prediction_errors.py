@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid import _native
+from flightid.identification.multistart import DenseEnd
 from flightid.identification.subspace.data import SubspaceData
 from flightid.identification.subspace.matrices import STABLE, adjoint_run
 from flightid.models.innovations.prediction import RANK
@@ -315,10 +315,10 @@ def _search(
         return predictor.jacobian(predictor.unpack(origin + basis @ step), whiten, basis)
 
     free = np.full(basis.shape[1], np.inf)
-    found = _native.least_squares(
+    end = DenseEnd.searched(
         residuals, jacobian, np.zeros(basis.shape[1]), -free, free, rows, maximum_iterations
     )
-    return predictor.unpack(origin + basis @ found[0]), found[4], found[5]
+    return predictor.unpack(origin + basis @ end.x), end.iterations, end.termination
 
 
 def _covariance(
