@@ -136,3 +136,12 @@ def test_absurd_ratios_are_red() -> None:
     for ratios in ((1e-4, 1.0), (1.0, 1e4)):
         (finding,) = colour_findings(*ratios)
         assert (finding.code, finding.light.value) == ("colour-absurd", "red")
+
+
+def test_parameters_that_are_hardly_told_apart_have_a_symmetric_covariance() -> None:
+    random = np.random.default_rng(4)
+    slow = signal.lfilter([1.0], np.poly([0.99, 0.98, 0.97, 0.96]), random.standard_normal(3000))
+    late = np.stack([np.roll(slow, lag) for lag in range(6)], axis=1)[10:]
+    residual = signal.lfilter([1.0], [1.0, -0.9], random.standard_normal((1, 2990)))
+    found = residual_covariance([RecordBlock.of(late[None], np.ones((1, 2990, 1)), residual)])
+    assert np.array_equal(found.covariance, found.covariance.T)

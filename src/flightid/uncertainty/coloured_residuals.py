@@ -364,6 +364,9 @@ def _freedom(shared: Array, variances: Array, models: Sequence[Autoregression]) 
 
 
 def _lifted(covariance: Array, plain: Array) -> Array:
-    """Of data without noise, rounding alone is left, and that may be negative."""
+    """Of data without noise, rounding alone is left, and that may be negative.
+
+    Where data hardly tell parameters apart, rounding leaves the two triangles unlike.
+    """
     lift = np.maximum(ROUNDING * np.diag(plain) - np.diag(covariance), 0.0)
-    return np.asarray(covariance + np.diag(lift))
+    return np.asarray(0.5 * (covariance + covariance.T) + np.diag(lift))
