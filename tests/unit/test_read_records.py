@@ -389,3 +389,8 @@ def test_g_is_what_the_model_makes_of_it(tmp_path: Path) -> None:
 )
 def test_spellings_of_test_reports_are_read(spelling: str, unit: str) -> None:
     assert canonical(spelling) == canonical(unit)
+
+
+def test_a_column_that_looks_like_the_time_is_named(tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match="'time_s' looks like the time"):
+        read_records(_csv(tmp_path, "time_s,p\n0,1\n1,2\n"))

@@ -52,12 +52,17 @@ def row_stamps(
             f"{table.path.name} has no time column {time_column!r}",
             found="columns " + ", ".join(table.lengths),
             needed="time_column=<name of the column> or sample_time_s=<seconds>",
-            action="no sample time is invented: state it",
+            action=_looks_like_time(table) or "no sample time is invented: state it",
         )
     if not (np.isfinite(sample_time_s) and sample_time_s > 0):
         raise OptionError("sample time is not positive", found=sample_time_s, needed="above 0 s")
     longest = max(table.lengths.values(), default=0)
     return np.asarray(sample_time_s * np.arange(longest), dtype=np.float64)
+
+
+def _looks_like_time(table: ColumnTable) -> str:
+    near = [name for name in table.lengths if name.lower() == "t" or name.lower()[:4] == "time"]
+    return f"{near[0]!r} looks like the time: name it as that" if near else ""
 
 
 def column_unit(
