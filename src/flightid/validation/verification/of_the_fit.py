@@ -46,10 +46,11 @@ def left_by_fit(source: object, explained: float) -> dict[str, float]:
 def weighed(
     findings: Sequence[Finding], code: str, errors: Mapping[str, float], own: Mapping[str, float]
 ) -> tuple[Finding, ...]:
-    """Verdicts on a prediction, none red for a share of noise that the fit knows.
+    """Verdicts on a prediction, none red for an error that the fit itself shows.
 
     Where no output is predicted worse than the fit explains its own records, a poor share of the
-    measured motion says that the record hardly rises above noise, not that the model is wrong.
+    measured motion says that the record hardly rises above what the fit leaves (noise, or what
+    the structure lacks), not that the model is worse here.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ def weighed(
     """
     if not errors or any(error > AS_MUCH * own.get(name, 0.0) for name, error in errors.items()):
         return tuple(findings)
-    said = "; the error is no larger than in the records of the fit: little here rises above noise"
+    said = "; the error is no larger than in the records of the fit: little here rises above it"
     action = "verify on a record that moves the output more"
     return tuple(
         replace(each, light=Light.AMBER, message=each.message + said, action=action)
