@@ -185,10 +185,10 @@ def model() -> fid.StateSpaceModel:
 def fly(seed: int) -> Trial:
     """Output error on doublets.
 
-    Lr is fitted and not read: its slope at trim was held in 85 % of 60, the others in 95 %. Why
-    is not known; flown with slopes at trim, bank is off by up to 3 % (`test_jsbsim_aircraft`).
+    The slope Lr at trim was held in 85 % of 60, the others in 95 %. Why is not known; flown with
+    slopes at trim, bank is off by up to 3 % (`test_jsbsim_aircraft`).
     """
-    truth = {name: slopes()[at] for name, at in NAMES.items() if name != "Lr"}
+    truth = {name: slopes()[at] for name, at in NAMES.items()}
     return fit_trial(
         lambda: fid.identify(model(), record(seed), method="output_error"),
         truth,
