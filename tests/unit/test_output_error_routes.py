@@ -47,7 +47,6 @@ def _on_threads(count: int) -> str:
     return found.stdout
 
 
-@pytest.mark.nightly
 def test_one_thread_and_many_give_the_same_bits(capsys: pytest.CaptureFixture[str]) -> None:
     exec(compile(FIT, "fit", "exec"), {"__name__": "fit"})
     here = capsys.readouterr().out

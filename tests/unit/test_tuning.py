@@ -117,7 +117,6 @@ def test_the_result_shows_itself(design: fid.PidDesign) -> None:
         design.response("luck")
 
 
-@pytest.mark.nightly
 def test_a_target_is_reached_with_all_the_margin_there_is(fit: fid.Fit) -> None:
     need = dataclasses.replace(NEED, crossover_rad_s=12.0)
     design = fid.tune_pid(fit, gains=FLOWN, requirements=need, draws=20, angle_loop=False)

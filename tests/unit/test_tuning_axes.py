@@ -175,7 +175,6 @@ def _slow_yaw() -> fid.LinearSystem:
     return fid.LinearSystem([[-1.0]], [[140.0]], [[1.0]], [[0.0]], ("tau_psi",), ("r",), [0.4])
 
 
-@pytest.mark.nightly
 def test_a_refused_axis_leaves_the_others_and_their_files(
     tuning: fid.Tuning, tmp_path: Path
 ) -> None:
@@ -199,7 +198,6 @@ def test_a_refused_axis_leaves_the_others_and_their_files(
     assert next(f for f in made.findings if f.code == "axis-refused").light is Light.RED
 
 
-@pytest.mark.nightly
 def test_axes_of_one_model_are_written_together_or_not_at_all(tmp_path: Path) -> None:
     fast = dataclasses.replace(NEED, crossover_rad_s=60.0)
     plant = fid.load_model("rate_integrator", axis="yaw").with_values({"Ntpsi": 40.0, "tau": 0.03})
