@@ -13,7 +13,13 @@ PARTICIPLES = frozenset(
 )
 NOUNS = {"Feed", "Need", "Seed", "Speed"}
 # What nobody in the field would search for -> what they call it.
-FOREIGN = {"Motion": "ODE model", "Room": "slack", "Tangent": "sensitivity", "Walk": "trajectory"}
+FOREIGN = {
+    "Motion": "ODE model",
+    "Room": "slack",
+    "Tangent": "sensitivity",
+    "Walk": "trajectory",
+    "Promise": "worst case",
+}
 
 
 def _offences(name: str) -> list[str]:

@@ -270,7 +270,7 @@ def broken_promise(design: fid.PidDesign, flight: Flight, seed: int) -> str:
         return f"saturated {share:.0%}"
     for name, loop in axis.loops().items():
         for kind, true in zip(("phase margin", "gain margin"), margins(loop), strict=True):
-            least = design.promise(name, kind).worst
+            least = design.worst_case(name, kind).worst
             if least is not None and true < least - TOLERANCE[kind]:
                 return f"{name}: {kind} {true:.2f}, promised {least:.2f}"
     return ""

@@ -208,7 +208,7 @@ def broken_promise(design: fid.PidDesign, rig: Rig, seed: int) -> str:
     z = np.exp(1j * omega * rig.step_s)
     true = margins(np.polyval(open_num, z) / np.polyval(open_den, z))
     for kind, value in zip(("phase margin", "gain margin"), true, strict=True):
-        least = design.promise("loop", kind).worst
+        least = design.worst_case("loop", kind).worst
         if least is not None and value < least - TOLERANCE[kind]:
             return f"{kind} {value:.2f}, promised {least:.2f}"
     return "limit cycle" if swings(rig, num, den, seed) else ""

@@ -49,7 +49,7 @@ def test_worst_margins_hold_for_the_true_plant() -> None:
             grid, design.loop.feedback(grid, gyro="filtered", with_hold=False) * response
         )
         worst = {
-            name: design.promise("rate loop", name).worst
+            name: design.worst_case("rate loop", name).worst
             for name in ("phase margin", "gain margin", "sensitivity peak")
         }
         kept.append(

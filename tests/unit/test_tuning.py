@@ -11,8 +11,8 @@ import pytest
 import flightid as fid
 from flightid.control.autopilots import axis_loop, axis_loop_of
 from flightid.control.tuning.loop_problem import highest_crossover
+from flightid.control.tuning.order_statistics import content_of_worst, least_share
 from flightid.control.tuning.requirements import TuningRequirements
-from flightid.control.tuning.worst_case import content_of_worst, least_share
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
 from flightid.findings import Finding
@@ -62,22 +62,22 @@ def test_gains_meet_every_requirement_for_fresh_plants(design: fid.PidDesign, dr
     assert design.n_plants == draws + 1
     assert design.share_met > 0.85
     for loop in ("rate loop", "whole loop"):
-        assert (design.promise(loop, "phase margin").worst or 0.0) > 44.0
-        assert (design.promise(loop, "sensitivity peak").worst or 9.0) < 2.04
-    assert (design.promise("angle loop", "phase margin").worst or 0.0) > 59.0
-    assert (design.promise("rate loop", "crossover").worst or 99.0) < 30.5
+        assert (design.worst_case(loop, "phase margin").worst or 0.0) > 44.0
+        assert (design.worst_case(loop, "sensitivity peak").worst or 9.0) < 2.04
+    assert (design.worst_case("angle loop", "phase margin").worst or 0.0) > 59.0
+    assert (design.worst_case("rate loop", "crossover").worst or 99.0) < 30.5
     assert design.binding
 
 
 def test_worst_lies_beyond_nominal_and_the_flown_gains_stand_beside(design: fid.PidDesign) -> None:
-    for each in design.promises:
+    for each in design.worst_cases:
         if None in (each.nominal, each.worst, each.estimate.interval95):
             continue
         low, high = each.estimate.interval95 or (0.0, 0.0)
         assert low <= high
         assert each.worst is not None
         assert min(low, each.worst) <= (each.nominal or 0.0) <= max(high, each.worst)
-    crossover = design.promise("rate loop", "crossover")
+    crossover = design.worst_case("rate loop", "crossover")
     assert crossover.flown is not None
     assert crossover.nominal is not None
     assert crossover.nominal > 1.2 * crossover.flown
@@ -108,11 +108,11 @@ def test_the_result_shows_itself(design: fid.PidDesign) -> None:
     assert repr(design).startswith("PidDesign(roll: ATC_RAT_RLL_P")
     assert design.to_dict()["schema"] == "flightid.pid_design/1"
     assert "Binding: " in str(design.summary())
-    assert "95 % confidence" in str(design.promise_table())
+    assert "95 % confidence" in str(design.worst_case_table())
     assert len(design.stage_table().rows) == len(design.stages)
     assert "<table>" in design._repr_html_()
-    with pytest.raises(UnknownNameError, match="no such promise"):
-        design.promise("rate loop", "luck")
+    with pytest.raises(UnknownNameError, match="no such number"):
+        design.worst_case("rate loop", "luck")
     with pytest.raises(UnknownNameError, match="no such response"):
         design.response("luck")
 
@@ -120,10 +120,10 @@ def test_the_result_shows_itself(design: fid.PidDesign) -> None:
 def test_a_target_is_reached_with_all_the_margin_there_is(fit: fid.Fit) -> None:
     need = dataclasses.replace(NEED, crossover_rad_s=12.0)
     design = fid.tune_pid(fit, gains=FLOWN, requirements=need, draws=20, angle_loop=False)
-    crossover = design.promise("rate loop", "crossover")
+    crossover = design.worst_case("rate loop", "crossover")
     assert design.exists
     assert_close(crossover.worst or 0.0, 12.0, rtol=0.02, why="no more bandwidth than asked for")
-    assert (design.promise("rate loop", "phase margin").worst or 0.0) > 60.0
+    assert (design.worst_case("rate loop", "phase margin").worst or 0.0) > 60.0
 
 
 @pytest.mark.nightly  # test_tuning_axes.py holds that none are written, in every run
@@ -155,7 +155,7 @@ def test_models_without_errors_are_refused_or_taken_as_they_are(fit: fid.Fit) ->
     design = fid.tune_pid(fit.model, gains=FLOWN, requirements=NEED, nominal=True, band_rad_s=BAND)
     assert "no-uncertainty" in {finding.code for finding in design.findings}
     assert design.content == 0.0
-    assert "errors are not known" in str(design.promise_table())
+    assert "errors are not known" in str(design.worst_case_table())
 
 
 @pytest.mark.nightly
@@ -223,7 +223,7 @@ def test_a_structure_that_its_data_contradict_lowers_what_is_promised(fit: fid.F
     }
     options = {"gains": FLOWN, "requirements": NEED, "draws": 24, "angle_loop": False}
     right, doubted = (fid.tune_pid(each, **options) for each in (fit, wrong))
-    pairs = [each.promise("rate loop", "phase margin") for each in (right, doubted)]
+    pairs = [each.worst_case("rate loop", "phase margin") for each in (right, doubted)]
     gap = [(each.nominal or 0.0) - (each.worst or 0.0) for each in pairs]
     # An error of 0.3 turns the loop by up to arcsin 0.3 = 17.5 degrees.
     assert 12.0 < gap[1] - gap[0] < 22.0
@@ -271,7 +271,7 @@ def test_noise_bounds_the_gains(fit: fid.Fit) -> None:
     )
     assert quiet.exists
     assert "output noise" in quiet.binding
-    assert (quiet.promise("output", "noise, rms").worst or 1.0) <= 0.00201
+    assert (quiet.worst_case("output", "noise, rms").worst or 1.0) <= 0.00201
     assert quiet.gains["ATC_RAT_RLL_D"] < free.gains["ATC_RAT_RLL_D"]
     for bad in (-1.0, ([1.0, 2.0], [1.0])):
         with pytest.raises(OptionError, match="gyro_noise"):

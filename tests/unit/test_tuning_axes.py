@@ -136,7 +136,7 @@ def test_flown_gains_are_judged_with_the_other_axes_flown_gains(tuning: fid.Tuni
     )  # fmt: skip
     assert slow["pitch"].gains["ATC_RAT_PIT_P"] < 0.7 * tuning["pitch"].gains["ATC_RAT_PIT_P"]
     moved = False
-    for before, after in zip(tuning["roll"].promises, slow["roll"].promises, strict=True):
+    for before, after in zip(tuning["roll"].worst_cases, slow["roll"].worst_cases, strict=True):
         # What flew does not depend on what pitch is given now.
         assert (before.flown is None) == (after.flown is None)
         assert before.flown is None or before.flown == pytest.approx(after.flown, rel=1e-9)
@@ -231,10 +231,10 @@ def test_axes_designed_alone_are_refused_where_the_coupling_breaks_them(tmp_path
     (together,) = made.together
     crossover = next(
         each
-        for each in together.closed[0].promises
+        for each in together.closed[0].worst_cases
         if (each.loop, each.name) == ("rate loop", "crossover")
     )
-    alone = made["roll"].promise("rate loop", "crossover")
+    alone = made["roll"].worst_case("rate loop", "crossover")
     assert alone.nominal is not None
     assert crossover.nominal is not None
     assert alone.nominal <= 20.0 < crossover.nominal
@@ -242,7 +242,7 @@ def test_axes_designed_alone_are_refused_where_the_coupling_breaks_them(tmp_path
     gains = {design.axis: design.loop for design in made.designs}
     again = fid.tune(fits, gains=gains, **options)
     assert_close(
-        crossover.nominal, again["roll"].promise("rate loop", "crossover").flown, rtol=1e-9,
+        crossover.nominal, again["roll"].worst_case("rate loop", "crossover").flown, rtol=1e-9,
         why="one computation",
     )  # fmt: skip
     red = [finding for finding in made.findings if finding.light is Light.RED]

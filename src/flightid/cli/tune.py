@@ -148,7 +148,7 @@ def _show(tuning: Tuning, level: float | None) -> None:
     for design in tuning.designs:
         if design.plain and design.exists:
             click.echo(f"\n{design.plain.form_table()}")
-        click.echo(f"\n{design.promise_table(**at)}")
+        click.echo(f"\n{design.worst_case_table(**at)}")
     if tuning.together:
         click.echo(f"\n{tuning.together_table()}")
     if any(each.closed for each in tuning.together):

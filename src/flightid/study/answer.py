@@ -154,7 +154,7 @@ def _gains(tuning: Tuning) -> Finding:
     least = [
         each.worst
         for design in designs
-        for each in design.promises
+        for each in design.worst_cases
         if each.name == "phase margin" and each.worst is not None
     ]
     promise = f" keep at least {min(least):.0f}° of phase margin" if least else " keep their limits"
@@ -207,15 +207,15 @@ def _margin_table(designs: tuple[PidDesign, ...]) -> Table:
         columns += [Column(name, unit, 3), Column(f"{name} as flown", unit, 3)]
     rows: list[tuple[Cell, ...]] = []
     for design in designs:
-        for loop in dict.fromkeys(each.loop for each in design.promises):
+        for loop in dict.fromkeys(each.loop for each in design.worst_cases):
             cells: list[Cell] = []
             for name in MARGINS:
-                found = [e for e in design.promises if (e.loop, e.name) == (loop, name)]
+                found = [e for e in design.worst_cases if (e.loop, e.name) == (loop, name)]
                 cells += [found[0].worst, found[0].flown_worst] if found else [None, None]
             if any(cell is not None for cell in cells):
                 rows.append((design.axis, loop, *cells))
     asked = designs[0].requirements
-    angled = any(each.loop == ANGLE for design in designs for each in design.promises)
+    angled = any(each.loop == ANGLE for design in designs for each in design.worst_cases)
     angle = f" ({asked.angle_phase_margin_deg:g} deg of the angle loop)" if angled else ""
     note = f"Required: {asked.phase_margin_deg:g} deg{angle} and {asked.gain_margin_db:g} dB."
     title = "Margins of the worst vehicle that the data allow"

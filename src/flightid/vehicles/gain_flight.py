@@ -11,8 +11,8 @@ from flightid.control.margins.loop_source import Given
 from flightid.control.margins.margins import Margins, margins
 from flightid.control.tuning.limits import ANGLE, WHOLE, Limit, limits
 from flightid.control.tuning.pid_design import PidDesign
-from flightid.control.tuning.promises import Promise
 from flightid.control.tuning.result import Tuning
+from flightid.control.tuning.worst_cases import WorstCase
 from flightid.errors import DataError
 from flightid.options import Options, option
 from flightid.progress import progress
@@ -139,7 +139,7 @@ def _sweeps(design: PidDesign, asked: GainFlightOptions) -> Iterator[tuple[str, 
         start_hz=LOWEST_HZ, stop_hz=asked.mixer_stop_hz, record_s=asked.record_s,
         fade_out_s=FADE_S, leave_after_s=asked.record_s + 25.0,
     )  # fmt: skip
-    promised = {each.loop for each in design.promises}
+    promised = {each.loop for each in design.worst_cases}
     if WHOLE in promised:
         yield WHOLE, mixer
     if ANGLE in promised and design.axis != "yaw":
@@ -190,25 +190,25 @@ def _beside(tuning: Tuning, design: PidDesign, loop: str, found: Margins) -> Ite
     """What was promised of a loop beside what was measured."""
     asked = limits(design.requirements, (loop,), None)
     for name in NAMES:
-        promise = _promise(tuning, design, loop, name)
+        number = _number(tuning, design, loop, name)
         measured: Reading = getattr(found, name.replace(" ", "_"))
         of_it = [limit for limit in asked if limit.name == f"{loop}: {name}"]
         yield FlownMargin(
-            design.axis, loop, name, promise.estimate, promise.worst, promise.flown, measured,
-            promise.required, _slack(of_it, measured),
+            design.axis, loop, name, number.estimate, number.worst, number.flown, measured,
+            number.required, _slack(of_it, measured),
         )  # fmt: skip
 
 
-def _promise(tuning: Tuning, design: PidDesign, loop: str, name: str) -> Promise:
+def _number(tuning: Tuning, design: PidDesign, loop: str, name: str) -> WorstCase:
     """With all loops closed where the axes were designed alone."""
     closed = [
-        promise
+        number
         for each in tuning.together
         for axis in each.closed
-        for promise in axis.promises
-        if (axis.axis, promise.loop, promise.name) == (design.axis, loop, name)
+        for number in axis.worst_cases
+        if (axis.axis, number.loop, number.name) == (design.axis, loop, name)
     ]
-    return closed[0] if closed else design.promise(loop, name)
+    return closed[0] if closed else design.worst_case(loop, name)
 
 
 def _slack(asked: list[Limit], measured: Reading) -> float | None:

@@ -18,7 +18,6 @@ from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem, Plants
 from flightid.control.tuning.margins_beyond import MarginBeyond, margins_beyond
-from flightid.control.tuning.promises import Promise, promises
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.sampled_plants import (
     AxisLoops,
@@ -26,6 +25,7 @@ from flightid.control.tuning.sampled_plants import (
     loop_grid,
     plants_of_axis,
 )
+from flightid.control.tuning.worst_cases import WorstCase, worst_cases
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -111,7 +111,7 @@ class AxisResult:
     found : GainSearchResult
     loop : AxisLoop
         With the gains found, rounded.
-    promises : tuple of Promise
+    worst_cases : tuple of WorstCase
     met : ndarray of bool, shape (n_fresh,)
         Which fresh plants meet every requirement.
     flown_stable : ndarray of bool or None
@@ -124,7 +124,7 @@ class AxisResult:
 
     found: GainSearchResult
     loop: AxisLoop
-    promises: tuple[Promise, ...]
+    worst_cases: tuple[WorstCase, ...]
     met: NDArray[np.bool_]
     flown_stable: NDArray[np.bool_] | None
     problem: LoopProblem
@@ -197,7 +197,7 @@ def tune_axis(
     loop = paths.with_parameters(paths.parameters(found.gains))
     fresh, old = _judged(setting, paths, limit, loops, flown, place)
     gains = paths.gains_of(loop)
-    made, met = promises(fresh, gains, old)
+    made, met = worst_cases(fresh, gains, old)
     held = None if old is None else old.stable[0]
     beyond = margins_beyond(fresh, gains, setting.evidence.band_rad_s)
     return AxisResult(found, loop, made, met, held, fresh, beyond)
@@ -205,7 +205,7 @@ def tune_axis(
 
 def judge_axis(
     setting: Setting, loops: list[AxisLoop], flown: list[AxisLoop], place: int
-) -> tuple[tuple[Promise, ...], NDArray[np.bool_]]:
+) -> tuple[tuple[WorstCase, ...], NDArray[np.bool_]]:
     """What the gains of one axis promise as they stand, and which fresh plants keep it.
 
     Parameters
@@ -219,7 +219,7 @@ def judge_axis(
     paths = ControllerPaths(loops[place], setting.gyro, setting.with_angle)
     limit = _noise_limit(setting, paths, flown, place)
     fresh, old = _judged(setting, paths, limit, loops, flown, place)
-    return promises(fresh, paths.gains_of(loops[place]), old)
+    return worst_cases(fresh, paths.gains_of(loops[place]), old)
 
 
 def _noise_limit(

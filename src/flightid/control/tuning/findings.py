@@ -12,7 +12,7 @@ from flightid.control.margins.findings import COHERENCE
 from flightid.control.tuning.axis_tuning import AxisResult
 from flightid.control.tuning.gain_search import INTEGRAL
 from flightid.control.tuning.gain_steps import Stage, TunedGain
-from flightid.control.tuning.worst_case import least_share
+from flightid.control.tuning.order_statistics import least_share
 from flightid.conventions import Light
 from flightid.findings import Finding
 
@@ -160,17 +160,17 @@ def low_coherence(result: AxisResult, measured: tuple[Array, Array] | None) -> I
     if measured is None or not result.found.exists:
         return
     omega, coherence = measured
-    for promise in result.promises:
-        if promise.name != "crossover" or promise.nominal is None:
+    for each in result.worst_cases:
+        if each.name != "crossover" or each.nominal is None:
             continue
-        near = np.geomspace(promise.nominal / NEAR, promise.nominal * NEAR, 21)
+        near = np.geomspace(each.nominal / NEAR, each.nominal * NEAR, 21)
         known = float(np.mean(np.interp(near, omega, coherence)))
         if known < COHERENCE:
             yield Finding(
                 "coherence-at-crossover",
                 Light.RED,
-                f"{promise.loop}: coherence is {known:.2f} about the new crossover "
-                f"of {promise.nominal:.3g} rad/s",
+                f"{each.loop}: coherence is {known:.2f} about the new crossover "
+                f"of {each.nominal:.3g} rad/s",
                 "sweep that band with more amplitude, or ask for a crossover where the response "
                 "was measured",
             )

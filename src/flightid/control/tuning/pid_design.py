@@ -16,9 +16,9 @@ from flightid.control.autopilots import (
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.loop_problem import LoopProblem
-from flightid.control.tuning.promises import Promise
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import ResponseBand
+from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.files import as_path, write_atomically
@@ -45,7 +45,7 @@ class PidDesign(
         Whether gains meet the requirements for the plants that the data allow.
     changes : tuple of TunedGain
     requirements : TuningRequirements
-    promises : tuple of Promise
+    worst_cases : tuple of WorstCase
         Margins and bandwidths with their spread, beside those of the flown gains; of the nearest
         gains where none meet the requirements.
     binding : tuple of str
@@ -60,9 +60,9 @@ class PidDesign(
     share_met : float
         Lower 95 % bound of the share of plants that meet every requirement.
     problem : LoopProblem
-        The axis with the plants that the promises are for: what pictures are drawn from.
+        The axis with the plants that the worst cases are for: what pictures are drawn from.
     n_plants : int
-        Plants that the promises rest on, the search having seen none of them.
+        Plants that the worst cases rest on, the search having seen none of them.
     findings : tuple of Finding
     provenance : mapping
 
@@ -83,7 +83,7 @@ class PidDesign(
     exists: bool
     changes: tuple[TunedGain, ...]
     requirements: TuningRequirements
-    promises: tuple[Promise, ...]
+    worst_cases: tuple[WorstCase, ...]
     binding: tuple[str, ...]
     responses: tuple[ResponseBand, ...]
     stages: tuple[Stage, ...]
@@ -104,19 +104,21 @@ class PidDesign(
         """New gains by the autopilot's names."""
         return {change.name: change.new for change in self.changes}
 
-    def promise(self, loop: str, name: str) -> Promise:
-        """One number, for example ``promise("rate loop", "phase margin")``.
+    def worst_case(self, loop: str, name: str) -> WorstCase:
+        """One number, for example ``worst_case("rate loop", "phase margin")``.
 
         Raises
         ------
         UnknownNameError
             There is no such number.
         """
-        for each in self.promises:
+        for each in self.worst_cases:
             if (each.loop, each.name) == (loop, name):
                 return each
-        known = ", ".join(f"{each.loop}: {each.name}" for each in self.promises)
-        raise UnknownNameError("there is no such promise", found=f"{loop}: {name}", needed=known)
+        known = ", ".join(f"{each.loop}: {each.name}" for each in self.worst_cases)
+        raise UnknownNameError(
+            "there is no such number of a loop", found=f"{loop}: {name}", needed=known
+        )
 
     def response(self, name: str) -> ResponseBand:
         """One time response, for example ``response("rate step")``.
@@ -138,7 +140,7 @@ class PidDesign(
             return f"PidDesign({self.axis}: no gains; {', '.join(self.binding)})"
         margins = [
             each.worst
-            for each in self.promises
+            for each in self.worst_cases
             if each.name == "phase margin" and each.worst is not None
         ]
         gains = ", ".join(f"{name} {value:.4g}" for name, value in self.gains.items())
@@ -167,7 +169,7 @@ class PidDesign(
         made = Table(f"Gains of {self.axis}", columns, tuple(rows), self._words())
         return made if self.flown.has_flown else made.without_empty_columns()
 
-    def promise_table(self, *, level: float | None = None) -> Table:
+    def worst_case_table(self, *, level: float | None = None) -> Table:
         """Margins and bandwidths beside those of the flown gains.
 
         Parameters
@@ -190,7 +192,7 @@ class PidDesign(
             Column("flown, worst", digits=3),
         )
         rows: list[tuple[Cell, ...]] = []
-        for each in self.promises:
+        for each in self.worst_cases:
             low, high = each.estimate.interval(level) or (None, None)
             rows.append(
                 (
@@ -232,7 +234,7 @@ class PidDesign(
         return (bound, *map(str, self.findings))
 
     def summary(self) -> Table:
-        """Gains, with the verdicts below; `promise_table` has the margins."""
+        """Gains, with the verdicts below; `worst_case_table` has the margins."""
         return self.gain_table()
 
     def write(
@@ -287,7 +289,7 @@ class PidDesign(
 
     def _tables(self) -> tuple[Table, ...]:
         forms = () if self.plain is None else (self.plain.form_table(),)
-        return (self.gain_table(), *forms, self.promise_table())
+        return (self.gain_table(), *forms, self.worst_case_table())
 
 
 def write_steps(

@@ -182,12 +182,12 @@ class Tuning(Result, schema="flightid.tuning/1"):
         rows: list[tuple[Cell, ...]] = [
             (
                 *(axis.axis, now.loop, now.name, now.required),
-                *(self[axis.axis].promise(now.loop, now.name).nominal, now.nominal, now.worst),
+                *(self[axis.axis].worst_case(now.loop, now.name).nominal, now.nominal, now.worst),
                 *(now.unit, now.met if now.required else None),
             )
             for each in self.together
             for axis in each.closed
-            for now in axis.promises
+            for now in axis.worst_cases
         ]
         note = "Worst: of the fresh plants, with the new gains of all axes in their loops."
         return Table("Designed alone, closed together", columns, tuple(rows), (note,))

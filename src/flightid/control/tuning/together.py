@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from flightid.control.tuning.promises import Promise
+from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
 from flightid.findings import Finding
 
@@ -20,7 +20,7 @@ class ClosedAxis:
     Attributes
     ----------
     axis : str
-    promises : tuple of Promise
+    worst_cases : tuple of WorstCase
     kept_plants, n_plants : int
         Of the fresh plants, how many meet every requirement.
 
@@ -31,7 +31,7 @@ class ClosedAxis:
     """
 
     axis: str
-    promises: tuple[Promise, ...]
+    worst_cases: tuple[WorstCase, ...]
     kept_plants: int
     n_plants: int
 
@@ -47,7 +47,7 @@ class ClosedAxis:
         if self.is_kept:
             said = f"{self.axis}, designed alone, keeps what was required with all loops closed"
             return Finding("coupling-stood", Light.GREEN, f"{said}: {count}")
-        broken = "; ".join(_broken(each) for each in self.promises if not each.met)
+        broken = "; ".join(_broken(each) for each in self.worst_cases if not each.met)
         return Finding(
             "coupling-ignored",
             Light.RED,
@@ -58,7 +58,7 @@ class ClosedAxis:
 
     def to_dict(self) -> dict[str, object]:
         """Plain values."""
-        return {**vars(self), "promises": [each.to_dict() for each in self.promises]}
+        return {**vars(self), "worst_cases": [each.to_dict() for each in self.worst_cases]}
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,8 @@ class Together:
         return plain | {"closed": [each.to_dict() for each in self.closed]}
 
 
-def _broken(promise: Promise) -> str:
+def _broken(number: WorstCase) -> str:
     """A requirement that is not kept, in words."""
-    worst = "none" if promise.worst is None else f"{promise.worst:.3g}"
-    unit = "" if promise.unit == "1" else f" {promise.unit}"
-    return f"{promise.loop}, {promise.name} {worst}{unit} at the worst plant ({promise.required})"
+    worst = "none" if number.worst is None else f"{number.worst:.3g}"
+    unit = "" if number.unit == "1" else f" {number.unit}"
+    return f"{number.loop}, {number.name} {worst}{unit} at the worst plant ({number.required})"

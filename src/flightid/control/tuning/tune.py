@@ -223,10 +223,10 @@ def _closed(
     loops = [design.loop for design in alone]
     closed = []
     for place, each in enumerate(asked):
-        promises, met = judge_axis(
+        worst, met = judge_axis(
             replace(setting, requirements=each.requirements), loops, flown, place
         )
-        closed.append(ClosedAxis(each.axis, promises, int(met.sum()), len(met)))
+        closed.append(ClosedAxis(each.axis, worst, int(met.sum()), len(met)))
     whole = judge_together(setting, loops, flown, [each.axis for each in asked])
     return replace(whole, closed=tuple(closed))
 

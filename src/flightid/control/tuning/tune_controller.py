@@ -107,7 +107,7 @@ def tune_controller(
     >>> plant = fid.load_model("rate_first_order").with_values({"Lp": -5.0, "Ltphi": 10.0})
     >>> design = fid.tune_controller(plant, nominal=True, band_rad_s=(0.1, 60.0),
     ...     controller=fid.ControllerOptions(controller="pi", controller_rate_hz=100.0))
-    >>> design.promise("loop", "phase margin").nominal > 45.0
+    >>> design.worst_case("loop", "phase margin").nominal > 45.0
     True
     """
     asked = controller or ControllerOptions()

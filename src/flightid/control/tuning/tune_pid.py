@@ -26,12 +26,12 @@ from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
 from flightid.control.tuning.findings import low_coherence, remarks, verdict
 from flightid.control.tuning.flown_gains import Gains, flown_loop
 from flightid.control.tuning.margins_beyond import beyond_findings
+from flightid.control.tuning.order_statistics import content_of_worst, least_share
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import response_bands
 from flightid.control.tuning.sampled_plants import SampledPlants, sample_plants
 from flightid.control.tuning.structure_error import Band, perturbed
-from flightid.control.tuning.worst_case import content_of_worst, least_share
 from flightid.errors import ModelError, OptionError
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.progress import progress
@@ -145,7 +145,7 @@ def tune_pid(
     ...     {"Ltphi": 140.0, "tau": 0.03})
     >>> flown = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
     >>> design = fid.tune_pid(plant, gains=flown, band_rad_s=(1.0, 100.0), nominal=True)
-    >>> design.promise("rate loop", "phase margin").nominal > 45.0
+    >>> design.worst_case("rate loop", "phase margin").nominal > 45.0
     True
     """
     flown = flown_loop(gains, autopilot, axis)
@@ -262,7 +262,7 @@ def design_of(
         exists,
         changes,
         setting.requirements,
-        result.promises,
+        result.worst_cases,
         result.found.binding,
         bands,
         stages,

@@ -20,7 +20,7 @@ FEWEST_PLANTS = 3
 
 
 @dataclass(frozen=True, repr=False)
-class Promise:
+class WorstCase:
     """One number of one loop.
 
     Attributes
@@ -41,8 +41,8 @@ class Promise:
     Example
     -------
     >>> margin = Estimate("rate loop: phase margin", 52.0, "deg")
-    >>> Promise("rate loop", "phase margin", margin, 47.1, 60.0, 55.0, "≥ 45")
-    Promise(rate loop: phase margin 52 deg, worst 47.1)
+    >>> WorstCase("rate loop", "phase margin", margin, 47.1, 60.0, 55.0, "≥ 45")
+    WorstCase(rate loop: phase margin 52 deg, worst 47.1)
     """
 
     loop: str
@@ -58,7 +58,7 @@ class Promise:
         """Loop, name and numbers on one line."""
         values = ["none" if each is None else f"{each:.4g}" for each in (self.nominal, self.worst)]
         unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"Promise({self.loop}: {self.name} {values[0]}{unit}, worst {values[1]})"
+        return f"WorstCase({self.loop}: {self.name} {values[0]}{unit}, worst {values[1]})"
 
     @property
     def unit(self) -> str:
@@ -103,9 +103,9 @@ KINDS = (
 )
 
 
-def promises(
+def worst_cases(
     problem: LoopProblem, gains: Array, old: LoopAssessment | None
-) -> tuple[tuple[Promise, ...], NDArray[np.bool_]]:
+) -> tuple[tuple[WorstCase, ...], NDArray[np.bool_]]:
     """Numbers of all loops, and which plants meet every requirement.
 
     Parameters
@@ -119,7 +119,7 @@ def promises(
 
     Returns
     -------
-    tuple of tuple of Promise and ndarray of bool, shape (n_plants,)
+    tuple of tuple of WorstCase and ndarray of bool, shape (n_plants,)
     """
     new = problem.judge(gains[None])
     made = []
@@ -128,7 +128,7 @@ def promises(
         before = None if old is None else np.asarray(getattr(old.metrics[loop], kind.field))[0]
         steady = old is not None and bool(old.stable[0, 0])
         made.append(
-            Promise(
+            WorstCase(
                 loop,
                 kind.name,
                 _estimate(f"{loop}: {kind.name}", kind.unit, values),
@@ -165,7 +165,7 @@ def _requirement(
     return " and ".join(limit.text for limit in asked), met
 
 
-def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None) -> Promise:
+def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None) -> WorstCase:
     known = problem.noise_psd is not None
     values = new.noise[0]
     limit = problem.noise_limit
@@ -173,7 +173,7 @@ def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None
     rate = problem.inner == AxisLoop.inner
     sensor = "gyro" if rate else "measurement"
     name = "noise, rms" if known else f"noise over {sensor} noise"
-    return Promise(
+    return WorstCase(
         "output",
         name,
         _estimate(f"output: {name}", "1/(rad/s)" if rate and not known else "1", values),
