@@ -197,10 +197,10 @@ def test_commands_with_options_of_fields_read_them_all() -> None:
     """No option of a verb is written by hand: the commands of verbs with fields read the fields."""
     reading = {name for name, found in _commands() if isinstance(found, OptionsCommand)}
     assert reading == {
-        "advise", "consistency", "design", "disk-margin", "disturbance-rejection", "export", "fly",
-        "handling-qualities", "identify", "lower-order", "margins", "new", "pilot-cutoff",
-        "polynomial", "predict", "response", "rotor-physics", "run", "simulate model", "tune",
-        "verify",
+        "advise", "compare-structures", "consistency", "design", "disk-margin",
+        "disturbance-rejection", "export", "fly", "handling-qualities", "identify", "lower-order",
+        "margins", "new", "pilot-cutoff", "polynomial", "predict", "response", "rotor-physics",
+        "run", "simulate model", "tune", "verify",
     }  # fmt: skip
     for name, found in _commands():
         if isinstance(found, OptionsCommand):

@@ -39,3 +39,16 @@ def test_a_parameter_goes_and_the_path_is_told(
     plain = json.loads(capsys.readouterr().out)
     assert plain["schema"] == "flightid.reduction/1"
     assert [step["name"] for step in plain["path"] if step["accepted"]] == ["Lp"]
+
+
+def test_structures_stand_side_by_side(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The vehicle only integrates: its damping is worth less than the parameter that it costs."""
+    words = ["compare-structures", str(recorded(tmp_path)), "--axis", "roll", "--json"]
+    words += ["--method", "output_error", "--model", "rate_first_order"]
+    assert run([*words, "--model", "rate_integrator"]) == 0
+    made = json.loads(capsys.readouterr().out)
+    assert made["best"] == "rate_integrator"
+    assert 0.0 < made["rows"]["rate_first_order"]["criterion"] < 2.0
+    assert made["rows"]["rate_integrator"]["light"] == "green"
+    assert run(words) == 2
+    assert "two structures or more" in capsys.readouterr().err

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,21 +9,20 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from flightid.cli.black_boxes import KINDS, black_boxes, structure_of
-from flightid.cli.option_fields import OptionsCommand, parted
+from flightid.cli.equations import equations, fits_of
+from flightid.cli.option_fields import OptionsCommand
 from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
 from flightid.cli.pages import html_option, write_page
-from flightid.cli.records import FILES, read_files, reading
+from flightid.cli.records import FILES, reading
 from flightid.cli.sources import AXES, known_models
 
 if TYPE_CHECKING:
     from flightid.identification import Fit, Reduction
     from flightid.options import Options
 
-ON_RESPONSES, JOINT = "frequency_domain", "joint"
-
 
 def _fields() -> dict[str, type[Options]]:
-    return {"responses": _of_responses(), **_methods(), **black_boxes(), **reading()}
+    return {**equations(), **black_boxes(), **reading()}
 
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
@@ -90,16 +88,18 @@ def command(
 
     if (model_name is None) == (kind is None):
         raise click.UsageError("name a model with equations by --model, or a --kind without")
-    beside = {"records": records, "span_s": records_span_s}
-    loop = options.pop("loop", None)
     with progress(3, "Identifying") as advance:
         if kind is not None:
-            structure, read = structure_of(kind, method, files, options)
-            data: Any = read
+            loop = options.pop("loop", None)
+            structure, data = structure_of(kind, method, files, options)
             advance()
             fit = flightid.identify(structure, data, loop=loop)
         else:
-            fit, data = _with_equations(str(model_name), axis, method, files, beside, options, loop)
+            fits, data = fits_of(
+                [str(model_name)], axis, method, files, options,
+                beside=records, beside_span_s=records_span_s,
+            )  # fmt: skip
+            (fit,) = fits.values()
         advance()
         result = flightid.reduce(fit, data) if reduced else fit
         for log in filter(is_log, files):
@@ -116,79 +116,6 @@ def command(
         with showing(level):
             note(f"Wrote {write_page(found, found.model.name, html)}")
     leave_by_verdict((*result.findings, *found.evidence.findings))
-
-
-def _with_equations(
-    name: str,
-    axis: str | None,
-    method: str | None,
-    files: Sequence[Path],
-    beside: dict[str, Any],
-    options: dict[str, Any],
-    loop: Any,  # noqa: ANN401 — open or closed, as the parser has checked
-) -> tuple[Fit, Any]:
-    """Fit of a model with equations, and the data that it was fitted to."""
-    import flightid
-    from flightid.models import load_structure
-
-    way = method or ON_RESPONSES
-    of_response, of_method, *of_files = _divided(way, options)
-    model = load_structure(name, axis=axis)
-    channels: dict[str, Any] = {"inputs": model.inputs, "outputs": model.outputs}
-    read = read_files(
-        files, *of_files, **channels, units=model.units,
-        excitations=of_response.get("excitations"),
-    )  # fmt: skip
-    data: Any = read
-    if (way == JOINT) != bool(beside["records"]):
-        raise click.UsageError(
-            f"--method {JOINT} and --records belong together: the response comes from FILES, "
-            "the records stand beside it"
-        )
-    if way in (ON_RESPONSES, JOINT):
-        data = flightid.estimate_response(read, **channels, **of_response, loop=loop)
-    if way == JOINT:
-        span = {} if beside["span_s"] is None else {"span_s": beside["span_s"]}
-        more = read_files(beside["records"], of_files[0], span, **channels, units=model.units)
-        data = [data, *more]
-    return flightid.identify(model, data, method=way, loop=loop, **of_method), data
-
-
-def _methods() -> dict[str, type[Options]]:
-    """Options of the methods for models with equations."""
-    from flightid.identification.methods import METHODS
-    from flightid.models import StateSpaceModel
-
-    return {way.name: way.options for way in METHODS if StateSpaceModel in way.kinds}
-
-
-def _of_responses() -> type[Options]:
-    from flightid.responses.options import ResponseOptions
-
-    return ResponseOptions
-
-
-def _divided(method: str, options: dict[str, Any]) -> list[dict[str, Any]]:
-    """What was given for the estimate of the response, for the fit, and for reading files."""
-    from flightid.options import options_of
-
-    methods = _methods()
-    if method not in methods:
-        raise click.BadParameter(
-            f"{method!r} is none of {', '.join(methods)}", param_hint="--method"
-        )
-    fitted = methods[method]
-    if method not in (ON_RESPONSES, JOINT):
-        return [{}, *parted(options, {method: fitted, **reading()})]
-    given = {name: value for name, value in options.items() if value not in (None, ())}
-    of_response, of_fit, *of_files = parted(
-        given, {"a response": _of_responses(), method: fitted, **reading()}
-    )
-    # One word may serve both: the band is that of the response, the rest that of the fit.
-    shared = {each.name for each in options_of(fitted)} - {"band_rad_s"}
-    of_fit.pop("band_rad_s", None)
-    of_response = {name: value for name, value in of_response.items() if name not in shared}
-    return [of_response, of_fit, *of_files]
 
 
 def _with_inspection(result: Fit | Reduction, file: Path) -> Fit | Reduction:

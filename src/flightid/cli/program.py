@@ -36,6 +36,7 @@ ORDER = (
     "handling-qualities",
     "lower-order",
     "compare",
+    "compare-structures",
     "simulate",
     "report",
 )
@@ -44,6 +45,7 @@ NOT_VERBS = frozenset(
     {
         "bar",
         "black_boxes",
+        "equations",
         "model_commands",
         "option_fields",
         "output",

@@ -20,12 +20,16 @@ from flightid.identification.reduction.result import worst_percents
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 
+LIKELIHOODS = ("output_error", "filter_error")
+"""Methods whose objective is the negative logarithm of the likelihood, without its constant."""
+
 
 def information_criterion(fit: Fit) -> float | None:
     """Akaike's criterion of a fit, in the convention that its residuals are independent.
 
     n ln(J/n) + 2 k for a weighted cost J of n residuals and k free parameters; for a likelihood
-    cost, whose residuals have variance one, J + 2 k. Only differences between fits of the same
+    cost, whose residuals have variance one, J + 2 k; for a negative logarithm of the likelihood of
+    records 2 (J + k). Only differences between fits of the same
     data have a meaning, and neighbouring frequencies are not independent, so that the criterion
     ranks structures and is no test.
 
@@ -36,7 +40,7 @@ def information_criterion(fit: Fit) -> float | None:
     Returns
     -------
     float or None
-        None where the model follows the data without any residual.
+        None where the model follows the data without any residual, and for a regression.
 
     Reference
     ---------
@@ -55,6 +59,8 @@ def information_criterion(fit: Fit) -> float | None:
     2.0
     """
     k = len(fit.names)
+    if fit.method in LIKELIHOODS:
+        return 2.0 * (fit.objective + k)
     if _is_likelihood(fit):
         return fit.objective + 2.0 * k
     n = 2 * sum(len(each.omega_rad_s) for each in fit.responses)
@@ -84,6 +90,8 @@ class StructureRow:
         Largest size of a correlation between two parameters.
     n_outside : int
         Parameters that break a guide.
+    light : str
+        Of the fit's evidence.
     """
 
     n_free: int
@@ -93,6 +101,7 @@ class StructureRow:
     worst_insensitivity_percent: float | None
     worst_correlation: float | None
     n_outside: int
+    light: str = ""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -143,6 +152,7 @@ class StructureComparison(Result, schema="flightid.structure_comparison/1"):
             Column("worst Cramér–Rao", "%", 3),
             Column("worst correlation", digits=3),
             Column("outside the guides"),
+            Column("light"),
         )
         rows: list[tuple[Cell, ...]] = [
             (
@@ -154,6 +164,7 @@ class StructureComparison(Result, schema="flightid.structure_comparison/1"):
                 row.worst_cramer_rao_percent,
                 row.worst_correlation,
                 row.n_outside,
+                row.light,
             )
             for name, row in self.rows.items()
         ]
@@ -249,6 +260,7 @@ def _row(fit: Fit, criterion: float | None) -> StructureRow:
         slack,
         float(size.max()) if len(fit.names) > 1 else None,
         len(outside),
+        str(fit.evidence.light),
     )
 
 
@@ -263,7 +275,7 @@ def _judge(rows: Mapping[str, StructureRow]) -> list[Finding]:
                     "structure-outside",
                     Light.AMBER,
                     f"{name}: {row.n_outside} of {row.n_free} parameters break a guide{pair}",
-                    "reduce it with flightid.reduce",
+                    "reduce it: leave out what the data do not determine (--reduce)",
                 )
             )
     return found

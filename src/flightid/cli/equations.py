@@ -1,0 +1,142 @@
+"""Models with equations on the command line: methods, their options, fits to the same data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from flightid.cli.option_fields import parted
+from flightid.cli.records import read_files, reading
+
+if TYPE_CHECKING:
+    from flightid.identification import Fit
+    from flightid.models import Model
+    from flightid.options import Options
+
+ON_RESPONSES, JOINT = "frequency_domain", "joint"
+
+
+def methods() -> dict[str, type[Options]]:
+    """Options of the methods for models with equations, by name."""
+    from flightid.identification.methods import METHODS
+    from flightid.models import StateSpaceModel
+
+    return {way.name: way.options for way in METHODS if StateSpaceModel in way.kinds}
+
+
+def equations() -> dict[str, type[Options]]:
+    """Options of responses and of the methods, by what takes them."""
+    return {"responses": _of_responses(), **methods()}
+
+
+def fits_of(
+    names: Iterable[str],
+    axis: str | None,
+    method: str | None,
+    files: Sequence[Path],
+    options: dict[str, Any],
+    *,
+    beside: Sequence[Path] = (),
+    beside_span_s: tuple[float, float] | None = None,
+) -> tuple[dict[str, Fit], Any]:
+    """Fits of models with equations by name, and the data that they were fitted to.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Library models or model files, of the same inputs and outputs.
+    axis : str, optional
+        Of a library model.
+    method : str, optional
+        Default: to a response.
+    files : sequence of Path
+    options : dict of str to object
+        Values of the command's options, ``loop`` among them.
+    beside : sequence of Path
+        Records of a joint fit, the part of them in `beside_span_s`.
+
+    Raises
+    ------
+    click.UsageError
+        Models of other channels, or records beside a response where the method takes none.
+    """
+    from flightid import identify
+    from flightid.models import load_structure
+
+    way, loop = method or ON_RESPONSES, options.pop("loop", None)
+    of_response, of_method, *of_files = _divided(way, options)
+    models = {name: load_structure(name, axis=axis) for name in names}
+    _require_same_channels(models)
+    (first, *_) = models.values()
+    channels: dict[str, Any] = {"inputs": first.inputs, "outputs": first.outputs}
+    if (way == JOINT) != bool(beside):
+        raise click.UsageError(
+            f"--method {JOINT} and --records belong together: the response comes from FILES, "
+            "the records stand beside it"
+        )
+    data = _data(files, first, (way, of_response, of_files), loop)
+    if way == JOINT:
+        span = {} if beside_span_s is None else {"span_s": beside_span_s}
+        more = read_files(beside, of_files[0], span, **channels, units=first.units)
+        data = [data, *more]
+    return {
+        name: identify(model, data, method=way, loop=loop, **of_method)
+        for name, model in models.items()
+    }, data
+
+
+def _data(
+    files: Sequence[Path],
+    model: Model,
+    asked: tuple[str, dict[str, Any], Sequence[dict[str, Any]]],
+    loop: Any,  # noqa: ANN401 — open or closed, as the parser has checked
+) -> Any:  # noqa: ANN401 — records, or their response
+    from flightid import estimate_response
+
+    way, of_response, of_files = asked
+    channels: dict[str, Any] = {"inputs": model.inputs, "outputs": model.outputs}
+    injected = of_response.get("excitations")
+    read = read_files(files, *of_files, **channels, units=model.units, excitations=injected)
+    if way not in (ON_RESPONSES, JOINT):
+        return read
+    return estimate_response(read, **channels, **of_response, loop=loop)
+
+
+def _require_same_channels(models: Mapping[str, Model]) -> None:
+    found = {(tuple(each.inputs), tuple(each.outputs)) for each in models.values()}
+    if len(found) > 1:
+        words = "; ".join(
+            f"{name}: {', '.join(each.outputs)} from {', '.join(each.inputs)}"
+            for name, each in models.items()
+        )
+        raise click.UsageError(f"these models have other inputs or outputs: {words}")
+
+
+def _of_responses() -> type[Options]:
+    from flightid.responses.options import ResponseOptions
+
+    return ResponseOptions
+
+
+def _divided(method: str, options: dict[str, Any]) -> list[dict[str, Any]]:
+    """What was given for the estimate of the response, for the fit, and for reading files."""
+    from flightid.options import options_of
+
+    known = methods()
+    if method not in known:
+        raise click.BadParameter(f"{method!r} is none of {', '.join(known)}", param_hint="--method")
+    fitted = known[method]
+    if method not in (ON_RESPONSES, JOINT):
+        return [{}, *parted(options, {method: fitted, **reading()})]
+    given = {name: value for name, value in options.items() if value not in (None, ())}
+    of_response, of_fit, *of_files = parted(
+        given, {"a response": _of_responses(), method: fitted, **reading()}
+    )
+    # One word may serve both: the band is that of the response, the rest that of the fit.
+    shared = {each.name for each in options_of(fitted)} - {"band_rad_s"}
+    of_fit.pop("band_rad_s", None)
+    of_response = {name: value for name, value in of_response.items() if name not in shared}
+    return [of_response, of_fit, *of_files]
