@@ -103,7 +103,7 @@ def fit_leak(structure: LeakStructure, record: fid.Record) -> fid.Fit:
         iterations=0,
         noise_covariance=np.array([[float(np.mean(errors**2))]]),
         findings=(),
-        provenance=provenance_of("leak", [record], [record[u], record[y]], [], {}),
+        provenance=provenance_of("leak", [record], [], {}),
         details=Details(),
     )
 

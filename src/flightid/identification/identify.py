@@ -14,6 +14,7 @@ from flightid.identification.held_inputs import hold_for, with_hold_said
 from flightid.identification.hold_test import with_hold_tested
 from flightid.identification.methods import flat, method_of
 from flightid.identification.residual_evidence import in_doubt, with_residuals_judged
+from flightid.identification.training import data_provenance
 from flightid.models import GreyBoxModel
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.narx.structure import NarxStructure
@@ -184,7 +185,9 @@ def identify(
     given = options if held is None else {**options, "hold": held.hold}
     fit = replace(chosen.run(model, data, given), structure=model, method=chosen.name)
     told = options if loop is None else {**options, "loop": loop}
-    fit = replace(fit, provenance={**fit.provenance, "told": told})
+    channels = (*fit.model.inputs, *fit.model.outputs)
+    known = data_provenance(flat(data), channels)
+    fit = replace(fit, provenance={**fit.provenance, **known, "told": told})
     if held is not None:
         fit = with_hold_said(*with_hold_tested(fit, chosen, data, given, held))
     if not in_doubt(fit.findings):

@@ -1,13 +1,19 @@
-"""Where the records of a fit were: offsets and scales of their channels."""
+"""Which data a fit was made of, and where its records were: offsets and scales."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import hashlib
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from flightid.record import Record
+from flightid.record.digest import digest_of
+from flightid.responses import FrequencyResponse
+
+TRAINING = "training_records"
+"""Where provenance keeps digests of the records behind a fit."""
 
 
 @dataclass(frozen=True)
@@ -70,3 +76,31 @@ def training_channels(records: Sequence[Record]) -> dict[str, TrainingChannel]:
             float(np.mean(samples)), float(np.std(samples, ddof=1)), trim, records[0].unit(name)
         )
     return found
+
+
+def data_provenance(data: Iterable[object], channels: Sequence[str]) -> dict[str, object]:
+    """What the provenance of every fit says of its data.
+
+    Parameters
+    ----------
+    data : iterable of FrequencyResponse or Record
+    channels : sequence of str
+        Of the model.
+
+    Returns
+    -------
+    dict of str to object
+        ``data_sha256`` of all data together; ``training_records``, the digest of each record that
+        was fitted or that a response was estimated from.
+    """
+    whole, digests = hashlib.sha256(), []
+    for item in data:
+        if isinstance(item, FrequencyResponse):
+            digests += [each.to_dict() for each in item.digests]
+            for array in (item.omega_rad_s, item.response, item.coherence, item.random_error):
+                whole.update(np.ascontiguousarray(array).tobytes())
+        elif isinstance(item, Record):
+            made = digest_of(item, channels)
+            digests.append(made.to_dict())
+            whole.update(made.sha256.encode())
+    return {"data_sha256": whole.hexdigest(), TRAINING: digests}

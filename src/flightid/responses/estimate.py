@@ -13,6 +13,7 @@ from flightid.errors import DataError
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.record.chosen_hold import shape_of
+from flightid.record.digest import digest_of
 from flightid.record.history import Step
 from flightid.record.hold import InputShape, Loop, common_hold, common_loop
 from flightid.record.several import as_records
@@ -203,6 +204,7 @@ def _with_inputs(
 ) -> FrequencyResponse:
     """The response with what is known of its inputs: their hold, and whether they are fed back."""
     shapes = [shape_of(record) for record in records]
+    channels = (*response.inputs, *response.outputs)
     if response.estimator.startswith("instrument"):
         test = FeedbackTest("unknown", "instrument")
     elif response.estimator == PREWHITENED:
@@ -214,6 +216,7 @@ def _with_inputs(
         findings=(*response.findings, *feedback_findings(test)),
         loop=test,
         input_shape=InputShape(common_hold(shapes), loop=common_loop(shapes)),
+        digests=tuple(digest_of(each, channels) for each in records),
     )
 
 

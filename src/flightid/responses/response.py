@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid.errors import DataError, ShapeError, UnknownNameError
 from flightid.findings import Finding
+from flightid.record.digest import RecordDigest
 from flightid.record.history import Step
 from flightid.record.hold import InputShape
 from flightid.responses.bands import choose_frequencies, nearest
@@ -74,6 +75,8 @@ class FrequencyResponse(
         Whether a loop was closed, tested or declared; None after arithmetic and where it was given.
     input_shape : InputShape
         What the records know of their inputs between samples.
+    digests : tuple of RecordDigest
+        Of the records that it was estimated from.
     linear : LinearEstimate, optional
         The estimate as weights on the measured outputs, from which a fit computes its bias; None
         after arithmetic, from a file, and where it was given.
@@ -108,6 +111,7 @@ class FrequencyResponse(
     linear: LinearEstimate | None = field(default=None)
     loop: FeedbackTest | None = None
     input_shape: InputShape = field(default_factory=InputShape)
+    digests: tuple[RecordDigest, ...] = ()
 
     def __post_init__(self) -> None:
         sizes = {"o": len(self.outputs), "i": len(self.inputs), "f": len(self.omega_rad_s)}

@@ -20,6 +20,7 @@ from flightid.errors import FileFormatError
 from flightid.files import write_atomically
 from flightid.findings import Finding
 from flightid.reading import decoding
+from flightid.record.digest import RecordDigest
 from flightid.record.formats.hdf5 import plain_datasets
 from flightid.record.history import Step
 from flightid.record.hold import InputShape
@@ -82,6 +83,7 @@ def to_xarray(response: FrequencyResponse) -> xr.Dataset:
                 "window_s": list(response.window_s),
                 "loop": None if response.loop is None else response.loop.to_dict(),
                 "input_shape": response.input_shape.to_dict(),
+                "digests": [each.to_dict() for each in response.digests],
                 "findings": [finding.to_dict() for finding in response.findings],
                 "history": [
                     {"operation": s.operation, "options": dict(s.options), "version": s.version}
@@ -127,6 +129,7 @@ def from_xarray(dataset: xr.Dataset) -> FrequencyResponse:
             # Files of earlier versions do not say.
             loop=FeedbackTest(**about["loop"]) if about.get("loop") else None,
             input_shape=InputShape(**about.get("input_shape", {})),
+            digests=tuple(map(RecordDigest.from_dict, about.get("digests", ()))),
             history=tuple(
                 Step(one["operation"], one["options"], one["version"]) for one in about["history"]
             ),

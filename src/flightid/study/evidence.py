@@ -16,6 +16,7 @@ from flightid.responses import FrequencyResponse
 from flightid.study.identified import ModelResults
 from flightid.study.stages import NOT_TESTED
 from flightid.validation import Verification
+from flightid.validation.verification.of_the_fit import SEEN
 
 
 def examined(fit: Fit, item: ModelResults, inspection: Inspection | None) -> Fit:
@@ -50,9 +51,12 @@ def examined(fit: Fit, item: ModelResults, inspection: Inspection | None) -> Fit
         checks.append(worse(fit.evidence.check(RESIDUALS), check))
     damage = sample_checks(item.unfitted, {*fit.model.inputs, *fit.model.outputs})
     checks += [worse(fit.evidence.check(SAMPLES), each) for each in damage]
+    said = [each for run in item.verifications.values() for each in run.findings]
+    seen = [each for each in said if each.code == SEEN]
     if item.on_unseen:
-        said = [each for run in item.verifications.values() for each in run.findings]
         checks.append(prediction_check(item.on_unseen, (*said, *item.reduction_judged)))
+    elif seen:
+        checks.append(Check(PREDICTION, worst(tuple(said)), seen[0].message, seen[0].action))
     checks += _guidelines(fit.evidence, item.findings_of_choice)
     return replace(fit, evidence=fit.evidence.with_checks(checks))
 

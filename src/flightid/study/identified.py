@@ -15,6 +15,7 @@ from flightid.responses import CoherentPairs, FrequencyResponse
 from flightid.study.model_settings import ModelSettings
 from flightid.study.structures import Choice, goal_findings
 from flightid.validation import Comparison, ResidualTests, SpectrumComparison, Verification
+from flightid.validation.verification.of_the_fit import SEEN
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,12 +143,17 @@ class ModelResults:
 
     @property
     def on_unseen(self) -> dict[str, Verification]:
-        """Free runs of the fitted model through records that it has not seen, by their names."""
+        """Free runs of the fitted model through records that it has not seen, by their names.
+
+        A record that the study calls unseen, yet holds samples of the fit, is none.
+        """
         found = {
             name: each.first if isinstance(each, Comparison) else each
             for name, each in self.verifications.items()
         }
-        return {name: run for name, run in found.items() if run.horizon == FREE_RUN}
+        free = {name: run for name, run in found.items() if run.horizon == FREE_RUN}
+        seen = {name for name, run in free.items() if any(f.code == SEEN for f in run.findings)}
+        return {name: run for name, run in free.items() if name not in seen}
 
     @property
     def findings_of_choice(self) -> tuple[Finding, ...]:

@@ -6,7 +6,6 @@ Or, with ``cost="likelihood"``, the whitened complex error.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -314,13 +313,9 @@ def _assemble(
 
 
 def _provenance(data: FrequencyResponse, options: FrequencyDomainOptions) -> dict[str, object]:
-    digest = hashlib.sha256()
-    for array in (data.omega_rad_s, data.response, data.coherence, data.random_error):
-        digest.update(np.ascontiguousarray(array).tobytes())
     return {
         "method": "frequency domain",
         "flightid": VERSION,
-        "data_sha256": digest.hexdigest(),
         "data_history": [str(step) for step in data.history],
         "options": options.to_dict(),
     }

@@ -97,11 +97,9 @@ def fit_narx(structure: NarxStructure, data: Record | Sequence[Record]) -> Fit:
     flown = tuple(record for record in records if record.n_samples > structure.longest_lag)
     made = _Choice(structure, selection, model, baseline, flown, estimated_on, collinear)
     build = _of_simulation if structure.focus == SIMULATION else _of_prediction
-    arrays = [record.matrix([structure.output, *structure.inputs]) for record in records]
     provenance = provenance_of(
         "orthogonal least squares",
         records,
-        arrays,
         [scaling.mean] * len(records),
         structure.to_dict(),
     )

@@ -6,7 +6,6 @@ model v, over the model's parameters and each record's initial state, biases and
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -387,13 +386,9 @@ def _costs(records: Sequence[FittedRecord], outputs: Sequence[str]) -> dict[str,
 
 
 def _provenance(prepared: RecordSet, options: RecordOptions) -> dict[str, object]:
-    digest = hashlib.sha256()
-    for inputs, outputs, sample_time_s in prepared.arrays:
-        digest.update(inputs.tobytes() + outputs.tobytes() + str(sample_time_s).encode())
     return {
         "method": "output error",
         "flightid": VERSION,
-        "data_sha256": digest.hexdigest(),
         "data_history": [[str(step) for step in record.history] for record in prepared.records],
         "options": options.to_dict(),
     }

@@ -48,7 +48,7 @@ def remembered(source: object) -> StartChoice:
     StartChoice(initial_state=None, output_bias=None, input_bias=None, record_parameters=(),
     hold=None)
     """
-    told, inputs = _told(source, "told"), _told(source, "inputs")
+    told, inputs = (_table(provenance_entry(source, key)) for key in ("told", "inputs"))
     start = told.get("initial_state")
     biases = {
         name: None if told.get(name) is None else bool(told[name])
@@ -75,11 +75,15 @@ def of_record(source: object, model: object, record: Record) -> object:
     return with_record_values(model, record, names)
 
 
-def _told(source: object, key: str) -> Mapping[str, Any]:
+def provenance_entry(source: object, key: str) -> object:
+    """What the provenance of a fit, or of the model in its file, holds; None where nothing."""
     estimated = getattr(model_of(source), "estimated", None)
     for holder in (source, estimated):
         known = getattr(holder, "provenance", None)
-        told = known.get(key) if isinstance(known, Mapping) else None
-        if isinstance(told, Mapping):
-            return told
-    return {}
+        if isinstance(known, Mapping) and key in known:
+            return known[key]
+    return None
+
+
+def _table(entry: object) -> Mapping[str, Any]:
+    return entry if isinstance(entry, Mapping) else {}

@@ -275,7 +275,9 @@ def _assemble(
             ),
             *nothing_told(found.reason),
         ),
-        provenance=_provenance(structure, records, data),
+        provenance=provenance_of(
+            structure.method.replace("_", " "), records, data.offsets, structure.to_dict()
+        ),
         details=PolynomialDetails(
             roots,
             fitted_gains(model, degrees),
@@ -338,13 +340,4 @@ def _scores(
     return (
         score(f"one step ahead from {started}, records of the fit", one_step),
         score("free run from an estimated state, records of the fit", free),
-    )
-
-
-def _provenance(
-    structure: PolynomialStructure, records: Sequence[Record], data: SampledChannels
-) -> dict[str, object]:
-    method = structure.method.replace("_", " ")
-    return provenance_of(
-        method, records, (data.output, data.inputs), data.offsets, structure.to_dict()
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -214,7 +213,7 @@ def assemble(
             *judge_correlation(names, correlation),
             *judge_fit(costs, known.colour, noise),
         ),
-        provenance={**_provenance(method, fitted, records, options), **(extra or {})},
+        provenance={**_provenance(method, records, options), **(extra or {})},
         records=tuple(fitted_records),
         noise_covariance=noise_covariance,
         residual_horizon=residual_horizon,
@@ -223,16 +222,11 @@ def assemble(
 
 
 def _provenance(
-    method: str, model: GreyBoxModel, records: Sequence[Record], options: RegressionOptions
+    method: str, records: Sequence[Record], options: RegressionOptions
 ) -> dict[str, object]:
-    digest = hashlib.sha256()
-    for record in records:
-        digest.update(record.matrix([*model.inputs, *model.outputs]).tobytes())
-        digest.update(str(record.sample_time_s).encode())
     return {
         "method": method,
         "flightid": VERSION,
-        "data_sha256": digest.hexdigest(),
         "data_history": [[str(step) for step in record.history] for record in records],
         "options": options.to_dict(),
     }

@@ -141,7 +141,9 @@ def _assemble(
             *judge_innovations(structure, model, choice, roots, found.termination, spare),
             *tests.findings(biased=True, times=times),
         ),
-        provenance=_provenance(structure, records, data),
+        provenance=provenance_of(
+            structure.method, records, data.channels.offsets, structure.to_dict()
+        ),
         details=SubspaceDetails(
             roots,
             innovations_gains(model, spread, direct=bool(structure.direct)),
@@ -223,11 +225,3 @@ def _scores(
             score(f"{name} free run from an estimated state, records of the fit", free[place]),
         )
     return found
-
-
-def _provenance(
-    structure: SubspaceStructure, records: Sequence[Record], data: SubspaceData
-) -> dict[str, object]:
-    channels = data.channels
-    arrays, options = (channels.output, channels.inputs), structure.to_dict()
-    return provenance_of(structure.method, records, arrays, channels.offsets, options)

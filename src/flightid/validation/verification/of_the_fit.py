@@ -1,4 +1,4 @@
-"""What a fit leaves unexplained of the records that it was made of: no prediction can do better."""
+"""The records that a fit was made of: what it leaves of them, and whether they come again."""
 
 from __future__ import annotations
 
@@ -10,8 +10,14 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification.fit import Fit
+from flightid.identification.prediction.remembered import provenance_entry
+from flightid.identification.training import TRAINING
+from flightid.record import Record
+from flightid.record.digest import RecordDigest
 from flightid.simulation import metrics
 
+SEEN = "training-data"
+"""Of a record, or a part of one, that the model was fitted to."""
 AS_MUCH = 1.2
 """Largest ratio of two errors that a few hundred coloured samples do not tell apart."""
 
@@ -70,3 +76,36 @@ def weighed(
         else each
         for each in findings
     )
+
+
+def seen_findings(
+    source: object, records: Sequence[Record], outputs: Sequence[str]
+) -> tuple[Finding, ...]:
+    """A warning for each record that a model was fitted to, whole or in part.
+
+    By the digests that a fit, or the file of its model, keeps of its records. Samples that were
+    changed since (filtered, resampled, moved, in other units) are not known again.
+
+    Parameters
+    ----------
+    source : object
+        Anything that can be verified.
+    records : sequence of Record
+    outputs : sequence of str
+        What is compared.
+    """
+    entry = provenance_entry(source, TRAINING)
+    known = [RecordDigest.from_dict(each) for each in entry] if isinstance(entry, list) else []
+    findings = []
+    for record in records:
+        shares = {each.name: each.shared(record, outputs) for each in known}
+        name = max(shares, key=lambda each: shares[each], default="")
+        if not shares.get(name):
+            continue
+        part = "" if shares[name] == 1.0 else "a part of "
+        said = (
+            f"{record.name}: the model was fitted to {part}these samples (record {name!r}), "
+            "which the run explains and does not predict"
+        )
+        findings.append(Finding(SEEN, Light.AMBER, said, "verify on a record that no fit has seen"))
+    return tuple(findings)

@@ -31,7 +31,7 @@ from flightid.validation.verification.baseline import baseline_findings
 from flightid.validation.verification.comparison import Comparison, compared
 from flightid.validation.verification.judgement import THEIL_GUIDE, judge
 from flightid.validation.verification.muad import mismatch
-from flightid.validation.verification.of_the_fit import left_by_fit
+from flightid.validation.verification.of_the_fit import left_by_fit, seen_findings
 from flightid.validation.verification.result import Verification
 
 
@@ -196,7 +196,7 @@ def verify(
         judged = judge(tuple(made), chosen, request, seen, own)
         beside = baseline_findings(each, made, request)
         said = held.findings if way is predict_continuous else ()
-        said = (*said, *_at_mean(each, flown))
+        said = (*seen_findings(each, flown, chosen), *said, *_at_mean(each, flown))
         between = judged.hold if way is predict_continuous else None
         results.append(replace(judged, hold=between, findings=(*judged.findings, *beside, *said)))
     if not isinstance(source, list | tuple):

@@ -1,0 +1,172 @@
+"""What a record holds, in a few characters: whether another is the same, or a part of it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.errors import DataError
+from flightid.record.record import Record
+
+SPAN = 16
+"""Samples of one mark: so many equal ones in a row are no chance in a measured channel."""
+MARKS = 64
+"""Marks of a channel: a tenth of its record holds some six of them."""
+FEWEST = 3
+"""Marks in common that say that samples are the same."""
+_MIX = np.uint64(0x9E3779B97F4A7C15)
+
+
+@dataclass(frozen=True)
+class RecordDigest:
+    """Of one record: what its samples hash to, and marks that a part of it shares.
+
+    Attributes
+    ----------
+    name : str
+        Of the record.
+    start_s, end_s : float
+        First and last stamp, s.
+    sha256 : str
+        See `record_sha256`.
+    marks : mapping of str to str
+        By channel: the `MARKS` smallest hashes of its spans of `SPAN` samples, 16 hexadecimal
+        digits each. A span that stands still makes none.
+
+    Example
+    -------
+    >>> time_s = np.arange(400) * 0.1
+    >>> noise = np.random.default_rng(1).standard_normal(400)
+    >>> flown = Record.from_arrays(time_s, outputs={"p": noise})
+    >>> digest_of(flown, ["p"]).shared(flown.segment(10.0, 25.0), ["p"])
+    1.0
+    """
+
+    name: str
+    start_s: float
+    end_s: float
+    sha256: str
+    marks: Mapping[str, str]
+
+    def shared(self, record: Record, names: Iterable[str]) -> float:
+        """Share of a record's samples that are samples of this one; 0 where it cannot be told.
+
+        Of the channels in common the one that shares least: an input flown twice is no record
+        flown twice.
+
+        Parameters
+        ----------
+        record : Record
+        names : iterable of str
+            Channels to compare.
+        """
+        known = [name for name in names if name in self.marks and name in record]
+        if known and record_sha256(record, self.marks) == self.sha256:
+            return 1.0
+        shares = [_share(self.marks[name], record[name]) for name in known]
+        return min((share for share in shares if share is not None), default=0.0)
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> RecordDigest:
+        """From plain values; DataError where they are no digest, as in a file changed by hand."""
+        try:
+            marks = {str(name): str(text) for name, text in dict(values["marks"]).items()}
+            for text in marks.values():
+                _numbers(text)
+            span = float(values["start_s"]), float(values["end_s"])
+            return cls(str(values["name"]), *span, str(values["sha256"]), marks)
+        except (KeyError, TypeError, ValueError) as error:
+            raise DataError(
+                "these values are no digest of a record",
+                found=f"{type(error).__name__}: {error}"[:200],
+                needed="what the fit wrote under training_records",
+                action="take training_records out of the file",
+            ) from error
+
+
+def record_sha256(record: Record, names: Iterable[str] | None = None) -> str:
+    """Hash of what a record holds: stamps, and name, unit and samples of its channels.
+
+    Not of where it came from: a record and its copy in a file have the same.
+
+    Parameters
+    ----------
+    record : Record
+    names : iterable of str, optional
+        Channels to count, in any order; those that it lacks do not count. Default: all.
+
+    Example
+    -------
+    >>> record = Record.from_arrays([0.0, 0.1], outputs={"p": [1.0, 2.0]})
+    >>> record_sha256(record) == record_sha256(record.replace(name="copy"))
+    True
+    """
+    digest = hashlib.sha256(np.ascontiguousarray(record.time_s).tobytes())
+    held = {*record.channels}
+    for name in sorted(held if names is None else held & {*names}):
+        digest.update(f"\0{name}\0{record.unit(name)}\0".encode())
+        digest.update(np.ascontiguousarray(record[name]).tobytes())
+    return digest.hexdigest()
+
+
+def digest_of(record: Record, names: Iterable[str]) -> RecordDigest:
+    """Digest of the named channels of a record; those that it lacks are left out."""
+    held = [name for name in names if name in record]
+    marks = {name: _smallest(_hashes(record[name])) for name in held}
+    return RecordDigest(
+        record.name,
+        float(record.time_s[0]),
+        float(record.time_s[-1]),
+        record_sha256(record, held),
+        {name: found.astype(">u8").tobytes().hex() for name, found in marks.items()},
+    )
+
+
+def _hashes(samples: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """Hashes of all spans that move: of samples, of pairs, of fours, to spans of `SPAN`."""
+    # Negative zero is zero; products of unsigned integers wrap, as they are meant to.
+    found = (samples + 0.0).view(np.uint64)
+    if found.size < SPAN:
+        return np.zeros(0, np.uint64)
+    changes = np.cumsum(np.diff(found, prepend=found[:1]) != 0)
+    moving = changes[SPAN - 1 :] > changes[: found.size - SPAN + 1]
+    step = 1
+    while step < SPAN:
+        found = (found[:-step] ^ (found[step:] >> np.uint64(7))) * _MIX + found[step:]
+        found ^= found >> np.uint64(29)
+        step *= 2
+    return found[moving]
+
+
+def _smallest(found: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """The `MARKS` smallest of some hashes, in order, each once."""
+    place = 8 * MARKS
+    few = np.unique(np.partition(found, place)[:place] if found.size > place else found)
+    return (few if few.size >= MARKS else np.unique(found))[:MARKS]
+
+
+def _numbers(text: str) -> NDArray[np.uint64]:
+    return np.frombuffer(bytes.fromhex(text), ">u8").astype(np.uint64)
+
+
+def _share(text: str, samples: NDArray[np.float64]) -> float | None:
+    """Share of a channel's spans that are among the marks, of those that could be.
+
+    A record with fewer marks than `MARKS` has shown all of its spans.
+    """
+    marks = _numbers(text)
+    if marks.size < FEWEST:
+        return None
+    found = _hashes(samples)
+    seen = np.unique(found if marks.size < MARKS else found[found <= marks[-1]])
+    common = int(np.isin(seen, marks).sum())
+    return common / seen.size if common >= FEWEST else 0.0
