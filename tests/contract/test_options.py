@@ -42,11 +42,13 @@ from tests.contract.test_arguments import DICTIONARY, WORD_OF
 OF_COMMANDS = {
     "all": "everything, not one screen of it",
     "against": "another model beside the one on trial",
+    "blocks": "file of a law made of blocks",
     "axis": "roll, pitch or yaw, or an autopilot's number of it",
     "csv": "file of samples",
     "debug": "traceback of an error",
     "fixed_wing": "kind of vehicle that parameters are for",
     "format": "tool that an export is for",
+    "gains": "file of tuned gains to fly",
     "help": "this text",
     "html": "page to write",
     "json": "print one JSON document",

@@ -9,9 +9,13 @@ import click
 
 from flightid.cli.option_fields import OptionsCommand, given_options
 from flightid.cli.output import emit, json_option, note
+from flightid.cli.records import FILES
 from flightid.cli.sources import load_source, model_argument, model_options
 
 if TYPE_CHECKING:
+    from flightid.control.stepped.block_controller import BlockController
+    from flightid.control.stepped.gain_controller import GainController
+    from flightid.models import Model
     from flightid.options import Options
 
 
@@ -25,6 +29,18 @@ def _fields() -> dict[str, type[Options]]:
 @model_argument
 @model_options
 @click.option(
+    "--gains",
+    type=FILES,
+    help="Fly these gains: a parameter file of an autopilot, or the TOML of a PID, as tune writes "
+    "them; what it leaves out has the autopilot's default. The pilot commands phi_command, or "
+    "p_command where the model has no angle.",
+)
+@click.option(
+    "--blocks",
+    type=FILES,
+    help="Fly this law: a TOML file of [[block]] tables, as [[loop.block]] in a study.",
+)
+@click.option(
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
     help="Write the flight: .parquet or .nc.",
@@ -34,11 +50,13 @@ def command(
     model: str,
     axis: str | None,
     values: tuple[str, ...],
+    gains: Path | None,
+    blocks: Path | None,
     output: Path | None,
     as_json: bool,
     **options: Any,  # noqa: ANN401 — read from the fields
 ) -> None:
-    """Fly MODEL beside the clock; Ctrl-C ends the flight and keeps it.
+    """Fly MODEL beside the clock, alone or under a controller; Ctrl-C ends and keeps the flight.
 
     MODEL is a .toml file, the folder of a study with one model, the JSON of a fit, or the name of a
     library model. Inputs come as JSON datagrams such as {"lat": 0.1}, outputs go to a cockpit
@@ -49,7 +67,42 @@ def command(
     from flightid.simulation.realtime import fly_model
 
     asked = FlyOptions(**given_options(FlyOptions, options, "a flight"))
-    session = fly_model(load_source(model, axis, values), asked, say=note)
+    if gains is not None and blocks is not None:
+        raise click.UsageError("--gains and --blocks move the same inputs: give one of them")
+    source = load_source(model, axis, values)
+    around: GainController | BlockController | None = None
+    if gains is not None:
+        around = _gains(gains, source, 1.0 / asked.step_s(source))
+    elif blocks is not None:
+        around = _blocks(blocks, source, asked.step_s(source))
+    if around is not None and around.commands:
+        note(f"The pilot commands {', '.join(around.commands)} too")
+    session = fly_model(source, asked, controller=around, say=note)
     if output is not None:
         note(f"Wrote {write_records(session.record, output)}")
     emit(session, as_json=as_json)
+
+
+def _gains(file: Path, model: Model, rate_hz: float) -> GainController:
+    from flightid.control.autopilots import read_parameters
+    from flightid.control.stepped.gain_controller import gain_controller, pid_controller
+    from flightid.reading import read_toml
+
+    note(f"Controllers run at {rate_hz:g} Hz; --rate takes another")
+    if file.suffix == ".toml":
+        tables = read_toml(file, "a file of gains").get("controller", [])
+        return pid_controller(tables, model, rate_hz)
+    made = gain_controller(read_parameters(file), model, rate_hz)
+    for loop in made.loops.values():
+        note(repr(loop))
+    return made
+
+
+def _blocks(file: Path, model: Model, step_s: float) -> BlockController:
+    from flightid.control.stepped.block_controller import BlockController
+    from flightid.reading import read_toml
+    from flightid.study.loop_blocks import made_block
+
+    tables = read_toml(file, "a controller").get("block", [])
+    blocks = [made_block(each, f"{file.name}, [[block]]") for each in tables]
+    return BlockController(blocks, model, step_s)

@@ -17,7 +17,7 @@ from flightid.errors import DataError, OptionError
 from flightid.record import Record
 from flightid.result import Result
 from flightid.simulation.fly_options import FlyOptions
-from flightid.simulation.stepper import Stepper
+from flightid.simulation.stepper import Controller, Stepper
 from flightid.table import Column, Table
 
 MAXIMUM_DATAGRAM = 8192
@@ -173,7 +173,11 @@ def fly_in_real_time(
 
 
 def fly_model(
-    model: object, options: FlyOptions, *, say: Callable[[str], None] | None = None
+    model: object,
+    options: FlyOptions,
+    *,
+    controller: Controller | None = None,
+    say: Callable[[str], None] | None = None,
 ) -> FlownSession:
     """Fly a model beside the clock, its pilot and its cockpit on the other ends of UDP.
 
@@ -181,6 +185,8 @@ def fly_model(
     ----------
     model : what `Stepper` takes
     options : FlyOptions
+    controller : Controller, optional
+        Moves inputs beside the pilot.
     say : callable, optional
         Takes a sentence on where it listens, and one on what it could not deliver.
 
@@ -198,7 +204,10 @@ def fly_model(
     >>> fly_model(lag, FlyOptions(duration_s=0.05)).options["style"]
     'json'
     """
-    stepper = Stepper(model, options.step_s(model), feedback=options.gains, limits=options.bounds)
+    stepper = Stepper(
+        model, options.step_s(model), feedback=options.gains, limits=options.bounds,
+        controller=controller,
+    )  # fmt: skip
     heard = None if options.listen is None else (options.host, options.listen)
     with UdpLink(stepper.inputs, listen=heard, send=options.cockpit, style=options.style) as link:
         if say is not None and heard is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,17 @@ from flightid.models.model import linear_system
 from flightid.simulation.nonlinear import run_equations, start_of
 
 Array = NDArray[np.float64]
+
+
+class Controller(Protocol):
+    """What moves a model's inputs beside the pilot, one frame at a time."""
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """What the pilot moves of it, by name; at rest zero."""
+
+    def step(self, given: Mapping[str, float], outputs: Mapping[str, float]) -> dict[str, float]:
+        """What is added to inputs, from all that the pilot gives and the last sample's outputs."""
 
 
 class Stepper:
@@ -33,6 +45,8 @@ class Stepper:
         the outputs of the last sample.
     limits : mapping of str to (float, float), optional
         Lowest and highest value of an input, after the augmentation.
+    controller : Controller, optional
+        Beside the feedback; its commands are inputs too.
 
     Raises
     ------
@@ -56,24 +70,28 @@ class Stepper:
         *,
         feedback: Mapping[str, Mapping[str, float]] | None = None,
         limits: Mapping[str, tuple[float, float]] | None = None,
+        controller: Controller | None = None,
     ) -> None:
         if not (np.isfinite(sample_time_s) and sample_time_s > 0.0):
             raise OptionError("the sample time is not positive", found=sample_time_s)
         self.sample_time_s = sample_time_s
         self._plant = _plant(model, sample_time_s)
-        self.inputs, self.outputs = self._plant.inputs, self._plant.outputs
-        self.rest = self._plant.rest
-        self._gains = np.zeros((len(self.inputs), len(self.outputs)))
+        moved, self.outputs = self._plant.inputs, self._plant.outputs
+        commands = () if controller is None else controller.commands
+        self._moved, self._controller = moved, controller
+        self.inputs = (*moved, *commands)
+        self.rest = self._plant.rest | dict.fromkeys(commands, 0.0)
+        self._gains = np.zeros((len(moved), len(self.outputs)))
         for name, row in (feedback or {}).items():
             for output, gain in row.items():
-                self._gains[_place("input", name, self.inputs),
+                self._gains[_place("input", name, moved),
                             _place("output", output, self.outputs)] = gain  # fmt: skip
-        self._low = np.full(len(self.inputs), -np.inf)
+        self._low = np.full(len(moved), -np.inf)
         self._high = -self._low
         for name, (low, high) in (limits or {}).items():
             if not low < high:
                 raise OptionError(f"limits of {name} cross", found=(low, high))
-            place = _place("input", name, self.inputs)
+            place = _place("input", name, moved)
             self._low[place], self._high[place] = low, high
         self._last = np.zeros(len(self.outputs))
 
@@ -102,7 +120,13 @@ class Stepper:
             given[_place("input", name, self.inputs)] = value
         if not np.all(np.isfinite(given)):
             raise DataError("an input is not finite", found=str(dict(inputs)))
-        driven = np.clip(given + self._gains @ self._last, self._low, self._high)
+        driven = given[: len(self._moved)] + self._gains @ self._last
+        if self._controller is not None:
+            named = dict(zip(self.inputs, given.tolist(), strict=True))
+            last = dict(zip(self.outputs, self._last.tolist(), strict=True))
+            for name, value in self._controller.step(named, last).items():
+                driven[self._moved.index(name)] += value
+        driven = np.clip(driven, self._low, self._high)
         found = self._plant.step(driven)
         if not np.all(np.abs(found) < 1e30):
             raise DataError("the model diverges", found=str(dict(inputs)))

@@ -30,13 +30,15 @@ KINDS = {
 """Blocks that numbers and names of signals describe."""
 
 
-def made_block(entry: Mapping[str, Any]) -> loops.Block:
+def made_block(entry: Mapping[str, Any], where: str = "study file, [[loop.block]]") -> loops.Block:
     """The block that a table ``[[loop.block]]`` describes.
 
     Parameters
     ----------
     entry : mapping
         ``kind``, and the arguments of that function by name.
+    where : str
+        How a message names the table.
 
     Raises
     ------
@@ -54,7 +56,7 @@ def made_block(entry: Mapping[str, Any]) -> loops.Block:
     kind = given.pop("kind", None)
     if kind not in KINDS:
         raise StudyError(
-            "study file, [[loop.block]]: there is no such kind",
+            f"{where}: there is no such kind",
             found=repr(kind),
             needed="one of " + ", ".join(KINDS),
         )
@@ -66,7 +68,7 @@ def made_block(entry: Mapping[str, Any]) -> loops.Block:
         inspect.signature(make).bind(**given)
     except (KeyError, TypeError) as error:
         raise StudyError(
-            f"study file, [[loop.block]] of kind {kind!r}: its keys do not fit",
+            f"{where} of kind {kind!r}: its keys do not fit",
             found=str(error),
             needed=", ".join(inspect.signature(make).parameters),
         ) from error

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -127,6 +127,21 @@ class ArduPilotLoop(AxisLoop):
             (terms[name] for name in ("P", "I", "D", "FF", "DFF")), np.zeros(setpoint.size)
         )
         return LoopRun(output, terms, rate)
+
+    def runner(self) -> Callable[[float, float], float]:
+        """See `AxisLoop.runner`; goes on from the last loop's state where that is all there is."""
+        if self.values["smax"] or {self.target_notch, self.error_notch} != {NOTCH_OFF}:
+            return super().runner()
+        state: LoopState | None = None
+
+        def step(setpoint_rad_s: float, rate_rad_s: float) -> float:
+            nonlocal state
+            made = self.run([setpoint_rad_s], [rate_rad_s], LoopFlags(start=state))
+            last = {name: float(row[0]) for name, row in made.terms.items()}
+            state = self.state(last, setpoint_rad_s)
+            return float(made.output[0])
+
+        return step
 
     def without_target_filter(self) -> Self:
         """Copy for set-points that were logged behind the target's filters."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from array import array
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
@@ -302,6 +303,17 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
         single_precision : bool
             True: the firmware's arithmetic. False: double precision.
         """
+
+    def runner(self) -> Callable[[float, float], float]:
+        """The recursion one loop at a time, set-point and rate in: runs anew over all so far."""
+        wanted, measured = array("d"), array("d")
+
+        def step(setpoint_rad_s: float, rate_rad_s: float) -> float:
+            wanted.append(setpoint_rad_s)
+            measured.append(rate_rad_s)
+            return float(self.run(np.array(wanted), np.array(measured)).output[-1])
+
+        return step
 
     @abstractmethod
     def _feedback_terms(self, omega: Omega) -> dict[str, Response]:

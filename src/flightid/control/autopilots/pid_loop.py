@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -180,6 +180,17 @@ class PidLoop(AxisLoop):
     ) -> LoopRun:
         """Run the recursion from rest on set-points and measurements, in their own units."""
         target, measured = samples(setpoint_rad_s, rate_rad_s, 1)
+        step = self._recursion()
+        rows = np.array([step(r, y) for r, y in zip(target, measured, strict=True)]).reshape(-1, 4)
+        return LoopRun(rows[:, 0], dict(zip("PID", rows.T[1:], strict=True)), measured)
+
+    def runner(self) -> Callable[[float, float], float]:
+        """See `AxisLoop.runner`."""
+        step = self._recursion()
+        return lambda setpoint, measured: step(setpoint, measured)[0]
+
+    def _recursion(self) -> Callable[[float, float], tuple[float, float, float, float]]:
+        """From set-point and measurement of a loop to output, P, I and D."""
         step, sense = 1.0 / self.loop_rate_hz, -1.0 if self.direct else 1.0
         p, i, d = (self.values.get(role, 0.0) for role in "pid")
         b, c, lag = self.values["b"], self.values["c"], self.values["filter_s"]
@@ -188,17 +199,21 @@ class PidLoop(AxisLoop):
         low, high = (side if each is None else each for side, each in
                      ((-np.inf, self.low), (np.inf, self.high)))  # fmt: skip
         reach = np.inf if self.rate_per_s is None else self.rate_per_s * step
-        rows = np.zeros((target.size, 4))
         integral = slope = before = last = 0.0
-        for k, (r, y) in enumerate(zip(sense * target, sense * measured, strict=True)):
+
+        def after(setpoint: float, measurement: float) -> tuple[float, float, float, float]:
+            nonlocal integral, slope, before, last
+            r, y = sense * setpoint, sense * measurement
             slope = (lag * slope + d * ((c * r - y) - before)) / (lag + step)
             before = c * r - y
             integral += i * step * (r - y)
-            asked = p * (b * r - y) + integral + slope
+            terms = p * (b * r - y), integral, slope
+            asked = sum(terms)
             last = float(np.clip(np.clip(asked, last - reach, last + reach), low, high))
-            rows[k] = last, p * (b * r - y), integral, slope
             integral += back * (last - asked) if i else 0.0
-        return LoopRun(rows[:, 0], dict(zip("PID", rows.T[1:], strict=True)), measured)
+            return (last, *terms)
+
+        return after
 
     def _feedback_terms(self, omega: Omega) -> dict[str, Response]:
         terms = {"p": np.ones(omega.size, complex), "i": self._integral(omega)}
