@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 import flightid as fid
 from flightid.vehicles import Autopilot, RateGains, SidActivation, Turbulence, fly
+from tests.strangers import loop_shifts
 
 OMEGA = np.geomspace(1.5, 12.0, 8)
 RUN = SidActivation(10, 3.0, 0.06, 0.2, 6.0, 2.0, 60.0, 1.0, leave_after_s=70.0)
@@ -62,3 +63,13 @@ def test_instrument_removes_the_bias(
     scatter = instrument.std(axis=0) / np.sqrt(N_FLIGHTS)
     assert np.abs(mean).mean() < 0.35 * np.abs(direct.mean(axis=0)).mean()
     assert np.all(np.abs(mean) < 4 * scatter + 0.03)
+
+
+@pytest.mark.slow
+def test_claimed_shifts_are_those_that_are_there() -> None:
+    ratios = []
+    for family in loop_shifts.FAMILIES.values():
+        claimed, there = loop_shifts.claimed_and_true(family, range(40))
+        assert there
+        ratios += [claimed[name] / there[name] for name in there]
+    assert 0.5 <= np.median(ratios) <= 2.0, ratios

@@ -11,29 +11,37 @@ from flightid.uncertainty.blocks import JointResiduals, RecordBlock
 from flightid.uncertainty.coloured_residuals import residual_covariance
 from flightid.uncertainty.fed_noise import fed_noise_spectrum
 from tests.closeness import assert_close
-from tests.strangers import closed_loops
+from tests.strangers import closed_loops, loop_shifts
 
 POLE, GAIN, FED = 0.9, 0.5, -0.3
 
 
-def _loop(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """y = G u + v with G = 0.5 z⁻¹/(1 − 0.9 z⁻¹), v = e/(1 − 0.9 z⁻¹) and u = r − 0.3 z⁻¹ y."""
+def _loop(n: int, *, late: int = 1, direct: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """y = (G + direct) u + v, G = 0.5 z⁻¹/(1 − 0.9 z⁻¹), v = e/(1 − 0.9 z⁻¹); u = r − 0.3 z⁻ˡ y.
+
+    The controller answers `late` samples later.
+    """
     fresh, e = np.random.default_rng(3).standard_normal((2, n))
-    u, y = np.zeros(n), np.zeros(n)
+    x, u, y = np.zeros((3, n))
     for k in range(1, n):
-        u[k] = fresh[k] + FED * y[k - 1]
-        y[k] = POLE * y[k - 1] + GAIN * u[k - 1] + e[k]
+        x[k] = POLE * x[k - 1] + GAIN * u[k - 1] + e[k]
+        fed = FED * (y[k - 1] if late else x[k])
+        u[k] = (fresh[k] + fed) / (1.0 if late else 1.0 - FED * direct)
+        y[k] = x[k] + direct * u[k]
     return u, y
 
 
-def test_the_spectrum_of_fed_noise_is_that_of_the_loop() -> None:
-    u, y = _loop(60_000)
+@pytest.mark.parametrize(("late", "direct"), [(1, 0.0), (0, 0.0), (0, 0.8), (1, 0.8)])
+def test_the_spectrum_of_fed_noise_is_that_of_the_loop(late: int, direct: float) -> None:
+    u, y = _loop(60_000, late=late, direct=direct)
     omega = np.array([0.1, 0.5, 1.5])
-    found = fed_noise_spectrum([u[None]], [y[None]], 1.0, omega)
+    known = np.array([[direct]])
+    found = fed_noise_spectrum([u[None]], [y[None]], 1.0, omega, known)
     turn = np.exp(-1j * omega)
     noise = 1.0 / (1.0 - POLE * turn)
-    response = GAIN * turn * noise
-    reached = FED * turn * noise / (1.0 - FED * turn * response)
+    response = GAIN * turn * noise + direct
+    way = FED * turn**late
+    reached = way * noise / (1.0 - way * response)
     truth = 2.0 * reached.conj() * noise
     assert found is not None
     assert np.all(np.abs(found[:, 0, 0] / truth - 1.0) < 0.1)
@@ -45,6 +53,12 @@ def test_an_open_loop_feeds_nothing() -> None:
     found = fed_noise_spectrum([u[None]], [y[None]], 1.0, np.array([0.5]))
     assert found is not None
     assert not np.any(found)
+
+
+def test_a_fit_claims_the_shift_that_is_there() -> None:
+    """One of the counts of `tests/strangers/loop_shifts.py`, at its plainest parameter."""
+    claimed, shift = loop_shifts.claimed_and_true(loop_shifts.heave, range(4))
+    assert_close(claimed["Zw"], shift["Zw"], rtol=0.5, why="four flights' scatter")
 
 
 @pytest.mark.parametrize("feedback", [0.0, closed_loops.PILOT])

@@ -37,7 +37,8 @@ from flightid.findings import Finding, worst
 from flightid.inspection import Inspection
 from flightid.models.narx.structure import STOPS
 from flightid.record import Record
-from flightid.record.hold import FROM_LOG, Loop
+from flightid.record.history import is_of_log
+from flightid.record.hold import Loop
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.feedback import FeedbackTest, declared_loop
@@ -138,9 +139,8 @@ def _required(
     made: FitFacts, responses: Sequence[FrequencyResponse], records: Sequence[Record]
 ) -> tuple[str, ...]:
     histories = [*(each.history for each in responses), *(each.history for each in records)]
-    logged = any(step.operation == FROM_LOG for history in histories for step in history)
     signs = (SIGNS,) if made.signs else ()
-    return (*((INSPECTION,) if logged else ()), *ALWAYS, *signs)
+    return (*((INSPECTION,) if is_of_log(histories) else ()), *ALWAYS, *signs)
 
 
 def _with_findings(checks: list[Check], made: FitFacts) -> list[Check]:

@@ -27,7 +27,8 @@ from flightid.identification.methods import Method, flat
 from flightid.identification.rival_fits import estimates_alone
 from flightid.record import Record
 from flightid.record.chosen_hold import ASSUMED, DECLARED, RECORDED, ChosenHold
-from flightid.record.hold import BETWEEN, FROM_LOG, HOLDS, InputHold
+from flightid.record.history import is_of_log
+from flightid.record.hold import BETWEEN, HOLDS, InputHold
 from flightid.record.repeats import found_staircase
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.foretold import likelihood_gain
@@ -129,7 +130,7 @@ class _Rivals:
     @property
     def logged(self) -> bool:
         """Whether the data come from an autopilot's log."""
-        return self.made_by(FROM_LOG)
+        return is_of_log(getattr(each, "history", ()) for each in flat(self.data))
 
     def made_by(self, operation: str) -> bool:
         """Whether any of the data went through an operation."""

@@ -11,7 +11,8 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.errors import DataError
 from flightid.findings import Finding
-from flightid.record.hold import BETWEEN, FROM_LOG, InputHold, InputShape, require_hold
+from flightid.record.history import is_of_log
+from flightid.record.hold import BETWEEN, InputHold, InputShape, require_hold
 from flightid.record.record import Record
 from flightid.record.repeats import Staircase, found_staircase, is_switched
 from flightid.record.several import as_records
@@ -123,8 +124,7 @@ def is_seen_held(record: Record, inputs: Iterable[str] | None = None) -> bool:
     """
     names = [name for name in (record.inputs if inputs is None else inputs) if name in record]
     moving = [record[name] for name in names if np.ptp(record[name]) > 0.0]
-    logged = any(step.operation == FROM_LOG for step in record.history)
-    return bool(moving) and not logged and all(map(is_switched, moving))
+    return bool(moving) and not is_of_log([record.history]) and all(map(is_switched, moving))
 
 
 def shape_of(record: Record) -> InputShape:

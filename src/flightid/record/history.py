@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from flightid.table import Cell
+
+FROM_LOG = "Log.record"
+"""Operation that heads the history of a log's record."""
 
 
 @dataclass(frozen=True)
@@ -35,3 +38,8 @@ class Step:
         """Call with options and version on one line."""
         options = ", ".join(f"{key}={value!r}" for key, value in self.options.items())
         return f"{self.operation}({options}) [flightid {self.version}]"
+
+
+def is_of_log(histories: Iterable[Iterable[Step]]) -> bool:
+    """Whether any of the data come from an autopilot's log."""
+    return any(step.operation == FROM_LOG for history in histories for step in history)

@@ -14,8 +14,6 @@ InputHold = Literal["zero", "first", "band_limited"]
 Loop = Literal["open", "closed"]
 LOOPS: tuple[Loop, ...] = ("open", "closed")
 HOLDS: tuple[InputHold, ...] = ("zero", "first", "band_limited")
-FROM_LOG = "Log.record"
-"""Operation that heads the history of a log's record."""
 SAME_SAMPLE_TIME = 1e-6
 """Largest relative difference of sample times that still counts as the same."""
 

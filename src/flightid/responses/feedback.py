@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,7 +67,9 @@ def _thinning(
     return step, MAXIMUM_SAMPLES // n_records
 
 
-def feedback_bias(response: FrequencyResponse) -> NDArray[np.complex128] | None:
+def feedback_bias(
+    response: FrequencyResponse, at_once: Callable[[float], NDArray[np.float64]]
+) -> NDArray[np.complex128] | None:
     """Bias of a direct estimate that noise makes by way of a closed loop, (n_out, n_in, n_f).
 
     ``Φ_uu⁻¹ Φ_uv``: the inputs' spectrum, and that of the inputs with the noise of the outputs.
@@ -75,6 +77,9 @@ def feedback_bias(response: FrequencyResponse) -> NDArray[np.complex128] | None:
     Parameters
     ----------
     response : FrequencyResponse
+    at_once : callable
+        By a sample time, s: what a sample of an input adds to outputs of the same sample, shape
+        (n_out, n_in), outputs and inputs of the response.
 
     Returns
     -------
@@ -94,17 +99,21 @@ def feedback_bias(response: FrequencyResponse) -> NDArray[np.complex128] | None:
     order = np.argsort(linear.places[1])
     n_records, highest = len(linear.input_records), float(response.omega_rad_s[-1])
     step, most = _thinning(n_records, highest, linear.sample_time_s, SAMPLES_FOR_BIAS)
+    places = np.ix_(linear.places[0], linear.places[1])
+    known = np.zeros((len(linear.output_records[0]), len(linear.inputs)))
+    known[places] = at_once(step * linear.sample_time_s)
     fed = fed_noise_spectrum(
         [rows[:, ::step][:, :most] for rows in linear.input_records],
         [rows[:, ::step][:, :most] for rows in linear.output_records],
         step * linear.sample_time_s,
         response.omega_rad_s,
+        known,
     )
     if fed is None:
         return None
     inputs = spectrum[np.ix_(order, order)].transpose(2, 0, 1)
     bias = np.linalg.solve(inputs, fed).transpose(2, 1, 0)
-    return np.asarray(bias[:, linear.places[1]])
+    return np.asarray(bias[places])
 
 
 def feedback_findings(test: FeedbackTest) -> tuple[Finding, ...]:

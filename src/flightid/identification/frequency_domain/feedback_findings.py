@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Light
+from flightid.errors import ModelError
 from flightid.findings import Finding
 from flightid.identification.frequency_domain.error_model import ErrorModel
+from flightid.models import GreyBoxModel, linear_system
 from flightid.responses import FrequencyResponse
+from flightid.responses.feedback import feedback_bias
 
 Array = NDArray[np.float64]
 LOOP_BIAS = "loop-bias"
@@ -18,8 +23,15 @@ LARGE, RULING = 0.5, 2.0
 """Bias over the standard error without it from which a parameter is named, and from which red."""
 
 
-def points_of(bias: NDArray[np.complex128] | None, errors: ErrorModel) -> Array | None:
-    """Bias of the fitted points, in the order of `ErrorModel.propagated`."""
+def bias_of_points(
+    model: GreyBoxModel, data: FrequencyResponse, errors: ErrorModel, hold: str
+) -> Array | None:
+    """Bias of the fitted points by a closed loop, in the order of `ErrorModel.propagated`.
+
+    The fitted model tells what an input adds to an output within a sample; what else goes together
+    there is the controller's. `hold` is that of the inputs between samples.
+    """
+    bias = feedback_bias(data, lambda step: _at_once(model, data, step, hold))
     if bias is None or not errors.runs or errors.known is None:
         return None
     parts = []
@@ -28,6 +40,20 @@ def points_of(bias: NDArray[np.complex128] | None, errors: ErrorModel) -> Array 
         block = bias[points.output][np.ix_(points.inputs, points.frequencies)].ravel()
         parts.append(np.concatenate([block.real, block.imag])[run.kept])
     return np.concatenate(parts)
+
+
+def _at_once(model: GreyBoxModel, data: FrequencyResponse, step_s: float, hold: str) -> Array:
+    """What a sample of each input adds to each output at once, shape (n_out, n_in)."""
+    found = np.zeros((len(data.outputs), len(data.inputs)))
+    with suppress(ModelError):
+        held = hold == "zero" and data.linear is not None and step_s == data.linear.sample_time_s
+        system = linear_system(model).sampled(step_s, "zero" if held else "first")
+        direct = np.asarray(system.d)
+        for o, i in product(range(len(data.outputs)), range(len(data.inputs))):
+            names = data.outputs[o], data.inputs[i]
+            if names[0] in system.outputs and names[1] in system.inputs:
+                found[o, i] = direct[system.outputs.index(names[0]), system.inputs.index(names[1])]
+    return found
 
 
 def judge_feedback(

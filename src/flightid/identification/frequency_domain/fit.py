@@ -35,8 +35,8 @@ from flightid.identification.frequency_domain.error_model import (
 from flightid.identification.frequency_domain.estimates import Statistics, statistics
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.feedback_findings import (
+    bias_of_points,
     judge_feedback,
-    points_of,
     why_bent,
 )
 from flightid.identification.frequency_domain.noise_cost import noise_costs
@@ -54,7 +54,6 @@ from flightid.identification.multistart import DenseEnd, cluster, local_minima
 from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel
 from flightid.responses import FrequencyResponse
-from flightid.responses.feedback import feedback_bias
 from flightid.units import require_match
 from flightid.version import VERSION
 
@@ -122,7 +121,7 @@ def _fit_selected(
         sensitivity=sensitivity,
         withheld=withheld,
         compare=compare,
-        bias=points_of(feedback_bias(data), errors),
+        bias=bias_of_points(fitted, data, errors, options.hold),
     )
     bent = judge_feedback(found.names, found.covariance, found.bias)
     setup += bent

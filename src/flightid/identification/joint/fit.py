@@ -29,7 +29,7 @@ from flightid.identification.frequency_domain.error_model import ErrorModel, err
 from flightid.identification.frequency_domain.estimator_bias import Correction
 from flightid.identification.frequency_domain.feedback_findings import (
     LOOP_BIAS,
-    points_of,
+    bias_of_points,
     why_bent,
 )
 from flightid.identification.frequency_domain.fit import (
@@ -57,7 +57,6 @@ from flightid.identification.withheld_intervals import without_intervals
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.responses import FrequencyResponse
-from flightid.responses.feedback import feedback_bias
 from flightid.uncertainty.blocks import JointResiduals
 
 Array = NDArray[np.float64]
@@ -97,9 +96,11 @@ class ChosenPoints:
         ]
         return JointResiduals(slopes, slopes - np.vstack(moved))
 
-    def whitened(self, bias: NDArray[np.complex128] | None) -> Array | None:
-        """Bias of the response as residuals of unit variance; None where it is not known."""
-        known = points_of(bias, self.errors)
+    def whitened_bias(
+        self, fitted: GreyBoxModel, response: FrequencyResponse, hold: str
+    ) -> Array | None:
+        """A loop's bias as residuals of unit variance; None where it is not known."""
+        known = bias_of_points(fitted, response, self.errors, hold)
         if known is None:
             return None
         matrices = [matrix for _, _, matrix in whitening(self.errors)]
@@ -143,7 +144,8 @@ def fit_jointly(model: GreyBoxModel, data: Sequence[object], options: JointOptio
         made = _without_bias(found, prepared, response, points, options)
         setup += made.outcome.findings()
     beside = made.points.beside(made.found.fitted, made.following)
-    beside = replace(beside, bias=made.points.whitened(feedback_bias(response)))
+    bias = made.points.whitened_bias(made.found.fitted, response, options.hold)
+    beside = replace(beside, bias=bias)
     fit = conclude(made.found, options, setup, beside)
     bent = [each for each in fit.findings if each.code == LOOP_BIAS]
     bent_by = why_bent(response, beside.bias, bent)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.record import Record
+from flightid.record.history import is_of_log
 from flightid.record.hold import common_hold
 from flightid.responses.errors.linear_estimate import LinearEstimate
 from flightid.responses.errors.prewhitened import (
@@ -55,9 +56,9 @@ def estimate_prewhitened(
 
     Assumes
     -------
-    A way around the loop that takes a sample. Inputs that are known to be held (`hold="zero"`)
-    reach outputs a sample later, and the controller may answer at once; else the inputs may reach
-    outputs at once, and the controller answers a sample later.
+    A way around the loop that takes a sample. Inputs that are known to be held (`hold="zero"`),
+    or that an autopilot logged, reach outputs a sample later, and the controller may answer at
+    once; else the inputs may reach outputs at once, and the controller answers a sample later.
 
     Reference
     ---------
@@ -66,6 +67,7 @@ def estimate_prewhitened(
     """
     omega = windowed.omega_rad_s
     held = common_hold([record.input_shape for record in records]) == "zero"
+    held = held or is_of_log(record.history for record in records)
     model = NoiseModel.of(
         samples.part("inputs"),
         samples.part("outputs"),
@@ -109,7 +111,8 @@ def _near(omega: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _assumption(*, held: bool) -> Finding:
     taken = (
-        "inputs are held, so the vehicle answers a sample later and a controller may at once"
+        "inputs are held or an autopilot's own, so the vehicle answers a sample later and a "
+        "controller may at once"
         if held
         else "a loop, where there is one, answers a sample later"
     )
