@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 import numpy as np
@@ -69,7 +69,14 @@ def under_control(random: np.random.Generator, noise: Noise) -> fid.Record:
 Flight = Callable[[np.random.Generator], fid.Record]
 
 
-def fly(seed: int, *, flight: Flight, structure: object, loop: str | None = None) -> Trial:
+def fly(
+    seed: int,
+    *,
+    flight: Flight,
+    structure: object,
+    loop: str | None = None,
+    truth: Mapping[str, float] = MODE,
+) -> Trial:
     """Frequency, damping and gain of the mode, all options at their defaults."""
     record = flight(np.random.default_rng(seed))
     found: list[fid.Fit] = []
@@ -82,19 +89,20 @@ def fly(seed: int, *, flight: Flight, structure: object, loop: str | None = None
     if not found:
         return trial
     readings = tuple(
-        Reading(name, MODE[name], item.value, item.stderr, item.interval95)
-        for name, item in _mode(found[0]).items()
+        Reading(name, truth[name], item.value, item.stderr, item.interval95)
+        for name, item in _mode(found[0], truth["frequency"]).items()
+        if name in truth
     )
     return Trial(readings, trial.light, trial.seconds, trial.refusal)
 
 
-def _mode(fit: fid.Fit) -> dict[str, fid.Estimate]:
+def _mode(fit: fid.Fit, frequency: float) -> dict[str, fid.Estimate]:
     """The mode nearest to the true one, and the gain."""
     gains = {"gain": fit.details.gains["y/u"]}
     modes = fit.details.modes
     if not modes:
         return gains
-    best = min(modes, key=lambda each: abs(each.natural_frequency.value - MODE["frequency"]))
+    best = min(modes, key=lambda each: abs(each.natural_frequency.value - frequency))
     return {"frequency": best.natural_frequency, "damping": best.damping, **gains}
 
 

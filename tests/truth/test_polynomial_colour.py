@@ -52,8 +52,8 @@ def test_sensitivities_are_those_of_the_errors() -> None:
     def errors(at: np.ndarray) -> np.ndarray:
         return np.asarray(
             _native.polynomial_errors(
-                data.output, data.inputs, [80], structure.native, at, "unknown", []
-            )
+                data.output, data.inputs, [80], structure.native, at, "unknown", [], True
+            )[0]
         )
 
     slopes = np.array(

@@ -20,16 +20,17 @@ def _codes(item):
     return {finding.code for finding in item.findings}
 
 
-def test_products_of_lags_give_the_triangle_s_regression():
+@pytest.mark.parametrize("levels", [True, False])
+def test_products_of_lags_give_the_triangle_s_regression(levels):
     random = np.random.default_rng(0)
     inputs = lfilter([1.0], [1.0, -0.7], random.standard_normal((2, 700)))
-    output, lengths, order = random.standard_normal(700), [300, 400], 60
-    found = regress_lags(output, inputs, lengths, order, order + 4)
-    known = regress(output, inputs, lengths, 0, [order] * 2, [0] * 2, order + 4)
+    output, lengths, order = 2.0 + random.standard_normal(700), [300, 400], 60
+    found = regress_lags(output, inputs, lengths, order, order + 4, levels=levels)
+    known = regress(output, inputs, lengths, 0, [order] * 2, [0] * 2, order + 4, levels=levels)
     assert found.n_rows == known.n_rows
     assert_close(found.theta, known.theta, why="the same normal equations", rtol=1e-9)
     assert_close(found.sum_of_squares, known.sum_of_squares, why="the last pivot", rtol=1e-10)
-    equal = regress_lags(output, np.vstack([inputs[:1]] * 2), lengths, order, order)
+    equal = regress_lags(output, np.vstack([inputs[:1]] * 2), lengths, order, order, levels=levels)
     assert equal.dependent is not None
 
 

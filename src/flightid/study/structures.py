@@ -8,7 +8,7 @@ from typing import Any
 from flightid.conventions import Light
 from flightid.findings import Finding
 from flightid.identification import Fit, identify
-from flightid.identification.prediction_error.findings import NEEDLESS
+from flightid.identification.prediction_error.findings import CANCELLATION
 from flightid.models import InnovationsModel, NarxStructure, PolynomialModel
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
@@ -20,8 +20,7 @@ Choice = OrderScan | NarxSearch
 AS_GOOD = 0.10
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
 TRIED = 4
-"""Structures that are fitted whole, at most, for one that ended well and has no pole
-and zero too many."""
+"""Structures that are fitted whole, at most, for one that ended well and cancels no pole."""
 
 
 def fit_structure(
@@ -70,13 +69,12 @@ def _polynomial(
     first = next(fits)
     if _is_clean(first):
         return first, scan
-    # A search that ended at no minimum, or a pole and its zero that cancel or fit an offset of the
-    # record, leave the steady gain open.
+    # A search that ended at no minimum, or a pole and its zero that cancel, say little of a mode.
     return next((fit for fit in fits if _is_clean(fit)), first), scan
 
 
 def _is_clean(fit: Fit) -> bool:
-    return is_settled(fit) and not any(finding.code in NEEDLESS for finding in fit.findings)
+    return is_settled(fit) and not any(finding.code == CANCELLATION for finding in fit.findings)
 
 
 def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:

@@ -21,14 +21,14 @@ const FINEST: f64 = 0.02;
 pub struct Scan<'a> {
     /// Records of the fits.
     pub records: Vec<Samples<'a>>,
-    /// Records of the free runs.
-    pub unseen: Vec<Samples<'a>>,
     /// Structures A y = B u + C e.
     pub candidates: Vec<Orders>,
     /// Degree of the long ARX model whose errors stand for the noise.
     pub long: usize,
     /// Most steps of each refinement.
     pub maximum_iterations: usize,
+    /// Fit a constant to each record.
+    pub levels: bool,
 }
 
 /// One structure, fitted.
@@ -38,8 +38,6 @@ pub struct Scanned {
     pub theta: Vec<f64>,
     /// Sum of squared prediction errors after the longest lag of all structures.
     pub squares: f64,
-    /// Sum of squared free-run errors; infinite where the run diverged.
-    pub free_run: f64,
     /// Steps of the refinement.
     pub iterations: usize,
     /// Whether it ended at a minimum.
@@ -80,7 +78,7 @@ impl Largest {
     }
 }
 
-/// Fit every structure and run it freely; `stop` ends the work early with what is unfinished left
+/// Fit every structure; `stop` ends the work early with what is unfinished left
 /// as it started.
 ///
 /// # Errors
@@ -100,7 +98,7 @@ pub fn scan(
     }
     let largest = Largest::of(&work.candidates, n_inputs);
     let skip = largest.skip;
-    if let Some(shortest) = work.records.iter().chain(&work.unseen).map(|r| r.output.len()).min()
+    if let Some(shortest) = work.records.iter().map(|r| r.output.len()).min()
         && shortest <= skip + work.long
     {
         let needed = skip + work.long + 1;
@@ -133,7 +131,7 @@ fn long_errors(work: &Scan<'_>, skip: usize) -> Result<Vec<Vec<f64>>, CoreError>
     let first = work.long.max(skip);
     let mut problem =
         PredictionError::new(orders.clone(), work.records.clone(), Before::Rest, first, false)?;
-    problem.fast = true;
+    (problem.fast, problem.levels) = (true, work.levels);
     let n = orders.n_parameters();
     let mut triangle = vec![0.0; (n + 1) * (n + 1)];
     problem.triangle(&vec![0.0; n], &mut triangle)?;
@@ -182,6 +180,7 @@ fn regressors(
     };
     let n = orders.n_parameters();
     let mut problem = PredictionError::new(orders, records, Before::Rest, largest.skip, false)?;
+    problem.levels = work.levels;
     let mut triangle = vec![0.0; (n + 1) * (n + 1)];
     problem.triangle(&vec![0.0; n], &mut triangle)?;
     Ok(triangle)
@@ -219,13 +218,12 @@ fn refine(
 ) -> Option<Scanned> {
     let (theta, squares) = start;
     if orders.c == 0 {
-        let free_run = free_run(work, orders, &theta, skip);
-        return Some(Scanned { theta, squares, free_run, iterations: 0, converged: true });
+        return Some(Scanned { theta, squares, iterations: 0, converged: true });
     }
     let records = work.records.clone();
     let mut problem =
         PredictionError::new(orders.clone(), records, Before::Rest, skip, false).ok()?;
-    problem.fast = true;
+    (problem.fast, problem.levels) = (true, work.levels);
     let n = theta.len();
     let (low, high) = (vec![f64::NEG_INFINITY; n], vec![f64::INFINITY; n]);
     let options = Options {
@@ -236,34 +234,12 @@ fn refine(
     };
     let proceed = &mut |_: &_| !stop();
     let found = minimise(&mut problem, &theta, &low, &high, &options, proceed).ok()?;
-    let free_run = free_run(work, orders, &found.x, skip);
     Some(Scanned {
         squares: found.cost,
-        free_run,
         iterations: found.iterations,
         converged: found.termination.is_converged(),
         theta: found.x,
     })
-}
-
-/// Free run over the unseen records, started by their first outputs.
-fn free_run(work: &Scan<'_>, orders: &Orders, theta: &[f64], skip: usize) -> f64 {
-    let Ok(p) = Polynomials::new(orders, theta) else { return f64::INFINITY };
-    let mut squares = 0.0;
-    for record in &work.unseen {
-        let n = record.output.len();
-        let mut run = vec![0.0; n];
-        for ((b, input), &delay) in p.b.iter().zip(&record.inputs).zip(&orders.delays) {
-            add_product(1.0, b, delay, input, &mut run);
-        }
-        run[..skip].copy_from_slice(&record.output[..skip]);
-        for t in skip..n {
-            let past: f64 = (1..p.a.len()).map(|k| p.a[k] * run[t - k]).sum();
-            run[t] -= past;
-            squares += (record.output[t] - run[t]).powi(2);
-        }
-    }
-    if squares.is_finite() { squares } else { f64::INFINITY }
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@
 //! Reference: Ljung, *System Identification*, 2nd ed., chapter 10; elimination of linear unknowns:
 //! Golub & Pereyra (1973), SIAM J. Numer. Anal. 10, in the form of Kaufman (1975), BIT 15.
 
-use crate::black_box::polynomial_normal::{add_products, factorise};
+use crate::black_box::digital_filter::divide;
+use crate::black_box::polynomial_normal::{add_products, factorise, remove_square};
 use crate::black_box::polynomial_predictor::{
     Derivatives, Orders, Past, Polynomials, Run, Samples, run,
 };
@@ -44,6 +45,8 @@ pub struct PredictionError<'a> {
     pub skip: usize,
     /// Keep the roots of A, too, inside the circle.
     pub stable: bool,
+    /// Fit a constant to each record: the level of its output.
+    pub levels: bool,
     /// Take normal equations while they have digits enough: to rank many structures.
     pub fast: bool,
     cache: Option<(Vec<f64>, Vec<Run>, Vec<Past>)>,
@@ -88,7 +91,7 @@ impl<'a> PredictionError<'a> {
             let (found, needed) = (rows.len(), records.len());
             return Err(CoreError::Shape { what: "values of the past", found, needed });
         }
-        Ok(Self { orders, records, before, skip, stable, fast: false, cache: None })
+        Ok(Self { orders, records, before, skip, stable, levels: false, fast: false, cache: None })
     }
 
     /// Runs of the predictor with the past that counts, and the past's directions.
@@ -97,16 +100,24 @@ impl<'a> PredictionError<'a> {
         let mut runs = Vec::with_capacity(self.records.len());
         let mut pasts = Vec::new();
         for (index, record) in self.records.iter().enumerate() {
-            let memory: &[f64] = match &self.before {
-                Before::Given(rows) => &rows[index],
-                _ => &[],
-            };
-            let mut made = run(&self.orders, &p, record, memory);
-            if matches!(self.before, Before::Unknown) {
-                let past = Past::new(&self.orders, &p, record.output.len(), self.skip);
+            let n = record.output.len();
+            let unknown = matches!(self.before, Before::Unknown);
+            let given = if let Before::Given(rows) = &self.before { &rows[index][..] } else { &[] };
+            let mut made = run(&self.orders, &p, record, given);
+            if unknown || self.levels {
+                let mut past =
+                    if unknown { Past::new(&self.orders, &p, n, self.skip) } else { Past::empty() };
+                if self.levels {
+                    past.add_level(&p, n, self.skip);
+                }
                 if !past.directions.is_empty() {
                     let values = past.best(&made.error);
                     made = run(&self.orders, &p, record, &values);
+                } else if past.level.is_some() {
+                    made.level = past.best(&made.error).last().copied().unwrap_or(0.0);
+                    let mut response = vec![made.level; n];
+                    divide(&p.c, &mut response);
+                    made.error.iter_mut().zip(&response).for_each(|(x, r)| *x += r);
                 }
                 pasts.push(past);
             }
@@ -119,6 +130,7 @@ impl<'a> PredictionError<'a> {
     fn absorb(&self, triangle: &mut [f64], made: &Derivatives, run: &Run, past: Option<&Past>) {
         let width = self.orders.n_parameters() + 1;
         let n = run.error.len();
+        let shares = past.map_or(Vec::new(), |past| past.level_shares(made));
         let mut first = self.skip;
         let mut work = Vec::new();
         while first < n {
@@ -143,6 +155,12 @@ impl<'a> PredictionError<'a> {
                     whole[first..first + count].copy_from_slice(&column[width..]);
                     past.remove_from(&mut whole);
                     column[width..].copy_from_slice(&whole[first..first + count]);
+                }
+            }
+            if let Some(level) = past.and_then(|past| past.level.as_ref()) {
+                for (column, share) in work.chunks_exact_mut(height).zip(&shares) {
+                    let rows = column[width..].iter_mut().zip(&level[first..]);
+                    rows.for_each(|(value, d)| *value -= share * d);
                 }
             }
             triangularise(&mut work, height, width);
@@ -187,10 +205,13 @@ impl Problem for PredictionError<'_> {
             .zip(&runs)
             .map(|(record, run)| Derivatives::new(&self.orders, &p, record, run))
             .collect();
-        if self.fast && pasts.is_empty() {
+        if self.fast && !matches!(self.before, Before::Unknown) {
             let mut products = vec![0.0; triangle.len()];
-            for (made, run) in made.iter().zip(&runs) {
+            for (index, (made, run)) in made.iter().zip(&runs).enumerate() {
                 add_products(made, &run.error, self.skip, &mut products);
+                if let Some(past) = pasts.get(index) {
+                    remove_square(&past.level_shares(made), &mut products);
+                }
             }
             if let Some(found) = factorise(&products, self.orders.n_parameters() + 1) {
                 triangle.copy_from_slice(&found);

@@ -36,6 +36,16 @@ pub fn add_products(made: &Derivatives, errors: &[f64], skip: usize, products: &
     }
 }
 
+/// Take the products of one direction's coordinates off, those of the errors being none.
+pub fn remove_square(shares: &[f64], products: &mut [f64]) {
+    let width = shares.len() + 1;
+    for (j, right) in shares.iter().enumerate() {
+        for (i, left) in shares.iter().enumerate().take(j + 1) {
+            products[j * width + i] -= left * right;
+        }
+    }
+}
+
 fn before(x: &[f64], t: usize, shift: usize) -> f64 {
     if t >= shift { x[t - shift] } else { 0.0 }
 }

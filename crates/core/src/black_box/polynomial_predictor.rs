@@ -118,9 +118,12 @@ pub struct Run {
     pub disturbance: Vec<f64>,
     /// w of each input.
     pub responses: Vec<Vec<f64>>,
+    /// Constant that was fitted to D s, where there was one.
+    pub level: f64,
 }
 
-/// Run the predictor; `memory` holds the values that stand for the past, or nothing for rest.
+/// Run the predictor; `memory` holds the values that stand for the past, or nothing for rest, and
+/// after them the level where one is fitted.
 pub fn run(orders: &Orders, p: &Polynomials, samples: &Samples<'_>, memory: &[f64]) -> Run {
     let n = samples.output.len();
     let (of_inputs, of_noise) = orders.memory();
@@ -151,8 +154,10 @@ pub fn run(orders: &Orders, p: &Polynomials, samples: &Samples<'_>, memory: &[f6
         product
     };
     add_past(&mut error, memory, used, of_noise);
+    let level = memory.get(used + of_noise).copied().unwrap_or(0.0);
+    error.iter_mut().for_each(|value| *value += level);
     divide(&p.c, &mut error);
-    Run { error, disturbance, responses }
+    Run { error, disturbance, responses, level }
 }
 
 fn add_past(signal: &mut [f64], memory: &[f64], first: usize, count: usize) {
@@ -252,11 +257,14 @@ impl Derivatives {
     }
 }
 
-/// Orthonormal directions in which the unknown past moves the errors of a record.
+/// Orthonormal directions in which the unknown past, and an unknown level, move the errors of a
+/// record.
 #[derive(Debug, Clone)]
 pub struct Past {
-    /// Directions, each as long as the past lasts.
+    /// Directions of the past, each as long as it lasts.
     pub directions: Vec<Vec<f64>>,
+    /// Direction of the level, as long as the record.
+    pub level: Option<Vec<f64>>,
     /// Which unknown each direction came from, and its coordinates on the directions before it.
     factors: Vec<(usize, Vec<f64>)>,
     n_unknowns: usize,
@@ -271,8 +279,8 @@ impl Past {
     /// Directions for a record of `n` samples whose first `skip` errors do not count.
     pub fn new(orders: &Orders, p: &Polynomials, n: usize, skip: usize) -> Self {
         let (of_inputs, of_noise) = orders.memory();
-        let n_unknowns = of_inputs.iter().sum::<usize>() + of_noise;
-        let mut made = Self { directions: Vec::new(), factors: Vec::new(), n_unknowns };
+        let mut made = Self::empty();
+        made.n_unknowns = of_inputs.iter().sum::<usize>() + of_noise;
         let mut unknown = 0;
         for (i, &count) in of_inputs.iter().enumerate().filter(|&(_, &count)| count > 0) {
             let mut response = impulse(&p.d, n);
@@ -286,6 +294,25 @@ impl Past {
             made.add(&response, 1.0, of_noise, &mut unknown, skip);
         }
         made
+    }
+
+    /// Nothing unknown.
+    pub fn empty() -> Self {
+        Self { directions: Vec::new(), level: None, factors: Vec::new(), n_unknowns: 0 }
+    }
+
+    /// Add a constant before 1/C: an unknown level of the output, whatever A and D make of it.
+    pub fn add_level(&mut self, p: &Polynomials, n: usize, skip: usize) {
+        let mut response = vec![1.0; n];
+        divide(&p.c, &mut response);
+        response[..skip.min(n)].fill(0.0);
+        let place = self.n_unknowns;
+        self.n_unknowns += 1;
+        let before = self.directions.len();
+        self.orthogonalise(response, place);
+        if self.directions.len() > before {
+            self.level = self.directions.pop();
+        }
     }
 
     fn add(&mut self, response: &[f64], sign: f64, count: usize, unknown: &mut usize, skip: usize) {
@@ -324,15 +351,15 @@ impl Past {
         }
     }
 
-    /// Length of the longest direction.
+    /// Length of the longest direction of the past.
     pub fn lasting(&self) -> usize {
         self.directions.iter().map(Vec::len).max().unwrap_or(0)
     }
 
-    /// Values of the unknowns that make these errors smallest.
+    /// Values of the unknowns that make these errors smallest, the level's last.
     pub fn best(&self, error: &[f64]) -> Vec<f64> {
         let mut wanted: Vec<f64> =
-            self.directions.iter().map(|d| -dot(d, &error[..d.len()])).collect();
+            self.directions.iter().chain(&self.level).map(|d| -dot(d, &error[..d.len()])).collect();
         let mut values = vec![0.0; self.n_unknowns];
         for k in (0..wanted.len()).rev() {
             let (unknown, coordinates) = &self.factors[k];
@@ -349,6 +376,16 @@ impl Past {
             let part = dot(direction, &signal[..direction.len()]);
             signal.iter_mut().zip(direction).for_each(|(x, d)| *x -= part * d);
         }
+    }
+
+    /// Coordinates of the derivatives on the direction of the level.
+    pub fn level_shares(&self, made: &Derivatives) -> Vec<f64> {
+        let Some(level) = &self.level else { return Vec::new() };
+        let share = |column: &Column| {
+            let shift = column.shift.min(level.len());
+            column.sign * dot(&level[shift..], &made.signals[column.signal][..level.len() - shift])
+        };
+        made.columns.iter().map(share).collect()
     }
 }
 

@@ -59,11 +59,13 @@ fn before(word: &str, memory: Vec<Vec<f64>>) -> Result<Before, CoreError> {
 
 type Regression<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, usize, Option<usize>);
 
-/// polynomial_regression(output: NDArray[np.float64], inputs: NDArray[np.float64], lengths: list[int], orders: tuple[int, list[int], int, int, list[int], list[int]], skip: int) -> tuple[NDArray[np.float64], NDArray[np.float64], int, int | None]
+/// polynomial_regression(output: NDArray[np.float64], inputs: NDArray[np.float64], lengths: list[int], orders: tuple[int, list[int], int, int, list[int], list[int]], skip: int, levels: bool) -> tuple[NDArray[np.float64], NDArray[np.float64], int, int | None]
 ///
 /// Least squares of A y = B u + e: coefficients, triangle of [regressors | output] by columns, rows,
-/// first coefficient that the data cannot tell from those before it.
+/// first coefficient that the data cannot tell from those before it. With `levels` a constant of each
+/// record is fitted beside, and counts as a row less.
 #[pyfunction]
+#[allow(clippy::too_many_arguments)]
 fn polynomial_regression<'py>(
     py: Python<'py>,
     output: PyReadonlyArray1<'py, f64>,
@@ -71,6 +73,7 @@ fn polynomial_regression<'py>(
     lengths: Vec<usize>,
     orders: OrderTuple,
     skip: usize,
+    levels: bool,
 ) -> PyResult<Regression<'py>> {
     let n_inputs = inputs.as_array().nrows();
     let (output, inputs) = (output.as_slice()?, inputs.as_slice()?);
@@ -78,16 +81,19 @@ fn polynomial_regression<'py>(
         .detach(|| {
             let records = split(output, inputs, n_inputs, &lengths)?;
             let orders = orders_of(orders);
-            regress(&mut PredictionError::new(orders, records, Before::Rest, skip, false)?)
+            let mut problem = PredictionError::new(orders, records, Before::Rest, skip, false)?;
+            problem.levels = levels;
+            regress(&mut problem)
         })
         .map_err(from_core)?;
     let (theta, triangle) = (found.theta.into_pyarray(py), found.triangle.into_pyarray(py));
-    Ok((theta, triangle, found.n_rows, found.dependent))
+    let constants = if levels { lengths.len() } else { 0 };
+    Ok((theta, triangle, found.n_rows.saturating_sub(constants), found.dependent))
 }
 
 type End<'py> = (Bound<'py, PyArray1<f64>>, f64, Bound<'py, PyArray1<f64>>, usize, &'static str);
 
-/// polynomial_fit(output: NDArray[np.float64], inputs: NDArray[np.float64], lengths: list[int], orders: tuple[int, list[int], int, int, list[int], list[int]], starts: NDArray[np.float64], before: str, memory: list[list[float]], skip: int, stable: bool, maximum_iterations: int) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], int, str] | str]
+/// polynomial_fit(output: NDArray[np.float64], inputs: NDArray[np.float64], lengths: list[int], orders: tuple[int, list[int], int, int, list[int], list[int]], starts: NDArray[np.float64], before: str, memory: list[list[float]], levels: bool, skip: int, stable: bool, maximum_iterations: int) -> list[tuple[NDArray[np.float64], float, NDArray[np.float64], int, str] | str]
 ///
 /// Prediction-error minimum from each start: coefficients, sum of squares, triangle of the Jacobian
 /// by columns, iterations, termination; or the words of the error that stopped it.
@@ -102,6 +108,7 @@ fn polynomial_fit<'py>(
     starts: PyReadonlyArray2<'py, f64>,
     before: &str,
     memory: Vec<Vec<f64>>,
+    levels: bool,
     skip: usize,
     stable: bool,
     maximum_iterations: usize,
@@ -113,8 +120,9 @@ fn polynomial_fit<'py>(
     let (output, inputs) = (output.as_slice()?, inputs.as_slice()?);
     let known = self::before(before, memory).map_err(from_core)?;
     let records = split(output, inputs, n_inputs, &lengths).map_err(from_core)?;
-    let problem =
+    let mut problem =
         PredictionError::new(orders_of(orders), records, known, skip, stable).map_err(from_core)?;
+    problem.levels = levels;
     let options = Options { maximum_iterations, ..Options::default() };
     let found = interrupt::run_beside(py, |stop| fit_from(&problem, &starts, &options, stop))?;
     found.into_iter().map(|each| end(py, each)).collect()
@@ -137,9 +145,10 @@ fn end<'py>(py: Python<'py>, found: Result<Minimum, CoreError>) -> PyResult<Boun
     }
 }
 
-/// polynomial_errors(output: NDArray[np.float64], inputs: NDArray[np.float64], lengths: list[int], orders: tuple[int, list[int], int, int, list[int], list[int]], theta: NDArray[np.float64], before: str, memory: list[list[float]]) -> NDArray[np.float64]
+/// polynomial_errors(output: NDArray[np.float64], inputs: NDArray[np.float64], lengths: list[int], orders: tuple[int, list[int], int, int, list[int], list[int]], theta: NDArray[np.float64], before: str, memory: list[list[float]], levels: bool) -> tuple[NDArray[np.float64], list[float]]
 ///
-/// One-step prediction errors of all records, end to end.
+/// One-step prediction errors of all records, end to end, and the constant that D (A y - B/F u) of each
+/// record has: zero where none was fitted.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 fn polynomial_errors<'py>(
@@ -151,27 +160,30 @@ fn polynomial_errors<'py>(
     theta: PyReadonlyArray1<'py, f64>,
     before: &str,
     memory: Vec<Vec<f64>>,
-) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    levels: bool,
+) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<f64>)> {
     let n_inputs = inputs.as_array().nrows();
     let (output, inputs, theta) = (output.as_slice()?, inputs.as_slice()?, theta.as_slice()?);
     let known = self::before(before, memory).map_err(from_core)?;
     let found = py
         .detach(|| {
             let records = split(output, inputs, n_inputs, &lengths)?;
-            let problem = PredictionError::new(orders_of(orders), records, known, 0, false)?;
+            let mut problem = PredictionError::new(orders_of(orders), records, known, 0, false)?;
+            problem.levels = levels;
             Ok(problem.runs(theta)?.0)
         })
         .map_err(from_core)?;
+    let constants = found.iter().map(|run| 0.0 - run.level).collect();
     let errors: Vec<f64> = found.into_iter().flat_map(|run| run.error).collect();
-    Ok(errors.into_pyarray(py))
+    Ok((errors.into_pyarray(py), constants))
 }
 
-type Scanned<'py> = (Bound<'py, PyArray1<f64>>, f64, f64, usize, bool);
+type Scanned<'py> = (Bound<'py, PyArray1<f64>>, f64, usize, bool);
 
-/// scan_polynomials(output: NDArray[np.float64], inputs: NDArray[np.float64], lengths: list[int], unseen_output: NDArray[np.float64], unseen_inputs: NDArray[np.float64], unseen_lengths: list[int], orders: list[tuple[int, list[int], int, int, list[int], list[int]]], long: int, maximum_iterations: int) -> list[tuple[NDArray[np.float64], float, float, int, bool] | None]
+/// scan_polynomials(output: NDArray[np.float64], inputs: NDArray[np.float64], lengths: list[int], orders: list[tuple[int, list[int], int, int, list[int], list[int]]], long: int, maximum_iterations: int, levels: bool) -> list[tuple[NDArray[np.float64], float, int, bool] | None]
 ///
-/// Each ARX or ARMAX structure: coefficients, sum of squared prediction errors, of free-run errors on
-/// the unseen records, iterations, converged; None where its regressors are collinear.
+/// Each ARX or ARMAX structure: coefficients, sum of squared prediction errors, iterations, converged;
+/// None where its regressors are collinear.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 fn scan_polynomials<'py>(
@@ -179,32 +191,24 @@ fn scan_polynomials<'py>(
     output: PyReadonlyArray1<'py, f64>,
     inputs: PyReadonlyArray2<'py, f64>,
     lengths: Vec<usize>,
-    unseen_output: PyReadonlyArray1<'py, f64>,
-    unseen_inputs: PyReadonlyArray2<'py, f64>,
-    unseen_lengths: Vec<usize>,
     orders: Vec<OrderTuple>,
     long: usize,
     maximum_iterations: usize,
+    levels: bool,
 ) -> PyResult<Vec<Option<Scanned<'py>>>> {
     let n_inputs = inputs.as_array().nrows();
     let (output, inputs) = (output.as_slice()?, inputs.as_slice()?);
-    let (unseen_output, unseen_inputs) = (unseen_output.as_slice()?, unseen_inputs.as_slice()?);
     let work = Scan {
         records: split(output, inputs, n_inputs, &lengths).map_err(from_core)?,
-        unseen: split(unseen_output, unseen_inputs, n_inputs, &unseen_lengths)
-            .map_err(from_core)?,
         candidates: orders.into_iter().map(orders_of).collect(),
         long,
         maximum_iterations,
+        levels,
     };
     let found = interrupt::run_beside(py, |stop| scan(&work, stop))?.map_err(from_core)?;
     Ok(found
         .into_iter()
-        .map(|each| {
-            each.map(|s| {
-                (s.theta.into_pyarray(py), s.squares, s.free_run, s.iterations, s.converged)
-            })
-        })
+        .map(|each| each.map(|s| (s.theta.into_pyarray(py), s.squares, s.iterations, s.converged)))
         .collect())
 }
 

@@ -143,7 +143,9 @@ class _ArxScan:
         past = min(max(PAST), max(n // 20, 1), min(data.lengths) // 4)
         room = (n // 3 - past) // m
         span = max(min(largest + max(WINDOW), room, min(data.lengths) // 2), 2)
-        made = regress(data.output, data.inputs, data.lengths, past, [span] * m, [0] * m)
+        made = regress(
+            data.output, data.inputs, data.lengths, past, [span] * m, [0] * m, levels=data.levels
+        )
         return cls(made.triangle, made.n_rows, past, span, m)
 
     @property
@@ -209,6 +211,7 @@ class _Signals:
     output: Array
     inputs: Array
     lengths: tuple[int, ...]
+    levels: bool
 
     @property
     def spans(self) -> list[slice]:
@@ -220,7 +223,7 @@ class _Signals:
         rows = np.vstack([self.output, self.inputs])
         with np.errstate(over="ignore", invalid="ignore"):
             made = np.hstack([lfilter(top, below, rows[:, span]) for span in self.spans])
-        return _Signals(made[0], made[1:], self.lengths)
+        return _Signals(made[0], made[1:], self.lengths, self.levels)
 
 
 def _shortened(data: SampledChannels) -> _Signals:
@@ -234,14 +237,16 @@ def _shortened(data: SampledChannels) -> _Signals:
         if lengths[-1] < length:
             break
     n = sum(lengths)
-    return _Signals(data.output[:n], data.inputs[:, :n], tuple(lengths))
+    return _Signals(data.output[:n], data.inputs[:, :n], tuple(lengths), data.levels)
 
 
 def _whitened(data: _Signals) -> _Signals:
     """Signals filtered so that what a long model leaves of the output is white."""
     m, n = len(data.inputs), data.output.size
     long = max(1, min(LONG, n // (8 * (m + 1)), min(data.lengths) // 4))
-    made = regress(data.output, data.inputs, data.lengths, long, [long + 1] * m, [0] * m)
+    made = regress(
+        data.output, data.inputs, data.lengths, long, [long + 1] * m, [0] * m, levels=data.levels
+    )
     # The longer an ARX model, the more its A is the inverse of the noise model alone.
     return data.filtered(np.concatenate([[1.0], made.shortest[:long]]), np.ones(1))
 
@@ -270,7 +275,14 @@ def _output_error(
         if not np.all(np.isfinite(flat.output)):
             break
         made = regress(
-            flat.output, flat.inputs, flat.lengths, order, [order] * m, list(delays), skip
+            flat.output,
+            flat.inputs,
+            flat.lengths,
+            order,
+            [order] * m,
+            list(delays),
+            skip,
+            levels=flat.levels,
         )
         # Started from whatever state: only a simulation from rest would have to know it.
         before, criterion = criterion, _criterion(made.sum_of_squares, made.n_rows, made.theta.size)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -290,7 +290,7 @@ def _until_ended(
 
 
 def _lagged(data: SampledChannels, n: int) -> LinearRegression:
-    return regress_lags(data.output, data.inputs, data.lengths, n, n - 1)
+    return regress_lags(data.output, data.inputs, data.lengths, n, n - 1, levels=data.levels)
 
 
 def _ends(values: Array, covariance: Array, count: int) -> bool:
@@ -340,7 +340,7 @@ def _shifted(data: SampledChannels, negative: int) -> SampledChannels:
     output = np.concatenate([data.output[span] for span in keep])
     inputs = np.concatenate([data.inputs[:, span] for span in late], axis=1)
     lengths = tuple(length - negative for length in data.lengths)
-    return SampledChannels(output, inputs, lengths, data.offsets, data.units, data.sample_time_s)
+    return replace(data, output=output, inputs=inputs, lengths=lengths)
 
 
 def _estimate(
@@ -352,12 +352,16 @@ def _estimate(
             left[span] -= lfilter(start[i * n : (i + 1) * n], [1.0], row[span])
     inside = np.concatenate([left[span][n - 1 :] for span in data.spans])
     lengths = [length - n + 1 for length in data.lengths]
-    noise = regress(inside, np.empty((0, inside.size)), lengths, WHITENER, [], []).shortest
+    noise = regress(
+        inside, np.empty((0, inside.size)), lengths, WHITENER, [], [], levels=data.levels
+    ).shortest
     whitener = np.concatenate([[1.0], noise])
     signals = np.vstack([data.output, data.inputs])
     for span in data.spans:
         signals[:, span] = lfilter(whitener, [1.0], signals[:, span])
-    final = regress_lags(signals[0], signals[1:], data.lengths, n, n - 1 + WHITENER)
+    final = regress_lags(
+        signals[0], signals[1:], data.lengths, n, n - 1 + WHITENER, levels=data.levels
+    )
     if final.dependent is not None:
         raise DataError(
             "the inputs do not determine the response at every lag",

@@ -15,7 +15,9 @@ from flightid.identification.prediction_error.coloured_errors import (
     has_noise_model,
     output_error_covariance,
 )
+from flightid.identification.prediction_error.findings import NOISE_AT_CIRCLE
 from flightid.identification.prediction_error.part_blocks import errors_at, part_blocks
+from flightid.identification.prediction_error.roots import farthest
 from flightid.identification.residual_evidence import NOTHING, least_gain
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
@@ -115,6 +117,11 @@ def compared(
         )
         if not tests.is_white and not shares_poles(structure):
             found = _by_colour(structure, data, found, agreed.covariance, blocks)
+    first = structure.na + sum(structure.nb)
+    of_c = slice(first, first + structure.nc)
+    noise = np.concatenate([[1.0], found.theta[of_c]])
+    if structure.nc and farthest(noise, plain[of_c, of_c]) >= 1.0:
+        return replace(found, covariance=None, reason=NOISE_AT_CIRCLE)
     tests = judged_tests(tests, data, found, errors)
     if not has_noise_model(structure) and _tells_nothing(data, errors, plain):
         return replace(found, covariance=None, reason=NOTHING)

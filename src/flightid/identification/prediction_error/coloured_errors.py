@@ -68,11 +68,12 @@ def output_error_covariance(
     size = float(np.sqrt(errors @ errors / errors.size)) or 1.0
     blocks = []
     for span in data.spans:
+        level = np.ones((errors[span].size, int(data.levels)))
         shared, own = _sensitivities(
-            structure, theta, data.inputs[:, span], data.output[span] - errors[span]
+            structure, theta, data.inputs[:, span], data.output[span] - errors[span], level
         )
-        if structure.initial_state != "estimate" or structure.backcast or skip:
-            own = own[:, :0]
+        if structure.past != "estimate" or skip:
+            own = level
         blocks.append(
             RecordBlock.of(
                 shared[None, skip:] / size, own[None, skip:], errors[None, span][:, skip:] / size
@@ -83,9 +84,9 @@ def output_error_covariance(
 
 
 def _sensitivities(
-    structure: PolynomialStructure, theta: Array, inputs: Array, modelled: Array
+    structure: PolynomialStructure, theta: Array, inputs: Array, modelled: Array, level: Array
 ) -> tuple[Array, Array]:
-    """Derivatives of the output by the coefficients, and directions of what was before.
+    """Derivatives of the output by the coefficients; directions of what was before and of levels.
 
     ŷᵢ = Bᵢ/Fᵢ uᵢ: ∂ŷᵢ/∂b_k = q⁻ᵏ/Fᵢ uᵢ and ∂ŷᵢ/∂f_k = −q⁻ᵏ/Fᵢ ŷᵢ. What was before a record runs out
     as impulses through 1/Fᵢ; each ŷᵢ holds its part of that.
@@ -99,7 +100,7 @@ def _sensitivities(
         impulses = np.zeros((n, reach))
         impulses[np.arange(reach), np.arange(reach)] = 1.0
         starts.append(lfilter([1.0], f, impulses, axis=0))
-    own = np.concatenate(starts, axis=1)
+    own = np.concatenate([*starts, level], axis=1)
     shares = np.linalg.lstsq(own, modelled - np.sum(driven, axis=0), rcond=INDEPENDENT)[0]
     of_b, of_f, first = [], [], 0
     for i, (row, b, f) in enumerate(zip(inputs, numerators, denominators, strict=True)):

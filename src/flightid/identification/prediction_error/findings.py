@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from flightid.conventions import Light
@@ -27,9 +26,8 @@ HARDLY_SEEN = 0.5
 """Largest share by which a pole and its zero may change the response anywhere and still be said to
 cancel; a pair that may change it by more was not shown to."""
 
-CANCELLATION, PAIR_AT_ONE = "pole-zero-cancellation", "pole-zero-at-one"
-NEEDLESS = frozenset({CANCELLATION, PAIR_AT_ONE})
-"""Codes of findings that say a pole and a zero too many."""
+NOISE_AT_CIRCLE = "a root of C may lie on the unit circle, where errors to first order do not hold"
+CANCELLATION = "pole-zero-cancellation"
 
 
 def judge_polynomial(
@@ -39,11 +37,12 @@ def judge_polynomial(
     roots: Sequence[FittedRoot],
     minima: Sequence[LocalMinimum],
     n_samples: int,
+    reason: str = "",
 ) -> tuple[Finding, ...]:
     """All verdicts that the fit itself allows; residual tests say more."""
     return (
         *_ending(minima),
-        *_circle(model),
+        *_circle(model, reason),
         *_stability(structure, model),
         *(() if structure.kernel else _cancellation(model, roots)),
         *_overfit(structure, parameters, n_samples),
@@ -76,20 +75,16 @@ def _ending(minima: Sequence[LocalMinimum]) -> list[Finding]:
     return found
 
 
-def _circle(model: PolynomialModel) -> list[Finding]:
-    rows = {"C": model.c, **{f"F of {u}": f for u, f in zip(model.inputs, model.f, strict=True)}}
-    found = []
-    for letter, row in rows.items():
-        if np.max(np.abs(polynomial_roots(np.asarray(row))), initial=0.0) > 1.0 - AT_CIRCLE:
-            found.append(
-                Finding(
-                    "root-at-circle",
-                    Light.AMBER,
-                    f"a root of {letter} lies at the unit circle, where intervals do not hold",
-                    "difference or detrend the data less, or lower the order",
-                )
-            )
-    return found
+def _circle(model: PolynomialModel, reason: str) -> list[Finding]:
+    action = "difference or detrend the data less, or lower the order"
+    found = [
+        f"a root of F of {name} lies at the unit circle, where intervals do not hold"
+        for name, row in zip(model.inputs, model.f, strict=True)
+        if np.max(np.abs(polynomial_roots(np.asarray(row))), initial=0.0) > 1.0 - AT_CIRCLE
+    ]
+    if reason == NOISE_AT_CIRCLE:
+        found.append(f"{reason}: they have no intervals")
+    return [Finding("root-at-circle", Light.AMBER, words, action) for words in found]
 
 
 def _stability(structure: PolynomialStructure, model: PolynomialModel) -> list[Finding]:
@@ -145,17 +140,6 @@ def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[F
             spread = QUANTILE * float(np.sqrt(widest))
             seen = (abs(gap) + spread) / abs(1.0 - abs(pole.z))
             together = statistic < chdtri(n, 0.05)
-            if together and seen >= HARDLY_SEEN and _is_at_one(pole, covariance):
-                found.append(
-                    Finding(
-                        PAIR_AT_ONE,
-                        Light.AMBER,
-                        f"{pole.response}: pole {pole.z:.4g} and zero {zero.z:.4g} lie together at "
-                        "z = 1 within their errors: they fit an offset or a drift, and leave the "
-                        "steady gain open",
-                        "lower na or nf and nb by 1",
-                    )
-                )
             if together and seen < HARDLY_SEEN:
                 found.append(
                     Finding(
@@ -167,13 +151,6 @@ def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[F
                     )
                 )
     return found
-
-
-def _is_at_one(root: FittedRoot, covariance: NDArray[np.float64]) -> bool:
-    rate = root.gradient
-    if rate is None or root.z.imag != 0.0:
-        return False
-    return bool(abs(root.z - 1.0) < QUANTILE * np.sqrt(rate.real @ covariance @ rate.real))
 
 
 def _overfit(

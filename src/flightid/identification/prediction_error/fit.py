@@ -41,7 +41,11 @@ from flightid.identification.prediction_error.linear_regression import (
     regress,
     require_independent,
 )
-from flightid.identification.prediction_error.part_blocks import BEFORE, errors_at
+from flightid.identification.prediction_error.part_blocks import (
+    BEFORE,
+    about_levels,
+    errors_at,
+)
 from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
 from flightid.identification.prediction_error.starts import polynomial_starts
 from flightid.identification.residual_evidence import nothing_told
@@ -103,7 +107,14 @@ def _regression(structure: PolynomialStructure, data: SampledChannels) -> Search
     """ARX: linear in the coefficients, so no iteration."""
     skip = 0 if structure.initial_state == "zero" else structure.longest_lag
     made = regress(
-        data.output, data.inputs, data.lengths, structure.na, structure.nb, structure.nk, skip
+        data.output,
+        data.inputs,
+        data.lengths,
+        structure.na,
+        structure.nb,
+        structure.nk,
+        skip,
+        levels=data.levels,
     )
     degrees = made.n_rows - made.theta.size
     if structure.kernel is not None:
@@ -147,6 +158,7 @@ def _iterate(
         starts,
         BEFORE[structure.past],
         memory,
+        data.levels,
         skip,
         structure.enforce_stability,
         structure.maximum_iterations,
@@ -160,12 +172,12 @@ def _iterate(
         )
     ends.sort(key=lambda end: end[1])
     theta, squares, flat, iterations, _ = ends[0]
-    unknown = 0
+    unknown = len(data.lengths) * data.levels
     if structure.past == "estimate":
         of_inputs, of_noise = _native.polynomial_memory(structure.native)
-        unknown = len(data.lengths) * (sum(of_inputs) + of_noise)
+        unknown += len(data.lengths) * (sum(of_inputs) + of_noise)
     if structure.is_regression:
-        unknown = len(data.lengths) * skip
+        unknown = len(data.lengths) * (skip + data.levels)
     degrees = max(data.output.size - unknown - theta.size, 1)
     factor = flat.reshape(theta.size, theta.size).T
     covariance = None
@@ -202,7 +214,8 @@ def _backcast_rounds(structure: PolynomialStructure, data: SampledChannels) -> S
     found = _iterate(structure, data, starts, memory)
     for _ in range(BACKCASTS):
         model = PolynomialModel.from_theta(structure, found.theta, data.sample_time_s)
-        after = _iterate(structure, data, found.theta[None], backcast(model, data))
+        about = about_levels(structure, data, found.memory, found.theta)
+        after = _iterate(structure, data, found.theta[None], backcast(model, about))
         moved = np.abs(after.theta - found.theta)
         found = replace(after, minima=(*after.minima[:1], *found.minima[1:]))
         if found.covariance is None or np.all(
@@ -218,6 +231,7 @@ def _assemble(
     data: SampledChannels,
     found: SearchResult,
 ) -> Fit:
+    data = about_levels(structure, data, found.memory, found.theta)
     errors = errors_at(structure, data, found.memory, found.theta)
     counted = tuple(errors[span][found.skip :] for span in data.spans)
     tests = tests_of(structure, data, counted, found.skip)
@@ -267,7 +281,7 @@ def _assemble(
         iterations=found.iterations,
         noise_covariance=np.array([[squares / found.degrees]]),
         findings=(
-            *judge_polynomial(structure, model, parameters, roots, minima, n_counted),
+            *judge_polynomial(structure, model, parameters, roots, minima, n_counted, found.reason),
             *colour_findings(*found.colour),
             *tests.findings(
                 biased=shares_poles(structure),

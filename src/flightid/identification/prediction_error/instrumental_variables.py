@@ -38,7 +38,13 @@ def four_stage(
     Ljung, *System Identification*, 2nd ed., section 15.3, eqs. 15.20 to 15.27.
     """
     first = regress(
-        data.output, data.inputs, data.lengths, structure.na, structure.nb, structure.nk
+        data.output,
+        data.inputs,
+        data.lengths,
+        structure.na,
+        structure.nb,
+        structure.nk,
+        levels=data.levels,
     ).shortest
     second, _ = _instruments(structure, data, first, np.ones(1))
     left = _left(structure, data, second)
@@ -46,7 +52,7 @@ def four_stage(
     # Longer than Ljung's na + nb: what a short noise model leaves coloured falsifies the intervals.
     room = sum(data.lengths) // ROWS_PER_LAG
     degree = min(structure.na + max(structure.nb, default=0) + SPARE_LAGS, max(room, 1))
-    noise = regress(left, none, data.lengths, degree, [], []).shortest
+    noise = regress(left, none, data.lengths, degree, [], [], levels=data.levels).shortest
     return _instruments(structure, data, second, np.concatenate([[1.0], noise]))
 
 
@@ -83,6 +89,12 @@ def _instruments(
     regressors = _columns(structure, data, signals[0], signals[2:], start)
     instruments = _columns(structure, data, signals[1], signals[2:], start)
     target = np.concatenate([signals[0][span][start:] for span in data.spans])
+    ends = np.cumsum([n - start for n in data.lengths])[:-1]
+    if data.levels:
+        about = (np.split(part, ends) for part in (regressors, instruments, target))
+        regressors, instruments, target = (
+            np.concatenate([row - row.mean(axis=0) for row in rows]) for rows in about
+        )
     product = instruments.T @ regressors
     scale = np.outer(np.linalg.norm(instruments, axis=0), np.linalg.norm(regressors, axis=0))
     if np.any(scale == 0.0) or np.linalg.cond(product / scale) > 1e13:
@@ -92,7 +104,6 @@ def _instruments(
             action="lower the orders or use a richer input",
         )
     found = np.linalg.solve(product, instruments.T @ target)
-    ends = np.cumsum([n - start for n in data.lengths])[:-1]
     parts = (instruments, regressors, target - regressors @ found)
     return found, instrumental_covariance(*(np.split(part, ends) for part in parts))
 

@@ -63,20 +63,25 @@ def regress(
     nb: Sequence[int],
     nk: Sequence[int],
     skip: int | None = None,
+    *,
+    levels: bool = False,
 ) -> LinearRegression:
-    """Fit A y = Σ B u + e; rows whose lags reach before a record are left out by default."""
+    """Fit A y = Σ B u + e, with `levels` a constant of each record too, which is not shown.
+
+    Rows whose lags reach before a record are left out by default.
+    """
     spans = [n + k - 1 for n, k in zip(nb, nk, strict=True) if n]
     orders = (na, list(nb), 0, 0, [0] * len(nb), list(nk))
     first = max([na, *spans]) if skip is None else skip
     theta, flat, n_rows, dependent = _native.polynomial_regression(
-        output, np.ascontiguousarray(inputs), list(lengths), orders, first
+        output, np.ascontiguousarray(inputs), list(lengths), orders, first, levels
     )
     width = theta.size + 1
     return LinearRegression(theta, flat.reshape(width, width).T, n_rows, dependent)
 
 
 def regress_lags(
-    output: Array, inputs: Array, lengths: Sequence[int], n: int, skip: int
+    output: Array, inputs: Array, lengths: Sequence[int], n: int, skip: int, *, levels: bool
 ) -> LinearRegression:
     """Fit y = Σ B u + e, every B of `n` coefficients from lag 0, with `skip` from n - 1 rows out.
 
@@ -85,20 +90,23 @@ def regress_lags(
     """
     count = len(inputs)
     if n * count < MANY:
-        return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip)
+        return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip, levels=levels)
     products = np.zeros((n * count + 1, n * count + 1))
     start, rows = 0, 0
     for length in lengths:
         span = slice(start, start + length)
         products += _products(output[span], inputs[:, span], n, skip)
-        start, rows = start + length, rows + length - skip
+        if levels:
+            sums = _sums(output[span], inputs[:, span], n, skip)
+            products -= np.outer(sums, sums) / (length - skip)
+        start, rows = start + length, rows + length - skip - levels
     scale = np.sqrt(np.diag(products))
     try:
         lower = np.linalg.cholesky(products / np.outer(scale, scale))
     except np.linalg.LinAlgError:
         lower = np.zeros((1, 1))
     if not np.diag(lower).min() > FEWEST_DIGITS:
-        return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip)
+        return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip, levels=levels)
     triangle = (scale[:, None] * lower).T
     theta = -solve_triangular(triangle[:-1, :-1], triangle[:-1, -1])
     return LinearRegression(np.asarray(theta), triangle, rows, None)
@@ -127,6 +135,14 @@ def _products(output: Array, inputs: Array, n: int, skip: int) -> Array:
             found[mine, j * n : (j + 1) * n] = block
             found[j * n : (j + 1) * n, mine] = block.T
     return found
+
+
+def _sums(output: Array, inputs: Array, n: int, skip: int) -> Array:
+    """Sums of [-lagged inputs | output] of one record, from row `skip`."""
+    sums = np.concatenate([np.zeros((len(inputs), 1)), np.cumsum(inputs, axis=1)], axis=1)
+    lag, last = np.arange(n), output.size
+    lagged = sums[:, last - lag] - sums[:, skip - lag]
+    return np.concatenate([-lagged.ravel(), [output[skip:].sum()]])
 
 
 def inverse_square(factor: Array) -> Array:

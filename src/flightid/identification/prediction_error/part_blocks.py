@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,17 +26,55 @@ def errors_at(
 
     `memory` is the past of each record where it was given.
     """
-    return np.asarray(
-        _native.polynomial_errors(
-            data.output,
-            data.inputs,
-            list(data.lengths),
-            structure.native,
-            theta,
-            BEFORE[structure.past],
-            memory,
-        )
+    return _run(structure, data, memory, theta)[0]
+
+
+def _run(
+    structure: PolynomialStructure, data: SampledChannels, memory: list[list[float]], theta: Array
+) -> tuple[Array, list[float]]:
+    return _native.polynomial_errors(
+        data.output,
+        data.inputs,
+        list(data.lengths),
+        structure.native,
+        theta,
+        BEFORE[structure.past],
+        memory,
+        data.levels,
     )
+
+
+def about_levels(
+    structure: PolynomialStructure, data: SampledChannels, memory: list[list[float]], theta: Array
+) -> SampledChannels:
+    """The channels about a point on the model's steady line, in place of their means.
+
+    The constant of A y = Σ B/F u + C/D e moves the output's offset; where it would leave the range
+    that the record shows, as of an integrator that an input's offset drives, it moves the inputs'.
+    """
+    if not data.levels:
+        return data
+    _, constants = _run(structure, data, memory, theta)
+    counts = [structure.na, *structure.nb, structure.nc, structure.nd, *structure.nf]
+    parts = np.split(theta, np.cumsum(counts)[:-1])
+    m = len(structure.inputs)
+    noise, steady = 1.0 + parts[m + 2].sum(), 1.0 + parts[0].sum()
+    below = [1.0 + each.sum() for each in parts[m + 3 :]]
+    slopes = np.array([b.sum() / f for b, f in zip(parts[1 : m + 1], below, strict=True)])
+    output, inputs, offsets = data.output.copy(), data.inputs.copy(), []
+    for span, constant, before in zip(data.spans, constants, data.offsets, strict=True):
+        reach, moved = float(np.ptp(output[span])), np.zeros(m)
+        level = constant / (noise * steady) if noise * steady else np.inf
+        if abs(level) > reach:
+            level = 0.0
+            weights = slopes * np.var(inputs[:, span], axis=1)
+            if structure.nd == 0 and weights @ slopes > 0.0:
+                moved = -constant / (weights @ slopes) * weights
+        output[span] -= level
+        inputs[:, span] -= moved[:, None]
+        moves = {structure.output: level, **dict(zip(structure.inputs, moved, strict=True))}
+        offsets.append({name: value + float(moves[name]) for name, value in before.items()})
+    return replace(data, output=output, inputs=inputs, offsets=tuple(offsets))
 
 
 def part_blocks(

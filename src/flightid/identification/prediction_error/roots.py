@@ -13,6 +13,7 @@ from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.sampled.discrete_modes import discrete_modes, zero_note
 from flightid.responses.pair import quotient_unit
 from flightid.uncertainty.estimate import Estimate, Reading, first_order
+from flightid.uncertainty.quantiles import half_width
 from flightid.uncertainty.roots import UncertainRoot
 
 Array = NDArray[np.float64]
@@ -226,6 +227,23 @@ def propagated(
         return Estimate(name, value, unit, None, reason, status="derived")
     variance = float(gradient @ errors.covariance @ gradient)
     return derived(first_order(name, value, unit, variance, errors.degrees))
+
+
+def farthest(polynomial: Array, covariance: Array) -> float:
+    """Largest size of a root, a 95 % half-width further out, by the coefficients after the first.
+
+    Example
+    -------
+    >>> round(farthest(np.array([1.0, -0.9]), np.array([[0.01**2]])), 4)
+    0.9196
+    """
+    slope, reach = np.polyder(polynomial), 0.0
+    for z in np.roots(polynomial):
+        rate = -(z ** np.arange(polynomial.size - 2, -1, -1)) / (np.polyval(slope, z) or np.inf)
+        outwards = np.real(np.conj(z) / (abs(z) or 1.0) * rate)
+        spread = np.sqrt(max(float(outwards @ covariance @ outwards), 0.0))
+        reach = max(reach, abs(z) + half_width() * spread)
+    return float(reach)
 
 
 def fitted_gains(model: PolynomialModel, degrees: float) -> dict[str, Estimate]:

@@ -64,7 +64,13 @@ def _long_model(
     room = min(sum(data.lengths) // (4 * (n_inputs + 1)), shortest // 3)
     length = max(1, min(20 + 2 * degree, room))
     model = regress(
-        data.output, data.inputs, data.lengths, length, [length] * n_inputs, structure.nk
+        data.output,
+        data.inputs,
+        data.lengths,
+        length,
+        [length] * n_inputs,
+        structure.nk,
+        levels=data.levels,
     )
     theta = model.shortest
     a = np.concatenate([[1.0], theta[:length]])
@@ -112,13 +118,21 @@ def _with_innovations(
     """Second stage: the estimated innovations stand in for the noise as one more input."""
     inputs = np.vstack([data.inputs, innovations])
     nb, nk = [*structure.nb, structure.nc], [*structure.nk, 1]
-    theta = regress(data.output, inputs, data.lengths, structure.na, nb, nk).shortest
+    theta = regress(
+        data.output, inputs, data.lengths, structure.na, nb, nk, levels=data.levels
+    ).shortest
     return _Plant(*_split(structure, theta), _empty(structure))
 
 
 def _plain(structure: PolynomialStructure, data: SampledChannels) -> _Plant:
     theta = regress(
-        data.output, data.inputs, data.lengths, structure.na, structure.nb, structure.nk
+        data.output,
+        data.inputs,
+        data.lengths,
+        structure.na,
+        structure.nb,
+        structure.nk,
+        levels=data.levels,
     ).shortest
     return _Plant(*_split(structure, theta), _empty(structure))
 
@@ -133,21 +147,34 @@ def _reduced(long_a: Array, long_b: Array, nb: int, nf: int) -> tuple[Array, Arr
     size = np.max(np.abs(response))
     if nb == 0 or not np.isfinite(size) or size == 0.0 or abs(response[-1]) > 0.5 * size:
         return np.pad(long_b[:nb], (0, max(nb - len(long_b), 0))), np.zeros(nf)
-    return _steiglitz_mcbride(response, pulse[None], [length], [nb], nf, [0])
+    return _steiglitz_mcbride(response, pulse[None], [length], [nb], nf, [0], levels=False)
 
 
 def _filtered(structure: PolynomialStructure, data: SampledChannels) -> _Plant:
     """One denominator for all inputs, from the data themselves."""
     nf = max(structure.nf)
     b, f = _steiglitz_mcbride(
-        data.output, data.inputs, list(data.lengths), list(structure.nb), nf, list(structure.nk)
+        data.output,
+        data.inputs,
+        list(data.lengths),
+        list(structure.nb),
+        nf,
+        list(structure.nk),
+        levels=data.levels,
     )
     rows = list(np.split(b, np.cumsum(structure.nb)[:-1]))
     return _Plant(np.zeros(structure.na), rows, [f[:n] for n in structure.nf])
 
 
 def _steiglitz_mcbride(
-    output: Array, inputs: Array, lengths: list[int], nb: list[int], nf: int, nk: list[int]
+    output: Array,
+    inputs: Array,
+    lengths: list[int],
+    nb: list[int],
+    nf: int,
+    nk: list[int],
+    *,
+    levels: bool,
 ) -> tuple[Array, Array]:
     """Numerators end to end and denominator of an output-error model, by repeated prefilters."""
     f = np.zeros(nf)
@@ -161,7 +188,9 @@ def _steiglitz_mcbride(
         # Filters at the edge of stability leave no equations: what was found before stands.
         if not np.max(np.abs(signals)) < LARGEST:
             break
-        theta = regress(signals[0], signals[1:], lengths, nf, nb, nk, skip=0).shortest
+        theta = regress(
+            signals[0], signals[1:], lengths, nf, nb, nk, skip=0, levels=levels
+        ).shortest
         f, b = theta[:nf], theta[nf:]
     return b, f
 
@@ -182,11 +211,13 @@ def _noise(
         left[span] = part
     none = np.empty((0, left.size))
     length = max(1, min(20 + 2 * (nc + nd), min(data.lengths) // 4))
-    long_d = regress(left, none, data.lengths, length, [], []).shortest
+    long_d = regress(left, none, data.lengths, length, [], [], levels=data.levels).shortest
     innovations = np.concatenate(
         [lfilter(np.concatenate([[1.0], long_d]), [1.0], left[span]) for span in data.spans]
     )
-    theta = regress(left, innovations[None], data.lengths, nd, [nc], [1]).shortest
+    theta = regress(
+        left, innovations[None], data.lengths, nd, [nc], [1], levels=data.levels
+    ).shortest
     return theta[nd:], theta[:nd]
 
 

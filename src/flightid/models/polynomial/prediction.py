@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 def one_step_errors(model: Polynomials, output: Array, inputs: Array, initial_state: str) -> Array:
     """Prediction errors one step ahead, shape (n_samples,), of deviations from trim."""
-    return _native.polynomial_errors(
+    errors, _ = _native.polynomial_errors(
         output,
         np.ascontiguousarray(inputs),
         [output.size],
@@ -22,7 +22,9 @@ def one_step_errors(model: Polynomials, output: Array, inputs: Array, initial_st
         model.theta,
         "unknown" if initial_state == "estimate" else "rest",
         [],
+        False,
     )
+    return errors
 
 
 def ahead(

@@ -49,6 +49,8 @@ class SampledChannels:
         What was taken off, by channel, for each record.
     units : mapping of str to str
     sample_time_s : float
+    levels : bool
+        Whether a constant of each record is left to be fitted: a mean is no trim.
 
     Example
     -------
@@ -64,6 +66,7 @@ class SampledChannels:
     offsets: tuple[Mapping[str, float], ...]
     units: Mapping[str, str]
     sample_time_s: float
+    levels: bool = False
 
     @property
     def spans(self) -> tuple[slice, ...]:
@@ -147,7 +150,9 @@ def gather_channels(
     ]
     stacked = np.array(rows[1:]).reshape(len(inputs), rows[0].size)
     lengths = tuple(record.n_samples for record in records)
-    return SampledChannels(rows[0], stacked, lengths, removed, units, first.sample_time_s)
+    return SampledChannels(
+        rows[0], stacked, lengths, removed, units, first.sample_time_s, offsets == "mean"
+    )
 
 
 def require_same(model: SampledModel, units: Mapping[str, str], sample_time_s: float) -> None:

@@ -18,6 +18,7 @@ from flightid.identification.narx.free_run_choice import LINEAR
 from flightid.identification.prediction.predict import predict
 from flightid.identification.prediction.request import usual_stretch
 from flightid.identification.prediction_error.information_criteria import Criteria, criteria
+from flightid.identification.prediction_error.part_blocks import about_levels
 from flightid.models.model import Model
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.orders import ANY, USED, ScanOptions
@@ -232,12 +233,10 @@ def _native_trials(
             data.output,
             data.inputs,
             list(data.lengths),
-            check.output,
-            check.inputs,
-            list(check.lengths),
             [s.native for s in structures],
             long,
             ITERATIONS,
+            data.levels,
         )
     skip = _common_skip(structures)
     n = sum(length - skip for length in data.lengths)
@@ -246,13 +245,13 @@ def _native_trials(
         if each is None:
             trials.append(OrderTrial(structure, None, None, None, None, "collinear regressors"))
             continue
-        theta, squares, _, _, converged = each
+        theta, squares, _, converged = each
         model = PolynomialModel.from_theta(
             structure,
             theta,
             data.sample_time_s,
             units=data.units,
-            operating_point=data.operating_point,
+            operating_point=about_levels(structure, data, [], theta).operating_point,
         )
         measures = criteria(squares, n, structure.n_parameters)
         note = "" if converged else "not converged"

@@ -19,13 +19,13 @@ fn orders(a: usize, b: usize, c: usize, delay: usize) -> Orders {
 }
 
 fn scanned(candidates: Vec<Orders>) -> Vec<Option<Scanned>> {
-    let ((y, u), (y2, u2)) = (flown(1, 1000), flown(2, 800));
+    let (y, u) = flown(1, 1000);
     let work = Scan {
         records: vec![Samples { output: &y, inputs: vec![&u] }],
-        unseen: vec![Samples { output: &y2, inputs: vec![&u2] }],
         candidates,
         long: 25,
         maximum_iterations: 60,
+        levels: true,
     };
     scan(&work, &|| false).unwrap()
 }
@@ -39,6 +39,7 @@ fn columns_of_the_large_triangle_give_each_regression() {
         let samples = Samples { output: &y, inputs: vec![&u] };
         let mut alone =
             PredictionError::new(each.clone(), vec![samples], Before::Rest, 5, false).unwrap();
+        alone.levels = true;
         let direct = regress(&mut alone).unwrap();
         let width = direct.theta.len() + 1;
         let squares = direct.triangle[width * width - 1].powi(2);
@@ -53,11 +54,12 @@ fn columns_of_the_large_triangle_give_each_regression() {
 fn refined_structures_reach_the_minimum_of_the_full_fit() {
     let found = scanned(vec![orders(2, 2, 1, 1), orders(1, 1, 1, 1)]);
     let best = found[0].as_ref().unwrap();
-    assert!(best.converged && best.free_run < found[1].as_ref().unwrap().free_run);
+    assert!(best.converged && best.squares < found[1].as_ref().unwrap().squares);
     let (y, u) = flown(1, 1000);
     let samples = Samples { output: &y, inputs: vec![&u] };
-    let whole =
+    let mut whole =
         PredictionError::new(orders(2, 2, 1, 1), vec![samples], Before::Rest, 3, false).unwrap();
+    whole.levels = true;
     let ends = fit_from(&whole, std::slice::from_ref(&best.theta), &Options::default(), &|| false);
     let end = ends[0].as_ref().unwrap();
     assert!((best.squares / end.cost - 1.0).abs() < 1e-4);
@@ -74,6 +76,7 @@ fn normal_equations_are_those_of_the_jacobian() {
     let mut problem =
         PredictionError::new(orders(2, 2, 2, 1), vec![samples], Before::Rest, 4, false).unwrap();
     let mut made = [vec![0.0; 49], vec![0.0; 49]];
+    problem.levels = true;
     for (triangle, fast) in made.iter_mut().zip([false, true]) {
         problem.fast = fast;
         assert!(problem.triangle(&theta, triangle).unwrap());
@@ -95,10 +98,10 @@ fn collinear_columns_and_short_records_are_told() {
     let (y, _) = flown(1, 300);
     let work = |long| Scan {
         records: vec![Samples { output: &y, inputs: vec![&y] }],
-        unseen: vec![Samples { output: &y, inputs: vec![&y] }],
         candidates: vec![orders(1, 1, 0, 1), orders(1, 0, 0, 1)],
         long,
         maximum_iterations: 5,
+        levels: false,
     };
     let found = scan(&work(10), &|| false).unwrap();
     assert!(found[0].is_none() && found[1].is_some());

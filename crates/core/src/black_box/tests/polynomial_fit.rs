@@ -12,9 +12,10 @@ fn general() -> (Orders, Vec<f64>) {
 }
 
 /// The triangle must be that of finite differences: RᵀR = JᵀJ and Rᵀ(Qᵀr) = Jᵀr.
-fn compare_with_differences(before: Before, tolerance: f64) {
+fn compare_with_differences(before: Before, levels: bool, tolerance: f64) {
     let (orders, theta) = general();
-    let channels: Vec<Vec<f64>> = (0..6).map(|k| noise(k, 900)).collect();
+    let mut channels: Vec<Vec<f64>> = (0..6).map(|k| noise(k, 900)).collect();
+    channels[0].iter_mut().for_each(|y| *y += 3.0);
     let record = |k: usize| Samples {
         output: &channels[3 * k],
         inputs: vec![&channels[3 * k + 1], &channels[3 * k + 2]],
@@ -22,6 +23,7 @@ fn compare_with_differences(before: Before, tolerance: f64) {
     let n = theta.len();
     let mut problem =
         PredictionError::new(orders, vec![record(0), record(1)], before, 3, false).unwrap();
+    problem.levels = levels;
     let m = problem.n_residuals();
     let mut residuals = vec![0.0; m];
     let mut triangle = vec![0.0; (n + 1) * (n + 1)];
@@ -58,12 +60,38 @@ fn compare_with_differences(before: Before, tolerance: f64) {
 
 #[test]
 fn derivatives_from_rest_are_exact() {
-    compare_with_differences(Before::Rest, 1e-6);
+    compare_with_differences(Before::Rest, false, 1e-6);
 }
 
 #[test]
 fn the_gradient_is_exact_where_the_past_is_fitted() {
-    compare_with_differences(Before::Unknown, 1e-3);
+    compare_with_differences(Before::Unknown, false, 1e-3);
+}
+
+#[test]
+fn the_gradient_is_exact_where_a_level_is_fitted() {
+    compare_with_differences(Before::Unknown, true, 1e-3);
+    compare_with_differences(Before::Rest, true, 1e-3);
+}
+
+#[test]
+fn a_level_is_found_beside_the_coefficients_and_costs_nothing_else() {
+    let u: Vec<f64> = (0..300).map(|t| f64::from((t * t) % 11) - 5.0).collect();
+    let orders = Orders { a: 0, b: vec![1], c: 0, d: 0, f: vec![1], delays: vec![1] };
+    for before in [Before::Unknown, Before::Rest] {
+        let mut y = vec![0.0; 300];
+        for t in 1..300 {
+            y[t] = 0.8 * y[t - 1] + 2.0 * u[t - 1];
+        }
+        y.iter_mut().for_each(|value| *value += 7.0);
+        let record = Samples { output: &y, inputs: vec![&u] };
+        let mut problem =
+            PredictionError::new(orders.clone(), vec![record], before, 0, false).unwrap();
+        problem.levels = true;
+        let (runs, _) = problem.runs(&[2.0, -0.8]).unwrap();
+        assert!((runs[0].level + 7.0).abs() < 1e-9, "{}", runs[0].level);
+        assert!(norm(&runs[0].error) < 1e-9);
+    }
 }
 
 #[test]
@@ -71,7 +99,8 @@ fn a_past_that_is_given_enters_the_errors_and_their_derivatives() {
     let (orders, _) = general();
     let (inputs, of_noise) = orders.memory();
     let count = inputs.iter().sum::<usize>() + of_noise;
-    compare_with_differences(Before::Given(vec![noise(20, count), noise(21, count)]), 1e-6);
+    let given = Before::Given(vec![noise(20, count), noise(21, count)]);
+    compare_with_differences(given, false, 1e-6);
 }
 
 #[test]
