@@ -212,3 +212,19 @@ def test_pictures() -> None:
     )
     made = pictures.mismatch_envelopes(validation.mismatch(LAG, response))
     assert len(made.data) == 6
+
+
+def test_a_hold_that_moves_no_fit_asks_for_nothing() -> None:
+    """A slow sweep looks alike under every hold; steps of two seconds do not."""
+    model = fid.load_model("rate_first_order").with_values({"Lp": -4.0, "Ltphi": 60.0})
+    time_s = np.arange(600) * 0.02
+    for inputs, code in (
+        (np.sin(time_s), "hold-unimportant"),
+        (np.sign(np.sin(9 * time_s)) * (1 + 0.1 * time_s), "hold-unknown"),
+    ):
+        bare = fid.Record.from_arrays(time_s, inputs={"tau_phi": inputs})
+        flown = fid.simulate(model, bare, units={"p": "rad/s"}, hold="zero")
+        silent = bare.replace(channels=flown.channels.values(), samples={"p": flown["p"]})
+        found = {each.code: each for each in fid.verify(model, silent).findings}
+        assert code in found
+        assert bool(found[code].action) is (code == "hold-unknown")

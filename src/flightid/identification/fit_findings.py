@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc
 
 from flightid.conventions import Light
+from flightid.evidence.gather import CORRELATED, CRAMER_RAO, INSENSITIVE
 from flightid.findings import Finding
 from flightid.identification.multistart import CONVERGED, End
 from flightid.uncertainty.estimate import Estimate
@@ -43,7 +44,7 @@ CHANCE = 0.01
 """Share of flights of a model that is right whose noise costs more than noise explains."""
 
 _NEAR_COST = 1.1
-_DETERMINED = 0.2
+DETERMINED = 0.2
 """Half-width of a 95 % interval, as a share of the value, below which the data do determine it."""
 
 
@@ -191,18 +192,18 @@ def judge_parameters(parameters: Mapping[str, Estimate]) -> list[Finding]:
 def _judge_guides(p: Estimate) -> list[Finding]:
     insensitive, bounded = p.insensitivity_percent, p.cramer_rao_percent
     if insensitive is not None and insensitive > INSENSITIVITY_GUIDE_PERCENT:
-        code, what = "insensitive", f"insensitivity {insensitive:.0f} % is above the guide of 10 %"
+        code, what = INSENSITIVE, f"insensitivity {insensitive:.0f} % is above the guide of 10 %"
         action = "fix it or drop it from the model: the data hardly see it"
     elif bounded is not None and bounded > CRAMER_RAO_GUIDE_PERCENT:
-        code, what = "cramer-rao", f"Cramér–Rao bound {bounded:.0f} % is above the guide of 20 %"
+        code, what = CRAMER_RAO, f"Cramér–Rao bound {bounded:.0f} % is above the guide of 20 %"
         action = "it is correlated with others: fix or tie one of them, or widen the band"
     else:
         return []
     share = _half_width_share(p)
-    if share is not None and share < _DETERMINED:
+    if share is not None and share < DETERMINED:
         # The guides know nothing of the noise: a quiet record can determine what they would drop.
-        what += f", yet its 95 % interval is only ±{100 * share:.2g} %"
-        action = "keep it; widen the band if it matters"
+        what = f"{p.name} is known to ±{100 * share:.2g} % (95 %), though its {what}"
+        return [Finding(code, Light.GREEN, what)]
     return [Finding(code, Light.AMBER, f"{p.name}: {what}", action)]
 
 
@@ -213,19 +214,26 @@ def _half_width_share(p: Estimate) -> float | None:
     return 0.5 * (high - low) / abs(p.value)
 
 
-def judge_correlation(names: Sequence[str], correlation: NDArray[np.float64]) -> list[Finding]:
+def judge_correlation(
+    names: Sequence[str],
+    correlation: NDArray[np.float64],
+    parameters: Mapping[str, Estimate],
+) -> list[Finding]:
     """One verdict for each pair that the data can hardly tell apart."""
     pairs = np.argwhere(np.triu(np.abs(correlation) > CORRELATION_GUIDE, k=1)).tolist()
-    return [
-        Finding(
-            "correlated",
-            Light.AMBER,
-            f"{names[i]} and {names[j]} are correlated by {correlation[i, j]:+.3f}, "
-            "above the guide of 0.98",
-            "fix or tie one of them, or widen the band",
-        )
-        for i, j in pairs
-    ]
+    found = []
+    for i, j in pairs:
+        shares = [_half_width_share(parameters[names[k]]) for k in (i, j)]
+        size = f"correlated by {correlation[i, j]:+.3f}, above the guide of 0.98"
+        if all(share is not None and share < DETERMINED for share in shares):
+            known = " and ".join(f"±{100 * (share or 0.0):.2g} %" for share in shares)
+            what = f"{names[i]} and {names[j]} are known to {known} (95 %), though {size}"
+            found.append(Finding(CORRELATED, Light.GREEN, what))
+            continue
+        what = f"{names[i]} and {names[j]} are {size}"
+        action = "fix or tie one of them, or widen the band"
+        found.append(Finding(CORRELATED, Light.AMBER, what, action))
+    return found
 
 
 def rivals(groups: Sequence[Group], near: float) -> list[Group]:

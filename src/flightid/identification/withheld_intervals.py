@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from flightid.evidence.gather import OF_PARAMETERS
 from flightid.identification.fit import Fit
-from flightid.identification.fit_findings import UNKNOWN, judge_parameters
+from flightid.identification.fit_findings import (
+    UNKNOWN,
+    judge_correlation,
+    judge_parameters,
+)
 
 _OF_INTERVALS = {
     "residuals-coloured",
     "intervals-by-output",
     "intervals-approximate",
     "at-bound",
-    "insensitive",
-    "cramer-rao",
+    *OF_PARAMETERS,
 }
 """Findings on intervals, and those on parameters, which are judged again without."""
 
@@ -41,6 +45,7 @@ def without_intervals(fit: Fit, reason: str) -> Fit:
     findings = (
         *(each for each in fit.findings if each.code not in _OF_INTERVALS),
         *judge_parameters(bare),
+        *(judge_correlation(fit.names, fit.correlation, bare) if fit.details is None else ()),
     )
     return replace(
         fit,

@@ -282,7 +282,7 @@ def _assemble(
         *judge_search(groups),
         *judge_cost(costs, total / len(costs), noise),
         *judge_parameters(found.parameters),
-        *judge_correlation(found.names, found.correlation),
+        *judge_correlation(found.names, found.correlation, found.parameters),
         *(
             ()
             if found.withheld

@@ -344,7 +344,7 @@ def _assemble(
         *setup,
         *judge_search(groups, best.cost + _NEAR * prepared.n_samples * len(fitted.outputs)),
         *judge_parameters(found.parameters),
-        *judge_correlation(found.names, found.correlation),
+        *judge_correlation(found.names, found.correlation, found.parameters),
         *judge_fit(costs, found.colour, explained_percent(prepared.records, fitted.outputs)),
         *noise,
     )

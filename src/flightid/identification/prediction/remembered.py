@@ -30,6 +30,8 @@ class StartChoice:
         Parameters that each record has for itself.
     hold : {"zero", "first", "band_limited"} or None
         What inputs did between samples, where the fit was told or its records knew.
+    assumed_hold : {"zero", "first", "band_limited"} or None
+        What the fit took where nobody knew.
     """
 
     initial_state: str | None = None
@@ -37,6 +39,7 @@ class StartChoice:
     input_bias: bool | None = None
     record_parameters: tuple[str, ...] = ()
     hold: InputHold | None = None
+    assumed_hold: InputHold | None = None
 
 
 def remembered(source: object) -> StartChoice:
@@ -46,7 +49,7 @@ def remembered(source: object) -> StartChoice:
     -------
     >>> remembered(object())  # doctest: +NORMALIZE_WHITESPACE
     StartChoice(initial_state=None, output_bias=None, input_bias=None, record_parameters=(),
-    hold=None)
+    hold=None, assumed_hold=None)
     """
     told, inputs = (_table(provenance_entry(source, key)) for key in ("told", "inputs"))
     start = told.get("initial_state")
@@ -56,9 +59,15 @@ def remembered(source: object) -> StartChoice:
     }
     own = tuple(told.get("record_parameters", ()))
     known = inputs.get("hold_from") in (DECLARED, RECORDED, SEEN)
-    hold = inputs.get("hold") if known and inputs.get("hold") in HOLDS else None
+    hold = inputs.get("hold") if inputs.get("hold") in HOLDS else None
     start = start if start in WORDS else None
-    return StartChoice(start, **biases, record_parameters=own, hold=hold)
+    return StartChoice(
+        start,
+        **biases,
+        record_parameters=own,
+        hold=hold if known else None,
+        assumed_hold=None if known else hold,
+    )
 
 
 def of_record(source: object, model: object, record: Record) -> object:

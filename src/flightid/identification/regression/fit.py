@@ -210,7 +210,7 @@ def assemble(
             *findings,
             *judge_search(groups),
             *judge_parameters(parameters),
-            *judge_correlation(names, correlation),
+            *judge_correlation(names, correlation, parameters),
             *judge_fit(costs, known.colour, noise),
         ),
         provenance={**_provenance(method, records, options), **(extra or {})},

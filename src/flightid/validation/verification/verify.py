@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, overload
 
 import numpy as np
@@ -29,6 +30,7 @@ from flightid.record.several import as_records
 from flightid.responses import FrequencyResponse
 from flightid.validation.verification.baseline import baseline_findings
 from flightid.validation.verification.comparison import Comparison, compared
+from flightid.validation.verification.held_otherwise import hold_findings
 from flightid.validation.verification.judgement import THEIL_GUIDE, judge
 from flightid.validation.verification.muad import mismatch
 from flightid.validation.verification.of_the_fit import left_by_fit, seen_findings
@@ -180,28 +182,42 @@ def verify(
         _request(each, model, way, replace(asked, hold=held.hold), told)
         for each, (model, way), held in zip(several, models, holds, strict=True)
     ]
-    runs = []
-    for each, (model, way), request in zip(several, models, requests, strict=True):
+    for model, _ in models:
         for record in flown:
             require_units(model, record, chosen)
-        runs.append(
-            [way(of_record(each, model, record), record, chosen, request) for record in flown]
-        )
+    ways = [
+        partial(_run, each, model, way, flown, chosen)
+        for each, (model, way) in zip(several, models, strict=True)
+    ]
+    runs = [run(request) for run, request in zip(ways, requests, strict=True)]
     results = []
-    for each, (model, way), request, made, held in zip(
-        several, models, requests, _scored_alike(runs), holds, strict=True
+    for each, (model, way), run, request, made, held in zip(
+        several, models, ways, requests, _scored_alike(runs), holds, strict=True
     ):
         seen = None if responses is None else mismatch(model, responses)
         own = left_by_fit(each, THEIL_GUIDE[0])
         judged = judge(tuple(made), chosen, request, seen, own)
         beside = baseline_findings(each, made, request)
-        said = held.findings if way is predict_continuous else ()
+        in_time = way is predict_continuous
+        taken = remembered(each).assumed_hold
+        said = hold_findings(held, judged, request, taken, run) if in_time else ()
         said = (*seen_findings(each, flown, chosen), *said, *_at_mean(each, flown))
-        between = judged.hold if way is predict_continuous else None
+        between = judged.hold if in_time else None
         results.append(replace(judged, hold=between, findings=(*judged.findings, *beside, *said)))
     if not isinstance(source, list | tuple):
         return results[0]
     return compared(dict(zip(_names(several, names), results, strict=True)))
+
+
+def _run(
+    source: object,
+    model: object,
+    way: Predictor,
+    records: tuple[Record, ...],
+    outputs: tuple[str, ...],
+    request: Request,
+) -> list[Prediction]:
+    return [way(of_record(source, model, each), each, outputs, request) for each in records]
 
 
 def _request(
