@@ -268,6 +268,8 @@ __all__ = [
 
 def __getattr__(name: str) -> object:
     if (home := _HOMES.get(name)) is None:
+        if name.startswith("_"):  # what tools ask of every module: no spelling to look for
+            raise AttributeError(name)
         raise AttributeError(f"module 'flightid' has no attribute {name!r}{_nearest(name)}")
     module = import_module(home)
     return module if home == f"flightid.{name}" else getattr(module, name)
