@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -270,6 +271,7 @@ def file_stem(path: Path) -> str:
     return stem
 
 
+@cache
 def c_environment() -> jinja2.Environment:
     """Templates of C; numbers and texts go through the filters, which write literals."""
     environment = jinja2.Environment(
