@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import os
+from collections.abc import Generator
 from pathlib import Path
 
 import pytest
+from _pytest.doctest import DoctestModule
 from hypothesis import settings
 
 from flightid import Study
@@ -20,6 +23,22 @@ settings.register_profile("steady", derandomize=True, deadline=None, max_example
 settings.register_profile("nightly", derandomize=True, deadline=None)
 settings.register_profile("search", deadline=None, max_examples=2000)
 settings.load_profile(PROFILE)
+
+
+def pytest_configure() -> None:
+    """Collect garbage seldom: modules and trees of sources live as long as the run does."""
+    gc.set_threshold(100_000, 20, 100)
+
+
+def pytest_collection_finish() -> None:
+    """Take what was imported and collected out of every later look for garbage."""
+    gc.freeze()
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file() -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
+    """Tests hold no examples: doctests are those of the package."""
+    return [each for each in (yield) if not isinstance(each, DoctestModule)]
 
 
 def _shared_data() -> Path:
