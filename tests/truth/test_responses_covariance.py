@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
@@ -50,13 +51,15 @@ def _records(n: int, n_inputs: int, count: int, loop: bool) -> list[dict[str, np
 
 
 def _fly(given: dict[str, np.ndarray], noise: np.ndarray, loop: bool) -> Record:
-    time_s = np.arange(noise.size) * DT
+    """A flight with noise, shape (n,), or (k, n) for as many outputs alike, each with its own."""
+    time_s = np.arange(noise.shape[-1]) * DT
     if not loop:
         y = sum(
             signal.lfilter([0, 0.3], [1, -0.7 + 0.2 * k], row)
             for k, row in enumerate(given.values())
         )
-        return Record.from_arrays(time_s, inputs=given, outputs={"y": y + noise})
+        outputs = {f"y{k}": y + row for k, row in enumerate(np.atleast_2d(noise))}
+        return Record.from_arrays(time_s, inputs=given, outputs=outputs)
     # u = r − 0.5 y(t−1), y = 0.3 z⁻¹/(1 − 0.7 z⁻¹) u + v
     den = np.array([1.0, -0.7, 0.15])
     y = signal.lfilter([0, 0.3], den, given["r"]) + signal.lfilter([1, -0.7, 0], den, noise)
@@ -122,11 +125,14 @@ def _linear_map(case: str) -> tuple[FrequencyResponse, tuple[np.ndarray, ...]]:
 
     response = estimate(base, covariance=True)
     start = _stack(response.response[0])
+    # Outputs do not know of each other: many bumps fly at once. In a loop they move the input.
+    together = 1 if loop else n_short // 4
     columns = np.empty((N_RECORDS, n_short, start.size))
-    for place in np.ndindex(N_RECORDS, n_short):
-        bumped = base.copy()
-        bumped[place] += size
-        columns[place] = (_stack(estimate(bumped).response[0]) - start) / size
+    for place, first in product(range(N_RECORDS), range(0, n_short, together)):
+        bumped = np.repeat(base[:, None], together, axis=1)
+        bumped[place, range(together), range(first, first + together)] += size
+        found = estimate(bumped[:, 0] if loop else bumped).response
+        columns[place, first : first + together] = [(_stack(y) - start) / size for y in found]
     return response, tuple(one.T for one in columns)
 
 

@@ -147,30 +147,47 @@ def test_bar_is_quiet_for_short_work_and_vanishes() -> None:
     assert "short" not in stream.getvalue()
 
 
-def _completed(tmp_path: Path, line: str) -> list[str]:
-    """What a bash that has the script offers for the last word of a line."""
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
+def test_bash_completes_a_command(tmp_path: Path) -> None:
     (tmp_path / "flightid").write_text(f'#!/bin/sh\nexec {sys.executable} -m flightid "$@"\n')
     (tmp_path / "flightid").chmod(0o755)
-    words = line.split(" ")
     script = (
         f'export PATH="{tmp_path}:$PATH"; eval "$(flightid completion bash)"; '
-        f"COMP_WORDS=({' '.join(repr(word) for word in words)}); COMP_CWORD={len(words) - 1}; "
+        "COMP_WORDS=(flightid mod); COMP_CWORD=1; "
         '_flightid_completion flightid; printf "%s\\n" "${COMPREPLY[@]}"'
     )
     made = subprocess.run(
         ["bash", "--norc", "-c", script], capture_output=True, text=True, check=True, cwd=tmp_path
     )
-    return made.stdout.split()
+    assert made.stdout.split() == ["modes"]
 
 
-@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
-def test_bash_completes_commands_options_words_and_models(tmp_path: Path) -> None:
-    (tmp_path / "rate.toml").touch()
-    assert _completed(tmp_path, "flightid mod") == ["modes"]
-    assert {"--band-rad-s", "--band-hz"} <= set(_completed(tmp_path, "flightid response --band"))
-    assert _completed(tmp_path, "flightid identify x --axis r") == ["roll"]
-    found = _completed(tmp_path, "flightid modes rate")
-    assert found[0] == "rate.toml"
-    assert "rate_motor_lag" in found
-    for shell in ("zsh", "fish"):
-        assert program.run(["completion", shell]) == 0
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("flightid response --band", ["--band", "--band-rad-s", "--band-hz"]),
+        ("flightid identify x --axis r", ["roll"]),
+        ("flightid modes rate_m", ["rate_mine.toml", "rate_motor_lag"]),
+    ],
+)
+def test_a_shell_is_offered_options_words_and_models(
+    line: str,
+    offered: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    (tmp_path / "rate_mine.toml").touch()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(program.COMPLETE, "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(line.count(" ")))
+    with pytest.raises(SystemExit, match="0"):
+        program.run([])
+    found = [row.split(",")[1] for row in capsys.readouterr().out.split()]
+    assert sorted(found) == sorted(offered)
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish"])
+def test_other_shells_have_a_script(shell: str) -> None:
+    assert program.run(["completion", shell]) == 0

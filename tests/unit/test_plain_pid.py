@@ -6,6 +6,7 @@ import ctypes
 import subprocess
 import tomllib
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ def _loop(**changed: object) -> PidLoop:
     return replace(PidLoop("y", values, names, 50.0, 50.0), **changed)  # type: ignore[arg-type]
 
 
+@cache
 def _tuned(plant: LinearSystem = LAG, **asked: object) -> fid.PidDesign:
     options = fid.ControllerOptions(**asked)  # type: ignore[arg-type]
     return fid.tune_controller(plant, controller=options, nominal=True,

@@ -112,14 +112,22 @@ def test_coupled_axes_are_stable_together_by_their_poles(tuning: fid.Tuning) -> 
     assert any(f.code == "together" and f.light is Light.GREEN for f in tuning.findings)
 
 
-def test_coupling_costs_what_designing_alone_does_not_see(tuning: fid.Tuning) -> None:
-    plant, alone = _coupled(0.4), _coupled(0.0)
-    options = {"requirements": NEED, "gyro": "raw", "band_rad_s": (0.5, 100.0), "nominal": True}
-    single = fid.tune_pid(plant, gains=_loops("roll")["roll"], **options)
-    free = fid.tune_pid(alone, gains=_loops("roll")["roll"], **options)
-    assert any(finding.code == "couplings" for finding in single.findings)
+ALONE = {"requirements": NEED, "gyro": "raw", "band_rad_s": (0.5, 100.0), "nominal": True}
+
+
+@pytest.fixture(scope="module")
+def alone() -> fid.PidDesign:
+    """Roll as if no other loop were closed."""
+    return fid.tune_pid(_FIXED, gains=_loops("roll")["roll"], **ALONE)
+
+
+def test_coupling_costs_what_designing_alone_does_not_see(
+    tuning: fid.Tuning, alone: fid.PidDesign
+) -> None:
+    free = fid.tune_pid(_coupled(0.0), gains=_loops("roll")["roll"], **ALONE)
+    assert any(finding.code == "couplings" for finding in alone.findings)
     assert_close(
-        single.gains["ATC_RAT_RLL_P"], free.gains["ATC_RAT_RLL_P"], rtol=1e-2,
+        alone.gains["ATC_RAT_RLL_P"], free.gains["ATC_RAT_RLL_P"], rtol=1e-2,
         why="one loop closed alone does not feel the other axis",
     )  # fmt: skip
     ratio = tuning.gains["ATC_RAT_RLL_P"] / free.gains["ATC_RAT_RLL_P"]
@@ -161,13 +169,15 @@ def test_steps_of_all_axes_are_written_together(tuning: fid.Tuning, tmp_path: Pa
 
 
 def test_nothing_is_written_where_there_are_no_gains(tmp_path: Path) -> None:
-    slow = fid.LinearSystem([[-1.0]], [[140.0]], [[1.0]], [[0.0]], ("tau_phi",), ("p",), [0.4])
-    design = fid.tune_pid(
-        slow, gains=_loops("roll")["roll"], nominal=True, band_rad_s=(0.5, 90.0),
-        requirements=fid.TuningRequirements(crossover_rad_s=20.0, noise_growth=None),
+    slow = fid.LinearSystem([[-1.0]], [[120.0]], [[1.0]], [[0.0]], ("u",), ("y",), [0.4])
+    design = fid.tune_controller(
+        slow, controller=fid.ControllerOptions(controller="p"), nominal=True,
+        band_rad_s=(0.5, 90.0), requirements=dataclasses.replace(NEED, crossover_rad_s=20.0),
     )  # fmt: skip
+    assert not design.exists
+    assert design.findings[0].code == "no-gains"
     with pytest.raises(DataError, match="so none are written"):
-        design.write(tmp_path / "roll.param")
+        design.write(tmp_path / "gains.toml")
     assert not list(tmp_path.iterdir())
 
 
@@ -176,19 +186,15 @@ def _slow_yaw() -> fid.LinearSystem:
 
 
 def test_a_refused_axis_leaves_the_others_and_their_files(
-    tuning: fid.Tuning, tmp_path: Path
+    alone: fid.PidDesign, tmp_path: Path
 ) -> None:
     turned = dataclasses.replace(_slow_yaw(), b=[[-140.0]])
-    made = fid.tune(
-        {"yaw": turned, "roll": _FIXED, "pitch": _FIXED},
-        gains=_loops("roll", "pitch", "yaw"),
-        requirements=NEED, gyro="raw", band_rad_s=(0.5, 100.0), nominal=True,
-    )  # fmt: skip
+    made = fid.tune({"yaw": turned, "roll": _FIXED}, gains=_loops("roll", "yaw"), **ALONE)
     assert [each.axis for each in made.refused] == ["yaw"]
     assert "positive command with a negative rate" in made.refused[0].reason
     assert not made.exists
-    assert [each.axis for each in made.sound] == ["roll", "pitch"]
-    assert made.gains == tuning.gains
+    assert [each.axis for each in made.sound] == ["roll"]
+    assert made.gains == alone.gains
     assert "yaw is not tuned" in str(made.summary())
     written = made.write(tmp_path / "gains.param")
     for path in written:
@@ -198,6 +204,22 @@ def test_a_refused_axis_leaves_the_others_and_their_files(
     assert next(f for f in made.findings if f.code == "axis-refused").light is Light.RED
 
 
+def test_axes_of_one_model_are_not_written_without_each_other(
+    tuning: fid.Tuning, tmp_path: Path
+) -> None:
+    quick = dataclasses.replace(_slow_yaw(), delays_s=[0.02])
+    yaw = fid.tune_pid(quick, gains=_loops("yaw")["yaw"], angle_loop=False, **ALONE)
+    both = (tuning["roll"], dataclasses.replace(tuning["pitch"], exists=False, changes=()))
+    made = fid.Tuning((*both, yaw), tuning.together)
+    assert [each.axis for each in made.sound] == ["yaw"]
+    assert "couples it with pitch" in made.left_out["roll"]
+    path, *_ = made.write(tmp_path / "gains.param")
+    assert {name.split("_")[2] for name in read_parameters(path)} == {"YAW"}
+    with pytest.raises(DataError, match="so none are written"):
+        fid.Tuning(both, tuning.together).write(tmp_path / "none.param")
+
+
+@pytest.mark.nightly  # the test above holds the same of results put together
 def test_axes_of_one_model_are_written_together_or_not_at_all(tmp_path: Path) -> None:
     fast = dataclasses.replace(NEED, crossover_rad_s=60.0)
     plant = fid.load_model("rate_integrator", axis="yaw").with_values({"Ntpsi": 40.0, "tau": 0.03})
