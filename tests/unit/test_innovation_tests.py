@@ -48,7 +48,7 @@ def test_slight_colour_makes_bars_longer_and_missing_dynamics_leave_none() -> No
     assert replace(chance, worth_percent=0.5).widening(biased=False) is None
 
 
-@pytest.mark.parametrize(("seed", "method"), [(135, "armax"), (230, "subspace")])
+@pytest.mark.parametrize(("seed", "method"), [(135, "armax"), (311, "subspace")])
 def test_gains_of_a_right_black_box_survive_slight_colour(seed: int, method: str) -> None:
     """A true structure that a whiteness test calls wrong, as it may, keeps (longer) bars."""
     rig = rig_gains.drawn(seed)

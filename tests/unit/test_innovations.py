@@ -304,3 +304,17 @@ def test_a_stable_estimate_is_asked_for() -> None:
         asked = M.subspace("u", "y", 3, offsets="none", enforce_stability=enforce)
         radius = np.max(np.abs(np.linalg.eigvals(fid.identify(asked, record).model.a)))
         assert bool(radius < 1.0) is enforce
+
+
+@pytest.mark.parametrize("method", [*OPEN, "pbsid"])
+def test_a_mean_is_no_trim_where_a_record_begins_away_from_its_working_point(method):
+    random = np.random.default_rng(0)
+    u = 5.0 + np.repeat(random.standard_normal(40), 10)
+    y = 20.0 + lfilter([0.0, 0.4], [1.0, -0.9], u) + 1e-3 * random.standard_normal(400)
+    record = fid.Record.from_arrays(
+        np.arange(400) * 0.1, inputs={"u": u}, outputs={"y": y}, hold="zero"
+    )
+    fit = fid.identify(M.subspace("u", "y", order=1, method=method), record)
+    assert_close(fit.details.gains["y/u"].value, 4.0, rtol=1e-3, why="hardly any noise")
+    point = fit.model.operating_point
+    assert_close(point["y"], 20.0 + 4.0 * point["u"], rtol=1e-3, why="on the steady line")

@@ -81,12 +81,42 @@ class SubspaceData:
         for y, u in zip(self.outputs, self.inputs, strict=True):
             if y.shape[1] <= horizon:
                 continue
-            past.append(_hankel(np.vstack([u, y]), horizon)[:, :-1])
-            now.append(y[:, horizon:])
-            driven.append(u[:, horizon:])
+            past.append(self._about(_hankel(np.vstack([u, y]), horizon)[:, :-1]))
+            now.append(self._about(y[:, horizon:]))
+            driven.append(self._about(u[:, horizon:]))
         if not past:
             return tuple(np.zeros((0, 0)) for _ in range(3))  # type: ignore[return-value]
         return np.hstack(past), np.hstack(now), np.hstack(driven)
+
+    def hankel(self, record: int, blocks: int) -> tuple[Array, Array]:
+        """Block Hankel matrices of inputs and outputs, what is constant in a record taken out."""
+        signals = self.inputs[record], self.outputs[record]
+        u, y = (self._about(_hankel(rows, blocks)) for rows in signals)
+        return u, y
+
+    def _about(self, rows: Array) -> Array:
+        return rows - rows.mean(axis=1, keepdims=True) if self.channels.levels else rows
+
+    def about(self, levels: Sequence[Array]) -> SubspaceData:
+        """The same about these levels of the outputs, one row for each record.
+
+        A level outside what a record shows, as beside a pole at one, stays where the mean is.
+        """
+        names = list(self.channels.units)[: self.n_outputs]
+        outputs, offsets, joint = [], [], self.channels.output.copy()
+        others = self.channels.inputs.copy()
+        for y, level, before, span in zip(
+            self.outputs, levels, self.channels.offsets, self.channels.spans, strict=True
+        ):
+            moved = np.where(np.abs(level) <= np.ptp(y, axis=1), level, 0.0)
+            outputs.append(y - moved[:, None])
+            shift = moved * self.scales
+            joint[span] -= shift[0]
+            others[: self.n_outputs - 1, span] -= shift[1:, None]
+            moves = dict(zip(names, shift.tolist(), strict=True))
+            offsets.append({name: at + moves.get(name, 0.0) for name, at in before.items()})
+        channels = replace(self.channels, output=joint, inputs=others, offsets=tuple(offsets))
+        return replace(self, outputs=tuple(outputs), channels=channels)
 
     def neighbours(self, horizon: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Columns of `lagged` with a successor in the same record, and the successors."""
@@ -225,10 +255,10 @@ def compress(data: SubspaceData, horizon: int) -> RowSpaceFactor:
             action="give longer records, a shorter horizon or a smaller maximum_order",
         )
     triangle: Array = np.zeros((0, needed))
-    for y, u in zip(data.outputs, data.inputs, strict=True):
+    for record, y in enumerate(data.outputs):
         if y.shape[1] < 2 * horizon:
             continue
-        inputs, outputs = _hankel(u, 2 * horizon), _hankel(y, 2 * horizon)
+        inputs, outputs = data.hankel(record, 2 * horizon)
         split = horizon * m
         for start in range(0, inputs.shape[1], BLOCK):
             part = slice(start, start + BLOCK)

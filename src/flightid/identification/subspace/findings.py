@@ -22,12 +22,14 @@ def judge_innovations(
     roots: Sequence[FittedRoot],
     termination: str,
     spare: str,
+    at_circle: bool,
 ) -> tuple[Finding, ...]:
     """All verdicts that the fit itself allows; residual tests say more."""
     return (
         *_ending(structure, termination),
         *_order(order),
         *_spare(spare),
+        *_predictor(at_circle=at_circle),
         *_stability(model),
         *_uncertain(roots),
     )
@@ -53,6 +55,20 @@ def _ending(structure: SubspaceStructure, termination: str) -> list[Finding]:
             )
         ]
     return []
+
+
+def _predictor(*, at_circle: bool) -> list[Finding]:
+    if not at_circle:
+        return []
+    return [
+        Finding(
+            "root-at-circle",
+            Light.AMBER,
+            "a pole of the predictor may lie on the unit circle, where errors to first order do "
+            "not hold: poles, zeros and gains have no intervals",
+            "difference or detrend the data less, or lower the order",
+        )
+    ]
 
 
 def _order(order: OrderChoice) -> list[Finding]:

@@ -25,13 +25,19 @@ from flightid.identification.subspace.estimate import Matrices, decompose, reali
 from flightid.identification.subspace.findings import judge_innovations
 from flightid.identification.subspace.order import OrderChoice, choose_order, determinant_criteria
 from flightid.identification.subspace.prediction_errors import (
+    Predictor,
     RefinementResult,
     refine,
     spare_states,
+    whitener,
 )
-from flightid.identification.subspace.roots import innovations_gains, innovations_roots
+from flightid.identification.subspace.roots import (
+    innovations_gains,
+    innovations_roots,
+    predictor_reach,
+)
 from flightid.models.innovations.model import InnovationsModel
-from flightid.models.innovations.prediction import free_run, one_step_errors
+from flightid.models.innovations.prediction import free_run
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.sampled.channels import hold_diverged
 from flightid.record import Record
@@ -88,14 +94,15 @@ def _scaled(matrices: Matrices, size: Array) -> Matrices:
 def _unrefined(
     structure: SubspaceStructure, data: SubspaceData, start: Matrices
 ) -> RefinementResult:
-    model = InnovationsModel(structure.inputs, structure.outputs, 1.0, *start)
-    errors = tuple(
-        one_step_errors(model, y, u, structure.initial_state)
-        for y, u in zip(data.outputs, data.inputs, strict=True)
-    )
+    errors = _predictor(structure, data, start).fitted_errors(start, np.eye(data.n_outputs))
     samples = sum(e.size for e in errors)
-    degrees = max(samples - structure.n_parameters(model.order), 1)
+    degrees = max(samples - structure.n_parameters(len(start[0])), 1)
     return RefinementResult(start, errors, None, degrees, 0, "subspace")
+
+
+def _predictor(structure: SubspaceStructure, data: SubspaceData, matrices: Matrices) -> Predictor:
+    direct, start = bool(structure.direct), structure.initial_state
+    return Predictor.of(data, matrices, direct=direct, initial_state=start)
 
 
 def _assemble(
@@ -107,6 +114,9 @@ def _assemble(
     spare: str,
 ) -> Fit:
     size = data.scales
+    if data.channels.levels:
+        predictor = _predictor(structure, data, found.matrices)
+        data = data.about(predictor.levels(found.matrices, whitener(found.errors)))
     errors = tuple(size[:, None] * e for e in found.errors)
     joint = np.hstack(errors)
     model = InnovationsModel(
@@ -123,8 +133,12 @@ def _assemble(
     tests = innovation_tests(found.errors, data.inputs, data.outputs, spent)
     times = None if spare else tests.widening(biased=True)
     covariance = None if times is None else _in_units(structure, found, size, times)
+    direct = bool(structure.direct)
+    plain = _in_units(structure, found, size, 1.0)
+    at_circle = plain is not None and predictor_reach(model, plain, direct=direct) >= 1.0
+    covariance = None if at_circle else covariance
     spread = Errors(model.sample_time_s, covariance, found.degrees)
-    roots = innovations_roots(model, spread, direct=bool(structure.direct))
+    roots = innovations_roots(model, spread, direct=direct)
     measures = determinant_criteria(joint, size[:, None], structure.n_parameters(model.order))
     runs = _free_runs(model, data)
     parameters = _parameters(model)
@@ -138,7 +152,9 @@ def _assemble(
         iterations=found.iterations,
         noise_covariance=np.asarray(model.noise_covariance),
         findings=(
-            *judge_innovations(structure, model, choice, roots, found.termination, spare),
+            *judge_innovations(
+                structure, model, choice, roots, found.termination, spare, at_circle
+            ),
             *tests.findings(biased=True, times=times),
         ),
         provenance=provenance_of(

@@ -80,11 +80,11 @@ def feedthrough(
     n, p, m = a.shape[0], data.n_outputs, data.n_inputs
     closed = a - k @ c
     n_free = n * m + (p * m if direct else 0)
-    records = len(data.outputs)
+    records, own = len(data.outputs), n + (p if data.channels.levels else 0)
     rows, targets = [], []
     for place, (y, u) in enumerate(zip(data.outputs, data.inputs, strict=True)):
         count = y.shape[1]
-        columns = np.zeros((n_free + n * records, p, count))
+        columns = np.zeros((n_free + own * records, p, count))
         for j in range(m):
             passed = adjoint_run(closed, c, u[j : j + 1])[0]
             columns[j : n * m : m] = passed
@@ -93,8 +93,10 @@ def feedthrough(
                     column = columns[n * m + o * m + j]
                     column -= np.tensordot(k[:, o], passed, axes=1)
                     column[o] += u[j]
-        first = n_free + n * place
+        first = n_free + own * place
         columns[first : first + n] = free_motion(closed, c, count)
+        if own > n:
+            columns[first + n : first + own] = level_motion(closed, c, k, count)[1]
         rows.append(columns.reshape(columns.shape[0], -1))
         targets.append((y - c @ run_recursion(closed, k @ y)).ravel())
     if not all(np.all(np.isfinite(each)) for each in (*rows, *targets)):
@@ -106,6 +108,19 @@ def feedthrough(
     found = np.linalg.lstsq(np.hstack(rows).T, np.concatenate(targets), rcond=None)[0]
     d = found[n * m : n_free].reshape(p, m) if direct else np.zeros((p, m))
     return found[: n * m].reshape(n, m), d
+
+
+def level_motion(closed: Array, c: Array, k: Array, count: int) -> tuple[Array, Array]:
+    """What a level of each output makes of a predictor's states and of its outputs.
+
+    Returns
+    -------
+    tuple of ndarray, shapes (p, n, n_samples) and (p, p, n_samples)
+    """
+    p = len(c)
+    forcing = np.repeat(-k.T[:, :, None], count, axis=2)
+    moved = run_recursion(closed, forcing)
+    return moved, np.asarray(c @ moved + np.eye(p)[:, :, None])
 
 
 def adjoint_run(a: Array, c: Array, signals: Array) -> Array:

@@ -20,12 +20,12 @@ from flightid.identification.subspace.estimate import (
     decompose,
     realise,
 )
+from flightid.identification.subspace.prediction_errors import Predictor
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.prediction import (
     forced_run,
     free_motion,
     motion_from,
-    one_step_errors,
 )
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.result import Result
@@ -189,18 +189,24 @@ def kept_errors(structure: SubspaceStructure, data: SubspaceData, largest: int) 
     skip = usual_stretch(min(y.shape[1] for y in kept.outputs), largest)
     if min(y.shape[1] for y in kept.outputs) < skip + STRETCHES:
         return []
-    return [_kept_error(structure, kept, each, skip) for each in made]
+    return [_kept_error(structure, first, kept, each, skip) for each in made]
 
 
 def _kept_error(
-    structure: SubspaceStructure, kept: SubspaceData, matrices: Matrices, skip: int
+    structure: SubspaceStructure,
+    first: SubspaceData,
+    kept: SubspaceData,
+    matrices: Matrices,
+    skip: int,
 ) -> Array:
     model = InnovationsModel(structure.inputs, structure.outputs, 1.0, *matrices)
     size, a, c = kept.scales[:, None], matrices[0], matrices[2]
     squares = []
+    predictor, inside = predictor_of(structure, first, matrices)
     with np.errstate(over="ignore", invalid="ignore"):
-        for y, u in zip(kept.outputs, kept.inputs, strict=True):
-            left = y * size - forced_run(model, u)
+        levels = predictor.levels(inside, np.eye(first.n_outputs))
+        for y, u, level in zip(kept.outputs, kept.inputs, levels, strict=True):
+            left = (y - level[:, None]) * size - forced_run(model, u)
             if not np.all(np.isfinite(left)):
                 return np.full(STRETCHES, np.inf)
             motion = free_motion(a, c, skip).reshape(len(a), -1).T
@@ -240,15 +246,19 @@ def simplest(errors: Sequence[Array]) -> int:
 def _prediction_criteria(
     structure: SubspaceStructure, data: SubspaceData, matrices: Matrices, count: int
 ) -> Criteria:
-    model = InnovationsModel(structure.inputs, structure.outputs, 1.0, *matrices)
-    size = data.scales[:, None]
-    errors = np.hstack(
-        [
-            one_step_errors(model, y * size, u, structure.initial_state)
-            for y, u in zip(data.outputs, data.inputs, strict=True)
-        ]
-    )
-    return determinant_criteria(errors, size, count)
+    predictor, scaled = predictor_of(structure, data, matrices)
+    errors = np.hstack(predictor.fitted_errors(scaled, np.eye(data.n_outputs)))
+    return determinant_criteria(data.scales[:, None] * errors, data.scales[:, None], count)
+
+
+def predictor_of(
+    structure: SubspaceStructure, data: SubspaceData, matrices: Matrices
+) -> tuple[Predictor, Matrices]:
+    """The predictor of a model in the outputs' units, and that model in their sizes."""
+    a, b, c, d, k = matrices
+    inside = a, b, c / data.scales[:, None], d / data.scales[:, None], k * data.scales
+    direct, start = bool(structure.direct), structure.initial_state
+    return Predictor.of(data, inside, direct=direct, initial_state=start), inside
 
 
 def determinant_criteria(errors: Array, size: Array, count: int) -> Criteria:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.identification.multistart import DenseEnd
 from flightid.identification.subspace.data import SubspaceData
-from flightid.identification.subspace.matrices import STABLE, adjoint_run
+from flightid.identification.subspace.matrices import STABLE, adjoint_run, level_motion
 from flightid.models.innovations.prediction import RANK
 from flightid.models.sampled.recursion import run_recursion, spectral_radius
 from flightid.progress import progress
@@ -70,6 +71,16 @@ class Predictor:
     free_initial: bool
     stable: bool = False
 
+    @classmethod
+    def of(
+        cls, data: SubspaceData, start: Matrices, *, direct: bool, initial_state: str
+    ) -> Predictor:
+        """For models of one shape, stable ones where the first is."""
+        shapes = [each.shape for each in start]
+        free = tuple(shapes) if direct else (*shapes[:3], shapes[4])
+        stable = spectral_radius(start[0]) < STABLE
+        return cls(data, free, direct, initial_state == "estimate", stable)
+
     def unpack(self, theta: Array) -> Matrices:
         """A, B, C, D, K from their entries."""
         n, p, m = self.shapes[0][0], self.data.n_outputs, self.data.n_inputs
@@ -89,7 +100,7 @@ class Predictor:
         return np.concatenate([matrix.ravel() for matrix in free])
 
     def errors(self, matrices: Matrices) -> list[tuple[Array, Array, Array]]:
-        """Errors, states and free motions of each record, its initial state fitted."""
+        """Errors, states and free motions of each record, those of levels after those of states."""
         a, b, c, d, k = matrices
         closed, found = a - k @ c, []
         for y, u in zip(self.data.outputs, self.data.inputs, strict=True):
@@ -98,6 +109,10 @@ class Predictor:
             forcing[n] = (b - k @ d) @ u + k @ y
             runs = run_recursion(closed, forcing, np.eye(n + 1, n))
             moved, state = runs[:n], runs[n]
+            if not self.free_initial:
+                moved = moved[:0]
+            if self.data.channels.levels:
+                moved = np.concatenate([moved, level_motion(closed, c, k, y.shape[1])[0]])
             error = y - c @ state - d @ u
             found.append((error, state, moved))
         return found
@@ -106,18 +121,35 @@ class Predictor:
         """Whitened errors of each record after the initial state, and the bases taken out."""
         c, out, bases = matrices[2], [], []
         for error, _, moved in self.errors(matrices):
-            basis = self._basis(whiten @ (c @ moved))
+            basis = self._basis(whiten @ self._seen(c, moved))
             flat = (whiten @ error).ravel()
             out.append(flat - basis @ (basis.T @ flat))
             bases.append(basis)
         return out, bases
 
     def _basis(self, motion: Array) -> Array:
-        columns = motion.reshape(motion.shape[0], -1).T
-        if not self.free_initial:
-            return np.zeros((columns.shape[0], 0))
+        columns = motion.reshape(len(motion), math.prod(motion.shape[1:])).T
+        if not len(motion):
+            return columns
         left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
         return np.asarray(left[:, sizes > RANK * max(float(sizes[0]), 1e-300)])
+
+    def _seen(self, c: Array, moved: Array) -> Array:
+        """What own numbers of a record make of its outputs: initial states, then levels."""
+        seen = np.asarray(c @ moved)
+        p = len(c) if self.data.channels.levels else 0
+        seen[len(moved) - p :] += np.eye(len(c))[: p or 0, :, None]
+        return seen
+
+    def levels(self, matrices: Matrices, whiten: Array) -> list[Array]:
+        """Level of each output in each record, beside its initial state."""
+        c, p = matrices[2], self.data.n_outputs
+        found = []
+        for error, _, moved in self.errors(matrices):
+            columns = (whiten @ self._seen(c, moved)).reshape(len(moved), error.size).T
+            own = np.linalg.lstsq(columns, (whiten @ error).ravel(), rcond=RANK)[0]
+            found.append(np.asarray(own[-p:]) if self.data.channels.levels else np.zeros(p))
+        return found
 
     def fitted_errors(self, matrices: Matrices, whiten: Array) -> tuple[Array, ...]:
         """Errors of each record with its initial state, in the outputs' units."""
@@ -135,21 +167,17 @@ class Predictor:
         c = matrices[2]
         parts = []
         for (error, state, moved), u in zip(self.errors(matrices), self.data.inputs, strict=True):
-            taken = self._basis(whiten @ (c @ moved))
-            motion = self._fitted_motion(c, error, moved)
+            seen = self._seen(c, moved)
+            taken = self._basis(whiten @ seen)
+            columns = seen.reshape(len(moved), error.size).T
+            own = np.linalg.lstsq(columns, error.ravel(), rcond=RANK)[0]
             made = np.zeros((basis.shape[1], *error.shape))
-            signals = (error - c @ motion, state + motion, u)
+            left = error - np.tensordot(own, seen, axes=1)
+            signals = (left, state + np.tensordot(own, moved, axes=1), u)
             self._add_slopes(made, matrices, basis, signals)
             flat = (whiten @ made).reshape(basis.shape[1], -1).T
             parts.append(flat - taken @ (taken.T @ flat))
         return np.ascontiguousarray(np.vstack(parts))
-
-    def _fitted_motion(self, c: Array, error: Array, moved: Array) -> Array:
-        if not self.free_initial:
-            return np.zeros(moved.shape[1:])
-        columns = (c @ moved).reshape(moved.shape[0], -1).T
-        start = np.linalg.lstsq(columns, error.ravel(), rcond=RANK)[0]
-        return np.tensordot(start, moved, axes=1)
 
     def _add_slopes(
         self, made: Array, matrices: Matrices, basis: Array, signals: tuple[Array, Array, Array]
@@ -194,10 +222,8 @@ def refine(
     coordinates; Ljung, *System Identification*, 2nd ed., eq. 15.39.
     """
     n = start[0].shape[0]
-    shapes = [each.shape for each in start]
-    free = tuple(shapes) if direct else (*shapes[:3], shapes[4])
-    stable = spectral_radius(start[0]) < STABLE
-    predictor = Predictor(data, free, direct, initial_state == "estimate", stable)
+    predictor = Predictor.of(data, start, direct=direct, initial_state=initial_state)
+    free = predictor.shapes
     matrices = _balanced(predictor, start)
     iterations, termination, last = 0, "rounds", np.inf
     errors = predictor.fitted_errors(matrices, np.eye(data.n_outputs))
@@ -208,7 +234,7 @@ def refine(
                 termination = "cost" if np.isfinite(level) else "zero"
                 break
             last = level
-            whiten = _whitener(errors)
+            whiten = whitener(errors)
             matrices, steps, ended = _search(predictor, matrices, whiten, maximum_iterations)
             errors = predictor.fitted_errors(matrices, whiten)
             iterations += steps
@@ -218,6 +244,7 @@ def refine(
                 break
     samples = sum(e.shape[1] for e in errors)
     own = n * len(errors) if initial_state == "estimate" else 0
+    own += data.n_outputs * len(errors) * data.channels.levels
     degrees = max(samples * data.n_outputs - _count(free, n) - own, 1)
     covariance, agreement = _covariance(predictor, matrices, errors, degrees)
     if agreement is not None and agreement.freedom is not None:
@@ -284,7 +311,8 @@ def _tangent(predictor: Predictor, matrices: Matrices) -> Array:
     return np.asarray(full[:, n * n :])
 
 
-def _whitener(errors: tuple[Array, ...], degrees: int | None = None) -> Array:
+def whitener(errors: tuple[Array, ...], degrees: int | None = None) -> Array:
+    """Whitening of errors of different outputs by their covariance, shape (p, p)."""
     joint = np.hstack(errors)
     count = joint.shape[1] if degrees is None else degrees / len(joint)
     size = np.sqrt(np.sum(joint**2, axis=1) / count)
@@ -327,7 +355,7 @@ def _covariance(
     if not np.isfinite(_level(errors)):
         return None, None
     basis = _tangent(predictor, matrices)
-    whiten = _whitener(errors, degrees)
+    whiten = whitener(errors, degrees)
     jacobian = predictor.jacobian(matrices, whiten, basis)
     triangle = np.linalg.qr(jacobian, mode="r")
     lengths = np.linalg.norm(triangle, axis=0)

@@ -22,6 +22,7 @@ from flightid.models.innovations.model import InnovationsModel
 from flightid.models.sampled.discrete_modes import discrete_modes
 from flightid.responses.pair import quotient_unit
 from flightid.uncertainty.estimate import Estimate
+from flightid.uncertainty.quantiles import half_width
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -76,6 +77,29 @@ def innovations_gains(
             key = f"{output}/{name}"
             found[key] = propagated(f"gain {key}", unit, value, gradient, errors)
     return found
+
+
+def predictor_reach(model: InnovationsModel, covariance: Array, *, direct: bool) -> float:
+    """Largest size of a real eigenvalue of A - K C, a 95 % half-width further out.
+
+    It is a zero of the noise model: see `prediction_error.roots.farthest`.
+    """
+    a, _, c, _, k = model.matrices
+    solved: Any = eig(a - k @ c, left=True, right=True)
+    reach = 0.0
+    for z, left, right in zip(solved[0], solved[1].conj().T, solved[2].T, strict=True):
+        if z.imag != 0.0:
+            continue
+        across = left @ right
+        slopes = [np.zeros(matrix.shape, dtype=np.complex128) for matrix in model.matrices]
+        slopes[0] += np.outer(left, right)
+        slopes[2] -= np.outer(k.T @ left, right)
+        slopes[4] -= np.outer(left, c @ right)
+        rate = np.concatenate([s.ravel() for n, s in enumerate(slopes) if direct or n != 3])
+        outwards = np.real(np.conj(z) / (abs(z) or 1.0) * rate / (across or np.inf))
+        spread = float(np.sqrt(max(outwards @ covariance @ outwards, 0.0)))
+        reach = max(reach, abs(z) + half_width() * spread)
+    return float(reach)
 
 
 def _poles(model: InnovationsModel, *, direct: bool) -> Iterator[tuple[complex, Complex | None]]:

@@ -55,7 +55,7 @@ class SubspaceStructure(Options):
         State at the first sample of each record: ``"estimate"`` or ``"zero"``.
     offsets : str
         What is taken off each channel of each record: its ``"mean"``, its declared ``"trim"`` or
-        nothing (``"none"``).
+        nothing (``"none"``). Beside means a constant of each record is fitted.
     maximum_order : int
         Largest order that the choice considers.
     maximum_iterations : int
