@@ -47,6 +47,11 @@ GROUPS = {
             "excitation",
         ),
     ),
+    "flight": Group(
+        "Flight review",
+        "flight.md",
+        ("review_flight", "FlightReview", "LoopResponse"),
+    ),
     "responses": Group(
         "Responses",
         "responses.md",

@@ -38,6 +38,7 @@ ORDER = [
     "validation",
     "dynamics",
     "control",
+    "review",
     "vehicles",
     "export",
 ]

@@ -23,6 +23,7 @@ ORDER = (
     "run",
     "tune",
     "inspect",
+    "flight",
     "new",
     "design",
     "response",

@@ -129,7 +129,9 @@ def _chosen(
         chosen = channels
     else:
         chosen = channel_map(channels)
-    return chosen if names is None else chosen.select(names)
+    if names is not None:
+        return chosen.select(names)
+    return replace(chosen, channels=tuple(c for c in chosen.channels if not c.on_request))
 
 
 def _found(

@@ -18,6 +18,7 @@ from flightid.plot.consistency import consistency
 from flightid.plot.excitation import excitation_history, plan_spectrum
 from flightid.plot.fit import fit_figure
 from flightid.plot.fitted_record import record_figure
+from flightid.plot.flight import flight_steps, loop_steps
 from flightid.plot.handling_qualities import (
     bandwidth_curves,
     cutoff_spectrum,
@@ -153,6 +154,8 @@ PICTURES: Mapping[str, Callable[..., Any]] = {
     "AttitudeBandwidth": bandwidth_curves,
     "AxisLoop": controller,
     "ClosedLoop": _closed_loop,
+    "FlightReview": flight_steps,
+    "LoopResponse": loop_steps,
     "Comparison": comparison,
     "DiskMargin": disk_figure,
     "KinematicConsistency": consistency,

@@ -25,7 +25,7 @@ ANGLES = ("roll", "pitch", "yaw")
 _SOURCE_KEYS = {
     "message", "field", "instance", "unit", "factor", "stamp", "quaternion", "angle", "note",
 }  # fmt: skip
-_CHANNEL_KEYS = {"unit", "role", "unwrap", "sets_rate", "sources"}
+_CHANNEL_KEYS = {"unit", "role", "unwrap", "sets_rate", "on_request", "sources"}
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,8 @@ class MappedChannel:
         Whether a record must not be sampled faster than this channel is logged.
     sources : tuple of ChannelSource
         The first that the log holds is taken.
+    on_request : bool
+        Whether a record holds it only where it is named: it may pause in flight.
     """
 
     name: str
@@ -97,6 +99,7 @@ class MappedChannel:
     unwrap: bool
     sets_rate: bool
     sources: tuple[ChannelSource, ...]
+    on_request: bool = False
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,7 @@ class ChannelMap:
     Example
     -------
     >>> channel_map("arducopter")
-    ChannelMap('ArduCopter', 17 channels)
+    ChannelMap('ArduCopter', 20 channels)
     >>> [str(source) for source in channel_map("arducopter")["p"].sources]
     ['RATE.R', 'PIDR.Act', 'IMU.GyrX']
     """
@@ -173,7 +176,7 @@ def default_map(kind: str, vehicle: str | None) -> ChannelMap:
     Example
     -------
     >>> default_map("px4", "copter")
-    ChannelMap('PX4 multicopter', 16 channels)
+    ChannelMap('PX4 multicopter', 19 channels)
     """
     name = DEFAULTS.get((kind, vehicle or ""))
     if name is None:
@@ -242,6 +245,7 @@ def _channel(name: str, item: dict[str, Any]) -> MappedChannel:
         bool(item.get("unwrap", False)),
         bool(item.get("sets_rate", False)),
         tuple(_source(name, source) for source in item["sources"]),
+        bool(item.get("on_request", False)),
     )
 
 

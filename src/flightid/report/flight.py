@@ -1,0 +1,41 @@
+"""The sections of a page that review a flight."""
+
+from __future__ import annotations
+
+from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
+from flightid.report.figures import figure_block
+from flightid.review import FlightReview
+
+FOLDED = {"Modes", "Flown gains"}
+CAPTION = (
+    "Steps of the closed loops with their bands, from ordinary flying: what follows when a "
+    "set-point jumps by 1"
+)
+
+
+def flight_blocks(review: FlightReview, *, repeats: bool = False) -> tuple[Block, ...]:
+    """Verdicts, picture and tables of a flight.
+
+    Parameters
+    ----------
+    review : FlightReview
+    repeats : bool
+        The verdicts are not counted among those of the page: it is about something else.
+    """
+    worst_first = tuple(reversed(review.findings))
+    blocks: list[Block] = [Lights(worst_first, repeats=repeats)] if worst_first else []
+    if any(loop.is_told for loop in review.loops):
+        blocks.append(figure_block(review.plot(), CAPTION))
+    blocks += [TableBlock(table, table.title in FOLDED) for table in review.tables()]
+    return tuple(blocks)
+
+
+def flight_document(review: FlightReview) -> Document:
+    """A page of its own for a flight."""
+    untold = "" if review.phases.airborne else "Nothing was flown: what the log tells is below."
+    opening = (Paragraph(untold),) if untold else ()
+    return Document(
+        f"Flight {review.name}",
+        repr(review),
+        (Section("What this flight tells", (*opening, *flight_blocks(review))),),
+    )

@@ -1,0 +1,7 @@
+"""Review: what one flight tells of its vehicle, sweeps or none."""
+
+from flightid.review.flight import review_flight
+from flightid.review.loop_response import LoopResponse
+from flightid.review.result import FlightReview
+
+__all__ = ["FlightReview", "LoopResponse", "review_flight"]

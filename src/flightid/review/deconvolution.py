@@ -1,0 +1,202 @@
+"""From set-points and what followed to the closed loop between: a regularised long ARX model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from flightid.errors import DataError
+from flightid.identification.prediction_error.kernel_regression import kernel_estimate
+from flightid.identification.prediction_error.linear_regression import regress
+
+Array = NDArray[np.float64]
+MEMORY_S = (0.3, 0.1, 0.4)
+"""Lags of the measured channel, of its forerunner and of the set-point, in units of `pace_s`."""
+FEWEST_LAGS, MOST_LAGS = 4, 50
+ROWS_PER_LAG = 10
+DRAWS = 400
+
+
+@dataclass(frozen=True, eq=False)
+class LoopSamples:
+    """A set-point and what followed, piece by piece at one sample time, means removed.
+
+    Attributes
+    ----------
+    set_point, measured : ndarray, shape (n,)
+        In the same unit.
+    forerunner : ndarray, shape (n,), or None
+        What the set-point was made from, before the filters of `measured`.
+    lengths : tuple of int
+        Samples of each piece.
+    sample_time_s : float
+    """
+
+    set_point: Array
+    measured: Array
+    forerunner: Array | None
+    lengths: tuple[int, ...]
+    sample_time_s: float
+
+    @property
+    def duration_s(self) -> float:
+        """Seconds in all."""
+        return self.sample_time_s * sum(self.lengths)
+
+
+@dataclass(frozen=True, eq=False)
+class LoopDraws:
+    """The closed loop as polynomials in the delay of one sample: the estimate, then draws of it.
+
+    Attributes
+    ----------
+    numerators, denominators : ndarray, shape (1 + draws, n)
+        Ascending powers; row 0 is the estimate.
+    sample_time_s : float
+    """
+
+    numerators: Array
+    denominators: Array
+    sample_time_s: float
+
+    def step(self, count: int) -> Array:
+        """Answers to a step of the set-point at `count` samples, shape (1 + draws, count).
+
+        Value k is what the loop reaches half a sample after sample k: the sum of smooth pulses.
+        """
+        ones = np.ones(count)
+        rows = zip(self.numerators, self.denominators, strict=True)
+        return np.array([lfilter(b, a, ones) for b, a in rows])
+
+    def response(self, omega_rad_s: Array) -> NDArray[np.complex128]:
+        """Frequency responses, shape (1 + draws, n_omega)."""
+        delay = np.exp(-1j * omega_rad_s * self.sample_time_s)
+        top, bottom = (
+            polynomials @ delay ** np.arange(polynomials.shape[1])[:, None]
+            for polynomials in (self.numerators, self.denominators)
+        )
+        return np.asarray(top / bottom)
+
+
+@dataclass(frozen=True)
+class _Equation:
+    """One predicted channel: coefficients of its own past, of the other's, of the set-point."""
+
+    own: Array
+    other: Array
+    driven: Array
+
+
+def closed_loop(samples: LoopSamples, *, pace_s: float = 1.0, seed: int = 0) -> LoopDraws:
+    """Estimate a closed loop from ordinary flying, with draws of what the data still allow.
+
+    Gusts move the measured channel, the attitude loop answers, and the set-point follows: a plain
+    quotient is bent by that. A long ARX model predicts the measured channel from its own past, from
+    the set-point and from the forerunner, which knows of a gust before the filtered gyro does, and
+    so leaves the noise out.
+
+    Parameters
+    ----------
+    samples : LoopSamples
+    pace_s : float
+        What the memory is measured in: 1 for rate loops of a multirotor, longer for slower loops.
+    seed : int
+        Of the draws.
+
+    Raises
+    ------
+    DataError
+        Fewer than ten samples for each coefficient, or a channel that does not move.
+
+    Assumes
+    -------
+    One linear loop throughout; a set-point that acts after a sample at the earliest; no common
+    cause of set-point and motion that neither shows.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., section 13.4 (direct approach); Chen, Ohlsson & Ljung
+    (2012), Automatica 48.
+    """
+    own, other, driven = (_lags(memory * pace_s, samples.sample_time_s) for memory in MEMORY_S)
+    _require_rows(samples, own + other + driven)
+    random = np.random.default_rng(seed)
+    if samples.forerunner is None:
+        found = _predicted(samples.measured, (samples.set_point,), samples, (own, driven), random)
+        rows = [_Equation(row[:own], np.zeros(0), row[own:]) for row in found]
+        return _polynomials(rows, None, samples.sample_time_s)
+    w, y, r = samples.forerunner, samples.measured, samples.set_point
+    ahead = _predicted(y, (w, r), samples, (own, other, driven), random)
+    beside = _predicted(w, (y, r), samples, (other, own, driven), random)
+    first = [_Equation(*np.split(row, [own, own + other])) for row in ahead]
+    second = [_Equation(*np.split(row, [other, own + other])) for row in beside]
+    return _polynomials(first, second, samples.sample_time_s)
+
+
+def _lags(memory_s: float, sample_time_s: float) -> int:
+    return int(np.clip(round(memory_s / sample_time_s), FEWEST_LAGS, MOST_LAGS))
+
+
+def _require_rows(samples: LoopSamples, coefficients: int) -> None:
+    if np.ptp(samples.set_point) == 0.0 or np.ptp(samples.measured) == 0.0:
+        raise DataError("the set-point or what was measured does not move at all")
+    rows = sum(max(0, length - MOST_LAGS) for length in samples.lengths)
+    if rows < ROWS_PER_LAG * coefficients:
+        raise DataError(
+            "too few samples",
+            found=f"{samples.duration_s:.3g} s",
+            needed=f"{(ROWS_PER_LAG * coefficients + MOST_LAGS) * samples.sample_time_s:.3g} s "
+            "in one piece",
+        )
+
+
+def _predicted(
+    channel: Array,
+    others: Sequence[Array],
+    samples: LoopSamples,
+    lags: Sequence[int],
+    random: np.random.Generator,
+) -> Array:
+    """Coefficients of a one-step predictor, the estimate and draws, signs as of inputs."""
+    regression = regress(
+        channel, np.vstack(others), samples.lengths, lags[0], list(lags[1:]), [1] * len(others)
+    )
+    found = kernel_estimate(regression, list(lags), "dc")
+    values, directions = np.linalg.eigh(found.covariance)
+    spread = directions * np.sqrt(np.maximum(values, 0.0))
+    drawn = random.standard_normal((DRAWS, values.size)) @ spread.T
+    rows = found.theta + np.vstack([np.zeros(values.size), drawn])
+    rows[:, : lags[0]] *= -1.0
+    return np.asarray(rows)
+
+
+def _polynomials(
+    first: Sequence[_Equation], second: Sequence[_Equation] | None, sample_time_s: float
+) -> LoopDraws:
+    """Closed loops of predictors: what a set-point does to the first channel by way of both."""
+    made = []
+    for place, one in enumerate(first):
+        a, b, through = _delayed(-one.own, 1.0), _delayed(one.driven), _delayed(one.other)
+        if second is not None:
+            two = second[place]
+            c = _delayed(-two.own, 1.0)
+            top = _sum(np.convolve(c, b), np.convolve(through, _delayed(two.driven)))
+            a = _sum(np.convolve(c, a), -np.convolve(through, _delayed(two.other)))
+            b = top
+        made.append((b, a))
+    return LoopDraws(np.array([b for b, _ in made]), np.array([a for _, a in made]), sample_time_s)
+
+
+def _delayed(coefficients: Array, first: float = 0.0) -> Array:
+    return np.concatenate([[first], coefficients])
+
+
+def _sum(one: Array, two: Array) -> Array:
+    longer = np.zeros(max(one.size, two.size))
+    longer[: one.size] += one
+    longer[: two.size] += two
+    return longer

@@ -1,0 +1,70 @@
+"""The verb of the room: a log in, what its flight tells of the vehicle out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from flightid.inspection.actuators import find_actuators
+from flightid.inspection.flight_phases import flight_phases
+from flightid.inspection.stamps import log_span
+from flightid.logs import Log, read_log
+from flightid.review.identity import flight_identity
+from flightid.review.loops import loop_responses
+from flightid.review.motors import motor_use
+from flightid.review.result import FlightReview
+from flightid.review.verdicts import judge_flight
+from flightid.review.vibration import vibrations
+
+
+def review_flight(log: Log | str | Path) -> FlightReview:
+    """Say what one flight tells of its vehicle; no sweep is needed.
+
+    Steps and bandwidths of the closed loops from ordinary flying, tracking errors, motors at their
+    limits and out of balance, vibration, battery, modes, flown gains. What a flight does not tell
+    it says, with what to fly or log for it.
+
+    Parameters
+    ----------
+    log : Log or path-like
+        An opened log or its file.
+
+    Raises
+    ------
+    LogFormatError
+        The file is not a log that flightid reads.
+    OSError
+        The file cannot be read.
+
+    Notes
+    -----
+    Assumes linear loops that stay the same in the whole flight: limits of rates and motors bend
+    the steps. Loops of the controller are as logged; set-points move smoothly between samples.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., section 13.4; see `closed_loop`.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> review = fid.review_flight("flight.bin")                     # doctest: +SKIP
+    >>> print(review.to_text())                                      # doctest: +SKIP
+    """
+    opened = log if isinstance(log, Log) else read_log(log)
+    actuators = find_actuators(opened)
+    start_s, stop_s = log_span(opened)
+    phases = flight_phases(opened, actuators)
+    found = FlightReview(
+        name=opened.path.name,
+        kind=opened.kind,
+        firmware=opened.firmware,
+        vehicle=opened.vehicle,
+        duration_s=stop_s - start_s,
+        phases=phases,
+        identity=flight_identity(opened, phases),
+        loops=loop_responses(opened, phases.airborne),
+        motors=motor_use(actuators, phases.airborne),
+        vibrations=vibrations(opened, phases.airborne),
+    )
+    return replace(found, findings=judge_flight(found))

@@ -1,0 +1,226 @@
+"""Loops of a log: which channels close them, pieces of flight to use, and what each does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.control.autopilots.make import LOOP_RATE_PARAMETERS
+from flightid.errors import FlightidError
+from flightid.inspection.signals import Signal, Span, find, inside, places, records
+from flightid.logs import Log
+from flightid.record import Record
+from flightid.review.deconvolution import LoopDraws, LoopSamples, closed_loop
+from flightid.review.loop_response import LoopResponse
+from flightid.review.step_features import frequency_features, step_features
+from flightid.review.thresholds import FASTEST_RATE, SAMPLES_IN_RISE, WIDEST_LEVEL
+from flightid.uncertainty.estimate import Estimate, Reading
+
+Array = NDArray[np.float64]
+SHORTEST_PIECE_S = 2.0
+WINDOW_S = {"rate": 0.5, "attitude": 1.5}
+SLOWEST_HZ = {"rate": 2.0, "attitude": 0.5}
+PACE = {"rate": 1.0, "attitude": 2.5}
+STRETCHES = 10
+EVEN = 0.7
+"""Least share of rows that may be there, of those that the median interval promises."""
+CHANNELS = {
+    ("roll", "rate"): ("p_ref", "p", "phi"),
+    ("pitch", "rate"): ("q_ref", "q", "theta"),
+    ("yaw", "rate"): ("r_ref", "r", "psi"),
+    ("roll", "attitude"): ("phi_ref", "phi", None),
+    ("pitch", "attitude"): ("theta_ref", "theta", None),
+    ("yaw", "attitude"): ("psi_ref", "psi", None),
+}
+EMPTY = np.zeros(0)
+FASTER = {
+    "ardupilot": "set LOG_BITMASK bit 0 (ATTITUDE_FAST)",
+    "px4": "set SDLOG_PROFILE 25",
+}
+
+
+@dataclass(frozen=True)
+class _Pair:
+    """A set-point with what was measured, as logged, and what forewarns of gusts."""
+
+    set_point: Signal
+    measured: Signal
+    attitude: Signal | None
+
+
+def loop_responses(log: Log, spans: tuple[Span, ...]) -> tuple[LoopResponse, ...]:
+    """Every loop of every axis: its step, or why there is none; loops that are not logged go."""
+    made = (_loop(log, spans, axis, loop) for axis, loop in CHANNELS)
+    return tuple(each for each in made if each is not None)
+
+
+def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopResponse | None:
+    pair = _pair(log, axis, loop)
+    if pair is None:
+        return None
+    labels = pair.set_point.label, pair.measured.label
+    blank = LoopResponse(axis, loop, *labels, 0.0, 0.0, 0, None, None, EMPTY, EMPTY, EMPTY)
+    if not spans:
+        return replace(blank, reason="nothing was flown", action="hand in a log of a flight")
+    uneven = _uneven(pair, spans)
+    if uneven:
+        return replace(blank, reason=uneven, action=f"{FASTER[log.kind]} and fly again")
+    pieces = _pieces(pair, spans)
+    if not pieces:
+        return replace(
+            blank, reason="no span in the air of 2 s holds both", action=FASTER[log.kind]
+        )
+    samples = _samples(pieces)
+    moved = float(np.std(samples.set_point))
+    unit = "rad/s" if loop == "rate" else "rad"
+    begun = replace(
+        blank,
+        rate_hz=1.0 / samples.sample_time_s,
+        used_s=samples.duration_s,
+        pieces=len(pieces),
+        moved=moved,
+        tracking=_tracking(pieces, unit),
+    )
+    return _step(begun, samples, 1.0 / loop_rate_hz(log) if loop_rate_hz(log) else 0.0, log.kind)
+
+
+def loop_rate_hz(log: Log) -> float:
+    """Rate of the controller by the log's parameters, Hz; 0 where they do not tell."""
+    found = (log.parameters.get(name, 0.0) for name in LOOP_RATE_PARAMETERS)
+    return next((rate for rate in found if rate > 0.0), 0.0)
+
+
+def _pair(log: Log, axis: str, loop: str) -> _Pair | None:
+    wanted, measured, attitude = CHANNELS[axis, loop]
+    set_point, streams = find(log, wanted), places(log, measured)
+    if set_point is None or not streams:
+        return None
+    message = set_point.label.split(".")[0]
+    same = [each for each in streams if each.label.split(".")[0] == message]
+    return _Pair(
+        replace(set_point, name="set_point"),
+        replace((same or streams)[0], name="measured"),
+        None if attitude is None else _named(find(log, attitude), "attitude"),
+    )
+
+
+def _named(signal: Signal | None, name: str) -> Signal | None:
+    return None if signal is None else replace(signal, name=name)
+
+
+def _uneven(pair: _Pair, spans: tuple[Span, ...]) -> str:
+    """Why the rows of a stream are too uneven to be put on one time base; else empty."""
+    for signal in (pair.set_point, pair.measured):
+        times = signal.time_s[inside(signal.time_s, spans)]
+        if times.size < 2:
+            continue
+        mean_hz = (times.size - 1) / sum(min(b, times[-1]) - max(a, times[0]) for a, b in spans)
+        if mean_hz < EVEN * signal.rate_hz:
+            return (
+                f"{signal.label} is logged at {signal.rate_hz:.3g} Hz between neighbours but "
+                f"{mean_hz:.3g} Hz on the whole: too unevenly"
+            )
+    return ""
+
+
+def _pieces(pair: _Pair, spans: tuple[Span, ...]) -> list[Record]:
+    signals = [pair.set_point, pair.measured]
+    slowest = min(signal.rate_hz for signal in signals)
+    if pair.attitude is not None and pair.attitude.rate_hz > 0.9 * slowest:
+        signals.append(pair.attitude)
+    made = records(signals, {"set_point"}, spans)
+    return [record for record in made if record.duration_s >= SHORTEST_PIECE_S]
+
+
+def _samples(pieces: list[Record]) -> LoopSamples:
+    """Pieces one behind the other, means removed, no faster than a step needs."""
+    logged = pieces[0].sample_rate_hz
+    every = max(1, round(logged / FASTEST_RATE.value))
+    step_s = every / logged
+
+    def joined(name: str) -> Array:
+        parts = [np.asarray(piece[name])[::every] for piece in pieces]
+        if name == "attitude":
+            parts = [np.concatenate([[0.0], np.diff(part) / step_s]) for part in parts]
+        return np.concatenate([part - part.mean() for part in parts])
+
+    ahead = joined("attitude") if "attitude" in pieces[0].channels else None
+    lengths = tuple(len(range(0, piece.n_samples, every)) for piece in pieces)
+    return LoopSamples(joined("set_point"), joined("measured"), ahead, lengths, step_s)
+
+
+def _tracking(pieces: list[Record], unit: str) -> Reading:
+    """Root mean square error, with an interval by the scatter between ten stretches."""
+    error = np.concatenate([np.asarray(p["measured"]) - np.asarray(p["set_point"]) for p in pieces])
+    if unit == "rad":
+        error = (error + np.pi) % (2.0 * np.pi) - np.pi
+    squares = np.array([np.mean(part**2) for part in np.array_split(error, STRETCHES)])
+    left_out = np.sqrt((squares.sum() - squares) / (STRETCHES - 1))
+    spread = math.sqrt((STRETCHES - 1) * float(np.var(left_out)))
+    value = math.sqrt(float(squares.mean()))
+    return Estimate("tracking error, rms", value, unit, spread, freedom=STRETCHES - 1)
+
+
+def _step(begun: LoopResponse, samples: LoopSamples, tick_s: float, kind: str) -> LoopResponse:
+    pace = PACE[begun.loop]
+    try:
+        draws = closed_loop(samples, pace_s=pace)
+    except FlightidError as error:
+        clauses = (error.problem, error.found, error.needed and f"needed {error.needed}")
+        reason = ", ".join(str(clause) for clause in clauses if clause)
+        return replace(begun, reason=reason, action=_fly(begun))
+    window_s = WINDOW_S[begun.loop]
+    while True:
+        steps, time_s = _steps(draws, window_s, tick_s)
+        readings = (
+            *step_features(steps, time_s),
+            *frequency_features(draws, SLOWEST_HZ[begun.loop]),
+        )
+        late = readings[1].value is None or readings[1].value > window_s / 3.0
+        if not late or window_s >= 4.0 * WINDOW_S[begun.loop]:
+            break
+        window_s *= 2.0
+    refused = _refusal(begun, readings, samples.sample_time_s, kind)
+    if refused is not None:
+        return refused
+    return replace(begun, time_s=time_s, step=steps[0], draws=steps[1:], readings=readings)
+
+
+def _steps(draws: LoopDraws, window_s: float, tick_s: float) -> tuple[Array, Array]:
+    """Steps at their instants: a held set-point acts half a tick later than a smooth one."""
+    count = max(4, round(window_s / draws.sample_time_s))
+    middles = (np.arange(count) + 0.5) * draws.sample_time_s
+    return draws.step(count), np.asarray(middles - 0.5 * tick_s)
+
+
+def _refusal(
+    begun: LoopResponse, readings: tuple[Reading, ...], sample_time_s: float, kind: str
+) -> LoopResponse | None:
+    level, rise = readings[0], readings[2]
+    half = level.half_width95
+    if half is None or half > WIDEST_LEVEL.value or rise.value is None:
+        told = "" if half is None else f": the step ends at {level.text}"
+        return replace(begun, reason=f"not enough motion{told}", action=_fly(begun))
+    if rise.value < SAMPLES_IN_RISE.value * sample_time_s:
+        return replace(
+            begun,
+            reason=f"logged at {begun.rate_hz:.3g} Hz, too slowly for a step that rises in less "
+            f"than {SAMPLES_IN_RISE.value * sample_time_s:.2g} s",
+            action=f"{FASTER[kind]} and fly again",
+        )
+    return None
+
+
+def _fly(begun: LoopResponse) -> str:
+    """What to fly so that this loop shows a step."""
+    size = "30 to 60 deg/s" if begun.loop == "rate" else "10 to 20 deg"
+    stick = {"roll": "roll stick", "pitch": "pitch stick", "yaw": "yaw stick"}[begun.axis]
+    now = begun.moved or 0.0
+    unit = "deg/s" if begun.loop == "rate" else "deg"
+    return (
+        f"fly a minute with quick moves of the {stick}, {size} to both sides, two a second at most "
+        f"(the set-point's standard deviation was {math.degrees(now):.2g} {unit})"
+    )

@@ -1,0 +1,153 @@
+"""The noun of the room: what one flight tells of its vehicle, whatever was flown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from textwrap import fill
+
+from flightid.conventions import Light
+from flightid.errors import UnknownNameError
+from flightid.findings import Finding, worst
+from flightid.inspection.flight_phases import FlightPhases
+from flightid.inspection.inspection import WIDTH
+from flightid.result import Result
+from flightid.review import tables
+from flightid.review.identity import FlightIdentity
+from flightid.review.loop_response import LoopResponse
+from flightid.review.motors import MotorUse
+from flightid.review.vibration import Vibration
+from flightid.table import Cell, Column, Table
+
+
+@dataclass(frozen=True, repr=False)
+class FlightReview(Result, schema="flightid.flight_review/1"):
+    """What one flight tells of its vehicle: loops, motors, vibration, who flew.
+
+    Attributes
+    ----------
+    name, kind, firmware : str
+        File name, ``"ardupilot"`` or ``"px4"``, firmware as logged.
+    vehicle : str or None
+        Kind of vehicle.
+    duration_s : float
+        First to last stamp, s.
+    phases : FlightPhases
+        Airborne spans.
+    identity : FlightIdentity
+        Frame, modes, battery, gains.
+    loops : tuple of LoopResponse
+        Rate and attitude loops of each axis.
+    motors : tuple of MotorUse
+        Time at limits and balance.
+    vibrations : tuple of Vibration
+        Levels against published limits.
+    findings : tuple of Finding
+        Verdicts with what to do.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> review = fid.review_flight("flight.bin")                     # doctest: +SKIP
+    >>> review["roll rate"]["rise time"]                             # doctest: +SKIP
+    Estimate(rise time = 0.084 (0.071 to 0.098) s)
+    """
+
+    name: str
+    kind: str
+    firmware: str
+    vehicle: str | None
+    duration_s: float
+    phases: FlightPhases
+    identity: FlightIdentity
+    loops: tuple[LoopResponse, ...]
+    motors: tuple[MotorUse, ...]
+    vibrations: tuple[Vibration, ...]
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def verdict(self) -> Light:
+        """Worst light of all findings."""
+        return worst(self.findings)
+
+    def __getitem__(self, name: str) -> LoopResponse:
+        """A loop by axis and kind, for example ``"roll rate"``.
+
+        Raises
+        ------
+        UnknownNameError
+            The log holds no such loop.
+        """
+        for loop in self.loops:
+            if loop.name == name:
+                return loop
+        raise UnknownNameError(
+            "the log holds no such loop",
+            found=name,
+            needed="one of " + ", ".join(loop.name for loop in self.loops),
+        )
+
+    def summary(self) -> Table:
+        """Steps of the loops that the flight tells; what it is, where it tells none."""
+        steps = tables.steps(self.loops)
+        return steps if steps.rows else self.flight()
+
+    def flight(self) -> Table:
+        """Vehicle, firmware, frame, time in the air, battery."""
+        rows: list[tuple[Cell, ...]] = [
+            ("vehicle", " ".join(filter(None, (self.kind, self.vehicle)))),
+            ("firmware", self.firmware or None),
+            ("frame", self.identity.frame or None),
+            ("logged", f"{self.duration_s:.1f} s"),
+            ("in the air", f"{self.phases.airborne_s:.1f} s"),
+            *tables.battery(self.identity.battery),
+        ]
+        told = tuple(row for row in rows if row[1] is not None)
+        return Table(f"Flight {self.name}", (Column("what"), Column("value")), told)
+
+    def tables(self) -> tuple[Table, ...]:
+        """All tables that have rows."""
+        made = (
+            self.flight(),
+            tables.steps(self.loops),
+            tables.frequencies(self.loops),
+            tables.motors(self.motors),
+            tables.vibrations(self.vibrations),
+            tables.modes(self.identity.modes),
+            tables.gains(self.identity),
+        )
+        return tuple(table.without_empty_columns() for table in made if table.rows)
+
+    def to_text(self) -> str:
+        """Tables, then the verdicts, the worst last, where eyes are."""
+        said = [table.to_text() for table in self.tables()]
+        given: set[str] = set()
+        lines = []
+        for finding in self.findings:
+            lines.append(
+                fill(f"{finding.light}: {finding.message}", WIDTH, subsequent_indent="    ")
+            )
+            if finding.action and finding.action not in given:
+                given.add(finding.action)
+                lines.append(
+                    fill(
+                        f"do: {finding.action}",
+                        WIDTH,
+                        initial_indent="    ",
+                        subsequent_indent="        ",
+                    )
+                )
+        return "\n\n".join([*said, "\n".join(lines)])
+
+    def _tables(self) -> tuple[Table, ...]:
+        return self.tables()
+
+    def _computed(self) -> dict[str, object]:
+        return {"verdict": self.verdict, "airborne_s": self.phases.airborne_s}
+
+    def __repr__(self) -> str:
+        """Log, time in the air, loops told and verdict on one line."""
+        told = sum(loop.is_told for loop in self.loops)
+        return (
+            f"FlightReview({self.name!r}, {self.phases.airborne_s:.4g} s airborne, "
+            f"{told} of {len(self.loops)} loops told, {self.verdict})"
+        )

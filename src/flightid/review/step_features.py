@@ -1,0 +1,91 @@
+"""What is read off a closed loop: rise, overshoot, delay, bandwidth, each with an interval."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid.review.deconvolution import LoopDraws
+from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.uneven import DrawnEnds
+
+Array = NDArray[np.float64]
+END = 0.2
+"""Share of the window, at its end, whose mean is the level that the step reaches."""
+SETTLED = 0.1
+"""Of the level: within it a step has settled."""
+TOLD = 0.95
+"""Least share of the draws in which a crossing exists: else it is not told."""
+HIGHEST = 0.3
+"""Of the sampling rate: frequencies above it are not read."""
+
+
+def step_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
+    """Level, delay, rise, overshoot and settling of step responses, row 0 the estimate."""
+    level = steps[:, time_s >= (1.0 - END) * time_s[-1]].mean(axis=1)
+    shares = steps / np.where(level > 0.0, level, np.nan)[:, None]
+    half = _crossings(shares, time_s, 0.5)
+    rise = _crossings(shares, time_s, 0.9) - _crossings(shares, time_s, 0.1)
+    peak = int(np.argmax(shares[0])) if np.isfinite(shares[0]).all() else 0
+    return (
+        _reading("level", level, "1"),
+        _reading("delay to half", half, "s"),
+        _reading("rise time", rise, "s"),
+        _reading("overshoot", 100.0 * (shares[:, peak] - 1.0), "%"),
+        _reading("settling time", _settling(shares, time_s), "s"),
+    )
+
+
+def frequency_features(loop: LoopDraws, slowest_hz: float) -> tuple[Reading, ...]:
+    """Bandwidths by gain and phase, and the phase delay at a low frequency."""
+    highest = HIGHEST / loop.sample_time_s
+    grid = np.geomspace(slowest_hz, highest, 240)
+    response = loop.response(2.0 * np.pi * grid)
+    gain = np.abs(response) / np.abs(response[:, :1])
+    phase = np.unwrap(np.angle(response), axis=1)
+    phase -= 2.0 * np.pi * np.round(phase[:, :1] / (2.0 * np.pi))
+    late = -phase[:, 0] / (2.0 * np.pi * slowest_hz)
+
+    def falls(curve: Array, value: float) -> Array:
+        return _crossings(-curve, grid, -value)
+
+    return (
+        _reading(f"phase delay at {slowest_hz:g} Hz", late, "s"),
+        _reading("bandwidth at -3 dB", falls(gain, np.sqrt(0.5)), "Hz", highest),
+        _reading("frequency at -90 deg", falls(phase, -np.pi / 2.0), "Hz", highest),
+        _reading("frequency at -180 deg", falls(phase, -np.pi), "Hz", highest),
+    )
+
+
+def _crossings(curves: Array, at: Array, value: float) -> Array:
+    """Where each curve first reaches a value, by straight lines; NaN where it does not."""
+    above = curves >= value
+    index = np.argmax(above, axis=1)
+    found = np.full(len(curves), np.nan)
+    for row in np.flatnonzero(above.any(axis=1)):
+        k = index[row]
+        if k == 0:
+            found[row] = at[0]
+            continue
+        left, right = curves[row, k - 1], curves[row, k]
+        found[row] = at[k - 1] + (at[k] - at[k - 1]) * (value - left) / (right - left)
+    return found
+
+
+def _settling(shares: Array, time_s: Array) -> Array:
+    """Last instant outside of the settled band; NaN where that is the last of the window."""
+    outside = np.abs(shares - 1.0) > SETTLED
+    last = shares.shape[1] - 1 - np.argmax(outside[:, ::-1], axis=1)
+    found = time_s[np.minimum(last + 1, time_s.size - 1)]
+    found = np.where(outside.any(axis=1), found, time_s[0])
+    return np.where(last >= shares.shape[1] - 2, np.nan, found)
+
+
+def _reading(name: str, values: Array, unit: str, highest: float | None = None) -> Reading:
+    told = np.isfinite(values)
+    if told[0] and np.mean(told) >= TOLD:
+        return Estimate(name, float(values[0]), unit, ends=DrawnEnds(values[1:][told[1:]]))
+    why = "not reached in every loop that the data allow"
+    if highest is not None:
+        why = f"above {highest:.3g} Hz, or not told below it by these data"
+    return Estimate(name, None, unit, reason=why)

@@ -1,0 +1,31 @@
+"""Every number that a verdict of the review rests on, with where it comes from."""
+
+from __future__ import annotations
+
+from flightid.inspection.thresholds import Threshold
+
+FASTEST_RATE = Threshold(
+    100, "Hz", "ten samples in the 0.1 s in which the rate loop of a middle-sized multirotor rises"
+)
+SAMPLES_IN_RISE = Threshold(
+    3, "1", "a step that rises within fewer logged samples is drawn by interpolation, not by data"
+)
+WIDEST_LEVEL = Threshold(
+    0.5, "1", "half of the step either way: such a step tells nothing about gains"
+)
+VIBE_GOOD = Threshold(
+    30, "m/s^2", "ArduPilot, Measuring Vibration: below 30 m/s/s is normally acceptable"
+)
+VIBE_BAD = Threshold(
+    60, "m/s^2", "ArduPilot, Measuring Vibration: above 60 m/s/s nearly always has problems"
+)
+PX4_VIBRATION_GOOD = Threshold(
+    4.905, "m/s^2", "PX4 Flight Review, Vibration Metrics: green below half of g"
+)
+PX4_VIBRATION_BAD = Threshold(9.81, "m/s^2", "PX4 Flight Review, Vibration Metrics: red above g")
+SATURATED = Threshold(
+    0.05, "1", "of the flight at the upper limit: no room left to hold attitude in that time"
+)
+UNBALANCED = Threshold(
+    0.15, "1", "of the mean command between the most and the least loaded motor in still hover"
+)

@@ -1,0 +1,135 @@
+"""Verdicts on a flight: what is out of the ordinary, and what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.review.motors import MotorUse
+from flightid.review.result import FlightReview
+from flightid.review.tables import cell
+from flightid.review.thresholds import SATURATED, UNBALANCED
+from flightid.review.vibration import Vibration
+
+
+def judge_flight(review: FlightReview) -> tuple[Finding, ...]:
+    """All verdicts, the worst last, where eyes are on a terminal."""
+    order = (Light.GREEN, Light.UNKNOWN, Light.AMBER, Light.RED)
+    return tuple(sorted(_all(review), key=lambda finding: order.index(finding.light)))
+
+
+def _all(review: FlightReview) -> Iterator[Finding]:
+    yield from _flown(review)
+    yield from _loops(review)
+    yield from _motors(review)
+    for vibration in review.vibrations:
+        yield from _vibration(vibration)
+    if review.phases.airborne and not review.vibrations:
+        yield Finding(
+            "vibration-unknown", Light.UNKNOWN, "the log holds no measure of vibration in the air"
+        )
+
+
+def _flown(review: FlightReview) -> Iterator[Finding]:
+    phases = review.phases
+    if not phases.is_known:
+        yield Finding("flight-unknown", Light.UNKNOWN, phases.evidence)
+    elif not phases.airborne:
+        yield Finding(
+            "no-flight",
+            Light.RED,
+            f"never airborne ({phases.evidence}): a log of the ground tells nothing of the vehicle "
+            "in the air",
+            "hand in a log of a flight",
+        )
+    if phases.tipped_s is not None:
+        yield Finding(
+            "tipped-over",
+            Light.AMBER,
+            f"the vehicle falls over at {phases.tipped_s:.1f} s: what comes after is left out",
+            "look for the cause of the fall first",
+        )
+
+
+def _loops(review: FlightReview) -> Iterator[Finding]:
+    told = [loop for loop in review.loops if loop.is_told]
+    for loop in told:
+        half, over = cell(loop["delay to half"], 1e3), cell(loop["overshoot"])
+        yield Finding(
+            f"step-{loop.axis}-{loop.loop}",
+            Light.GREEN,
+            f"{loop.name}: half way after {half} ms, overshoots by {over} %",
+        )
+    if not review.phases.airborne:
+        return
+    for loop in review.loops:
+        if not loop.is_told:
+            yield Finding(
+                f"no-step-{loop.axis}-{loop.loop}",
+                Light.AMBER,
+                f"{loop.name}: no step, {loop.reason}",
+                loop.action,
+            )
+    if not review.loops:
+        yield Finding(
+            "no-set-points", Light.AMBER, "the log holds no set-point with what was measured"
+        )
+
+
+def _motors(review: FlightReview) -> Iterator[Finding]:
+    for motor in review.motors:
+        for share, limit, action in (
+            (motor.at_upper, "upper", "less weight, larger propellers, or gentler flying"),
+            (
+                motor.at_lower,
+                "lower",
+                "lower MOT_SPIN_MIN (ArduPilot), lower gains, or more weight",
+            ),
+        ):
+            if share > SATURATED.value:
+                yield Finding(
+                    f"motor-at-{limit}",
+                    Light.AMBER,
+                    f"{motor.name} is at its {limit} limit for {100 * share:.0f} % of the time in "
+                    "the air: loops are not what they were tuned to be there",
+                    action,
+                )
+        yield from _balance(motor)
+
+
+def _balance(motor: MotorUse) -> Iterator[Finding]:
+    """A motor whose whole interval lies beyond what is usual in a hover."""
+    ends = motor.difference.interval95
+    if ends is None or (-UNBALANCED.value < ends[1] and ends[0] < UNBALANCED.value):
+        return
+    word, sign = ("more", 1.0) if ends[0] > 0.0 else ("less", -1.0)
+    yield Finding(
+        "motors-unbalanced",
+        Light.AMBER,
+        f"{motor.name} works {cell(motor.difference, 100.0 * sign)} % {word} than the mean of all",
+        "balance the centre of gravity; look for a twisted motor mount, a worn motor or propeller",
+    )
+
+
+def _vibration(found: Vibration) -> Iterator[Finding]:
+    light = Light.GREEN
+    if found.median > found.bad.value:
+        light = Light.RED
+    elif found.median > found.good.value or found.high > found.bad.value:
+        light = Light.AMBER
+    if light is not Light.GREEN:
+        yield Finding(
+            "vibration",
+            light,
+            f"{found.name}: median {found.median:.3g}, 99th percentile {found.high:.3g} m/s^2, "
+            f"where {found.good.value:g} is fine and {found.bad.value:g} is trouble",
+            "balance propellers, damp the autopilot's mount, look for loose parts",
+        )
+    if found.clipped:
+        yield Finding(
+            "accelerometer-clips",
+            Light.AMBER,
+            f"{found.name}: the accelerometer was at its range {found.clipped} times",
+            "balance propellers, damp the autopilot's mount, look for loose parts",
+        )

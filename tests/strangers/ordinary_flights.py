@@ -1,0 +1,134 @@
+"""One axis of a vehicle under an autopilot's loops, flown by sticks: a simulator of its own.
+
+ArduPilot: D on the filtered error, set-point filtered first. PX4: D on the measured rate. Linear,
+one step a tick; the truth is the same loop's answer to a step of the set-point without noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import butter
+
+from tests.strangers import noises
+
+Array = noises.Array
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A body axis: effectiveness, damping, motor lag and delay, and the gains about it.
+
+    Gains in the autopilot's own units: rad/s in, normalised command out.
+    """
+
+    form: str = "ardupilot"
+    loop_hz: float = 400.0
+    effectiveness: float = 140.0
+    damping: float = 3.0
+    motor_s: float = 0.045
+    delay_ticks: int = 3
+    p: float = 0.12
+    i: float = 0.12
+    d: float = 0.0035
+    angle_p: float = 4.5
+    target_hz: float = 20.0
+    derivative_hz: float = 20.0
+    gyro_hz: float = 40.0
+    gust: float = 4.0
+    gust_s: float = 0.4
+    noise: float = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Flown:
+    """Signals at every tick: attitude and rate, wanted and measured."""
+
+    time_s: Array
+    angle_wanted: Array
+    angle: Array
+    rate_wanted: Array
+    rate: Array
+    command: Array
+
+
+def sticks(random: np.random.Generator, n: int, tick_s: float, size: float, lag_s: float) -> Array:
+    """A pilot's wishes: levels held for a random while, smoothed as a hand does."""
+    levels, at = np.zeros(n), 0
+    while at < n:
+        held = int(random.uniform(0.3, 2.0) / tick_s)
+        levels[at : at + held] = size * random.standard_normal() * (random.random() < 0.7)
+        at += held
+    pole = np.exp(-tick_s / lag_s)
+    for _ in range(2):
+        levels = noises.lfilter([1.0 - pole], [1.0, -pole], levels)
+    return levels
+
+
+def fly(
+    axis: Axis, angle_wanted: Array | None, rate_wanted: Array | None, gust: Array, noise: Array
+) -> Flown:
+    """Run the loops: from attitudes wanted, or from rates wanted where attitude is left alone."""
+    n, h = gust.size, 1.0 / axis.loop_hz
+    out = np.zeros((4, n))
+    wanted = rate_wanted.tolist() if rate_wanted is not None else [0.0] * n
+    angles = angle_wanted.tolist() if angle_wanted is not None else None
+    gusts, noisy = gust.tolist(), noise.tolist()
+
+    def share(hz: float) -> float:
+        return h / (h + 1.0 / (2.0 * np.pi * hz)) if hz else 1.0
+
+    at, ad = share(axis.target_hz if axis.form == "ardupilot" else 0.0), share(axis.derivative_hz)
+    b, a = _biquad(axis.gyro_hz, axis.loop_hz)
+    motor = 1.0 - np.exp(-h / axis.motor_s)
+    queue = [0.0] * max(axis.delay_ticks, 1)
+    target = total = slope = before = lag = rate = angle = 0.0
+    z1 = z2 = 0.0
+    for k in range(n):
+        raw = rate + noisy[k]
+        seen = b[0] * raw + z1
+        z1, z2 = b[1] * raw - a[1] * seen + z2, b[2] * raw - a[2] * seen
+        asked = axis.angle_p * (angles[k] - angle) if angles is not None else wanted[k]
+        target += at * (asked - target)
+        error = target - seen
+        total += axis.i * error * h
+        moved = error if axis.form == "ardupilot" else -seen
+        slope += ad * ((moved - before) / h - slope)
+        before = moved
+        u = axis.p * error + total + axis.d * slope
+        out[:, k] = angle, asked, seen, u
+        queue.append(u)
+        lag += motor * (queue.pop(0) - lag)
+        accel = axis.effectiveness * lag - axis.damping * rate + gusts[k]
+        rate += h * accel
+        angle += h * rate
+    return Flown(
+        np.arange(n) * h,
+        np.zeros(n) if angle_wanted is None else angle_wanted,
+        *out,
+    )
+
+
+def _biquad(hz: float, rate_hz: float) -> tuple[list[float], list[float]]:
+    """Second-order low-pass of Butterworth's shape, as autopilots filter gyros."""
+    b, a = butter(2, hz, fs=rate_hz)
+    return b.tolist(), a.tolist()
+
+
+def ordinary(axis: Axis, seed: int, duration_s: float, *, acro: bool, size: float) -> Flown:
+    """A flight by sticks in gusts: rates wanted in acro, attitudes wanted else."""
+    random = np.random.default_rng(seed)
+    n, h = round(duration_s * axis.loop_hz), 1.0 / axis.loop_hz
+    wish = sticks(random, n, h, size, 0.04)
+    gust = axis.gust * noises.ar1(random, n, np.exp(-h / axis.gust_s))
+    noise = axis.noise * random.standard_normal(n)
+    return fly(axis, None if acro else wish, wish if acro else None, gust, noise)
+
+
+def step(axis: Axis, duration_s: float, *, angle: bool = False) -> Array:
+    """Answer of the quiet loop at every tick to a step of its set-point at tick 0."""
+    n = round(duration_s * axis.loop_hz)
+    quiet, one = np.zeros(n), np.ones(n)
+    flown = fly(replace(axis), one if angle else None, None if angle else one, quiet, quiet)
+    return flown.angle if angle else flown.rate

@@ -1,0 +1,114 @@
+"""The review of a flight: true numbers from ordinary flying, or the reason for none."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import flightid as fid
+from flightid.cli.flight import command
+from flightid.conventions import Light
+from flightid.errors import DataError
+from flightid.review.deconvolution import LoopSamples, closed_loop
+from tests.ordinary_log import write_ordinary_log
+from tests.strangers.ordinary_flights import Axis, step
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("ordinary") / "flight.bin"
+    write_ordinary_log(path)
+    return path
+
+
+@pytest.fixture(scope="module")
+def review(log: Path) -> fid.FlightReview:
+    return fid.review_flight(log)
+
+
+def codes(review: fid.FlightReview) -> set[str]:
+    return {f.code for f in review.findings if f.light is not Light.GREEN}
+
+
+def test_the_step_of_the_rate_loop_is_that_of_the_simulator(review: fid.FlightReview) -> None:
+    loop = review["roll rate"]
+    truth = step(Axis(), 1.0)
+    at = np.interp(loop.time_s, np.arange(truth.size) / 400.0, truth)
+    lower, upper = loop.band()
+    assert np.mean((lower <= at) & (at <= upper)) > 0.8
+    assert np.max(upper - lower) < 0.4
+    half = np.interp(0.5 * at[-10:].mean(), truth[:60], np.arange(60) / 400.0)
+    low, high = loop["delay to half"].interval95 or (0.0, 0.0)
+    assert low <= half <= high
+    assert high - low < 0.02
+
+
+def test_the_step_of_the_attitude_loop_is_that_of_the_simulator(review: fid.FlightReview) -> None:
+    loop = review["roll attitude"]
+    truth = step(Axis(), 2.0, angle=True)
+    at = np.interp(loop.time_s, np.arange(truth.size) / 400.0, truth)
+    lower, upper = loop.band()
+    assert np.mean((lower <= at) & (at <= upper)) > 0.8
+    assert np.max(upper - lower) < 0.4
+
+
+def test_noise_alone_is_told_from_a_loop() -> None:
+    random = np.random.default_rng(2)
+    still = LoopSamples(np.zeros(900), random.standard_normal(900), None, (900,), 0.01)
+    with pytest.raises(DataError, match="does not move"):
+        closed_loop(still)
+    short = LoopSamples(*random.standard_normal((2, 300)), None, (300,), 0.01)
+    with pytest.raises(DataError, match=r"too few samples.*needed"):
+        closed_loop(short)
+
+
+def test_a_quiet_flight_says_what_to_fly(tmp_path: Path) -> None:
+    write_ordinary_log(tmp_path / "quiet.bin", axis=Axis(gust=20.0, noise=0.5), size=0.002)
+    loop = fid.review_flight(tmp_path / "quiet.bin")["roll rate"]
+    assert loop.is_told or "not enough motion" in loop.reason
+    if not loop.is_told:
+        assert "roll stick" in loop.action
+
+
+def test_a_slow_log_says_what_to_log(tmp_path: Path) -> None:
+    write_ordinary_log(tmp_path / "slow.bin", every=40, duration_s=30.0)
+    loop = fid.review_flight(tmp_path / "slow.bin")["roll rate"]
+    assert not loop.is_told
+    assert "logged at 10 Hz, too slowly" in loop.reason
+    assert "LOG_BITMASK" in loop.action
+    assert loop.tracking is not None
+
+
+def test_a_healthy_flight_has_no_complaint(review: fid.FlightReview) -> None:
+    # The simulator flies roll alone: the other axes stand still.
+    assert not [code for code in codes(review) if "pitch" not in code and "yaw" not in code]
+    assert review.identity.battery is not None
+    assert review.identity.battery.least_v == pytest.approx(15.2, abs=0.01)
+    assert review.identity.gains["roll"] == {"ATC_RAT_RLL_P": pytest.approx(0.12)}
+
+
+def test_motors_and_vibration_out_of_order_are_said(tmp_path: Path) -> None:
+    write_ordinary_log(
+        tmp_path / "sick.bin",
+        duration_s=20.0,
+        motors_us=(1950.0, 1300.0, 1500.0, 1500.0),
+        vibe=70.0,
+    )
+    review = fid.review_flight(tmp_path / "sick.bin")
+    assert {"motor-at-upper", "motors-unbalanced", "vibration"} <= codes(review)
+    assert review.verdict is Light.RED
+
+
+def test_the_command_prints_text_values_and_a_page(log: Path, tmp_path: Path) -> None:
+    page = tmp_path / "flight.html"
+    done = CliRunner().invoke(command, [str(log), "--html", str(page)])
+    assert done.exit_code == 0, done.output
+    assert "Steps, from ordinary flying" in done.output
+    assert "roll attitude" in page.read_text("utf-8")
+    values = json.loads(CliRunner().invoke(command, [str(log), "--json"]).stdout)
+    assert values["schema"] == "flightid.flight_review/1"
+    assert [loop["step"] == [] for loop in values["loops"]].count(False) == 2
