@@ -79,3 +79,21 @@ def test_noise_alone_has_no_bars(method: str | None) -> None:
     assert all(each.stderr is None for each in fit.parameters.values())
     assert str(fit.evidence.light) == "red"
     assert "nothing-told" in [each.code for each in fit.findings]
+
+
+def test_slow_smooth_noise_denies_no_response_that_is_there() -> None:
+    """99 % explained is not chance, however few samples of such noise are independent."""
+    random = np.random.default_rng(2)
+    u = np.repeat(random.choice([-1.0, 1.0], 300), 5)
+    moved = np.convolve(u, 0.8 ** np.arange(60))[: u.size]
+    record = fid.Record.from_arrays(
+        np.arange(u.size) * 0.1,
+        inputs={"u": u},
+        outputs={"y": moved + 0.1 * moved.std() * noises.ar2(random, u.size, 0.98, 0.05)},
+        hold="zero",
+    )
+    asked = fid.PolynomialModel.oe("u", "y", nb=1, nf=1, nk=0)
+    assert fid.identify(asked, record).covariance is not None
+    noise = {"y": noises.ar2(random, u.size, 0.98, 0.05)}
+    barren = fid.Record.from_arrays(record.time_s, inputs={"u": u}, outputs=noise, hold="zero")
+    assert fid.identify(asked, barren).covariance is None

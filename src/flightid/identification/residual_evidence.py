@@ -11,7 +11,7 @@ from flightid.findings import Finding
 from flightid.identification.fit import Fit
 from flightid.identification.innovation_tests import ROUNDING, InnovationTests
 from flightid.identification.withheld_intervals import without_intervals
-from flightid.uncertainty.foretold import likelihood_gain
+from flightid.uncertainty.foretold import chance_share, likelihood_gain
 
 MISSING = (
     "add the lag, delay or state that the model lacks, check how inputs are held, or look for "
@@ -83,5 +83,6 @@ def _gain(fit: Fit) -> float:
     for name in fit.costs:
         left = [each.residual(name) for each in fit.records]
         about = [each.measured[name] - np.mean(each.measured[name]) for each in fit.records]
-        total += max(likelihood_gain(about, [row - np.mean(row) for row in left]), 0.0)
+        gain = likelihood_gain(about, [row - np.mean(row) for row in left], chance_share)
+        total += max(gain, 0.0)
     return total

@@ -7,17 +7,19 @@ worth is the part of the residual that could have been foretold, beside the size
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg
+from scipy import linalg, signal
 
 from flightid.uncertainty.residual_correlation import SMALLEST_EIGENVALUE
 
 Array = NDArray[np.float64]
 MATERIAL_PERCENT = 10.0
 """Of an output's standard deviation: what is missed from there on shows in a prediction."""
+LONGEST = 10
+"""Of a record's length over the longest lag that is looked at."""
 
 
 def share_from_past(values: Array, n_samples: int) -> float:
@@ -130,13 +132,40 @@ def independent_share(row: Array) -> float:
     return (1.0 - max(first, 0.0)) / (1.0 + max(first, 0.0))
 
 
-def likelihood_gain(before: Sequence[Array], after: Sequence[Array]) -> float:
+def chance_share(row: Array) -> float:
+    """Share of samples that count where something else of its colour may explain it by chance.
+
+    1/(1 + 2 Σ ρ²). Smooth noise is far from what its first correlation alone makes of it.
+
+    Reference
+    ---------
+    Bartlett, Journal of the Royal Statistical Society 98 (1935), 536–543; Box, Jenkins & Reinsel,
+    Time Series Analysis, 4th ed., section 12.1.
+
+    Example
+    -------
+    >>> white = np.random.default_rng(0).standard_normal(4000)
+    >>> smooth = signal.lfilter([1.0], np.poly([0.9, 0.9]), white)
+    >>> round(chance_share(white), 1), round(chance_share(smooth), 2)
+    (0.9, 0.03)
+    """
+    lags = signal.correlate(row, row, method="fft")[row.size - 1 :][: max(row.size // LONGEST, 2)]
+    return 1.0 / (2.0 * float(lags @ lags) / float(lags[0]) ** 2 - 1.0) if lags[0] > 0.0 else 1.0
+
+
+def likelihood_gain(
+    before: Sequence[Array],
+    after: Sequence[Array],
+    share: Callable[[Array], float] = independent_share,
+) -> float:
     """½ n ln(power before / after), n the independent samples of what is left after.
 
     Parameters
     ----------
     before, after : sequence of ndarray, shape (n_samples,)
         Residuals of one output, by record.
+    share : callable
+        Of a residual's samples that count.
 
     Example
     -------
@@ -146,7 +175,7 @@ def likelihood_gain(before: Sequence[Array], after: Sequence[Array]) -> float:
     """
     tiny = float(np.finfo(float).tiny)
     power = [max(sum(float(row @ row) for row in rows), tiny) for rows in (before, after)]
-    count = sum(row.size * independent_share(row) for row in after)
+    count = sum(row.size * share(row) for row in after)
     return 0.5 * count * math.log(power[0] / power[1])
 
 

@@ -26,7 +26,7 @@ from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.coloured_residuals import residual_covariance, white_covariance
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.fitted_correlation import FittedCorrelation
-from flightid.uncertainty.foretold import likelihood_gain
+from flightid.uncertainty.foretold import chance_share, likelihood_gain
 
 Array = NDArray[np.float64]
 UNDETERMINED = "the data do not tell the coefficients apart"
@@ -140,7 +140,7 @@ def widened(found: SearchResult, times: float) -> SearchResult:
 def _tells_nothing(data: SampledChannels, errors: Array, plain: Array) -> bool:
     """Whether inputs explain no more of the output than chance does."""
     about = [data.output[span] - data.output[span].mean() for span in data.spans]
-    gain = likelihood_gain(about, [errors[span] for span in data.spans])
+    gain = likelihood_gain(about, [errors[span] for span in data.spans], chance_share)
     return gain < least_gain(len(plain))
 
 
