@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import subprocess
 import tomllib
 from dataclasses import replace
@@ -15,6 +16,7 @@ import pytest
 import flightid as fid
 from flightid.cli.program import run
 from flightid.control.autopilots.pid_loop import PidLoop
+from flightid.control.tuning.order_statistics import least_share
 from flightid.errors import DataError, ExportError, OptionError
 from flightid.models.linear.linear_system import LinearSystem
 from tests.closeness import assert_close
@@ -171,6 +173,28 @@ def test_refusals_are_those_of_autopilots(tmp_path: Path) -> None:
         fid.tune_controller(two, nominal=True)
     with pytest.raises(OptionError, match="leave nothing between"):
         fid.ControllerOptions(output_low=1.0, output_high=0.0)
+
+
+@pytest.mark.parametrize(("error", "allowed"), [(0.045, True), (0.1, False)])
+def test_few_plants_of_the_other_sign_leave_the_promise_of_the_others(
+    error: float, allowed: bool
+) -> None:
+    """1.3 % and 16 % of a normal gain of 0.1 lie below zero."""
+    plant = fid.PolynomialModel(
+        ("u",), "y", 0.1, b=[[0.1]], f=[[1.0, -0.9]], covariance=np.diag([error**2, 1e-8])
+    )
+    asked = fid.ControllerOptions(controller="pi")
+    common = {"controller": asked, "band_rad_s": (0.1, 30.0), "draws": 200, "accept_red": True}
+    if not allowed:
+        with pytest.raises(DataError, match="leave open which way y answers a steady u"):
+            fid.tune_controller(plant, **common)
+        return
+    design = fid.tune_controller(plant, **common)
+    (said,) = [each.message for each in design.findings if each.code == "steady-sign"]
+    against = int(re.search(r"in (\d+) of 200 plants", said).group(1))
+    assert 0 < against <= 10
+    assert design.n_plants == 201 - against
+    assert_close(design.content, least_share(200 - against, 200), rtol=1e-12, why="Clopper-Pearson")
 
 
 def test_a_command_ends_in_gains_and_code(

@@ -58,6 +58,8 @@ class TuningEvidence:
         By ``"output/input"`` of the fitted responses: frequencies (rad/s) and coherence.
     errors : mapping of str to ModelErrorBound
         By ``"output/input"``: how far the model itself was from its data.
+    left_out : int
+        Fresh plants drawn that no gains could hold beside the others.
     """
 
     estimate: LinearSystem
@@ -69,6 +71,7 @@ class TuningEvidence:
     findings: tuple[Finding, ...]
     coherences: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     errors: Mapping[str, ModelErrorBound] = field(default_factory=dict)
+    left_out: int = 0
 
     @property
     def sources(self) -> tuple[LinearSystem, ...]:

@@ -30,8 +30,8 @@ ADVICE = {
 }
 
 
-def verdict(result: AxisResult, known: bool) -> Finding:
-    """Whether gains were found, and for how many of the plants."""
+def verdict(result: AxisResult, drawn: int) -> Finding:
+    """Whether gains were found, and for how many of the plants drawn; 0: for none of them."""
     names = ", ".join(result.found.binding)
     if not result.found.exists:
         short = [
@@ -44,14 +44,13 @@ def verdict(result: AxisResult, known: bool) -> Finding:
             f"ranges nor by search from it; nearest: {', '.join(short)}",
             advice(result.found.binding),
         )
-    if not known:
+    if not drawn:
         return Finding("gains", Light.AMBER, f"gains found for the model alone; binding: {names}")
-    good, count = int(result.met.sum()), len(result.met)
-    share = least_share(good, count)
+    good, share = int(result.met.sum()), least_share(int(result.met.sum()), drawn)
     return Finding(
         "gains",
         Light.GREEN if share >= ENOUGH else Light.AMBER,
-        f"{good} of {count} fresh plants meet every requirement: at least {share:.1%} of those "
+        f"{good} of {drawn} fresh plants meet every requirement: at least {share:.1%} of those "
         f"that the data allow (95 % confidence); binding: {names or 'nothing'}",
         "" if share >= ENOUGH else "draw more plants for the search",
     )
@@ -121,7 +120,7 @@ def remarks(
     outside = [c.name for c in changes if c.flown is not None and not c.low <= c.flown <= c.high]
     if outside:
         yield Finding(
-            "outside-range", Light.AMBER, f"flown outside its range: {', '.join(outside)}"
+            "outside-range", Light.GREEN, f"flown outside its range: {', '.join(outside)}"
         )
     shaky = [k for k, stage in enumerate(stages, 1) if not stage.stable]
     if shaky:
@@ -134,7 +133,7 @@ def remarks(
     elif len(stages) > 1:
         yield Finding(
             "steps",
-            Light.AMBER,
+            Light.GREEN,
             f"the new gains are further than one safe step: {len(stages)} steps",
             "fly each before the next, and identify again on the way",
         )

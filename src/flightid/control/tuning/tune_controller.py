@@ -41,6 +41,8 @@ POINTS = 4000
 WIDEST_P, HIGHEST_I, HIGHEST_D = (1e-3, 10.0), 50.0, 0.5
 WEIGHTS_TRIED = np.linspace(1.0, 0.0, 21)
 AT_ZERO, ON_AXIS = 1e-6, 1e-9
+MOST_AGAINST = 0.05
+"""Share of the plants drawn that may answer a steady input the other way."""
 
 
 def tune_controller(
@@ -120,7 +122,8 @@ def tune_controller(
               "needs_band": need.band_factor is not None}  # fmt: skip
     # A continuous model is drawn alike for any step; a sampled one knows its own rate.
     evidence = gather(fit, 1.0 / (rate_hz or 1.0), ["/".join(channels)], **common)  # type: ignore[arg-type]
-    direct, turn = _action(evidence, *channels), _turn(evidence, *channels, rate_hz, need)
+    direct, evidence = _of_one_sign(evidence, *channels)
+    turn = _turn(evidence, *channels, rate_hz, need)
     loop = _loop(asked, channels[0], rate_hz or FINE * turn, sampled, direct)
     start = _scaled(loop, turn, _gain(evidence.estimate, *channels, np.array([turn]))[0])
     # Of a continuous loop the hold's half step is taken off again.
@@ -179,22 +182,44 @@ def _gain(system: LinearSystem, output: str, input: str, omega: Array) -> Comple
     return np.asarray(chosen.frequency_response(omega)[0, 0])
 
 
-def _action(evidence: TuningEvidence, output: str, input: str) -> bool:
-    """Whether the controller must turn its error, by the sign that integral action needs.
+def _of_one_sign(evidence: TuningEvidence, output: str, input: str) -> tuple[bool, TuningEvidence]:
+    """Whether the controller subtracts its error, by the sign that integral action needs.
+
+    And the evidence without the few plants drawn that need the other one: no gains hold both, so
+    what is promised leaves them out, and its share says so.
 
     The constant term of the closed loop's polynomial is Ki times that of the plant's numerator:
     the sign of the steady gain, turned for each unstable real pole; s^n takes integrators out.
     """
-    signs = [_sign(each, output, input) for each in (evidence.estimate, *evidence.fresh)]
-    against = sum(sign != signs[0] for sign in signs)
-    if against:
+    mine = _sign(evidence.estimate, output, input)
+
+    def alike(plants: tuple[LinearSystem, ...]) -> tuple[LinearSystem, ...]:
+        return tuple(each for each in plants if _sign(each, output, input) == mine)
+
+    kept, drawn = alike(evidence.fresh), len(evidence.fresh)
+    against = drawn - len(kept)
+    said = f"another sign than the estimate's in {against} of {drawn} plants drawn"
+    action = "identify from records with lower frequencies, or lower the order of the model"
+    if against > MOST_AGAINST * drawn:
         raise DataError(
             f"the data leave open which way {output} answers a steady {input}",
-            found=f"another sign than the estimate's in {against} of {len(signs) - 1} plants drawn",
-            needed="a steady gain that is told from zero",
-            action="identify from records with lower frequencies",
+            found=said,
+            needed=f"at most {MOST_AGAINST:.0%}",
+            action=action,
         )
-    return signs[0] < 0.0
+    findings = evidence.findings
+    if against:
+        text = f"which way {output} answers a steady {input} is not certain: {said}, where "
+        text += "integral action is unstable; margins are of the others"
+        findings += (Finding("steady-sign", Light.AMBER, text, action),)
+    return mine < 0.0, replace(
+        evidence,
+        corners=alike(evidence.corners),
+        draws=alike(evidence.draws),
+        fresh=kept,
+        left_out=against,
+        findings=findings,
+    )
 
 
 def _sign(system: LinearSystem, output: str, input: str) -> float:

@@ -26,7 +26,7 @@ from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
 from flightid.control.tuning.findings import low_coherence, remarks, verdict
 from flightid.control.tuning.flown_gains import Gains, flown_loop
 from flightid.control.tuning.margins_beyond import beyond_findings
-from flightid.control.tuning.order_statistics import content_of_worst, least_share
+from flightid.control.tuning.order_statistics import least_share
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import response_bands
@@ -256,6 +256,7 @@ def design_of(
     steady = all_flown if held is not None and bool(held[0]) else None
     bands = response_bands(shown, new, steady, place, setting.gyro) if exists else ()
     count = len(result.met)
+    drawn = count + setting.evidence.left_out
     return PidDesign(
         flown,
         result.loop if exists else flown,
@@ -266,12 +267,12 @@ def design_of(
         result.found.binding,
         bands,
         stages,
-        content_of_worst(count - 1) if known else 0.0,
-        least_share(int(result.met.sum()), count) if known else 0.0,
+        least_share(count - 1, drawn - 1) if known else 0.0,
+        least_share(int(result.met.sum()), drawn) if known else 0.0,
         count,
         result.problem,
         (
-            verdict(result, known),
+            verdict(result, drawn if known else 0),
             *remarks(result, flown, changes, stages, couplings),
             *low_coherence(result, setting.coherence_of(place)),
             *beyond_findings(result.beyond, setting.evidence.band_rad_s),
