@@ -54,6 +54,8 @@ NEARLY = ("rate_motor_lag", "rate_second_order")
 TOLERANCE = {"phase margin": 0.25, "gain margin": 0.1}
 """Of grids and interpolation: deg, dB."""
 QUIET_S, SATURATED = 8.0, 0.02
+OTHER = 10**6
+"""From the seed of one sweep to that of the next."""
 NAMES = {
     "p": "ATC_RAT_RLL_P",
     "i": "ATC_RAT_RLL_I",
@@ -75,6 +77,7 @@ class Flight:
     every: int
     amplitude: float
     top_hz: float
+    sweeps: int
 
     @property
     def right(self) -> bool:
@@ -112,6 +115,7 @@ def drawn(seed: int) -> Flight:
         every=int(r.choice([1, 1, 4])),
         amplitude=float(r.uniform(0.08, 0.3)),
         top_hz=float(r.uniform(4.0, 20.0)),
+        sweeps=int(r.choice([1, 2, 2])),
     )  # fmt: skip
 
 
@@ -142,7 +146,10 @@ def _flown(craft: Vehicle, r: np.random.Generator) -> Gains:
 
 
 def record(flight: Flight, seed: int, duration_s: float = 60.0) -> fid.Record:
-    """A sweep injected at the command with both loops closed, as a log at every loop or fourth."""
+    """A sweep injected at the command with both loops closed, as a log at every loop or fourth.
+
+    Of the latter half tell how their inputs move between samples.
+    """
     r = np.random.default_rng([seed, 7])
     n = round(duration_s / STEP_S)
     t = np.arange(n) * STEP_S
@@ -158,7 +165,7 @@ def record(flight: Flight, seed: int, duration_s: float = 60.0) -> fid.Record:
         outputs={"p": rates[kept]},
         excitations={"injected": sweep[kept]},
         units={"p": "rad/s"},
-        hold="zero" if flight.every == 1 else None,
+        hold="zero" if flight.every == 1 else (None, "band_limited")[seed % 2],
     )
 
 
@@ -182,16 +189,17 @@ def structure_of(name: str) -> fid.TransferFunctionModel | fid.StateSpaceModel:
 
 def fitted(flight: Flight, seed: int) -> fid.Fit:
     """By the method of the flight, as the documentation says."""
-    model, data = structure_of(flight.structure), record(flight, seed)
+    model = structure_of(flight.structure)
     name, _, told = flight.method.partition(", ")
+    data = [record(flight, seed + OTHER * k) for k in range(flight.sweeps)]
     if told:
-        data = data.declare(loop=told)
+        data = [each.declare(loop=told) for each in data]
     if name in ("output_error", "equation_error", "filter_error"):
         return fid.identify(model, data, method=name)
     estimator = name if name in ("instrument", "prewhitened") else "composite"
     response = fid.estimate_response(data, inputs="tau_phi", outputs="p", estimator=estimator)
     if name == "joint":
-        return fid.identify(model, (response, record(flight, seed + 10**6)), method="joint")
+        return fid.identify(model, (response, record(flight, seed + 7 * OTHER)), method="joint")
     return fid.identify(model, response)
 
 
@@ -204,7 +212,7 @@ def loop_of(gains: Gains, flight: Flight) -> fid.AxisLoop:
     return usual.with_gains({name: value for name, value in values.items() if name in usual.gains})
 
 
-def tried(seed: int, *, draws: int = 60) -> Outcome:
+def tried(seed: int, *, draws: int = 120) -> Outcome:
     """Draw, fly, fit, tune and fly what was tuned."""
     begun, flight = time.process_time(), drawn(seed)
 

@@ -171,7 +171,7 @@ def tried(seed: int, *, draws: int = 60) -> Outcome:
 def _would_hold(fit: fid.Fit, rig: Rig, seed: int, controller: fid.ControllerOptions) -> bool:
     """Whether refused gains of a right structure would have kept what they promise."""
     try:
-        design = fid.tune_controller(fit, controller=controller, draws=40, accept_red=True)
+        design = fid.tune_controller(fit, controller=controller, draws=60, accept_red=True)
     except fid.FlightidError:
         return False
     return design.exists and not broken_promise(design, rig, seed)

@@ -197,7 +197,7 @@ def tune_axis(
     loop = paths.with_parameters(paths.parameters(found.gains))
     fresh, old = _judged(setting, paths, limit, loops, flown, place)
     gains = paths.gains_of(loop)
-    made, met = worst_cases(fresh, gains, old)
+    made, met = worst_cases(fresh, gains, old, setting.evidence.band_rad_s)
     held = None if old is None else old.stable[0]
     beyond = margins_beyond(fresh, gains, setting.evidence.band_rad_s)
     return AxisResult(found, loop, made, met, held, fresh, beyond)
@@ -219,7 +219,7 @@ def judge_axis(
     paths = ControllerPaths(loops[place], setting.gyro, setting.with_angle)
     limit = _noise_limit(setting, paths, flown, place)
     fresh, old = _judged(setting, paths, limit, loops, flown, place)
-    return worst_cases(fresh, paths.gains_of(loops[place]), old)
+    return worst_cases(fresh, paths.gains_of(loops[place]), old, setting.evidence.band_rad_s)
 
 
 def _noise_limit(

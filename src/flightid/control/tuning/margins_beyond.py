@@ -14,6 +14,8 @@ from flightid.conventions import Light
 from flightid.findings import Finding
 
 Array = NDArray[np.float64]
+MOST_RAISED_DB = 20.0
+"""By which no mode raises a response that damping and share leave ordinary: ten times."""
 TO_SEE_IT = 1.3
 """Band beyond the frequency of a margin from which the model is known about it."""
 
@@ -70,16 +72,16 @@ def margins_beyond(
 def beyond_findings(
     found: Iterable[MarginBeyond], band_rad_s: tuple[float, float] | None
 ) -> list[Finding]:
-    """Amber for each: what stands above the band is the model's word alone."""
+    """Amber for each that a resonance may pass: what stands there is the model's word alone."""
     top_rad_s = np.inf if band_rad_s is None else band_rad_s[1]
     return [
         Finding(
             "margin-beyond-band",
-            Light.AMBER,
+            Light.AMBER if each.room_db < MOST_RAISED_DB else Light.GREEN,
             f"{each.loop}: margins are read up to {each.omega_rad_s:.3g} rad/s, above the "
             f"{top_rad_s:.3g} rad/s to which the model was shown to hold: a resonance there that "
-            f"raises the response by {each.room_db:.2g} dB may make it unstable, and no "
-            "margin of the table knows of it",
+            f"raises the response by {each.room_db:.2g} dB may make it unstable, and "
+            "nothing is promised of those margins",
             f"identify up to {TO_SEE_IT * each.omega_rad_s:.3g} rad/s, and sweep that far",
         )
         for each in found

@@ -30,7 +30,7 @@ class WorstCase:
         Of the estimated plant, with the middle of all plants as its interval; no value where there
         is no such crossing, no interval where there is one plant, or a crossing is missing.
     worst : float or None
-        Of all plants.
+        Of all plants; none where one of them reads it above the identified band.
     flown, flown_worst : float or None
         The same with the gains of the log; None where they are not stable either.
     required : str
@@ -89,22 +89,27 @@ class _Kind:
     name: str
     unit: str
     more: bool
+    place: str = ""
+    """Field that says at which frequency it is read, where that may lie above the band."""
 
 
 KINDS = (
     _Kind("crossover_rad_s", "crossover", "rad/s", True),
     _Kind("phase_margin_deg", "phase margin", "deg", True),
-    _Kind("gain_margin_db", "gain margin", "dB", True),
+    _Kind("gain_margin_db", "gain margin", "dB", True, "phase_crossover_rad_s"),
     _Kind("gain_reduction_margin_db", "gain reduction margin", "dB", True),
     _Kind("delay_margin_s", "delay margin", "s", True),
-    _Kind("sensitivity_peak", "sensitivity peak", "1", False),
+    _Kind("sensitivity_peak", "sensitivity peak", "1", False, "sensitivity_peak_rad_s"),
     _Kind("disturbance_bandwidth_rad_s", "disturbance bandwidth", "rad/s", True),
     _Kind("disturbance_peak_db", "disturbance peak", "dB", False),
 )
 
 
 def worst_cases(
-    problem: LoopProblem, gains: Array, old: LoopAssessment | None
+    problem: LoopProblem,
+    gains: Array,
+    old: LoopAssessment | None,
+    band_rad_s: tuple[float, float] | None = None,
 ) -> tuple[tuple[WorstCase, ...], NDArray[np.bool_]]:
     """Numbers of all loops, and which plants meet every requirement.
 
@@ -116,6 +121,8 @@ def worst_cases(
         New gains.
     old : LoopAssessment or None
         The flown gains on the same plants; None where nothing was flown.
+    band_rad_s : tuple of float or None
+        Where the model was shown to hold, rad/s: nothing is promised of what is read above it.
 
     Returns
     -------
@@ -127,12 +134,13 @@ def worst_cases(
         values = np.asarray(getattr(new.metrics[loop], kind.field))[0]
         before = None if old is None else np.asarray(getattr(old.metrics[loop], kind.field))[0]
         steady = old is not None and bool(old.stable[0, 0])
+        known = not _beyond(new, loop, kind, band_rad_s)
         made.append(
             WorstCase(
                 loop,
                 kind.name,
-                _estimate(f"{loop}: {kind.name}", kind.unit, values),
-                _worst(values, kind.more),
+                _estimate(f"{loop}: {kind.name}", kind.unit, values, known),
+                _worst(values, kind.more) if known else None,
                 _number(before[0]) if steady and before is not None else None,
                 _worst(before, kind.more)
                 if before is not None and old is not None and bool(old.stable.all())
@@ -185,15 +193,26 @@ def _noise(problem: LoopProblem, new: LoopAssessment, old: LoopAssessment | None
     )
 
 
+def _beyond(
+    judged: LoopAssessment, loop: str, kind: _Kind, band_rad_s: tuple[float, float] | None
+) -> bool:
+    """Whether a plant reads a number above the band, where a resonance would change it."""
+    if band_rad_s is None or not kind.place:
+        return False
+    return bool(np.any(getattr(judged.metrics[loop], kind.place)[0] > band_rad_s[1]))
+
+
 def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _estimate(name: str, unit: str, values: Array) -> Reading:
+def _estimate(name: str, unit: str, values: Array, known: bool = True) -> Reading:
     """Of the estimated plant, which is the first, with the middle of all plants about it."""
     value = _number(values[0])
     if value is None:
         return Estimate(name, None, unit, None, "no crossing in the band of the loop")
+    if not known:
+        return Estimate(name, value, unit, None, "read above the identified band")
     if len(values) < FEWEST_PLANTS or not np.all(np.isfinite(values)):
         return Estimate(name, value, unit)
     return Estimate(name, value, unit, ends=DrawnEnds(values))
