@@ -64,6 +64,17 @@ def test_a_hold_that_is_told_wrong_is_amber_and_bars_reach_the_truth(
     assert low < holds.TRUTH["tau"] < high
 
 
+@pytest.mark.parametrize("shape", ["steps", "straight", "smooth"])
+def test_a_response_tells_what_its_records_know_of_a_wrong_hold(shape: str) -> None:
+    lights = []
+    for told in (True, holds.WRONG[shape]):
+        response = fid.estimate_response(holds.flight(1, shape, told=told))
+        lights.append(fid.identify(holds.model(), response).evidence.check("input hold"))
+    assert lights[0] is None
+    assert lights[1] is not None
+    assert str(lights[1].light) == "amber"
+
+
 def test_likelihood_under_another_hold_is_what_a_fit_under_it_finds() -> None:
     record = holds.flight(0, "straight", told=False)
     fit, other = (fid.identify(holds.model(), record, hold=hold) for hold in ("zero", "first"))

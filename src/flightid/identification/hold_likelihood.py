@@ -1,17 +1,21 @@
 """What records say of a hold that was told: likelihood and estimates under another, without a fit.
 
 Estimates under another hold lie half a sample of delay away: a few steps of Gauss and Newton from
-those of the fit, on the records themselves, reach them.
+those of the fit, on the records themselves, reach them. Fits by other ways than least squares on
+outputs leave residuals with colour (gusts, what lies outside a response's band): it is taken out,
+the same for every hold.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
 
 from flightid.errors import DataError
 from flightid.identification.fit import Fit
@@ -30,8 +34,12 @@ from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.foretold import likelihood_gain
 
 Array = NDArray[np.float64]
+RIDGE = 1e-9
+"""Added to the power of what is left, as white noise."""
 FAR = 100.0
 """Residual over an output's deviation beyond which a model follows nothing."""
+LAGS = 20
+"""Of the filters that take colour out."""
 STEPS = 2
 """Of Gauss and Newton: what a delay moves by half a sample bends by less than the second tells."""
 
@@ -52,7 +60,7 @@ class HeldOutputs:
     left: list[Array]
 
     @classmethod
-    def of(cls, fit: Fit) -> HeldOutputs:
+    def of(cls, fit: Fit) -> Self:
         """A fit as it is: least squares on its records lead nowhere else."""
         values = [float(parameter.value or 0.0) for parameter in fit.model.parameters.free]
         return cls(np.array(values), [record.residuals for record in fit.records])
@@ -72,6 +80,8 @@ def held_outputs(
     records: Sequence[Record],
     given: Mapping[str, Any],
     holds: Sequence[InputHold],
+    *,
+    coloured: bool = False,
 ) -> list[HeldOutputs]:
     """Records beside a model near whose values the estimates lie, under each of some holds.
 
@@ -83,6 +93,8 @@ def held_outputs(
     given : mapping
         Options of the fit, of which those of records count.
     holds : sequence of {"zero", "first", "band_limited"}
+    coloured : bool
+        Take out the colour of what is left under the first of them.
 
     Raises
     ------
@@ -95,10 +107,37 @@ def held_outputs(
     runs_of = equation_runs(model, prepared)
     if runs_of is not None:
         prepared = segmented_starts(prepared, runs_of)
-    return [_under(replace(prepared, hold=hold), runs_of) for hold in holds]
+    filters = None
+    if coloured:
+        filters = _whitening(_under(replace(prepared, hold=holds[0]), runs_of, None).left)
+    return [_under(replace(prepared, hold=hold), runs_of, filters) for hold in holds]
 
 
-def _under(prepared: RecordSet, runs_of: EquationRuns | None) -> HeldOutputs:
+def _whitening(left: Sequence[Array]) -> list[Array]:
+    """Of each output, the filter that makes white what is left of it (Yule and Walker)."""
+    found = []
+    for output in range(len(left[0])):
+        rows = [each[output] for each in left]
+        lags = min(LAGS, *(row.size // LAGS for row in rows))
+        own = np.array([sum(float(r[: r.size - k] @ r[k:]) for r in rows) for k in range(lags + 1)])
+        own[0] = own[0] * (1.0 + RIDGE) + np.finfo(float).tiny
+        past = solve_toeplitz(own[:-1], own[1:]) if lags else np.empty(0)
+        found.append(np.concatenate([[1.0], -past]))
+    return found
+
+
+def _whitened(values: Array, filters: Sequence[Array] | None) -> Array:
+    """Values or slopes, shape (n_outputs, n_samples, …), along the samples."""
+    if filters is None:
+        return values
+    return np.stack(
+        [lfilter(f, [1.0], row, axis=0) for f, row in zip(filters, values, strict=True)]
+    )
+
+
+def _under(
+    prepared: RecordSet, runs_of: EquationRuns | None, filters: Sequence[Array] | None
+) -> HeldOutputs:
     free = [parameter.name for parameter in prepared.model.parameters.free]
     values = np.array([prepared.model.parameters[name].value or 0.0 for name in free])
     sizes = np.std(np.concatenate([each[1] for each in prepared.arrays], axis=1), axis=1)
@@ -113,10 +152,10 @@ def _under(prepared: RecordSet, runs_of: EquationRuns | None) -> HeldOutputs:
         ]
         left = [each[1] - run[0] for each, run in zip(prepared.arrays, runs, strict=True)]
         _require_near(left, [slopes for _, slopes in runs], largest)
-        steps = _steps(left, [slopes for _, slopes in runs], sizes, len(free))
-        left = [
-            rest - slopes @ step for rest, (_, slopes), step in zip(left, runs, steps, strict=True)
-        ]
+        left = [_whitened(each, filters) for each in left]
+        slopes = [_whitened(each, filters) for _, each in runs]
+        steps = _steps(left, slopes, sizes, len(free))
+        left = [rest - slope @ step for rest, slope, step in zip(left, slopes, steps, strict=True)]
         sizes = np.sqrt(np.mean(np.concatenate(left, axis=1) ** 2, axis=1))
         values = values + steps[0][: len(free)]
         own = [

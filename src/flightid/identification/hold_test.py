@@ -25,6 +25,7 @@ from flightid.identification.hold_likelihood import (
 )
 from flightid.identification.methods import Method, flat
 from flightid.identification.rival_fits import estimates_alone
+from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.record.chosen_hold import ASSUMED, DECLARED, RECORDED, ChosenHold
 from flightid.record.history import is_of_log
@@ -138,9 +139,10 @@ class _Rivals:
         return any(step.operation == operation for step in steps)
 
     @property
-    def told_apart(self) -> bool:
-        """Whether residuals in time can prefer one hold to another."""
-        return bool(self.fit.records) and self.fit.residual_horizon != 1
+    def records(self) -> list[Record]:
+        """All samples that were fitted: of records, and of those behind responses."""
+        made = [records_behind(each, self.fit.model) for each in flat(self.data)]
+        return [record for records in made for record in records]
 
     @property
     def is_likeliest(self) -> bool:
@@ -160,9 +162,10 @@ class _Rivals:
 
     def by_likelihood(self, holds: Sequence[InputHold]) -> list[OtherHold]:
         """What the records alone say of other holds, without a fit."""
-        records = [each for each in flat(self.data) if isinstance(each, Record)]
         asked = holds if self.is_likeliest else [self.assumed, *holds]
-        found = held_outputs(self.fit.model, records, self.given, asked)
+        found = held_outputs(
+            self.fit.model, self.records, self.given, asked, coloured=not self.is_likeliest
+        )
         here, *others = [HeldOutputs.of(self.fit), *found] if self.is_likeliest else found
         free = [parameter.name for parameter in self.fit.model.parameters.free]
         places = [free.index(name) for name in self.fit.names]
@@ -179,9 +182,35 @@ class _Rivals:
         return self.method.run(self.fit.model, data, {**self.given, **fresh, "hold": hold})
 
 
+def records_behind(data: object, model: GreyBoxModel) -> list[Record]:
+    """A record, or those that a response of a model was estimated from, means removed."""
+    if isinstance(data, Record):
+        return [data]
+    if not isinstance(data, FrequencyResponse) or data.linear is None:
+        return []
+    linear = data.linear
+    if not set(model.inputs) <= set(linear.inputs):
+        return []
+    outputs = {name: linear.places[0][k] for k, name in enumerate(data.outputs)}
+    if not set(model.outputs) <= set(outputs):
+        return []
+    trim = getattr(model, "trim", {})
+    return [
+        Record.from_arrays(
+            np.arange(u.shape[1]) * linear.sample_time_s,
+            inputs={
+                name: u[linear.inputs.index(name)] + trim.get(name, 0.0) for name in model.inputs
+            },
+            outputs={name: y[outputs[name]] for name in model.outputs},
+            units={name: model.units[name] for name in (*model.inputs, *model.outputs)},
+        )
+        for u, y in zip(linear.input_records, linear.output_records, strict=True)
+    ]
+
+
 def _told(fit: Fit, held: ChosenHold, rivals: _Rivals) -> tuple[Fit, ChosenHold]:
     """A hold that somebody vouches for: doubted where the data say otherwise."""
-    if not rivals.told_apart:
+    if not rivals.records:
         return fit, held
     rival: InputHold = "zero" if held.hold != "zero" else "band_limited"
     known = rivals.by_likelihood([rival])
@@ -205,7 +234,7 @@ def _steps_told_otherwise(steps: OtherHold, rivals: _Rivals, whose: str) -> Find
     """A staircase in samples that were told as anything else; none where a simulator made them."""
     if rivals.logged or rivals.made_by("simulate"):
         return None
-    for record in (each for each in flat(rivals.data) if isinstance(each, Record)):
+    for record in rivals.records:
         for name in rivals.fit.model.inputs:
             stairs = found_staircase(record[name])
             if stairs is not None:
