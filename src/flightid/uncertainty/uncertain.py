@@ -24,6 +24,8 @@ INSIDE = 1.0 - 1e-9
 """Keeps steps off the bounds by more than rounding."""
 TRIES = 100
 """Draws for each one that has to lie inside the bounds."""
+TOGETHER = 64
+"""Directions whose ends are computed at once: a long response has thousands."""
 LOST = "not determined everywhere within its uncertainty"
 
 
@@ -160,29 +162,36 @@ class Uncertain(Generic[T]):
     def slopes(self, function: Callable[[T], ArrayLike]) -> Array:
         """Moves of a function's values by one standard deviation along each independent direction.
 
+        See `slopes_together`, for one thing at a time.
+        """
+        return self.slopes_together(lambda things: np.array(_each(function, things)))
+
+    def slopes_together(self, function: Callable[[list[T]], Array]) -> Array:
+        """Moves of a function's values by one standard deviation along each independent direction.
+
         Central differences over ± one standard deviation; over less where that would leave the
         bounds, as for a delay known to its own size.
 
         Parameters
         ----------
         function : callable
-            From the thing to k numbers.
+            From n things to an array, shape (n, k).
 
         Returns
         -------
         ndarray, shape (n_directions, k)
         """
+        shares = np.array([self._share_inside(each) for each in self.directions])
+        moves = shares[:, None] * self.directions
         found = []
-        for direction in self.directions:
-            share = self._share_inside(direction)
-            ends = [
-                np.atleast_1d(
-                    np.asarray(function(self.make(self.numbers + sign * share * direction)), float)
-                )
+        for first in range(0, len(moves), TOGETHER):
+            part = slice(first, first + TOGETHER)
+            up, down = (
+                function([self.make(self.numbers + sign * move) for move in moves[part]])
                 for sign in (1.0, -1.0)
-            ]
-            found.append((ends[0] - ends[1]) / (2.0 * share))
-        return np.array(found)
+            )
+            found.append((up - down) / (2.0 * shares[part, None]))
+        return np.concatenate(found) if found else np.zeros((0, 0))
 
     def _share_inside(self, direction: Array) -> float:
         """Share of a direction that stays inside the bounds, up and down; one where all does."""
@@ -196,13 +205,20 @@ class Uncertain(Generic[T]):
     def carried(self, function: Callable[[T], ArrayLike]) -> Uncertain[Array]:
         """Numbers that are computed from the thing, with their covariance.
 
+        See `carried_together`, for one thing at a time: NaN for a number that is not determined.
+        """
+        return self.carried_together(lambda things: np.array(_each(function, things)))
+
+    def carried_together(self, function: Callable[[list[T]], Array]) -> Uncertain[Array]:
+        """Numbers that are computed from many things at once, with their covariance.
+
         Central differences over ± one standard deviation along the independent directions of the
         covariance: deterministic, and right in second order too as far as the slope goes.
 
         Parameters
         ----------
         function : callable
-            From the thing to k numbers; NaN for one that is not determined.
+            From n things to an array, shape (n, k).
 
         Returns
         -------
@@ -217,10 +233,10 @@ class Uncertain(Generic[T]):
         ---------
         Julier & Uhlmann, *Proceedings of the IEEE* 92 (2004), eqs. 11–15, with the slopes alone.
         """
-        values = np.atleast_1d(np.asarray(function(self.value), dtype=np.float64))
+        values = function([self.value])[0]
         covariance, reason = None, self.reason
         if self.known:
-            slopes = self.slopes(function).reshape(-1, len(values))
+            slopes = self.slopes_together(function).reshape(-1, len(values))
             covariance, reason = slopes.T @ slopes, ""
         found = uncertain_numbers(values, covariance, reason)
         return replace(found, findings=self.findings, valid_rad_s=self.valid_rad_s)
@@ -308,6 +324,10 @@ def uncertain_numbers(
     array([[1.02, 2.98]])
     """
     return Uncertain(np.asarray(numbers, dtype=np.float64), covariance, _same, None, reason)
+
+
+def _each(function: Callable[[T], ArrayLike], things: list[T]) -> list[Array]:
+    return [np.atleast_1d(np.asarray(function(each), dtype=np.float64)) for each in things]
 
 
 def _same(numbers: Array) -> Array:

@@ -172,13 +172,13 @@ def disturbance_rejection(
     drawn = drawn_points(loop, omega)
     sensitivity = 1.0 / (1.0 + loop.of(loop.uncertain.value, drawn))
 
-    def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever is uncertain
-        found = loop.metrics(omega, loop.of(thing, omega))
-        ratio = 1.0 / ((1.0 + loop.of(thing, drawn)) * sensitivity)
-        numbers = [float(getattr(found, name)) for _, _, name, _ in QUANTITIES]
-        return np.concatenate([numbers, 20 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))])
+    def all_of(things: list[Any]) -> Array:
+        found = loop.metrics(omega, np.array([loop.of(each, omega) for each in things]))
+        ratio = 1.0 / ((1.0 + np.array([loop.of(each, drawn) for each in things])) * sensitivity)
+        numbers = np.array([getattr(found, name) for _, _, name, _ in QUANTITIES]).T
+        return np.hstack([numbers, 20 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))])
 
-    carried = loop.uncertain.carried(all_of)
+    carried = loop.uncertain.carried_together(all_of)
     made = {
         key: carried.number(place, name, unit, NO_BANDWIDTH)
         for place, (key, name, _, unit) in enumerate(QUANTITIES)

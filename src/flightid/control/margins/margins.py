@@ -308,17 +308,19 @@ def _carried(loop: BrokenLoop, omega: Array) -> tuple[list[tuple[Any, Reading]],
     drawn = drawn_points(loop, omega)
     centre = loop.of(loop.uncertain.value, drawn)
 
-    def all_of(thing: Any) -> Array:  # noqa: ANN401 — whatever is uncertain
-        values = loop.of(thing, omega)
+    def all_of(things: list[Any]) -> Array:
+        values = np.array([loop.of(each, omega) for each in things])
         found = loop.metrics(omega, values)
-        numbers = {name: float(getattr(found, name)) for name in names}
+        numbers = np.array([getattr(found, name) for name in names]).T
         if whole is not None:
-            numbers |= gain_limits(numbers, loop, whole, loop.of(thing, whole))
-        ratio = (values if drawn is omega else loop.of(thing, drawn)) / centre
-        curve = [20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))]
-        return np.concatenate([list(numbers.values()), *curve])
+            for row, each in zip(numbers, things, strict=True):
+                own = dict(zip(names, row.tolist(), strict=True))
+                row[:] = list((own | gain_limits(own, loop, whole, loop.of(each, whole))).values())
+        at_drawn = values if drawn is omega else np.array([loop.of(each, drawn) for each in things])
+        ratio = at_drawn / centre
+        return np.hstack([numbers, 20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))])
 
-    carried = loop.uncertain.carried(all_of)
+    carried = loop.uncertain.carried_together(all_of)
     missing = MISSING | (dict.fromkeys(GAIN_LIMITS, UNSEEN) if loop.measured else {})
     quantities = [
         (each, carried.number(place, each[0], each[2], missing.get(each[1], "")))
