@@ -22,7 +22,7 @@ from flightid.simulation.model_outputs import systems_of
 from tests.closeness import assert_close
 from tests.strangers.responses import fly_feedthrough
 
-RATE_HZ = 200.0
+RATE_HZ = 100.0
 BAND = (1.5, 35.0)
 MODEL = fid.load_model("rate_motor_lag")
 TRUTH = {name: float(p.value or 0.0) for name, p in MODEL.parameters.items()}

@@ -56,7 +56,7 @@ def test_multisines_are_orthogonal_start_at_zero_and_keep_their_amplitude(
         period_s=8.0,
         sample_rate_hz=50.0,
         names=tuple(f"u{index}" for index in range(n_inputs)),
-        starts=2,
+        starts=1,
         seed=seed,
     )
     apart = ~np.eye(n_inputs, dtype=bool)

@@ -91,7 +91,7 @@ def multisine(
 
     Example
     -------
-    >>> both = multisine(band_rad_s=(0.6, 12.0), amplitude=0.1, period_s=20.0,
+    >>> both = multisine(band_rad_s=(1.2, 12.0), amplitude=0.1, period_s=10.0,
     ...                  sample_rate_hz=50.0, names=("tau_phi", "tau_theta"))
     >>> bool(abs(both.correlation()[0, 1]) < 1e-12), bool(max(both.peak_factor) < 1.1)
     (True, True)
