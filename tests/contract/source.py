@@ -28,6 +28,12 @@ def tree(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
 
 
+@cache
+def nodes(module: ast.Module) -> tuple[ast.AST, ...]:
+    """Every node of a tree, walked once for all that look at it."""
+    return tuple(ast.walk(module))
+
+
 def stage(path: Path) -> str:
     """First folder below the package, or the stem of a base file."""
     parts = path.relative_to(PACKAGE).parts

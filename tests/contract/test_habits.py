@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from tests.contract.source import PACKAGE, ROOT, python_files, rust_files, stage, tree
+from tests.contract.source import PACKAGE, ROOT, nodes, python_files, rust_files, stage, tree
 
 FORBIDDEN_STEMS = {"utils", "util", "helpers", "common", "misc", "base", "core"}
 OPEN_ENDS = re.compile(r"\b(TODO|FIXME|XXX|HACK)\b|todo!\(|unimplemented!\(|NotImplementedError")
@@ -26,7 +26,7 @@ def _open_ends(text: str) -> list[str]:
 def _python_habits(module: ast.Module, *, may_print: bool) -> list[str]:
     forbidden = {"eval", "exec"} if may_print else {"eval", "exec", "print"}
     found = []
-    for node in ast.walk(module):
+    for node in nodes(module):
         called = node.func if isinstance(node, ast.Call) else None
         if isinstance(called, ast.Name) and called.id in forbidden:
             found.append(f"{called.lineno}: calls {called.id}")

@@ -35,7 +35,7 @@ from flightid.simulation.options import SimulationOptions
 from flightid.study.reading import TableReader
 from flightid.validation.residuals.options import ResidualTestOptions
 from flightid.validation.verification.options import VerifyOptions
-from tests.contract.source import PACKAGE, python_files, tree
+from tests.contract.source import PACKAGE, nodes, python_files, tree
 from tests.contract.test_arguments import DICTIONARY, WORD_OF
 
 # What a command is told beside the options of its verb: its name, and the one thing it means.
@@ -137,7 +137,7 @@ def _keys() -> Iterator[tuple[str, str]]:
     for path in python_files():
         if path.parent.name != "study":
             continue
-        for node in ast.walk(tree(path)):
+        for node in nodes(tree(path)):
             if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
                 continue
             first = next((arg for arg in node.args if isinstance(arg, ast.Constant)), None)

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.contract.source import ROOT, python_files, rust_files, tree
+from tests.contract.source import ROOT, nodes, python_files, rust_files, tree
 
 MAXIMUM_FILE = 400
 MAXIMUM_FUNCTION = 80
@@ -28,7 +28,7 @@ def _lines(text: str) -> int:
 
 def _python_functions(module: ast.Module) -> Iterator[tuple[str, int]]:
     """Name and lines of each function, its docstring not counted."""
-    for node in ast.walk(module):
+    for node in nodes(module):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             document = node.body[0]
             has_doc = isinstance(document, ast.Expr) and isinstance(document.value, ast.Constant)

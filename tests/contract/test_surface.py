@@ -13,7 +13,7 @@ from flightid.cli.program import program
 from flightid.cli.wording import as_typed
 from flightid.errors import OptionError
 from flightid.surface import GIVEN, as_key, speaking
-from tests.contract.source import PACKAGE, python_files, tree
+from tests.contract.source import PACKAGE, nodes, python_files, tree
 
 SAY = {"problem", "found", "needed", "action", "message", "what"}
 # Arguments that neither a command nor a study has: their verbs are Python's alone.
@@ -33,7 +33,7 @@ PYTHON_ONLY = {
 
 def _told(path_tree: ast.Module) -> Iterator[ast.Constant]:
     """Texts that errors and findings are made of."""
-    for node in ast.walk(path_tree):
+    for node in nodes(path_tree):
         if not isinstance(node, ast.Call):
             continue
         name = getattr(node.func, "id", getattr(node.func, "attr", ""))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 
-from tests.contract.source import PACKAGE, python_files, tree
+from tests.contract.source import PACKAGE, nodes, python_files, tree
 
 PARTICIPLES = frozenset(
     {"Beside", "Chosen", "Cut", "Drawn", "Flown", "Found", "Given", "Held", "Kept", "Known", "Left"}
@@ -43,7 +43,7 @@ def test_classes_are_nouns_for_what_they_hold() -> None:
 def _classes() -> dict[str, list[str]]:
     homes: dict[str, list[str]] = {}
     for path in python_files():
-        for node in ast.walk(tree(path)):
+        for node in nodes(tree(path)):
             if isinstance(node, ast.ClassDef):
                 homes.setdefault(node.name, []).append(f"{path.relative_to(PACKAGE)}:{node.lineno}")
     return homes

@@ -95,23 +95,27 @@ def compare(found, wanted: fid.Record, names, tolerance: float, why: str) -> Non
         assert_close(found[name] / scale, wanted[name] / scale, atol=tolerance, why=why)
 
 
+@pytest.fixture(scope="module")
+def plane(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("plane")
+    return fid.export(SYSTEM, folder / "plane.fmu", sample_time_s=STEP_S).files[0]
+
+
 @needs_compiler
-def test_a_linear_system_flies_as_simulate_does(tmp_path: Path) -> None:
-    made = fid.export(SYSTEM, tmp_path / "plane.fmu", sample_time_s=STEP_S)
-    assert validation.validate_fmu(str(made.files[0])) == []
-    found, record = flown(made.files[0], SYSTEM, "CoSimulation")
+def test_a_linear_system_flies_as_simulate_does(plane: Path, tmp_path: Path) -> None:
+    assert validation.validate_fmu(str(plane)) == []
+    found, record = flown(plane, SYSTEM, "CoSimulation", n=50)
     wanted = fid.simulate(SYSTEM, record, hold="zero")
     compare(found, wanted, ("p", "q"), 1e-6, "Runge-Kutta steps")
-    found = exchanged(made.files[0], tmp_path / "unzipped", record, ("p", "q"))
+    found = exchanged(plane, tmp_path / "unzipped", record, ("p", "q"))
     wanted = fid.simulate(SYSTEM, record, hold="first")
     compare(found, wanted, ("p", "q"), 1e-9, "the solver's tolerance")
 
 
 @needs_compiler
-def test_fmpys_solver_flies_a_step(tmp_path: Path) -> None:
-    made = fid.export(SYSTEM, tmp_path / "plane.fmu", sample_time_s=STEP_S)
+def test_fmpys_solver_flies_a_step(plane: Path) -> None:
     found = fmpy.simulate_fmu(
-        str(made.files[0]), fmi_type="ModelExchange", stop_time=2.0, output_interval=STEP_S,
+        str(plane), fmi_type="ModelExchange", stop_time=2.0, output_interval=STEP_S,
         relative_tolerance=1e-9, start_values={"u": 1.0, "v": -0.5},
     )  # fmt: skip
     time_s = np.arange(len(found)) * STEP_S
@@ -183,10 +187,9 @@ def test_a_discrete_model_keeps_its_samples(tmp_path: Path) -> None:
 
 
 @needs_compiler
-def test_a_state_is_saved_and_brought_back(tmp_path: Path) -> None:
-    made = fid.export(SYSTEM, tmp_path / "plane.fmu", sample_time_s=STEP_S)
-    description = fmpy.read_model_description(str(made.files[0]))
-    folder = fmpy.extract(str(made.files[0]), unzipdir=str(tmp_path / "unzipped"))
+def test_a_state_is_saved_and_brought_back(plane: Path, tmp_path: Path) -> None:
+    description = fmpy.read_model_description(str(plane))
+    folder = fmpy.extract(str(plane), unzipdir=str(tmp_path / "unzipped"))
     references = {each.name: each.valueReference for each in description.modelVariables}
     unit = fmpy.fmi3.FMU3Slave(
         guid=description.guid, unzipDirectory=folder, modelIdentifier="plane", instanceName="one"

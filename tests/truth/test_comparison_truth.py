@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -25,6 +26,7 @@ def _unstable(a: np.ndarray = A, delays_s: tuple[float, float] = (0.0, 0.0)) -> 
     return LinearSystem(a, B, np.eye(3), D, ("a", "b"), ("x", "y", "z"), delays_s)
 
 
+@cache
 def _held(duration_s: float, noise: float = 0.0) -> fid.Record:
     """Steps of a controller hold the unstable model; its states are sampled exactly."""
     whole = expm(np.block([[A, B], [np.zeros((2, 5))]]) * STEP_S)

@@ -221,7 +221,7 @@ def test_smoothing_keeps_parabolas_and_averages_noise() -> None:
 
 
 def test_low_coherence_and_several_crossings_are_said() -> None:
-    response = measured(0.1, 0.3, 200)
+    response = measured(0.1, 0.3, 120)
     omega = response.omega_rad_s
     wobble = np.radians(25.0 * np.sin(60.0 * np.log(omega)))
     noisy = fid.FrequencyResponse.from_values(

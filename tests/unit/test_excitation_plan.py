@@ -263,7 +263,7 @@ def test_csv_reads_back_to_twelve_digits(tmp_path: Path) -> None:
 
 
 def test_pictures_show_every_input() -> None:
-    plan = excitation.plan("multisine", AXIS, band_rad_s=(2.0, 12.0), inputs=("a", "b"))
+    plan = excitation.plan("multisine", AXIS, band_rad_s=(4.0, 12.0), inputs=("a", "b"))
     assert [trace.name for trace in excitation_history(plan.excitation).data] == ["a", "b"]
     made = plan_spectrum(plan)
     assert len(made.data) == 6

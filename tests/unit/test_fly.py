@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from flightid import errors
-from flightid.cli.program import program
 from flightid.conventions import Role
 from flightid.vehicles import (
     Autopilot,
@@ -143,11 +140,3 @@ def test_unknown_names_are_refused() -> None:
         fly_scenario(weather={})
     with pytest.raises(errors.OptionError, match="has no such field"):
         fly_scenario(vehicle={"weight": 1.0})
-
-
-def test_command_line_writes_a_log_and_prints_the_truth(tmp_path: Path) -> None:
-    path = tmp_path / "sim.BIN"
-    run = CliRunner().invoke(program, ["simulate", "quadrotor", "--output", str(path), "--json"])
-    assert run.exit_code == 0, run.output
-    assert path.stat().st_size > 10_000_000
-    assert '"damping_1_s"' in run.stdout

@@ -89,9 +89,11 @@ def test_parameters_go_into_the_autopilot_and_come_out() -> None:
 def test_a_file_of_gains_is_flown_from_the_command_line(tmp_path: Path) -> None:
     (tmp_path / "gains.param").write_text("ATC_RAT_RLL_P,0.05\n", encoding="utf-8")
     log = tmp_path / "flight.BIN"
-    command = ["simulate", "quadrotor", "--output", str(log)]
+    command = ["simulate", "quadrotor", "--json", "--output", str(log)]
     done = CliRunner().invoke(program, [*command, "--parameters", str(tmp_path / "gains.param")])
     assert done.exit_code == 0, done.output
+    assert log.stat().st_size > 10_000_000
+    assert '"damping_1_s"' in done.stdout
     flown = axis_loop("arducopter", "roll", fid.read_log(log).parameters)
     assert_close(flown.gains["ATC_RAT_RLL_P"], 0.05, rtol=1e-6, why="single precision of the log")
 
