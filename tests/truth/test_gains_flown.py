@@ -15,8 +15,6 @@ from tests.strangers import gains, hover, rig_gains
 from tests.strangers.gain_counts import Outcome, table
 
 RUNS = 30
-BEYOND = 0.15
-"""Share of gains that may miss a margin that was said to be read above the identified band."""
 LOST = 0.25
 """Share of good gains that may be refused in so few: 500 are counted by hand (docs/tuning.md)."""
 
@@ -26,23 +24,16 @@ LOST = 0.25
 def test_gains_keep_what_they_promise(
     tried: Callable[[int], Outcome], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """None of 60 tunings breaks a promise it did not doubt, few one that it did; few are lost."""
+    """None of 60 tunings breaks a promise, green or amber; few good ones are lost."""
     monkeypatch.setattr(tune_pid, "response_bands", lambda *_: ())
     judge([tried(seed) for seed in range(RUNS)])
 
 
 def judge(outcomes: list[Outcome]) -> None:
-    """Green gains and stability without exception, doubted margins and lost gains by share."""
+    """Promises without exception, lost gains by share."""
     made, said = [each for each in outcomes if each.is_made], table(outcomes)
     assert made, said
-    broken = [each for each in made if each.broken]
-    doubted = [
-        each
-        for each in broken
-        if each.verdict == "amber" and "margin-beyond-band" in each.why and "margin" in each.broken
-    ]
-    assert not [each.row() for each in broken if each not in doubted], said
-    assert len(doubted) <= BEYOND * len(made), said
+    assert not [each.row() for each in made if each.broken], said
     lost = sum(each.wasted for each in outcomes)
     held = sum(each.right and not each.broken for each in made)
     assert lost <= LOST * (held + lost), said
@@ -51,13 +42,9 @@ def judge(outcomes: list[Outcome]) -> None:
 def test_a_broken_promise_is_counted_whatever_was_said_of_it() -> None:
     kept = Outcome(0, "rig", "order", "oe", True, "green", "", "", 1.0)
     judge([kept] * 8)
-    low = {"broken": "loop: gain margin 9.2, promised 9.6", "verdict": "amber"}
-    missed = replace(kept, **low, why="margin-beyond-band")
-    judge([kept] * 8 + [missed])
-    unstable = replace(missed, broken="unstable")
+    missed = replace(kept, broken="loop: gain margin 9.2, promised 9.6", verdict="amber")
     lost = replace(kept, verdict="refused", wasted=True)
-    undoubted, green = replace(missed, why="gains"), replace(missed, verdict="green")
-    for wrong in ([unstable], [undoubted], [green], [missed] * 2, [lost] * 4):
+    for wrong in ([missed], [replace(missed, verdict="green")], [lost] * 4):
         with pytest.raises(AssertionError):
             judge([kept] * 8 + wrong)
 

@@ -199,7 +199,9 @@ class Fit(
         if self.covariance is not None:
             return ""
         said = [each.message for each in self.findings if each.code in WITHHOLDING]
-        bare = [self.parameters[name].reason for name in self.names if name in self.parameters]
+        # Of a black box only coefficients with intervals are named.
+        names = [name for name in self.names or self.parameters if name in self.parameters]
+        bare = [self.parameters[name].reason for name in names]
         return "; ".join(dict.fromkeys(said or filter(None, bare)))
 
     @property

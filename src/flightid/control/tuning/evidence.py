@@ -15,6 +15,7 @@ from flightid.dynamics.continuous import to_continuous
 from flightid.errors import DataError, FlightidError
 from flightid.evidence.evidence import LOOP
 from flightid.findings import Finding
+from flightid.identification.fit import WITHHOLDING
 from flightid.identification.model_error import ModelErrorBound
 from flightid.identification.uncertain_of import evidence_behind, uncertain_of
 from flightid.models import InnovationsModel, PolynomialModel
@@ -207,8 +208,16 @@ def _refusals(
             "gains for a model whose errors are not known would promise nothing",
             found=uncertain.reason,
             needed="a fit with a covariance",
-            action="fit a measured response or records; or take nominal=True and keep margins",
+            action=_towards_errors(source),
         )
+
+
+def _towards_errors(source: object) -> str:
+    """What gives a fit its covariance: what the finding that took it says, where one did."""
+    for finding in getattr(source, "findings", ()):
+        if finding.code in WITHHOLDING and finding.action:
+            return str(finding.action)
+    return "fit a measured response or records; or take nominal=True and keep margins"
 
 
 def _listed(given: Verdicts | Iterable[Verdicts] | None) -> Sequence[Verdicts]:
