@@ -109,11 +109,11 @@ if TYPE_CHECKING:
         CoherentPairs,
         FrequencyResponse,
         PairResponse,
-        coherent_pairs,
         estimate_response,
-        response_band,
         without_bias,
     )
+    from flightid.responses.coherent_pairs import coherent_pairs
+    from flightid.responses.response_band import response_band
     from flightid.review import FlightReview, LoopResponse, review_flight
     from flightid.simulation.noise import Noise
     from flightid.simulation.simulate import simulate
@@ -160,11 +160,13 @@ _HOMES = {
     ),
     **dict.fromkeys(
         [
-            "CoherentPairs", "FrequencyResponse", "PairResponse", "coherent_pairs",
-            "estimate_response", "response_band", "without_bias",
+            "CoherentPairs", "FrequencyResponse", "PairResponse", "estimate_response",
+            "without_bias",
         ],
         "flightid.responses",
     ),
+    "coherent_pairs": "flightid.responses.coherent_pairs",
+    "response_band": "flightid.responses.response_band",
     "Estimate": "flightid.uncertainty",
     "Finding": "flightid.findings",
     "Uncertain": "flightid.uncertainty",

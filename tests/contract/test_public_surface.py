@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from types import ModuleType
 
 import pytest
 
@@ -41,6 +42,18 @@ def _astray(module: object, names: list[str]) -> list[str]:
 def test_every_name_is_where_it_is_said_to_be() -> None:
     assert not _astray(flightid, list(flightid.__all__))
     assert _astray(flightid, ["identify", "nonsense"]) == ["nonsense"]
+
+
+def _public_rooms() -> list[ModuleType]:
+    made = [getattr(flightid, name) for name in flightid.__all__]
+    return [each for each in made if isinstance(each, ModuleType)]
+
+
+def test_public_rooms_list_their_public_names_and_no_files() -> None:
+    rooms = _public_rooms()
+    assert len(rooms) > 4
+    stray = {each.__name__: {*dir(each)} ^ {*each.__all__} for each in (flightid, *rooms)}
+    assert not any(stray.values()), stray
 
 
 def test_an_unknown_name_is_an_attribute_error() -> None:

@@ -192,6 +192,8 @@ def _write_px4(plan: Plan, path: Path, fixed_wing: bool) -> Path:
 def _write_page(plan: Plan, path: Path) -> Path:
     from flightid.files import write_atomically
     from flightid.plot.excitation import excitation_history, plan_spectrum
+    from flightid.plot.inputs import input_figure
+    from flightid.record import Record
     from flightid.report.blocks import result_blocks
     from flightid.report.content import Document, Section
     from flightid.report.figures import figure_block
@@ -203,6 +205,10 @@ def _write_page(plan: Plan, path: Path) -> Path:
             plan_spectrum(plan),
             "Power of the input over the target band (shaded), and the coherence and error of a "
             "response that the guess lets expect.",
+        ),
+        figure_block(
+            input_figure(Record.from_excitation(plan.excitation)),
+            "Spectrum of each input, and how often it has each size.",
         ),
     )
     sections = (

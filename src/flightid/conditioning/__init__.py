@@ -66,3 +66,7 @@ __all__ = [
     "to_uniform",
     "velocities_at_cg",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -57,3 +57,7 @@ __all__ = [
     "window_lengths",
     "write_csv",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

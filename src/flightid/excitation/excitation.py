@@ -117,7 +117,7 @@ class Excitation(Result, schema="flightid.excitation/1"):
 
     @property
     def by_name(self) -> dict[str, NDArray[np.float64]]:
-        """Samples by input name, ready for ``Record.from_arrays(time_s, excitations=...)``."""
+        """Samples by input name, in `unit`; ``Record.from_excitation`` makes a record of all."""
         return dict(zip(self.names, self.signals, strict=True))
 
     @property

@@ -11,6 +11,7 @@ and no meaning rests on colour alone: series differ in dash or marker too.
 
 from flightid.plot.fit import EstimateBar, parameter_intervals
 from flightid.plot.frequency_response import Curve, bode
+from flightid.plot.inputs import input_figure
 from flightid.plot.loops import diagram, step
 from flightid.plot.margins import loop_bode, loop_nichols, loop_nyquist
 from flightid.plot.modes import pole_map
@@ -25,6 +26,7 @@ __all__ = [
     "bode",
     "diagram",
     "fit_picture",
+    "input_figure",
     "loop_bode",
     "loop_nichols",
     "loop_nyquist",
@@ -34,3 +36,7 @@ __all__ = [
     "step",
     "time_histories",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

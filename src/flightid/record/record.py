@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid.conventions import Role
+from flightid.excitation.excitation import Excitation
 from flightid.record.channel import Channel
 from flightid.record.display import one_line, plain_values, summary_table
 from flightid.record.history import Step
@@ -117,6 +118,26 @@ class Record(LabelledSamples, Result, schema="flightid.record/1"):
         made = cls(stamps, samples, name=name, trim=trim, history=history, input_shape=known)
         require_period([made[name] for name in made.inputs], made.sample_time_s, period_s)
         return made
+
+    @classmethod
+    def from_excitation(cls, excitation: Excitation) -> Record:
+        """Designed inputs as a record: their unit, held between samples as an autopilot does.
+
+        Example
+        -------
+        >>> from flightid.excitation import doublet
+        >>> made = doublet(amplitude=2.0, step_s=0.5, sample_rate_hz=10.0, unit="deg", name="da")
+        >>> Record.from_excitation(made).unit("da")
+        'deg'
+        """
+        return cls.from_arrays(
+            excitation.time_s,
+            inputs=excitation.by_name,
+            units=dict.fromkeys(excitation.names, excitation.unit),
+            name=excitation.kind,
+            history=[Step("design", {"kind": excitation.kind, **excitation.options})],
+            hold="zero",
+        )
 
     def replace(
         self,

@@ -15,6 +15,7 @@ from flightid.findings import Finding
 from flightid.identification import PolynomialDetails
 from flightid.models import StateSpaceModel
 from flightid.models.model import model_of
+from flightid.plot.inputs import input_figure
 from flightid.plot.modes import pole_map
 from flightid.plot.pictures import record_history
 from flightid.plot.polynomial import pole_zero
@@ -74,6 +75,10 @@ def _first(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
         yield from record_figures(fit)
     for record in item.training:
         yield figure_block(record_history(record), f"{record.name}: what the model was fitted to.")
+        yield figure_block(
+            input_figure(record, fit.model.inputs),
+            f"{record.name}: spectrum of each input, and how often it has each size.",
+        )
     goal = goal_findings(fit)
     if goal:
         yield Lights(goal)

@@ -73,5 +73,5 @@ def _figure(item: ModelResults, name: str, truth: Truth | None) -> Figure:
         said += "; truth dotted"
     least = item.settings.response.minimum_coherence
     if item.settings.structure is None:
-        return figure_block(bode(curves, unit=pair.unit), f"{shown}.")
-    return figure_block(bode(curves, unit=pair.unit, minimum_coherence=least), f"{shown}.")
+        return figure_block(bode(curves, unit=pair.unit), f"{said}.")
+    return figure_block(bode(curves, unit=pair.unit, minimum_coherence=least), f"{said}.")

@@ -70,3 +70,7 @@ __all__ = [
     "verify",
     "weighted_rms",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
