@@ -7,8 +7,12 @@ import pytest
 from scipy.signal import lfilter
 
 import flightid as fid
-from flightid.errors import DataError, OptionError
-from flightid.identification.prediction_error.linear_regression import regress, regress_lags
+from flightid.errors import DataError, FitError, OptionError
+from flightid.identification.prediction_error.linear_regression import (
+    LinearRegression,
+    regress,
+    regress_lags,
+)
 from flightid.plot import polynomial as plot
 from tests.closeness import assert_close
 from tests.polynomial_records import ARMAX, TWO_INPUTS, flown
@@ -32,6 +36,12 @@ def test_products_of_lags_give_the_triangle_s_regression(levels):
     assert_close(found.sum_of_squares, known.sum_of_squares, why="the last pivot", rtol=1e-10)
     equal = regress_lags(output, np.vstack([inputs[:1]] * 2), lengths, order, order, levels=levels)
     assert equal.dependent is not None
+
+
+def test_a_regression_without_finite_numbers_is_a_typed_error():
+    ran_away = LinearRegression(np.zeros(2), np.full((3, 3), np.nan), 10, None)
+    with pytest.raises(FitError, match="a regression ran away"):
+        _ = ran_away.shortest
 
 
 def test_pulse_responses_recover_the_model_and_its_delays():

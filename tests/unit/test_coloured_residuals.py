@@ -145,3 +145,15 @@ def test_parameters_that_are_hardly_told_apart_have_a_symmetric_covariance() -> 
     residual = signal.lfilter([1.0], [1.0, -0.9], random.standard_normal((1, 2990)))
     found = residual_covariance([RecordBlock.of(late[None], np.ones((1, 2990, 1)), residual)])
     assert np.array_equal(found.covariance, found.covariance.T)
+
+
+def test_a_covariance_of_nearly_equal_sensitivities_has_no_negative_direction():
+    """Alike to ten digits: their squares alone hold none of what tells them apart."""
+    random = np.random.default_rng(0)
+    noise = signal.lfilter([1.0], [1.0, -0.9], random.standard_normal(500))
+    common, apart = random.standard_normal((2, 500))
+    slopes = np.stack([common, common + 1e-10 * apart, common + 1e-5 * np.roll(apart, 7)], axis=1)
+    block = RecordBlock.of(slopes[None], np.zeros((1, 500, 0)), noise[None])
+    found = residual_covariance([block]).covariance
+    size = np.sqrt(np.diag(found))
+    assert np.linalg.eigvalsh(found / np.outer(size, size))[0] > 0.0

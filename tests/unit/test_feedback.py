@@ -107,6 +107,22 @@ def test_an_instrument_needs_no_open_loop() -> None:
     assert not response.loop.is_closed
 
 
+def test_residuals_of_a_direct_path_do_not_call_a_loop_within_the_sample_open() -> None:
+    """y = 0.5 u + 0.3 u(t-1) + v and u = r - y: the path that is fitted takes v out of u."""
+    r, v = np.random.default_rng(0).standard_normal((2, 800))
+    v *= 0.5
+    u, y = np.zeros(800), np.zeros(800)
+    for t in range(800):
+        past = 0.3 * u[t - 1] if t else 0.0
+        u[t] = (r[t] - past - v[t]) / 1.5
+        y[t] = past + 0.5 * u[t] + v[t]
+    record = fid.Record.from_arrays(np.arange(800) * DT, inputs={"u": u}, outputs={"y": y})
+    fit = fid.identify(fid.PolynomialModel.arx("u", "y", na=0, nb=2, nk=0), record)
+    found = fid.residual_tests(fit)
+    assert (found.feedback.loop, found.feedback.source) == ("unknown", "same sample")
+    assert "cannot be told" in str(found.summary().notes)
+
+
 def test_a_controller_that_answers_within_the_sample_is_not_called_open() -> None:
     noise = signal.lfilter([1.0], [1.0, -0.8], np.random.default_rng(0).standard_normal(1000))
     u, y = np.zeros(1000), np.zeros(1000)
@@ -118,7 +134,7 @@ def test_a_controller_that_answers_within_the_sample_is_not_called_open() -> Non
     assert (found.loop, found.source, found.is_function_of_outputs) == (
         "unknown", "same sample", True,
     )  # fmt: skip
-    fit = fid.identify(fid.PolynomialModel.arx(("u",), "y", na=2, nb=2, nk=0), record)
+    fit = fid.identify(fid.PolynomialModel.arx(("u",), "y", na=2, nb=1, nk=0), record)
     loop = fit.evidence.check("loop")
     assert loop is not None
     assert loop.light is Light.RED

@@ -47,6 +47,16 @@ class RecordBlock:
         on_own = basis.T @ shared
         return cls(shared - basis @ on_own, on_own, basis, triangle, residual)
 
+    def along(self, directions: Array) -> RecordBlock:
+        """The same by combinations of the parameters, one a column."""
+        answering = None if self.answering is None else self.answering @ directions
+        return replace(
+            self,
+            projected=self.projected @ directions,
+            shared_on_own=self.shared_on_own @ directions,
+            answering=answering,
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class JointResiduals:
@@ -68,6 +78,10 @@ class JointResiduals:
     total: Array
     measured: bool = True
     bias: Array | None = None
+
+    def along(self, directions: Array) -> JointResiduals:
+        """The same by combinations of the parameters, one a column."""
+        return replace(self, slopes=self.slopes @ directions, total=self.total @ directions)
 
     def of(self, parameters: NDArray[np.bool_]) -> JointResiduals:
         """Columns of some parameters."""

@@ -191,21 +191,26 @@ def residual_covariance(
     """
     triangle = triangle_of(blocks, None if beside is None else beside.slopes)
     root = _inverse_root(triangle)
-    turned = _gain(root, beside, blocks)
+    # In directions of unit information squares keep their digits, however nearly singular it is.
+    whitened = [block.along(root) for block in blocks]
+    slopes = None if beside is None else beside.along(root)
+    inner = _gain(slopes, whitened)
+    half = root @ inner
+    turned = half @ root.T
     taken = []
-    for block in blocks:
-        parts = (block.basis, block.projected @ root)
+    for block in whitened:
+        parts = (block.basis, block.projected)
         taken.append(FittedDirections(*(part.reshape(*block.residual.shape, -1) for part in parts)))
     walks = None if noise is None else _walks(taken[0], *noise)
     models = noise_models([block.residual for block in blocks], taken, walks)
-    apart = noise_heard(models, blocks)
+    apart = noise_heard(models, whitened)
     answers = [joined(each, block) for each, block in zip(apart, blocks, strict=True)]
     sizes = [block.basis.shape[1] for block in blocks]
     heard = sum(each[:, m:, m:] for each, m in zip(answers, sizes, strict=True))
-    variances = turned @ heard @ turned.T
+    variances = half @ heard @ half.T
     shared = np.asarray(variances.sum(axis=0))
-    if beside is not None:
-        brought = beside.slopes @ turned.T
+    if slopes is not None:
+        brought = slopes.slopes @ half.T
         shared = shared + brought.T @ brought
     if noise is not None:
         brought = _of_walks(blocks[0], *noise) @ turned.T
@@ -216,19 +221,23 @@ def residual_covariance(
         heard_here = each.sum(axis=0)
         back = np.linalg.inv(block.triangle)
         through = back @ block.shared_on_own
-        gain = np.vstack([np.zeros((m, len(turned))), turned.T])
-        direct = np.vstack([back.T, -turned.T @ through.T])
+        gain = np.vstack([np.zeros((m, len(half))), half.T])
+        direct = np.vstack([back.T, -half.T @ through.T])
         others = shared - gain.T @ heard_here @ gain
         found = direct.T @ heard_here @ direct + through @ others @ through.T
         own.append(_lifted(found, back @ back.T))
         crossed.append(direct.T @ heard_here @ gain - through @ others)
-    plain = turned @ np.linalg.inv(root).T
+    plain = half
     white = np.asarray(root @ root.T) if blocks[0].answering is None else plain @ plain.T
     freedom = _freedom(shared, variances, models)
     # Random walks from noise of inputs join whatever parts a record is cut into.
-    compared = flights_of(apart, blocks) if noise is None else []
+    compared = []
+    if noise is None:
+        compared = flights_of(
+            [_turned_back(each, triangle, m) for each, m in zip(apart, sizes, strict=True)], blocks
+        )
     rest = rest_of(compared, beside)
-    tested = () if inputs is None else _tested(blocks, models, answers, turned, beside, inputs)
+    tested = () if inputs is None else _tested(whitened, models, answers, inner, slopes, inputs)
     agreed = compare_parts(compared, turned, _lifted(shared, white), freedom, rest)
     return ResidualCovariance(
         agreed.covariance,
@@ -315,8 +324,8 @@ def _inverse_root(triangle: Array) -> Array:
     return np.asarray(solve_triangular(triangle / size, np.eye(len(size))) / size[:, None])
 
 
-def _gain(root: Array, beside: JointResiduals | None, blocks: Sequence[RecordBlock]) -> Array:
-    """What turns a gradient into a change of the estimates, from the root R⁻¹ of the information.
+def _gain(beside: JointResiduals | None, blocks: Sequence[RecordBlock]) -> Array:
+    """What turns a gradient into a change of the estimates, in directions of unit information.
 
     Where data follow the parameters, the equations that the estimates solve bend less than the
     cost does, and the gain is larger than the inverse of the information.
@@ -325,10 +334,19 @@ def _gain(root: Array, beside: JointResiduals | None, blocks: Sequence[RecordBlo
     if answering:
         pairs = zip(blocks, answering, strict=True)
         return np.linalg.inv(np.sum([each.projected.T @ slopes for each, slopes in pairs], axis=0))
+    count = blocks[0].projected.shape[1]
     if beside is None:
-        return np.asarray(root @ root.T)
-    follows = (beside.slopes @ root).T @ ((beside.slopes - beside.total) @ root)
-    return np.asarray(root @ np.linalg.solve(np.eye(len(root)) - follows, root.T))
+        return np.eye(count)
+    follows = beside.slopes.T @ (beside.slopes - beside.total)
+    return np.asarray(np.linalg.inv(np.eye(count) - follows), dtype=np.float64)
+
+
+def _turned_back(apart: Array, triangle: Array, m: int) -> Array:
+    """Squares of `noise_heard` by the parameters, from those along directions of a triangle."""
+    turn = np.eye(apart.shape[1])
+    for half in np.split(np.arange(m, len(turn)), 2):
+        turn[np.ix_(half, half)] = triangle
+    return np.asarray(turn.T @ apart @ turn)
 
 
 def _walks(taken: FittedDirections, noise: InputNoise, whitener: Array) -> Array:
@@ -369,4 +387,13 @@ def _lifted(covariance: Array, plain: Array) -> Array:
     Where data hardly tell parameters apart, rounding leaves the two triangles unlike.
     """
     lift = np.maximum(ROUNDING * np.diag(plain) - np.diag(covariance), 0.0)
-    return np.asarray(0.5 * (covariance + covariance.T) + np.diag(lift))
+    lifted = np.asarray(0.5 * (covariance + covariance.T) + np.diag(lift))
+    size = np.sqrt(np.diag(lifted))
+    if not size.size or not np.all(size > 0.0):
+        return lifted
+    own, axes = np.linalg.eigh(lifted / np.outer(size, size))
+    least = len(size) * np.finfo(float).eps * own[-1]
+    if own[0] >= least:
+        return lifted
+    root = size[:, None] * axes * np.sqrt(np.maximum(own, 2.0 * least))
+    return np.asarray(root @ root.T)

@@ -12,7 +12,7 @@ from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dpotri, dtrcon
 
 from flightid import _native
-from flightid.errors import DataError
+from flightid.errors import DataError, FitError
 from flightid.models.polynomial.structure import PolynomialStructure
 
 Array = NDArray[np.float64]
@@ -45,7 +45,20 @@ class LinearRegression:
 
     @property
     def shortest(self) -> Array:
-        """Shortest coefficients among those that fit best: safe where regressors are collinear."""
+        """Shortest coefficients among those that fit best: safe where regressors are collinear.
+
+        Raises
+        ------
+        FitError
+            Regressors run away: their triangle holds no finite numbers.
+        """
+        if not np.all(np.isfinite(self.triangle)):
+            raise FitError(
+                "a regression ran away",
+                found="regressors without finite numbers",
+                needed="channels whose filtered samples stay finite",
+                action="lower the orders, or look for outliers and unlike scales in the records",
+            )
         scale = np.linalg.norm(self.factor, axis=0)
         scale[scale == 0.0] = 1.0
         # No singular value is less than this bound, times √n, over the largest: none is left out.

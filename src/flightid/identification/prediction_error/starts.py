@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from flightid.errors import FitError
 from flightid.identification.prediction_error.linear_regression import reflected, regress
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
@@ -188,9 +189,11 @@ def _steiglitz_mcbride(
         # Filters at the edge of stability leave no equations: what was found before stands.
         if not np.max(np.abs(signals)) < LARGEST:
             break
-        theta = regress(
-            signals[0], signals[1:], lengths, nf, nb, nk, skip=0, levels=levels
-        ).shortest
+        try:
+            made = regress(signals[0], signals[1:], lengths, nf, nb, nk, skip=0, levels=levels)
+            theta = made.shortest
+        except FitError:
+            break
         f, b = theta[:nf], theta[nf:]
     return b, f
 

@@ -59,6 +59,8 @@ def free_motion(model: Polynomials, n_samples: int) -> Array:
         below = np.convolve(below, np.asarray(row))
     impulse = np.zeros((below.size - 1, n_samples))
     np.fill_diagonal(impulse, 1.0)
+    if below.size == 1:
+        return impulse
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray(lfilter([1.0], below, impulse))
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 
 from flightid.errors import DataError, OptionError
+from flightid.evidence.feedback import feedback_test
 from flightid.identification import Fit
 from flightid.record import Record
 from flightid.record.hold import LOOPS, common_loop
@@ -115,7 +116,7 @@ def residual_tests(
     )
     fitted_noise = data.fitted_noise if fitted_noise is None else fitted_noise
     fitted_input = data.fitted_input if fitted_input is None else fitted_input
-    how, feedback = _loop(data, loop or _known_loop(residuals))
+    how, feedback = _loop(data, loop or _known_loop(residuals), _measured(residuals))
     injected = _injected(residuals, excitations)
     bent = data.horizon is Horizon.FREE_RUN and feedback.loop != "open"
     if inputs is None and injected and bent:
@@ -176,8 +177,14 @@ def _injected(residuals: Residuals, named: Iterable[str] | None) -> tuple[str, .
     return tuple(name for name in records[0].excitations if all(name in r for r in records))
 
 
-def _loop(data: ResidualData, declared: Loop | str | None) -> tuple[Loop, FeedbackTest]:
-    """What is declared; else whether past residuals move what is new in the inputs."""
+def _loop(
+    data: ResidualData, declared: Loop | str | None, records: Sequence[Record]
+) -> tuple[Loop, FeedbackTest]:
+    """What is declared; else whether past residuals move what is new in the inputs.
+
+    A direct path that was fitted takes a loop within the sample out of the residuals: where they
+    see none, the measured outputs are asked, too.
+    """
     if declared is not None:
         chosen = _choice(Loop, declared)
         return chosen, declared_loop("open" if chosen is Loop.OPEN else "closed")
@@ -187,6 +194,10 @@ def _loop(data: ResidualData, declared: Loop | str | None) -> tuple[Loop, Feedba
     left = [np.vstack(rows) for rows in zip(*map(centred, data.residuals.values()), strict=True)]
     repeats = all(found_period(rows) is not None for rows in inputs)
     found = find_feedback(inputs, left, tuple(data.inputs), repeats=repeats)
+    channels = (*data.inputs, *data.residuals)
+    if found.loop == "open" and records and all(n in r for r in records for n in channels):
+        measured = feedback_test(records, inputs=data.inputs, outputs=data.residuals)
+        found = measured if measured.loop == "unknown" else found
     return (Loop.CLOSED if found.is_closed else Loop.OPEN), found
 
 
