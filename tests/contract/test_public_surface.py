@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import subprocess
 import sys
 from types import ModuleType
@@ -63,6 +64,14 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         flightid.inspect  # noqa: B018
     with pytest.raises(AttributeError, match=r"nearest: identify$"):
         flightid.identfy  # noqa: B018
+
+
+def test_a_room_that_is_imported_leaves_its_verb() -> None:
+    rooms = [name for name, home in flightid._HOMES.items() if home.startswith(f"flightid.{name}.")]
+    assert rooms
+    for name in rooms:
+        setattr(flightid, name, importlib.import_module(f"flightid.{name}"))
+        assert callable(getattr(flightid, name)), name
 
 
 @pytest.mark.nightly

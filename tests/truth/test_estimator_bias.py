@@ -78,7 +78,7 @@ def test_truth_is_recovered_without_noise(way: str) -> None:
 
 @pytest.mark.nightly
 def test_inputs_that_are_smooth_between_samples() -> None:
-    fine = fid.simulate(MODEL, sweep(16 * RATE_HZ), units={"p": "rad/s"})
+    fine = fid.simulate(MODEL, sweep(32 * RATE_HZ), units={"p": "rad/s"})
     step = slice(None, None, 16)
     record = fid.Record.from_arrays(
         fine.time_s[step],
@@ -197,7 +197,6 @@ def test_the_functional_is_the_derivative_of_a_single_window_estimate() -> None:
         response.linear.apply([change])
 
 
-@pytest.mark.nightly
 def test_where_nothing_is_known_the_fit_says_why(tmp_path: Path) -> None:
     response = estimated(flown(0.001))
     cases = {

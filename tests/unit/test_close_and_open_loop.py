@@ -151,7 +151,6 @@ def test_errors_of_opened_responses_are_those_of_draws() -> None:
     assert_close(covariance[first, second] / size, wanted / size, atol=0.06, why="1500 draws")
 
 
-@pytest.mark.nightly
 def test_a_fit_gives_intervals_and_says_when_its_vehicles_are_unstable() -> None:
     truth = fid.load_model("rate_first_order").with_values({"Lp": -3.0, "Ltphi": 60.0, "tau": 0.03})
     omega = np.geomspace(0.5, 30.0, 40)
@@ -161,7 +160,7 @@ def test_a_fit_gives_intervals_and_says_when_its_vehicles_are_unstable() -> None
     )  # fmt: skip
     fit = fid.identify(truth, noise)
     (stick,), (rate,) = truth.inputs, truth.outputs
-    calm = fid.close_loop(fit, {stick: {rate: 0.1}})
+    calm = fid.close_loop(fit, {stick: {rate: 0.1}}, draws=30)
     assert calm.is_stable
     assert calm.unstable_draws == 0
     low, high = calm.poles[0].real.interval95 or (0.0, 0.0)
@@ -170,7 +169,7 @@ def test_a_fit_gives_intervals_and_says_when_its_vehicles_are_unstable() -> None
     s = 1j * np.linspace(20.0, 80.0, 20001)
     turn = np.angle(truth.frequency_response(s.imag)[0, 0])
     last = 1.0 / np.abs(truth.frequency_response(s.imag)[0, 0])[np.argmin(np.abs(turn + np.pi))]
-    near = fid.close_loop(fit, {stick: {rate: 0.985 * last}}, seed=2)
+    near = fid.close_loop(fit, {stick: {rate: 0.985 * last}}, seed=2, draws=30)
     assert near.is_stable
     assert 0 < near.unstable_draws < near.draws
     assert any(f.code == "unstable-within-uncertainty" for f in near.findings)

@@ -14,7 +14,7 @@ from flightid.control.autopilots import axis_loop
 from flightid.conventions import Light
 from flightid.errors import DataError, StudyError, UnknownNameError
 from flightid.study.settings import read_settings
-from flightid.vehicles import Autopilot, GainFlightOptions, fly_gains, rate_truth
+from flightid.vehicles import Autopilot, GainFlight, GainFlightOptions, fly_gains, rate_truth
 from tests.closeness import assert_close
 
 SHORT = GainFlightOptions(record_s=60.0)
@@ -38,8 +38,30 @@ def _with_gains(tuning: fid.Tuning, factor: float) -> fid.Tuning:
     return fid.Tuning((dataclasses.replace(design, changes=changes),), ())
 
 
-def test_the_flight_shows_the_loops_that_the_true_model_promises(tuning: fid.Tuning) -> None:
-    flown = fly_gains(tuning, options=SHORT)
+@pytest.fixture(scope="module")
+def flown(tuning: fid.Tuning) -> GainFlight:
+    return fly_gains(tuning, options=SHORT)
+
+
+def _red(flown: GainFlight) -> list[str]:
+    return [finding.code for finding in flown.findings if finding.light is Light.RED]
+
+
+def test_what_the_vehicle_does_not_stand_or_keep_is_red(flown: GainFlight) -> None:
+    assert _red(flown) == []
+    first = dataclasses.replace(flown.margins[0], slack=-0.1, required="at least 75")
+    broken = dataclasses.replace(flown, margins=(first, *flown.margins[1:]))
+    assert _red(broken) == ["requirement-broken"]
+    assert _red(dataclasses.replace(flown, largest_command={"roll": 1.0})) == ["saturated"]
+    lost = dataclasses.replace(flown, lost={"roll, whole loop": "the vehicle fell"})
+    assert _red(lost) == ["not-flown"]
+    for bad in (broken, lost):
+        assert not any(finding.code == "requirements-flown" for finding in bad.findings)
+
+
+def test_the_flight_shows_the_loops_that_the_true_model_promises(
+    tuning: fid.Tuning, flown: GainFlight
+) -> None:
     assert set(flown.loops) == {"roll, whole loop", "roll, angle loop"}
     assert flown.gains == tuning.gains
     by_name = {(each.loop, each.name): each for each in flown.margins}

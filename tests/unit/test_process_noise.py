@@ -138,7 +138,6 @@ def test_records_of_vehicles_that_differ_are_no_turbulence() -> None:
     assert low < -8.0 < high
 
 
-@pytest.mark.nightly
 def test_a_lag_that_is_left_out_is_no_turbulence_to_a_filter() -> None:
     model = fid.StateSpaceModel.from_dict(
         {

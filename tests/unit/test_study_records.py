@@ -192,7 +192,6 @@ def test_a_narx_model_is_searched_and_tested(folder: Path) -> None:
     assert "NARX" in text
 
 
-@pytest.mark.nightly
 @pytest.mark.usefixtures("no_report")
 def test_one_structure_needs_no_choice(folder: Path) -> None:
     text = units_in_mat(LINEAR).replace('select = "choice"\n', "")
@@ -284,7 +283,6 @@ def test_a_missing_file_is_named(folder: Path) -> None:
         fid.run_study(written(folder, text), output=folder / "gone")
 
 
-@pytest.mark.nightly
 @pytest.mark.usefixtures("no_report")
 def test_a_file_with_a_gap_needs_a_decision(folder: Path) -> None:
     lines = (folder / "rig.csv").read_text(encoding="utf-8").split("\n")

@@ -158,6 +158,35 @@ def test_models_without_errors_are_refused_or_taken_as_they_are(fit: fid.Fit) ->
     assert "errors are not known" in str(design.worst_case_table())
 
 
+PLAIN = {"controller": fid.ControllerOptions(controller="p", controller_rate_hz=400.0), "draws": 5}
+
+
+def test_a_crossover_of_a_plain_loop_where_little_was_measured_is_red() -> None:
+    omega = np.geomspace(0.5, 90.0, 40)
+    low = (omega > 8.0) & (omega < 40.0)
+    design = fid.tune_controller(_fit(coherence=np.where(low, 0.3, 0.95)), **PLAIN)
+    (found,) = [each for each in design.findings if each.code == "coherence-at-crossover"]
+    assert found.light is Light.RED
+    assert "coherence is 0.3" in found.message
+
+
+def test_a_model_that_its_data_contradict_promises_a_plain_loop_less(fit: fid.Fit) -> None:
+    errors, gaps = fit.model_errors["p/tau_phi"], []
+    for bound in (0.02, 0.3, 0.8):
+        doubted = dataclasses.replace(fit)
+        own = dataclasses.replace(errors, bound=bound + 0.0 * errors.bound)
+        doubted.__dict__["model_errors"] = {"p/tau_phi": own}
+        if bound > 0.5:
+            with pytest.raises(DataError, match="nowhere shown to hold"):
+                fid.tune_controller(doubted, **PLAIN)
+            continue
+        design = fid.tune_controller(doubted, **PLAIN)
+        margin = design.worst_case("loop", "phase margin")
+        gaps.append((margin.nominal or 0.0) - (margin.worst or 0.0))
+    # An error of 0.3 turns the loop by up to arcsin 0.3 = 17.5 degrees, of 0.02 by 1.1.
+    assert 12.0 < gaps[1] - gaps[0] < 20.0
+
+
 @pytest.mark.nightly
 def test_a_crossover_where_little_was_measured_is_red() -> None:
     omega = np.geomspace(0.5, 90.0, 40)
