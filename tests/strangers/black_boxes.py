@@ -196,7 +196,7 @@ CASES = (
             f"impulse response, decay {decay:g}, {name}",
             partial(fly_impulse, decay=decay, noise=noise),
         )
-        for decay in (0.8, 0.95, 0.98)
+        for decay in (0.8, 0.95, 0.98, 0.997)
         for name, noise in (("white", WHITE), ("AR(1) 0.9", RED))
     ),
 )

@@ -10,7 +10,7 @@ from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.coloured_residuals import residual_covariance
 from flightid.uncertainty.fitted_correlation import LAGS
 from tests.closeness import assert_close
-from tests.strangers import noises
+from tests.strangers import closed_loops, noises
 from tests.strangers.output_error import COLOURS, flight, late, model
 
 N = 4000
@@ -79,6 +79,15 @@ def test_noise_alone_has_no_bars(method: str | None) -> None:
     assert all(each.stderr is None for each in fit.parameters.values())
     assert str(fit.evidence.light) == "red"
     assert "nothing-told" in [each.code for each in fit.findings]
+
+
+def test_what_stays_mostly_unexplained_has_no_bars() -> None:
+    flown, *beside = (closed_loops.record(k, feedback=closed_loops.PILOT) for k in range(2))
+    response = fid.estimate_response(flown, estimator="prewhitened", band_rad_s=(0.5, 10.0))
+    fit = fid.identify(closed_loops.model(), [response, *beside[0]])
+    assert str(fit.evidence.light) == "red"
+    assert fit.covariance is None
+    assert "of its variance is left" in (fit.parameters["Zw"].reason or "")
 
 
 def test_slow_smooth_noise_denies_no_response_that_is_there() -> None:

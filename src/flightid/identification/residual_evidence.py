@@ -45,6 +45,9 @@ def with_residuals_judged(fit: Fit) -> Fit:
         return fit
     if not fit.responses and _gain(fit) < least_gain(len(fit.names)):
         return _withheld(fit, NOTHING, *nothing_told(NOTHING))
+    worst = next((each for each in fit.findings if _is_unexplained(each)), None)
+    if worst is not None:
+        return without_intervals(fit, worst.message) if fit.covariance is not None else fit
     ratios = [float(np.sqrt(cost / 100.0)) for cost in fit.costs.values()]
     # What rounding leaves follows the inputs too.
     seen = [each for each in fit.input_correlations if ratios[each.output] > ROUNDING]
@@ -54,6 +57,11 @@ def with_residuals_judged(fit: Fit) -> Fit:
         return fit
     (said,) = tests.findings(biased=False, action=MISSING)
     return _withheld(fit, tests.why_biased, said)
+
+
+def _is_unexplained(found: Finding) -> bool:
+    """Whether most of what moves an output is no part of the model: its bars hold nothing."""
+    return found.code == "output-unexplained" and found.light is Light.RED
 
 
 def least_gain(n_parameters: int) -> float:

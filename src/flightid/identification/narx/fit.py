@@ -340,7 +340,10 @@ def _select(model: NarxStructure, candidates: CandidateTerms, data: Regressors) 
         raise FitError(
             "no term explains any of the output", action="allow linear terms or other lags"
         )
-    spread = _spread(factor.reshape(kept, kept), penalties, squares[kept - 1], target.size)
+    # No output is known better than its rounding, however exactly terms may give it.
+    rounding = float(np.finfo(float).eps) ** 2 * float(target @ target)
+    left = max(float(squares[kept - 1]), rounding)
+    spread = _spread(factor.reshape(kept, kept), penalties, left, target.size)
     errors = np.linalg.norm(spread, axis=1)
     terms = candidates.terms
     columns = (weights, errors, reduction, squares, press, penalties)
