@@ -38,6 +38,21 @@ def test_quadratic_functions_keep_the_slope() -> None:
     assert_close(found.stderr[0], 6.0 * 0.3, rtol=1e-12, why="central differences of a square")
 
 
+def test_a_number_that_jumps_has_the_spread_of_its_draws() -> None:
+    both = Uncertain(np.array([0.0, 0.0]), np.diag([0.01, 0.01]), lambda numbers: numbers)
+    # No single direction reaches the jump by one standard deviation; one draw of ten does.
+    found = both.carried(lambda x: [x.sum() + 5.0 * (x.sum() > 0.18), x.sum()])
+    assert found.stderr is not None
+    assert 0.5 < found.stderr[0] < 3.0
+    assert_close(found.stderr[1], np.sqrt(0.02), rtol=1e-9, why="a straight number keeps its own")
+
+
+def test_a_number_that_many_draws_lose_is_not_determined() -> None:
+    both = Uncertain(np.array([0.0, 0.0]), np.diag([0.01, 0.01]), lambda numbers: numbers)
+    found = both.carried(lambda x: [np.nan if x.sum() > 0.18 else x.sum()])
+    assert found.number(0, "crossing").interval95 is None
+
+
 def test_steps_stay_inside_the_bounds() -> None:
     """A delay known to twice its size still has its error, and no step makes it negative."""
     seen = []

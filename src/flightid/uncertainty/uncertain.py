@@ -26,6 +26,12 @@ TRIES = 100
 """Draws for each one that has to lie inside the bounds."""
 TOGETHER = 64
 """Directions whose ends are computed at once: a long response has thousands."""
+CHECKED = 32
+"""Draws that ask whether what is computed is as straight as its first order says."""
+BENT = 1.2
+"""Spread of the draws over that of first order of the same draws from which it counts."""
+MISSED = 0.05
+"""Share of draws without the number from which it is not determined."""
 LOST = "not determined everywhere within its uncertainty"
 
 
@@ -213,7 +219,9 @@ class Uncertain(Generic[T]):
         """Numbers that are computed from many things at once, with their covariance.
 
         Central differences over ± one standard deviation along the independent directions of the
-        covariance: deterministic, and right in second order too as far as the slope goes.
+        covariance: deterministic, and right in second order too as far as the slope goes. Draws of
+        all directions at once then check it: where their spread is clearly larger, as of a crossing
+        that changes places with another one, the number has the spread of the draws.
 
         Parameters
         ----------
@@ -226,8 +234,7 @@ class Uncertain(Generic[T]):
 
         Assumes
         -------
-        A function that is nearly straight over the uncertainty: biased where it is not, for
-        example for a damping ratio known to half its size.
+        Normal errors; a bent function has a standard error, its interval is symmetric all the same.
 
         Reference
         ---------
@@ -237,9 +244,28 @@ class Uncertain(Generic[T]):
         covariance, reason = None, self.reason
         if self.known:
             slopes = self.slopes_together(function).reshape(-1, len(values))
-            covariance, reason = slopes.T @ slopes, ""
+            wider = self._bend(function, values, slopes)
+            covariance, reason = wider[:, None] * (slopes.T @ slopes) * wider, ""
         found = uncertain_numbers(values, covariance, reason)
         return replace(found, findings=self.findings, valid_rad_s=self.valid_rad_s)
+
+    def _bend(self, function: Callable[[list[T]], Array], values: Array, slopes: Array) -> Array:
+        """Factors of standard errors, shape (k,): one where first order holds, NaN where lost."""
+        factors = np.ones(len(values))
+        if not len(slopes) or not np.all(np.isfinite(self.directions)):
+            return factors
+        steps = np.random.default_rng(0).standard_normal((CHECKED, len(slopes)))
+        ends = self.numbers + steps @ self.directions
+        moves = function([self.make(self._held(end)) for end in ends]) - values
+        there = np.isfinite(moves)
+        found, straight = (
+            np.sqrt(np.sum(np.where(there, each, 0.0) ** 2, axis=0))
+            for each in (moves, steps @ slopes)
+        )
+        bent = (found > BENT * straight) & (straight > 0.0)
+        np.divide(found, straight, out=factors, where=bent)
+        factors[np.mean(there, axis=0) < 1.0 - MISSED] = np.nan
+        return factors
 
     def draws(self, count: int, seed: int = 0) -> list[T]:
         """Things drawn from the normal distribution of the estimate, inside bounds and class.

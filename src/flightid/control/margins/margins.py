@@ -237,10 +237,10 @@ def margins(
 
     Assumes
     -------
-    A linear loop. Intervals are those of the estimate's covariance carried by first order, so they
-    are biased where a margin hangs on two crossings that change places, and leave out what a model
-    lacks. The sensitivity peak of a noisy measurement is biased upwards: it is the highest of many
-    points. A measurement should begin below and end above the crossings; joint input and output
+    A linear loop. Intervals are those of the estimate's covariance carried by first order, by draws
+    where a margin hangs on two crossings that change places, and leave out what a model lacks. The
+    sensitivity peak of a noisy measurement is biased upwards: it is the highest of many points. A
+    measurement should begin below and end above the crossings; joint input and output
     with a known excitation (``estimate_response(estimator="instrument")`` from error to feedback)
     gives L of a flown loop without the bias of a direct estimate.
 
