@@ -127,13 +127,15 @@ def test_skew_is_found_to_a_hundredth_of_a_sample_and_removed(lag: float) -> Non
     ("flights", "least"), [(8, 6), pytest.param(40, 35, marks=pytest.mark.nightly)]
 )
 def test_skew_interval_covers_the_truth(flights: int, least: int) -> None:
-    inside = 0
+    inside, scores = 0, []
     for seed in range(flights):
         estimate = c.estimate_skew(_skewed(3.37, seed, 0.3), "a", "b", band_rad_s=BAND, window_s=4)
         low, high = estimate.lag.interval95
         inside += low <= 0.0337 <= high
+        scores.append((estimate.lag.value - 0.0337) / estimate.lag.stderr)
     # At 95 %: fewer of 8 or of 40 has a chance of some in 1000.
     assert inside >= least
+    assert 0.5 < np.sqrt(np.mean(np.square(scores))) < 1.6
 
 
 @pytest.mark.slow
