@@ -99,7 +99,7 @@ def test_advice_on_a_good_record():
     advice = fid.advise(flown(ARMAX, 2, n=1200, noise=0.3))
     assert advice.excitation_orders == {"u": 50}
     assert advice.delays == {"u": 1}
-    assert _codes(advice) == {"delay"}
+    assert _codes(advice) == {"delay", "sampling-rate"}
     assert "excitation order 50" in repr(advice)
     assert advice.to_dict()["schema"] == "flightid.advice/1"
     assert "No loop seen: past noise of the outputs" in advice.summary().to_text()

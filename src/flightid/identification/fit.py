@@ -151,6 +151,11 @@ class Fit(
         return self.prediction_errors or tuple(item.residual_record() for item in self.records)
 
     @property
+    def ranked(self) -> tuple[str, ...]:
+        """Responses, or outputs on records, from the best fit to the worst."""
+        return tuple(sorted(self.costs, key=lambda name: self.costs[name]))
+
+    @property
     def training(self) -> dict[str, TrainingChannel]:
         """Where the training records were, by channel; empty for a fit of responses alone."""
         return training_channels([item.measured for item in self.records])
@@ -274,7 +279,10 @@ class Fit(
         return dict(zip(self.names, map(float, found.by_noise), strict=True))
 
     def _notes(self) -> tuple[str, ...]:
-        costs = ", ".join(f"{name} {cost:.3g}" for name, cost in self.costs.items())
+        ranked = [f"{name} {self.costs[name]:.3g}" for name in self.ranked]
+        costs = ", ".join(ranked)
+        if len(ranked) > 1:
+            costs = f"best {', '.join(ranked[:-1])}, worst {ranked[-1]}"
         meaning = (
             "(guide: at most 100)"
             if self.responses

@@ -2,7 +2,7 @@
 
 The page asks nothing of the network: styles, plots and plotting library are inside it, and a
 content policy that names the two scripts by their hash keeps anything else from running, whatever a
-log may have smuggled into a name.
+log may have smuggled into a name. A table's columns are made by its result's `summary()`, not here.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def response_figures(item: ModelResults, truth: Truth | None) -> list[Figure]:
-    """One picture for each response that was fitted; of a structure, for each that was tested.
+    """One picture for each fitted response, best fit first; of a structure, for each tested.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def response_figures(item: ModelResults, truth: Truth | None) -> list[Figure]:
     if response is None:
         return []
     if fit is not None and fit.responses:
-        names = [each.name for each in fit.responses]
+        names = list(fit.ranked)
     else:
         names = [f"{output}/{name}" for output in response.outputs for name in response.inputs]
     return [_figure(item, name, truth) for name in names]
@@ -63,10 +63,13 @@ def _figure(item: ModelResults, name: str, truth: Truth | None) -> Figure:
     exact = None
     # A NARX model has no frequency response, and inputs without coherence are in no model.
     if fit is not None and source in fit.model.inputs and hasattr(fit.model, "frequency_response"):
-        place = fit.model.outputs.index(output), fit.model.inputs.index(source)
-        fitted = fit.model.frequency_response(omega)[place]
+        row, column = fit.model.outputs.index(output), fit.model.inputs.index(source)
+        fitted = fit.model.frequency_response(omega)[row, column]
         curves.append(Curve("model", omega, fitted, colour=look.MODEL))
         said += ", and model" if fit.responses else ", and model fitted in time"
+        if name in fit.costs and len(fit.costs) > 1:
+            place = {fit.ranked[0]: ", the best fit", fit.ranked[-1]: ", the worst fit"}
+            said += f"; cost {fit.costs[name]:.3g}{place.get(name, '')}"
         exact = None if truth is None else truth.response(fit.model, omega)
     if exact is not None and fit is not None and len(fit.responses) == 1:
         curves.append(Curve("truth", omega, exact, colour=look.TRUTH, dash="dot"))

@@ -1,4 +1,7 @@
-"""Stability and control derivatives of a model, with and without dimensions."""
+"""Stability and control derivatives of a model, with and without dimensions.
+
+A further one is a parameter of its model in `models/library/`; its name is known here.
+"""
 
 from __future__ import annotations
 

@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 
 from flightid.conventions import Light
-from flightid.errors import DataError, OptionError
+from flightid.errors import DataError, FitError, OptionError, SingularError
 from flightid.evidence import FeedbackTest, feedback_test
 from flightid.findings import Finding
 from flightid.identification.advice.delays import InputDelay, find_delays
 from flightid.identification.advice.impulse_response import ImpulseResponse, impulse_response
+from flightid.identification.prediction_error.sampling_rate import SAMPLING
+from flightid.identification.subspace.fit import fit_subspace
+from flightid.models import InnovationsModel
 from flightid.models.sampled.channels import SampledChannels, gather_channels
 from flightid.record import Record
 from flightid.record.hold import Loop
@@ -174,7 +177,7 @@ def advise(
         *_pulse(reason),
         *_delays(name, acts, data.sample_time_s),
         *_feedback(feedback),
-        *_sampling(name, data),
+        *(_sampling(name, data) or _poles(name, names, listed)),
         *_levels(names, data),
     )
     return Advice(
@@ -290,6 +293,16 @@ def _sampling(name: str, data: SampledChannels) -> list[Finding]:
             "resample to about ten times the bandwidth (conditioning.resample)",
         )
     ]
+
+
+def _poles(name: str, names: Sequence[str], records: Sequence[Record]) -> list[Finding]:
+    """What the poles of a state-space model of the usual order say of the sampling rate."""
+    structure = InnovationsModel.subspace(names, (name,))
+    try:
+        fit = fit_subspace(structure, records)
+    except (DataError, FitError, SingularError):
+        return []
+    return [each for each in fit.findings if each.code in SAMPLING]
 
 
 def _levels(names: Sequence[str], data: SampledChannels) -> list[Finding]:

@@ -2,6 +2,7 @@
 
 The model runs free through every record. Minimised is ½ Σ vᵀR⁻¹v + (N/2) ln det R of measured minus
 model v, over the model's parameters and each record's initial state, biases and reference shifts.
+Its time goes into sensitivities: `linear_sensitivities.rs`, `trajectories/sensitivity.rs`.
 """
 
 from __future__ import annotations

@@ -47,6 +47,7 @@ from flightid.identification.prediction_error.part_blocks import (
     errors_at,
 )
 from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
+from flightid.identification.prediction_error.sampling_rate import sampling_findings
 from flightid.identification.prediction_error.starts import polynomial_starts
 from flightid.identification.residual_evidence import nothing_told
 from flightid.models.polynomial.model import PolynomialModel
@@ -288,6 +289,7 @@ def _assemble(
                 times=tests.widening(biased=shares_poles(structure)),
             ),
             *nothing_told(found.reason),
+            *sampling_findings(roots, data.sample_time_s),
         ),
         provenance=provenance_of(
             structure.method.replace("_", " "), records, data.offsets, structure.to_dict()

@@ -19,6 +19,7 @@ from flightid.identification.innovation_tests import innovation_tests
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.details import FitScore
 from flightid.identification.prediction_error.roots import Errors
+from flightid.identification.prediction_error.sampling_rate import sampling_findings
 from flightid.identification.subspace.data import SubspaceData, acts_at_once, gather
 from flightid.identification.subspace.details import SubspaceDetails
 from flightid.identification.subspace.estimate import Matrices, decompose, realise
@@ -156,6 +157,7 @@ def _assemble(
                 structure, model, choice, roots, found.termination, spare, at_circle
             ),
             *tests.findings(biased=True, times=times),
+            *sampling_findings(roots, model.sample_time_s),
         ),
         provenance=provenance_of(
             structure.method, records, data.channels.offsets, structure.to_dict()
