@@ -91,6 +91,7 @@ def test_a_verification_gives_the_spectra_of_its_residuals_and_its_peaks() -> No
     other = compare_spectra(fid.verify(_mode(14.0), noisy))
     codes = {finding.code for finding in other.findings}
     assert {"peak-missed", "peak-of-model-alone"} <= codes
+    assert {f.light.value for f in other.findings if f.code == "peak-missed"} == {"amber"}
 
 
 def test_a_comparison_needs_both_sides_once() -> None:

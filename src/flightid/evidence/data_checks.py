@@ -115,7 +115,11 @@ def _band(records: Sequence[Record]) -> tuple[float, float]:
 
 @lru_cache(maxsize=KEPT)
 def power_of_records(
-    records: tuple[Record, ...], inputs: tuple[str, ...], outputs: tuple[str, ...]
+    records: tuple[Record, ...],
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    *,
+    predicted: bool = False,
 ) -> tuple[Check, ...]:
     """Band and coherence of each output with all inputs together, from a quick response.
 
@@ -136,10 +140,10 @@ def power_of_records(
     except FlightidError as error:
         said = f"the records give no response: {error}"
         return tuple(Check(name, Light.UNKNOWN, said) for name in (BAND, COHERENCE))
-    return band_checks(found)
+    return band_checks(found, predicted=predicted)
 
 
-def band_checks(response: FrequencyResponse) -> tuple[Check, Check]:
-    """Band and coherence that a response of the fitted channels shows."""
+def band_checks(response: FrequencyResponse, *, predicted: bool = False) -> tuple[Check, Check]:
+    """Band and coherence that a response of the fitted channels shows; see `judge_span`."""
     spans = spans_of(response)
-    return judge_span(spans), judge_coherence(spans)
+    return judge_span(spans, predicted=predicted), judge_coherence(spans)

@@ -195,10 +195,11 @@ def _band(
         return None, None, None, f"{windows}: coherence is not judged"
     band = usable_band(omega[fast_enough], coherence[fast_enough], MINIMUM_COHERENCE.value)
     largest = float(coherence[fast_enough].max())
-    if band is None and largest >= MINIMUM_COHERENCE.value:
-        why = f"partial coherence reaches 0.6 at single frequencies only (largest {largest:.2f})"
-        return None, largest, largest, why
     if band is None:
-        return None, largest, largest, f"partial coherence stays below 0.6 (largest {largest:.2f})"
+        # Rounded down, so that what stays below the limit is not written as the limit.
+        size = f"(largest {math.floor(100.0 * largest) / 100.0:.2f})"
+        reached = largest >= MINIMUM_COHERENCE.value
+        why = "reaches 0.6 at single frequencies only" if reached else "stays below 0.6"
+        return None, largest, largest, f"partial coherence {why} {size}"
     within = (omega >= band[0]) & (omega <= band[1])
     return band, float(np.mean(coherence[within])), largest, ""

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from flightid.conventions import Light
 from flightid.evidence import Check, Evidence, inspection_check, residual_check
-from flightid.evidence.data_checks import band_checks, sample_checks
-from flightid.evidence.evidence import GUIDELINES, LOOP, PREDICTION, RESIDUALS, SAMPLES
-from flightid.evidence.gather import loop_of_residuals, worse
+from flightid.evidence.data_checks import band_checks, power_of_records, sample_checks
+from flightid.evidence.evidence import GUIDELINES, LOOP, PREDICTION, RESIDUALS, SAMPLES, SETTLED
+from flightid.evidence.gather import BELONGS, loop_of_residuals, worse
 from flightid.findings import Finding, worst
 from flightid.identification import Fit
 from flightid.inspection import Inspection
+from flightid.record import Record
 from flightid.responses import FrequencyResponse
 from flightid.study.identified import ModelResults
 from flightid.study.stages import NOT_TESTED
@@ -35,10 +37,6 @@ def examined(fit: Fit, item: ModelResults, inspection: Inspection | None) -> Fit
     if inspection is not None:
         channels = (*fit.model.inputs, *fit.model.outputs)
         checks.append(inspection_check(inspection, channels))
-    response = item.response
-    if response is not None and not fit.responses and _is_of(response, fit):
-        outputs, inputs = tuple(fit.model.outputs), tuple(fit.model.inputs)
-        checks += band_checks(response.select(outputs=outputs, inputs=inputs))
     if item.tests is not None and item.tests.findings:
         residuals = residual_check(item.tests.findings)
         checks.append(worse(fit.evidence.check(RESIDUALS), residuals))
@@ -57,8 +55,45 @@ def examined(fit: Fit, item: ModelResults, inspection: Inspection | None) -> Fit
         checks.append(prediction_check(item.on_unseen, (*said, *item.reduction_judged)))
     elif seen:
         checks.append(Check(PREDICTION, worst(tuple(said)), seen[0].message, seen[0].action))
+    checks += _bands(fit, item, checks)
+    checks += _found_once(fit, checks)
     checks += _guidelines(fit.evidence, item.findings_of_choice)
     return replace(fit, evidence=fit.evidence.with_checks(checks))
+
+
+def _found_once(fit: Fit, checks: Iterable[Check]) -> tuple[Check, ...]:
+    """An optimum that one start alone found is good enough where it predicts unseen records."""
+    settled = fit.evidence.check(SETTLED)
+    doubts = {
+        each.code
+        for each in fit.findings
+        if BELONGS.get(each.code) == SETTLED and each.light is not Light.GREEN
+    }
+    if settled is None or doubts != {"local-minima"} or not _predicts(checks):
+        return ()
+    said = f"{settled.what}; it predicts what it has not seen all the same"
+    return (Check(SETTLED, Light.GREEN, said),)
+
+
+def _predicts(checks: Iterable[Check]) -> bool:
+    return any(each.name == PREDICTION and each.light is Light.GREEN for each in checks)
+
+
+def _bands(fit: Fit, item: ModelResults, checks: Iterable[Check]) -> tuple[Check, ...]:
+    """Band and coherence of a fit to records: of all that it was fitted to or predicts."""
+    outputs, inputs = tuple(fit.model.outputs), tuple(fit.model.inputs)
+    predicted = _predicts(checks)
+    if predicted and item.training:
+        whole = (*item.training, *(each for each in item.unfitted if _holds(each, fit)))
+        return power_of_records(whole, inputs, outputs, predicted=True)
+    response = item.response
+    if response is None or fit.responses or not _is_of(response, fit):
+        return ()
+    return band_checks(response.select(outputs=outputs, inputs=inputs), predicted=predicted)
+
+
+def _holds(record: Record, fit: Fit) -> bool:
+    return all(name in record for name in (*fit.model.inputs, *fit.model.outputs))
 
 
 def prediction_check(runs: Mapping[str, Verification], said: Iterable[Finding]) -> Check:

@@ -47,6 +47,8 @@ DRAWS = 32
 """Draws of random walks."""
 COLOURED = 1.5
 """Ratio of coloured over white standard errors above which residuals count as coloured."""
+WELL_TOLD = 5.0
+"""Ratio up to which longer intervals hold: noise with a time constant of ten samples makes 4.4."""
 LARGEST_RATIO, SMALLEST_RATIO = 50.0, 0.02
 """Ratios of coloured over white standard errors beyond which neither can be believed."""
 
@@ -107,7 +109,7 @@ class ResidualCovariance:
 def colour_findings(smallest: float, largest: float) -> list[Finding]:
     """Verdict on the colour of residuals: red where it changes standard errors beyond belief.
 
-    Amber where it widens them, and the intervals allow for it.
+    A note where it widens them and the intervals allow for it, amber from `WELL_TOLD` times on.
 
     Parameters
     ----------
@@ -123,15 +125,14 @@ def colour_findings(smallest: float, largest: float) -> list[Finding]:
     if believed and largest <= COLOURED:
         return []
     if believed:
-        return [
-            Finding(
-                "residuals-coloured",
-                Light.AMBER,
-                f"residuals are coloured: standard errors are up to {largest:.2g} times those of "
-                "white residuals, and the intervals allow for it",
-                "run residual_tests: where inputs still predict them, dynamics are missing",
-            )
-        ]
+        said = (
+            f"residuals are coloured: standard errors are up to {largest:.2g} times those of "
+            "white residuals, and the intervals allow for it"
+        )
+        if largest <= WELL_TOLD:
+            return [Finding("residuals-coloured", Light.GREEN, said)]
+        action = "run residual_tests: where inputs still predict them, dynamics are missing"
+        return [Finding("residuals-coloured", Light.AMBER, said, action)]
     ratio = largest if largest > LARGEST_RATIO else smallest
     return [
         Finding(

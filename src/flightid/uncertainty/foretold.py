@@ -16,6 +16,8 @@ from scipy import linalg, signal
 from flightid.uncertainty.residual_correlation import SMALLEST_EIGENVALUE
 
 Array = NDArray[np.float64]
+NEGLIGIBLE_PERCENT = 2.0
+"""Of an output's standard deviation: what is missed below that shows in no use of a model."""
 MATERIAL_PERCENT = 10.0
 """Of an output's standard deviation: what is missed from there on shows in a prediction."""
 LONGEST = 10

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from flightid.conventions import Light
+from flightid.evidence.gather import OVERFIT
 from flightid.findings import Finding
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.roots import POLE, ZERO, FittedRoot
@@ -173,8 +174,8 @@ def _overfit(
     if useless:
         found.append(
             Finding(
-                "overfit",
-                Light.AMBER,
+                OVERFIT,
+                Light.GREEN,
                 f"the last coefficient of a polynomial may be zero: {', '.join(useless)}",
                 "try the next lower order (flightid.scan_orders ranks them by free run)",
             )

@@ -353,8 +353,8 @@ class DataflashSource:
             yield Finding(
                 "no-units",
                 Light.AMBER,
-                "the log declares no units: its firmware is older than unit tables, or its "
-                f"beginning is missing{taken}",
+                "the log declares no units: its firmware is older than unit tables, or the part of "
+                f"the log that holds them is missing{taken}",
                 "name the units of other fields in a channel map of your own",
             )
 

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,10 @@ USED = {"arx": ("na", "nb", "nk"), "armax": ("na", "nb", "nc", "nk"), "oe": ("nb
 """Orders that are tried: two modes with their delays; a scan says where its edge is the best."""
 FITTED, CHOSEN, ALONE = 0.6, 1.0, (0.5, 0.75)
 """Part of a record that is fitted, the rest ranks structures; and where it also has to verify."""
+AS_GOOD = 1.02
+"""Ratio of errors of free runs that does not rank structures."""
+RICHER = 2.0
+"""Ratio of powers of an input's steps, of halves of a record, that is no chance."""
 CYCLES, SAMPLES_PER_CYCLE = 10.0, 10.0
 """What a response needs: cycles of its lowest frequency in a record, samples of its highest."""
 
@@ -168,19 +173,32 @@ def _segments(group: _Group) -> _Segments:
     first, record = group.paths[0], group.records[0]
     start, stop = float(record.time_s[0]), float(record.time_s[-1])
     alone = len(group.paths) == 1
-    cuts = ALONE if alone else (FITTED, CHOSEN)
+    cuts: Sequence[float] = ALONE if alone else (FITTED, CHOSEN)
+    turned = alone and _ends_richer(record, group.inputs)
+    if turned:
+        cuts = [1.0 - cut for cut in reversed(cuts)]
     edges = [start, *(_round(start + cut * (stop - start)) for cut in cuts), stop]
+    spans = list(pairwise(edges))
+    if turned:
+        spans.reverse()
     name = first.stem
-    parts = [
-        (f"{name}, fitted", first, (edges[0], edges[1])),
-        (f"{name}, choice", first, (edges[1], edges[2])),
-    ]
+    parts = [(f"{name}, fitted", first, spans[0]), (f"{name}, choice", first, spans[1])]
     rest = [(path.stem, path, None) for path in group.paths[1:]]
-    unseen = [(f"{name}, unseen", first, (edges[2], edges[3]))] if alone else rest
+    unseen = [(f"{name}, unseen", first, spans[2])] if alone else rest
     return _Segments(
         (*parts, *unseen), parts[0][0], parts[1][0],
         tuple(each[0] for each in unseen), (parts[0][2], parts[1][2]),
     )  # fmt: skip
+
+
+def _ends_richer(record: Record, inputs: tuple[str, ...]) -> bool:
+    """Whether inputs move much faster in the second half, as those of a rising sweep do.
+
+    What is slow is foretold by what was fitted to the fast, not the other way round.
+    """
+    steps = np.diff(record.matrix(inputs), axis=1) / np.std(record.matrix(inputs), axis=1)[:, None]
+    early, late = (float(np.sum(part**2)) for part in np.array_split(steps, 2, axis=1))
+    return late > RICHER * early
 
 
 def _record(name: str, path: Path, span: tuple[float, float] | None, folder: Path) -> Iterator[str]:
@@ -238,7 +256,10 @@ def _structure(
     if not reached:
         raise StudyError("no structure runs freely", needed="a record that moves the output")
     said = ", ".join(f"{kind} {value:.3g}" for kind, value in reached.items())
-    return min(reached, key=lambda kind: reached[kind]), f"{said} {record.unit(output)}".rstrip()
+    least = min(reached.values())
+    # What comes last assumes least of the noise, so that its intervals hold for more of it.
+    good = [kind for kind, value in reached.items() if value <= AS_GOOD * least]
+    return good[-1], f"{said} {record.unit(output)}".rstrip()
 
 
 def _head(paths: Sequence[Path], columns: Columns, missed: Sequence[Finding]) -> list[str]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from flightid.conventions import Light
 from flightid.evidence.gather import LEADS
 from flightid.findings import Finding
-from flightid.uncertainty.foretold import is_material
+from flightid.uncertainty.foretold import NEGLIGIBLE_PERCENT, is_material
 from flightid.uncertainty.residual_correlation import LEVEL
 from flightid.validation.residuals.correlation_result import CorrelationTest, Kind, Verdict
 from flightid.validation.residuals.obstacles import VOID
@@ -36,10 +36,10 @@ _BEFORE = (
 
 
 def residual_findings(tests: tuple[CorrelationTest, ...]) -> tuple[Finding, ...]:
-    """Findings of failures: red where neither chance nor a small size excuses them, else amber.
+    """Findings of failures: red where neither chance nor a small size excuses them.
 
-    Chance: of as many tests as were made. Small: of an output that is known, the part that is
-    missed lies below `MATERIAL_PERCENT`.
+    Notes where chance does it, of as many tests as were made, or where the part that is missed
+    lies below `NEGLIGIBLE_PERCENT` of an output that is known; amber below `MATERIAL_PERCENT`.
 
     Example
     -------
@@ -83,7 +83,9 @@ def _failure(test: CorrelationTest, n_tests: int) -> Finding:
     elif worth is not None:
         message += f"; worth {worth:.2g} % of {test.output}"
     action = _BEFORE if leads else _ACTIONS[test.kind]
-    light = Light.RED if sure and is_material(worth) else Light.AMBER
+    light = Light.RED if is_material(worth) else Light.AMBER
+    if not sure or (worth is not None and worth < NEGLIGIBLE_PERCENT):
+        light, action = Light.GREEN, ""
     return Finding(LEADS if leads and sure else _CODES[test.kind], light, message, action)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,8 @@ PEAK_DB = 3.0
 """Least height of a peak above its surroundings, dB; more where the spectrum is less certain."""
 SHARE_ALLOWED = 0.10
 """Share of frequencies with significant coherence that is still green: neighbours hang together."""
+PEAK_PERCENT = 5.0
+"""Of the measured power: what a peak that one spectrum has alone must be worth to count."""
 SAME_PEAK = 0.25
 """Largest relative distance of frequencies of a measured peak and the predicted one it matches."""
 
@@ -173,14 +175,17 @@ def compare_spectra(
     two = _estimate(made, driven, names, window_s, one.omega_rad_s)
     density, low, high = _with_bounds(one)
     model, model_low, model_high = _with_bounds(two)
-    peaks = []
+    peaks, findings = [], []
     for index, name in enumerate(names):
         mine = _peaks(one.omega_rad_s, density[index], low[index], high[index])
         theirs = _peaks(one.omega_rad_s, model[index], model_low[index], model_high[index])
-        peaks += _matched(name, mine, theirs)
+        found = _matched(name, mine, theirs)
+        excess = _excess_percent(one.omega_rad_s, density[index], model[index])
+        findings += [_peak_finding(peak, excess) for peak in found]
+        peaks += found
     return SpectrumComparison(
         one.omega_rad_s, names, dict(one.units), density, low, high, model, tuple(peaks),
-        one.window_s[0], tuple(_peak_finding(peak) for peak in peaks),
+        one.window_s[0], tuple(findings),
     )  # fmt: skip
 
 
@@ -282,15 +287,32 @@ def _matched(
     return peaks + [Peak(name, None, None, *item) for item in left]
 
 
-def _peak_finding(peak: Peak) -> Finding:
-    if peak.omega_rad_s is None:
-        message = f"{peak.output}: the model has a peak at {peak.predicted_rad_s:.3g} rad/s alone"
-        return Finding("peak-of-model-alone", Light.AMBER, message, "look at the model's modes")
-    if peak.predicted_rad_s is None:
-        message = f"{peak.output}: the peak at {peak.omega_rad_s:.3g} rad/s is not in the model"
-        return Finding("peak-missed", Light.AMBER, message, "raise the order of the model")
-    return Finding(
-        "peak-matched",
-        Light.GREEN,
-        f"{peak.output}: peak at {peak.omega_rad_s:.3g} rad/s, model {peak.predicted_rad_s:.3g}",
-    )
+def _excess_percent(
+    omega: NDArray[np.float64], density: NDArray[np.float64], model: NDArray[np.float64]
+) -> Callable[[float], float]:
+    """What measurement and model differ by about a frequency, percent of the measured power."""
+    whole = float(np.trapezoid(density, omega))
+
+    def about(place: float) -> float:
+        near = np.abs(omega - place) <= SAME_PEAK * place
+        apart = float(np.trapezoid((density - model)[near], omega[near]))
+        return 100.0 * abs(apart) / whole if whole > 0.0 else 100.0
+
+    return about
+
+
+def _peak_finding(peak: Peak, excess: Callable[[float], float]) -> Finding:
+    if peak.omega_rad_s is not None and peak.predicted_rad_s is not None:
+        said = f"peak at {peak.omega_rad_s:.3g} rad/s, model {peak.predicted_rad_s:.3g}"
+        return Finding("peak-matched", Light.GREEN, f"{peak.output}: {said}")
+    if peak.predicted_rad_s is not None:
+        place, code, action = peak.predicted_rad_s, "peak-of-model-alone", "look at its modes"
+        what = f"{peak.output}: the model has a peak at {place:.3g} rad/s alone"
+    else:
+        place, code, action = peak.omega_rad_s or 0.0, "peak-missed", "raise the order of the model"
+        what = f"{peak.output}: the peak at {place:.3g} rad/s is not in the model"
+    share = excess(place)
+    what += f" (they differ there by {share:.2g} % of the measured power)"
+    if share < PEAK_PERCENT:
+        return Finding(code, Light.GREEN, what)
+    return Finding(code, Light.AMBER, what, action)
