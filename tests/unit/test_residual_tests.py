@@ -344,7 +344,7 @@ def test_kernel_refusals() -> None:
         cross_correlation((e,), (np.zeros(20),), 2)
 
 
-@pytest.mark.parametrize(("gain", "light"), [(0.01, "green"), (0.05, "amber"), (0.5, "red")])
+@pytest.mark.parametrize(("gain", "light"), [(0.018, "green"), (0.05, "amber"), (0.5, "red")])
 def test_a_sure_failure_is_red_only_where_it_is_large(gain: float, light: str) -> None:
     rng = np.random.default_rng(4)
     time_s = np.arange(40_000) * 0.02
