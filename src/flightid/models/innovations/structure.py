@@ -55,7 +55,8 @@ class SubspaceStructure(Options):
         State at the first sample of each record: ``"estimate"`` or ``"zero"``.
     offsets : str
         What is taken off each channel of each record: its ``"mean"``, its declared ``"trim"`` or
-        nothing (``"none"``). Beside means a constant of each record is fitted.
+        nothing (``"none"``). Beside means a constant of each record is fitted, but not
+        with ``"mean_as_trim"``.
     maximum_order : int
         Largest order that the choice considers.
     maximum_iterations : int

@@ -60,7 +60,8 @@ class PolynomialStructure(Options):
     offsets : str
         What is taken off each channel of each record: its ``"mean"``, its declared ``"trim"`` or
         nothing (``"none"``). Means are no trims where a record starts away from its working point,
-        so with them a constant of each record is fitted beside the coefficients.
+        so with them a constant of each record is fitted beside the coefficients, but not with
+        ``"mean_as_trim"``.
     enforce_stability : bool
         Keep the roots of A inside the unit circle too; the fit says when that moved it.
     kernel : str or None

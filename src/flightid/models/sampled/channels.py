@@ -16,7 +16,7 @@ from flightid.units import clash, match
 
 Array = NDArray[np.float64]
 SAME_SAMPLE_TIME = 1e-6
-OFFSETS = ("mean", "trim", "none")
+OFFSETS = ("mean", "mean_as_trim", "trim", "none")
 LARGEST = 1e100
 """A run beyond this is held at the last sample before it: its squares still are numbers."""
 
@@ -180,7 +180,7 @@ def require_same(model: SampledModel, units: Mapping[str, str], sample_time_s: f
 def _offsets(record: Record, names: Sequence[str], kind: str) -> dict[str, float]:
     if kind == "none":
         return dict.fromkeys(names, 0.0)
-    if kind == "mean":
+    if kind in ("mean", "mean_as_trim"):
         return {name: float(np.mean(record[name])) for name in names}
     missing = [name for name in names if name not in record.trim]
     if missing:
