@@ -40,6 +40,7 @@ from tests.contract.test_arguments import DICTIONARY, WORD_OF
 
 # What a command is told beside the options of its verb: its name, and the one thing it means.
 OF_COMMANDS = {
+    "actuator": "known element ahead of a vehicle in a loop",
     "all": "everything, not one screen of it",
     "against": "another model beside the one on trial",
     "blocks": "file of a law made of blocks",
@@ -61,6 +62,7 @@ OF_COMMANDS = {
     "name": "name of what is made",
     "netcdf": "file of a response",
     "output": "file or folder that is written",
+    "pair": "output and input of a saved response",
     "overwrite": "whether a file may be replaced",
     "param": "file of ArduPilot parameters",
     "params": "file of PX4 parameters",

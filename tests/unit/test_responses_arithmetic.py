@@ -10,7 +10,8 @@ import pytest
 import xarray as xr
 from scipy import signal
 
-from flightid import FrequencyResponse, Record, estimate_response
+from flightid import FrequencyResponse, Record, estimate_response, load_model
+from flightid.cli.program import run
 from flightid.errors import DataError, FileFormatError, ShapeError
 from flightid.responses import arithmetic
 from flightid.responses.errors.random_error import StoredCovariance
@@ -19,6 +20,7 @@ from flightid.responses.store import from_xarray, read_response, to_xarray, writ
 from tests.closeness import assert_close
 
 OMEGA = np.array([1.0, 3.0, 9.0])
+SILENT = StoredCovariance(np.zeros((1, 6, 6)), 3)
 
 
 def _measured(seed: int = 0, output: str = "p", source: str = "u") -> FrequencyResponse:
@@ -60,6 +62,7 @@ def _numeric(function, response: FrequencyResponse) -> np.ndarray:
         lambda h: arithmetic.open_loop(h, 0.4),
         arithmetic.loop_of_sensitivity,
         lambda h: arithmetic.peel_loop(h, lambda s: 1 / (0.05 * s + 1), -0.3),
+        lambda h: arithmetic.add(h, replace(_measured(4), errors=SILENT)),
     ],
 )
 def test_errors_pass_through_to_first_order(function) -> None:
@@ -117,6 +120,62 @@ def test_measured_quotient_and_product() -> None:
         arithmetic.multiply(p, p)
     with pytest.raises(DataError, match="different frequencies"):
         arithmetic.divide(p, a.select(band_rad_s=(1.0, 4.0)))
+
+
+def test_a_sum_carries_both_errors() -> None:
+    one, two = _measured(1), _measured(2)
+    made = arithmetic.add(one, two)
+    assert_close(made.response, one.response + two.response, rtol=1e-15, why="sum")
+    assert_close(made.covariance, one.covariance + two.covariance, rtol=1e-12, why="independent")
+    sizes = [np.abs(each.response) * each.random_error for each in (one, two)]
+    assert_close(
+        made.random_error * np.abs(made.response), np.hypot(*sizes), rtol=1e-12, why="in squares"
+    )
+    with pytest.raises(DataError, match="same pair"):
+        arithmetic.add(one, _measured(2, "q"))
+    with pytest.raises(DataError, match="result is zero or not finite"):
+        arithmetic.add(one, arithmetic.apply_known(one, -1.0))
+
+
+def test_the_command_peels_a_gyro_loop_and_says_what_it_cannot(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Equation 19 from a file: stick to rate with actuator and gyro; then back, by a model."""
+    s = 1j * OMEGA
+    bare, servo, gyro = 5 / (s + 2), 1 / (0.05 * s + 1), 0.4 / (0.01 * s + 1)
+    seen = np.array([bare * servo / (1 + bare * servo * gyro), servo])[:, None]
+    flown = FrequencyResponse.from_values(OMEGA, seen, inputs=["ped"], outputs=["r", "d"])
+    file, out = str(write_response(flown, tmp_path / "flown.nc")), tmp_path / "made.nc"
+
+    def made(*words: str, code: int = 0) -> FrequencyResponse | str:
+        assert run(["response-arithmetic", *words, "--netcdf", str(out)]) == code, words
+        said = capsys.readouterr()
+        return read_response(out) if code == 0 else said.err
+
+    of_r = ["--pair", "r/ped"]
+    peeled = made("open-loop", file, "0.4 / 0.01 1", "--actuator", "1 / 0.05 1", *of_r)
+    assert_close(peeled.response[0, 0], bare, rtol=1e-12, why="closed form")
+    assert "open-loop" in peeled.history[-1].operation
+    again = str(write_response(peeled, tmp_path / "bare.nc"))
+    closed = made("close-loop", again, "0.4 / 0.01 1", "--actuator", "1 / 0.05 1")
+    assert_close(closed.response[0, 0], seen[0, 0], rtol=1e-12, why="the way back")
+    ratio = made("divide", file, file, *of_r, "--pair", "d/ped")
+    assert_close(ratio.response[0, 0], seen[0, 0] / servo, rtol=1e-12, why="quotient")
+    assert ratio.inputs == ("d",)
+    scaled = made("multiply", file, "rate_integrator")
+    factor = load_model("rate_integrator").frequency_response(OMEGA)[0, 0]
+    assert_close(scaled.response / seen, [[factor], [factor]], rtol=1e-12, why="the model's own")
+    for words, why in (
+        (["add", file, file], "holds r/ped, d/ped: name one"),
+        (["add", again, "2"], "no file of a response"),
+        (["loop-of-sensitivity", again, "2"], "takes no OTHER"),
+        (["divide", again], "takes an OTHER"),
+        (["divide", again, "2", "--actuator", "1"], "--actuator belongs to"),
+        (["multiply", again, "1 / 0"], "zero or not finite"),
+        (["close-loop", file, "1", "--pair", "r"], "OUTPUT/INPUT"),
+        (["close-loop", file, "1", *of_r, *of_r], "one pair of each"),
+    ):
+        assert why in made(*words, code=2), words
 
 
 def test_refusals() -> None:

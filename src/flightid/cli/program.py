@@ -27,6 +27,7 @@ ORDER = (
     "new",
     "design",
     "response",
+    "response-arithmetic",
     "identify",
     "verify",
     "predict",

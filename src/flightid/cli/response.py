@@ -16,7 +16,11 @@ if TYPE_CHECKING:
     from flightid.options import Options
     from flightid.responses import FrequencyResponse
 
-FILE = click.Path(dir_okay=False, path_type=Path)
+netcdf_option = click.option(
+    "--netcdf",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write the response to this file, which response-arithmetic takes.",
+)
 
 
 def _fields() -> dict[str, type[Options]]:
@@ -28,7 +32,7 @@ def _fields() -> dict[str, type[Options]]:
 
 @click.command(cls=OptionsCommand, fields_of=_fields)
 @click.argument("files", type=FILES, nargs=-1, required=True)
-@click.option("--netcdf", type=FILE, help="Write the response to this file.")
+@netcdf_option
 @level_option
 @html_option
 @all_option
@@ -47,14 +51,27 @@ def command(
     """
     from flightid.progress import progress
     from flightid.responses import estimate_response
-    from flightid.responses.store import write_response
-    from flightid.uncertainty.quantiles import showing
 
     channels, of_response, *of_files = parted(options, _fields())
     injected = of_response.get("excitations")
     records = read_files(files, *of_files, **channels, excitations=injected)
     with progress(None, "Estimating"):
         response = estimate_response(records, **channels, **of_response)
+    show_response(response, netcdf, html, as_json=as_json, level=level)
+
+
+def show_response(
+    response: FrequencyResponse,
+    netcdf: Path | None,
+    html: Path | None,
+    *,
+    as_json: bool,
+    level: float | None,
+) -> None:
+    """Print a response, write its file and page where asked for, and leave by its verdict."""
+    from flightid.responses.store import write_response
+    from flightid.uncertainty.quantiles import showing
+
     emit(response, as_json=as_json)
     if netcdf is not None:
         note(f"Wrote {write_response(response, netcdf)}")

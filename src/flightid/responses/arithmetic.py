@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from flightid.conventions import Light
 from flightid.errors import DataError, ShapeError
 from flightid.findings import Finding
+from flightid.record.hold import InputShape
 from flightid.responses.errors.random_error import CovarianceSource
 from flightid.responses.response import FrequencyResponse
 from flightid.units import canonical
@@ -207,6 +208,30 @@ def multiply(second: FrequencyResponse, first: FrequencyResponse) -> FrequencyRe
     return _joined(second, first, value, slopes, second.outputs, first.inputs)
 
 
+def add(first: FrequencyResponse, second: FrequencyResponse) -> FrequencyResponse:
+    """Sum of two measured responses of the same pair: paths side by side.
+
+    Raises
+    ------
+    DataError
+        Frequencies or channels differ.
+    ShapeError
+        A response has more than one pair.
+
+    Example
+    -------
+    >>> path = FrequencyResponse.from_values([1.0], [2.0], inputs=["u"], outputs=["p"])
+    >>> add(path, path).response
+    array([[[4.+0.j]]])
+    """
+    _require_alike(first, second)
+    if (first.outputs, first.inputs) != (second.outputs, second.inputs):
+        found = " and ".join(f"{h.outputs[0]}/{h.inputs[0]}" for h in (first, second))
+        raise DataError("a sum takes responses of the same pair", found=found)
+    value, one = first.response + second.response, np.ones_like(first.response)
+    return _joined(first, second, value, (one, one), first.outputs, first.inputs)
+
+
 def close_loop(response: FrequencyResponse, feedback: Known) -> FrequencyResponse:
     """Close a known negative feedback around a measured pair: ``H / (1 + H K)``.
 
@@ -283,12 +308,7 @@ def peel_loop(augmented: FrequencyResponse, actuator: Known, gyro: Known) -> Fre
     >>> peel_loop(flown, servo, gyro).response.round(12)
     array([[[2.+0.j]]])
     """
-    _require_pair(augmented)
-    h = augmented.response
-    act = _values(actuator, augmented.omega_rad_s)
-    fed = _values(gyro, augmented.omega_rad_s)
-    below = act - h * act * fed
-    return _mapped(augmented, h / below, act / below**2)
+    return apply_known(open_loop(augmented, gyro), actuator, invert=True)
 
 
 def _values(known: Known, omega: NDArray[np.float64]) -> NDArray[np.complex128]:
@@ -311,6 +331,11 @@ def _mapped(
     derivative: NDArray[np.complex128] | None = None,
 ) -> FrequencyResponse:
     """Exchange the values; the derivative defaults to that of a known factor."""
+    if not np.all(np.isfinite(values)) or np.any(values == 0.0):
+        raise DataError(
+            "the result is zero or not finite at a frequency",
+            needed="responses that do not cancel, loops that are not on the edge of stability",
+        )
     slope = values / response.response if derivative is None else derivative
     growth = np.abs(slope * response.response / values)
     return replace(
@@ -322,9 +347,7 @@ def _mapped(
         output_spectrum=None,
         errors=None if response.errors is None else MappedErrors(response.errors, slope),
         linear=None,
-        estimator=f"{response.estimator}, arithmetic"
-        if not response.estimator.endswith("arithmetic")
-        else response.estimator,
+        estimator=response.estimator.removesuffix(", arithmetic") + ", arithmetic",
     )
 
 
@@ -336,12 +359,8 @@ def _joined(
     outputs: tuple[str, ...],
     inputs: tuple[str, ...],
 ) -> FrequencyResponse:
-    made = _mapped(first, values, slopes[0])
-    errors: CovarianceSource | None = None
-    if first.errors is not None and second.errors is not None:
-        errors = SummedErrors(
-            MappedErrors(first.errors, slopes[0]), MappedErrors(second.errors, slopes[1])
-        )
+    made, other = _mapped(first, values, slopes[0]), _mapped(second, values, slopes[1])
+    driven = (each.input_shape for each in (first, second) if each.inputs == inputs)
     return replace(
         made,
         outputs=outputs,
@@ -349,10 +368,13 @@ def _joined(
         units={**first.units, **second.units},
         coherence=np.minimum(first.coherence, second.coherence),
         multiple_coherence=np.minimum(first.multiple_coherence, second.multiple_coherence),
-        random_error=np.hypot(first.random_error, second.random_error),
+        random_error=np.hypot(made.random_error, other.random_error),
         n_independent=np.minimum(first.n_independent, second.n_independent),
-        findings=(*first.findings, *second.findings, INDEPENDENT),
-        errors=errors,
+        findings=tuple(dict.fromkeys((*first.findings, *second.findings, INDEPENDENT))),
+        errors=made.errors and other.errors and SummedErrors(made.errors, other.errors),
+        loop=None,
+        input_shape=next(driven, InputShape()),
+        digests=(*first.digests, *(each for each in second.digests if each not in first.digests)),
     )
 
 
