@@ -14,6 +14,7 @@ from tools import options_page
 from tools.options_page import PAGE, page, section
 
 import flightid as fid
+from flightid.cli.equations import equations
 from flightid.cli.option_fields import OptionsCommand, given_options
 from flightid.cli.program import run
 from flightid.errors import OptionError, StudyError
@@ -81,9 +82,7 @@ def test_a_toy_option_is_a_key_of_a_study() -> None:
 
 @pytest.mark.usefixtures("with_toy")
 def test_a_toy_option_is_in_the_help_and_on_the_page() -> None:
-    from flightid.cli.identify import _methods  # noqa: PLC0415
-
-    command = OptionsCommand("identify", fields_of=_methods)
+    command = OptionsCommand("identify", fields_of=equations)
     shown = CliRunner().invoke(command, ["--help"]).output
     assert "--toy-gain" in shown
     assert "A toy. [1/s] (equation_error)" in " ".join(shown.split())

@@ -43,7 +43,7 @@ class BlockController:
     >>> from flightid.control.loops import gain, limiter
     >>> from flightid.models import LinearSystem
     >>> lag = LinearSystem([[-1.0]], [[1.0]], [[1.0]], [[0.0]], ("u",), ("y",))
-    >>> law = BlockController([gain("y", "x", -4.0), limiter("x", "u", -1.0, 1.0)], lag, 0.1)
+    >>> law = BlockController([gain("y", "x", -4.0), limiter("x", "u", 1.0)], lag, 0.1)
     >>> law.step({"u": 0.0}, {"y": 0.5})
     {'u': -1.0}
     """

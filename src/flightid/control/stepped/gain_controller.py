@@ -34,7 +34,7 @@ class GainController:
     >>> loop = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
     >>> law = GainController({"tau_phi": loop}, {"tau_phi": ("p", "phi")})
     >>> law.commands, round(law.step({"phi_command": 0.1}, {"p": 0.0, "phi": 0.0})["tau_phi"], 4)
-    (('phi_command',), 0.0287)
+    (('phi_command',), 0.0609)
     """
 
     def __init__(
