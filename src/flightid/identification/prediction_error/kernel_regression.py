@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag, solve_triangular
 from scipy.optimize import minimize
 
 from flightid.errors import DataError
@@ -33,24 +34,27 @@ class KernelEstimate:
     evidence: float
 
 
-def kernel(size: float, decay: float, correlation: float, count: int) -> Array:
-    """Prior covariance of `count` coefficients, DC; with correlation √decay it is TC.
+def kernel_root(size: float, decay: float, correlation: float, count: int) -> Array:
+    """Lower root of the prior covariance of `count` coefficients, DC; with correlation √decay TC.
+
+    The covariance at lags i and j is size · decay^((i+j)/2) · correlation^|i-j|: a first-order
+    autoregression that decays, whose root is known without a factorisation.
 
     Reference: Chen, Ohlsson & Ljung (2012), On the estimation of transfer functions,
     regularizations and Gaussian processes - revisited, Automatica 48, eqs. 35 and 36.
 
     Example
     -------
-    >>> kernel(2.0, 0.25, 0.5, 2)
+    >>> root = kernel_root(2.0, 0.25, 0.5, 2)
+    >>> root @ root.T
     array([[0.5  , 0.125],
            [0.125, 0.125]])
     """
     lag = np.arange(1, count + 1)
-    return np.asarray(
-        size
-        * decay ** ((lag[:, None] + lag[None, :]) / 2)
-        * correlation ** np.abs(lag[:, None] - lag[None, :])
-    )
+    behind = lag[:, None] - lag[None, :]
+    steps = np.where(behind < 0, 0.0, correlation ** np.abs(behind))
+    steps[:, 1:] *= math.sqrt(1.0 - correlation**2)
+    return np.asarray(np.sqrt(size * decay**lag)[:, None] * steps)
 
 
 def kernel_estimate(
@@ -75,7 +79,9 @@ def kernel_estimate(
 
     Reference
     ---------
-    Pillonetto et al. (2014), Kernel methods in system identification, Automatica 50, section 4.4.
+    Pillonetto et al. (2014), Kernel methods in system identification, Automatica 50, section 4.4;
+    Chen & Ljung (2013), Implementation of algorithms for tuning parameters in regularized least
+    squares problems, Automatica 49: by triangles alone, so that little noise costs no digits.
     """
     n, count = regression.n_rows, regression.theta.size
     if variance is None:
@@ -90,6 +96,7 @@ def kernel_estimate(
     factor, wanted = regression.factor, -regression.triangle[:-1, -1]
     used = [g for g in groups if g]
     scale = _sizes(factor, wanted, used)
+    noise = math.sqrt(variance)
 
     def unpack(x: Array) -> list[tuple[float, float, float]]:
         found = []
@@ -100,35 +107,36 @@ def kernel_estimate(
             found.append((base * math.exp(size), lam, rho))
         return found
 
-    def prior(settings: Sequence[tuple[float, float, float]]) -> Array:
-        block = np.zeros((count, count))
+    def posterior(settings: Sequence[tuple[float, float, float]]) -> tuple[Array, Array]:
+        """Root L of the prior and the triangle of [F L, σI | what is explained, 0], by columns."""
+        roots = [kernel_root(*of, g) for of, g in zip(settings, used, strict=True)]
+        rows = np.zeros((2 * count, count + 1))
         first = 0
-        for (size, decay, correlation), g in zip(settings, used, strict=True):
-            block[first : first + g, first : first + g] = kernel(size, decay, correlation, g)
-            first += g
-        return block
+        for root in roots:
+            span = slice(first, first + len(root))
+            rows[:count, span] = factor[:, span] @ root
+            first = span.stop
+        np.fill_diagonal(rows[count:], noise)
+        rows[:count, -1] = wanted
+        return block_diag(*roots), np.asarray(np.linalg.qr(rows, mode="r"))
 
     def evidence(x: Array) -> float:
-        total = variance * np.eye(count) + factor @ prior(unpack(x)) @ factor.T
-        root = np.linalg.cholesky(total)
-        half = np.linalg.solve(root, wanted)
-        return float(half @ half + 2 * np.sum(np.log(np.diag(root))))
+        _, triangle = posterior(unpack(x))
+        sizes = np.abs(np.diag(triangle))
+        return float((sizes[-1] / noise) ** 2 + 2 * np.sum(np.log(sizes[:-1])))
 
     width = 3 if kind == "dc" else 2
     start = np.tile([0.0, 1.5, 1.0][:width], len(used))
     limits = [(-12.0, 12.0), (-6.0, 9.0), (-3.0, 3.0)][:width] * len(used)
     best = minimize(evidence, start, method="L-BFGS-B", bounds=limits)
     settings = unpack(best.x)
-    before = prior(settings)
-    gain = before @ factor.T
-    total = variance * np.eye(count) + factor @ gain
-    weights = np.linalg.solve(total, np.column_stack([wanted, gain.T]))
-    theta = gain @ weights[:, 0]
-    covariance = before - gain @ weights[:, 1:]
+    root, triangle = posterior(settings)
+    # Uncorrelated directions of one size each: coefficients are L R⁻¹ of them.
+    spread = solve_triangular(triangle[:-1, :-1], root.T, trans="T").T
     rest = (n - count) * math.log(variance) + regression.sum_of_squares / variance
     return KernelEstimate(
-        theta,
-        np.asarray((covariance + covariance.T) / 2),
+        spread @ triangle[:-1, -1],
+        variance * spread @ spread.T,
         variance,
         tuple(settings),
         float(best.fun) + rest,
