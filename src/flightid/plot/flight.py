@@ -1,12 +1,15 @@
-"""Steps of closed loops from ordinary flying, axes overlaid, with their bands."""
+"""What a flight tells: steps of closed loops, axes overlaid, and noise of the gyroscope."""
 
 from __future__ import annotations
 
+import math
+
+import numpy as np
 import plotly.graph_objects as go
 
 from flightid.errors import DataError
 from flightid.plot import look
-from flightid.review import FlightReview, LoopResponse
+from flightid.review import FlightReview, GyroNoise, LoopResponse
 
 COLOURS = {"roll": look.BLUE, "pitch": look.ORANGE, "yaw": look.GREEN}
 DASHES = {"roll": "solid", "pitch": "dash", "yaw": "dashdot"}
@@ -87,4 +90,56 @@ def loop_steps(*loops: LoopResponse) -> go.Figure:
     )
     for row in range(1, len(kinds) + 1):
         made.add_hline(1.0, line={"color": look.LINE, "dash": "dot", "width": 1}, row=row, col=1)
+    return made
+
+
+def gyro_spectrum(noise: GyroNoise) -> go.Figure:
+    """Draw the spectrum of a gyroscope with its bands, and below it against throttle.
+
+    Parameters
+    ----------
+    noise : GyroNoise
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+
+    Raises
+    ------
+    DataError
+        The log holds no spectrum.
+
+    Example
+    -------
+    >>> gyro_spectrum(fid.review_flight("flight.bin").noise).show()   # doctest: +SKIP
+    """
+    if not noise.is_told:
+        raise DataError("there is no spectrum to draw", found=noise.reason)
+    bins = noise.throttle.size
+    made = look.figure(2 if bins else 1, shared_x=True, height_px=560 if bins else 340)
+    edges = noise.band()
+    for place, (axis, colour) in enumerate(COLOURS.items()):
+        low, middle, high = (
+            math.degrees(1.0) * np.sqrt(curves[place])
+            for curves in (edges[0], noise.spectrum, edges[1])
+        )
+        made.add_traces(look.band(axis, noise.frequency_hz, low, high, colour=colour), 1, 1)
+        drawn = look.line(
+            axis, noise.frequency_hz, middle, colour=colour, dash=DASHES[axis], width=1.3
+        )
+        made.add_trace(drawn, row=1, col=1)
+    titles = ["deg/s per root Hz"]
+    if bins:
+        levels = 10.0 * np.log10(np.maximum(noise.by_throttle, np.finfo(float).tiny))
+        heat = go.Heatmap(
+            x=noise.frequency_hz,
+            y=100.0 * noise.throttle,
+            z=levels - np.median(levels),
+            colorscale="Viridis",
+            colorbar={"title": {"text": "dB"}, "len": 0.42, "y": 0.2},
+        )
+        made.add_trace(heat, row=2, col=1)
+        titles.append("throttle [%]")
+    look.label_axes(made, x="frequency [Hz]", y=titles)
+    made.update_yaxes(type="log", row=1, col=1)
     return made

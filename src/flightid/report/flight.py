@@ -11,6 +11,7 @@ CAPTION = (
     "Steps of the closed loops with their bands, from ordinary flying: what follows when a "
     "set-point jumps by 1"
 )
+NOISE = "Spectrum of the gyroscope in the air with its band; below it the same by throttle"
 
 
 def flight_blocks(review: FlightReview, *, repeats: bool = False) -> tuple[Block, ...]:
@@ -26,6 +27,8 @@ def flight_blocks(review: FlightReview, *, repeats: bool = False) -> tuple[Block
     blocks: list[Block] = [Lights(worst_first, repeats=repeats)] if worst_first else []
     if any(loop.is_told for loop in review.loops):
         blocks.append(figure_block(review.plot(), CAPTION))
+    if review.noise.is_told:
+        blocks.append(figure_block(review.noise.plot(), NOISE))
     blocks += [TableBlock(table, table.title in FOLDED) for table in review.tables()]
     return tuple(blocks)
 
@@ -36,6 +39,6 @@ def flight_document(review: FlightReview) -> Document:
     opening = (Paragraph(untold),) if untold else ()
     return Document(
         f"Flight {review.name}",
-        repr(review),
+        review.in_short,
         (Section("What this flight tells", (*opening, *flight_blocks(review))),),
     )

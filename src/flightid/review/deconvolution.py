@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 from scipy.signal import lfilter
 
 from flightid.errors import DataError
-from flightid.identification.prediction_error.kernel_regression import kernel_estimate
 from flightid.identification.prediction_error.linear_regression import regress
+from flightid.review.kernel_posterior import kernel_draws
 
 Array = NDArray[np.float64]
 MEMORY_S = (0.3, 0.1, 0.4)
@@ -162,16 +164,24 @@ def _predicted(
     random: np.random.Generator,
 ) -> Array:
     """Coefficients of a one-step predictor, the estimate and draws, signs as of inputs."""
+    delays = [1] * len(others)
     regression = regress(
-        channel, np.vstack(others), samples.lengths, lags[0], list(lags[1:]), [1] * len(others)
+        channel, np.vstack(others), samples.lengths, lags[0], list(lags[1:]), delays, levels=True
     )
-    found = kernel_estimate(regression, list(lags), "dc")
-    values, directions = np.linalg.eigh(found.covariance)
-    spread = directions * np.sqrt(np.maximum(values, 0.0))
-    drawn = random.standard_normal((DRAWS, values.size)) @ spread.T
-    rows = found.theta + np.vstack([np.zeros(values.size), drawn])
-    rows[:, : lags[0]] *= -1.0
-    return np.asarray(rows)
+    if regression.dependent is not None or not np.isfinite(regression.triangle).all():
+        raise DataError("not enough motion: the set-point holds too few frequencies")
+    # The past of the channels is fitted freely: what a prior would take from it, the set-point
+    # would get. The triangle has it first: its last block is what is left for the set-point.
+    past = regression.theta.size - lags[-1]
+    triangle, wanted = regression.factor, -regression.triangle[:-1, -1]
+    variance = regression.sum_of_squares / (regression.n_rows - regression.theta.size)
+    mean, drawn = kernel_draws(triangle[past:, past:], wanted[past:], variance, DRAWS, random)
+    driven = np.vstack([mean, drawn])
+    left = wanted[:past] - driven @ triangle[:past, past:].T
+    left[1:] += math.sqrt(variance) * random.standard_normal((DRAWS, past))
+    freely = solve_triangular(triangle[:past, :past], left.T).T
+    freely[:, : lags[0]] *= -1.0
+    return np.hstack([freely, driven])
 
 
 def _polynomials(

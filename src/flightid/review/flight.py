@@ -9,6 +9,7 @@ from flightid.inspection.actuators import find_actuators
 from flightid.inspection.flight_phases import flight_phases
 from flightid.inspection.stamps import log_span
 from flightid.logs import Log, read_log
+from flightid.review.gyro_noise import gyro_noise
 from flightid.review.identity import flight_identity
 from flightid.review.loops import loop_responses
 from flightid.review.motors import motor_use
@@ -21,8 +22,8 @@ def review_flight(log: Log | str | Path) -> FlightReview:
     """Say what one flight tells of its vehicle; no sweep is needed.
 
     Steps and bandwidths of the closed loops from ordinary flying, tracking errors, motors at their
-    limits and out of balance, vibration, battery, modes, flown gains. What a flight does not tell
-    it says, with what to fly or log for it.
+    limits and out of balance, vibration, gyro noise, battery, modes, flown gains. What a flight
+    does not tell it says, with what to fly or log for it.
 
     Parameters
     ----------
@@ -66,5 +67,6 @@ def review_flight(log: Log | str | Path) -> FlightReview:
         loops=loop_responses(opened, phases.airborne),
         motors=motor_use(actuators, phases.airborne),
         vibrations=vibrations(opened, phases.airborne),
+        noise=gyro_noise(opened, phases.airborne),
     )
     return replace(found, findings=judge_flight(found))

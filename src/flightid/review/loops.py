@@ -10,16 +10,19 @@ from numpy.typing import NDArray
 
 from flightid.control.autopilots.make import LOOP_RATE_PARAMETERS
 from flightid.errors import FlightidError
+from flightid.inspection.advice import logging
 from flightid.inspection.signals import Signal, Span, find, inside, places, records
 from flightid.logs import Log
 from flightid.record import Record
 from flightid.review.deconvolution import LoopDraws, LoopSamples, closed_loop
 from flightid.review.loop_response import LoopResponse
 from flightid.review.step_features import frequency_features, step_features
-from flightid.review.thresholds import FASTEST_RATE, SAMPLES_IN_RISE, WIDEST_LEVEL
+from flightid.review.thresholds import FASTEST_ATTITUDE, FASTEST_RATE, SAMPLES_IN_RISE, WIDEST_LEVEL
 from flightid.uncertainty.estimate import Estimate, Reading
+from flightid.uncertainty.uneven import LogarithmicEnds
 
 Array = NDArray[np.float64]
+FASTEST = {"rate": FASTEST_RATE, "attitude": FASTEST_ATTITUDE}
 SHORTEST_PIECE_S = 2.0
 WINDOW_S = {"rate": 0.5, "attitude": 1.5}
 SLOWEST_HZ = {"rate": 2.0, "attitude": 0.5}
@@ -36,10 +39,6 @@ CHANNELS = {
     ("yaw", "attitude"): ("psi_ref", "psi", None),
 }
 EMPTY = np.zeros(0)
-FASTER = {
-    "ardupilot": "set LOG_BITMASK bit 0 (ATTITUDE_FAST)",
-    "px4": "set SDLOG_PROFILE 25",
-}
 
 
 @dataclass(frozen=True)
@@ -52,9 +51,27 @@ class _Pair:
 
 
 def loop_responses(log: Log, spans: tuple[Span, ...]) -> tuple[LoopResponse, ...]:
-    """Every loop of every axis: its step, or why there is none; loops that are not logged go."""
-    made = (_loop(log, spans, axis, loop) for axis, loop in CHANNELS)
+    """Every loop of every axis: its step, or why there is none; loops that are not logged go.
+
+    Sweeps at the mixer are left out: they are disturbances to the loops, and larger than any gust.
+    """
+    ordinary = without(spans, [(r.start_s, r.stop_s) for r in log.sid_runs if r.point == "mixer"])
+    made = (_loop(log, ordinary, axis, loop) for axis, loop in CHANNELS)
     return tuple(each for each in made if each is not None)
+
+
+def without(spans: tuple[Span, ...], cuts: list[Span]) -> tuple[Span, ...]:
+    """Spans less others.
+
+    Example
+    -------
+    >>> without(((0.0, 10.0),), [(2.0, 3.0), (9.0, 12.0)])
+    ((0.0, 2.0), (3.0, 9.0))
+    """
+    for begin, end in cuts:
+        parts = [part for a, b in spans for part in ((a, min(b, begin)), (max(a, end), b))]
+        spans = tuple((a, b) for a, b in parts if b > a)
+    return spans
 
 
 def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopResponse | None:
@@ -67,13 +84,11 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
         return replace(blank, reason="nothing was flown", action="hand in a log of a flight")
     uneven = _uneven(pair, spans)
     if uneven:
-        return replace(blank, reason=uneven, action=f"{FASTER[log.kind]} and fly again")
+        return replace(blank, reason=uneven, action=logging(log))
     pieces = _pieces(pair, spans)
     if not pieces:
-        return replace(
-            blank, reason="no span in the air of 2 s holds both", action=FASTER[log.kind]
-        )
-    samples = _samples(pieces)
+        return replace(blank, reason="no span in the air of 2 s holds both", action=logging(log))
+    samples = _samples(pieces, FASTEST[loop].value)
     moved = float(np.std(samples.set_point))
     unit = "rad/s" if loop == "rate" else "rad"
     begun = replace(
@@ -84,7 +99,9 @@ def _loop(log: Log, spans: tuple[Span, ...], axis: str, loop: str) -> LoopRespon
         moved=moved,
         tracking=_tracking(pieces, unit),
     )
-    return _step(begun, samples, 1.0 / loop_rate_hz(log) if loop_rate_hz(log) else 0.0, log.kind)
+    return _step(
+        begun, samples, 1.0 / loop_rate_hz(log) if loop_rate_hz(log) else 0.0, logging(log)
+    )
 
 
 def loop_rate_hz(log: Log) -> float:
@@ -135,10 +152,10 @@ def _pieces(pair: _Pair, spans: tuple[Span, ...]) -> list[Record]:
     return [record for record in made if record.duration_s >= SHORTEST_PIECE_S]
 
 
-def _samples(pieces: list[Record]) -> LoopSamples:
+def _samples(pieces: list[Record], fastest_hz: float) -> LoopSamples:
     """Pieces one behind the other, means removed, no faster than a step needs."""
     logged = pieces[0].sample_rate_hz
-    every = max(1, round(logged / FASTEST_RATE.value))
+    every = max(1, round(logged / fastest_hz))
     step_s = every / logged
 
     def joined(name: str) -> Array:
@@ -161,10 +178,11 @@ def _tracking(pieces: list[Record], unit: str) -> Reading:
     left_out = np.sqrt((squares.sum() - squares) / (STRETCHES - 1))
     spread = math.sqrt((STRETCHES - 1) * float(np.var(left_out)))
     value = math.sqrt(float(squares.mean()))
-    return Estimate("tracking error, rms", value, unit, spread, freedom=STRETCHES - 1)
+    ends = LogarithmicEnds(value, spread / value) if value > 0.0 else None
+    return Estimate("tracking error, rms", value, unit, ends=ends)
 
 
-def _step(begun: LoopResponse, samples: LoopSamples, tick_s: float, kind: str) -> LoopResponse:
+def _step(begun: LoopResponse, samples: LoopSamples, tick_s: float, advised: str) -> LoopResponse:
     pace = PACE[begun.loop]
     try:
         draws = closed_loop(samples, pace_s=pace)
@@ -183,7 +201,7 @@ def _step(begun: LoopResponse, samples: LoopSamples, tick_s: float, kind: str) -
         if not late or window_s >= 4.0 * WINDOW_S[begun.loop]:
             break
         window_s *= 2.0
-    refused = _refusal(begun, readings, samples.sample_time_s, kind)
+    refused = _refusal(begun, readings, samples.sample_time_s, advised)
     if refused is not None:
         return refused
     return replace(begun, time_s=time_s, step=steps[0], draws=steps[1:], readings=readings)
@@ -197,7 +215,7 @@ def _steps(draws: LoopDraws, window_s: float, tick_s: float) -> tuple[Array, Arr
 
 
 def _refusal(
-    begun: LoopResponse, readings: tuple[Reading, ...], sample_time_s: float, kind: str
+    begun: LoopResponse, readings: tuple[Reading, ...], sample_time_s: float, advised: str
 ) -> LoopResponse | None:
     level, rise = readings[0], readings[2]
     half = level.half_width95
@@ -209,7 +227,7 @@ def _refusal(
             begun,
             reason=f"logged at {begun.rate_hz:.3g} Hz, too slowly for a step that rises in less "
             f"than {SAMPLES_IN_RISE.value * sample_time_s:.2g} s",
-            action=f"{FASTER[kind]} and fly again",
+            action=advised,
         )
     return None
 

@@ -12,6 +12,7 @@ from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.inspection import WIDTH
 from flightid.result import Result
 from flightid.review import tables
+from flightid.review.gyro_noise import GyroNoise
 from flightid.review.identity import FlightIdentity
 from flightid.review.loop_response import LoopResponse
 from flightid.review.motors import MotorUse
@@ -41,6 +42,8 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
         Time at limits and balance.
     vibrations : tuple of Vibration
         Levels against published limits.
+    noise : GyroNoise
+        Spectrum of the gyroscope, its peaks by name.
     findings : tuple of Finding
         Verdicts with what to do.
 
@@ -62,6 +65,7 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
     loops: tuple[LoopResponse, ...]
     motors: tuple[MotorUse, ...]
     vibrations: tuple[Vibration, ...]
+    noise: GyroNoise
     findings: tuple[Finding, ...] = ()
 
     @property
@@ -112,6 +116,7 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
             tables.frequencies(self.loops),
             tables.motors(self.motors),
             tables.vibrations(self.vibrations),
+            self.noise.summary(),
             tables.modes(self.identity.modes),
             tables.gains(self.identity),
         )
@@ -143,6 +148,13 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
 
     def _computed(self) -> dict[str, object]:
         return {"verdict": self.verdict, "airborne_s": self.phases.airborne_s}
+
+    @property
+    def in_short(self) -> str:
+        """Firmware, time in the air, and how many loops the flight tells, in words."""
+        told = sum(loop.is_told for loop in self.loops)
+        loops = f"steps of {told} of {len(self.loops)} loops" if self.loops else "no loops logged"
+        return f"{self.firmware or self.kind}, {self.phases.airborne_s:.1f} s in the air, {loops}"
 
     def __repr__(self) -> str:
         """Log, time in the air, loops told and verdict on one line."""

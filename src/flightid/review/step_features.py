@@ -31,7 +31,7 @@ def step_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
         _reading("level", level, "1"),
         _reading("delay to half", half, "s"),
         _reading("rise time", rise, "s"),
-        _reading("overshoot", 100.0 * (shares[:, peak] - 1.0), "%"),
+        _reading("overshoot", np.maximum(100.0 * (shares[:, peak] - 1.0), 0.0), "%"),
         _reading("settling time", _settling(shares, time_s), "s"),
     )
 
@@ -39,15 +39,17 @@ def step_features(steps: Array, time_s: Array) -> tuple[Reading, ...]:
 def frequency_features(loop: LoopDraws, slowest_hz: float) -> tuple[Reading, ...]:
     """Bandwidths by gain and phase, and the phase delay at a low frequency."""
     highest = HIGHEST / loop.sample_time_s
-    grid = np.geomspace(slowest_hz, highest, 240)
+    grid = np.geomspace(0.5 * slowest_hz, highest, 240)
     response = loop.response(2.0 * np.pi * grid)
     gain = np.abs(response) / np.abs(response[:, :1])
     phase = np.unwrap(np.angle(response), axis=1)
     phase -= 2.0 * np.pi * np.round(phase[:, :1] / (2.0 * np.pi))
-    late = -phase[:, 0] / (2.0 * np.pi * slowest_hz)
+    slow = loop.response(np.array([2.0 * np.pi * slowest_hz]))[:, 0]
+    late = -np.angle(slow) / (2.0 * np.pi * slowest_hz)
 
     def falls(curve: Array, value: float) -> Array:
-        return _crossings(-curve, grid, -value)
+        found = _crossings(-curve, grid, -value)
+        return np.where(curve[:, 0] <= value, np.nan, found)
 
     return (
         _reading(f"phase delay at {slowest_hz:g} Hz", late, "s"),
@@ -84,7 +86,11 @@ def _settling(shares: Array, time_s: Array) -> Array:
 def _reading(name: str, values: Array, unit: str, highest: float | None = None) -> Reading:
     told = np.isfinite(values)
     if told[0] and np.mean(told) >= TOLD:
-        return Estimate(name, float(values[0]), unit, ends=DrawnEnds(values[1:][told[1:]]))
+        found = Estimate(name, float(values[0]), unit, ends=DrawnEnds(values[1:][told[1:]]))
+        ends = found.interval95
+        # Draws that scatter about another crossing than the estimate's tell of neither.
+        if ends is not None and ends[0] <= values[0] <= ends[1]:
+            return found
     why = "not reached in every loop that the data allow"
     if highest is not None:
         why = f"above {highest:.3g} Hz, or not told below it by these data"

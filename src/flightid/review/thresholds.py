@@ -7,6 +7,9 @@ from flightid.inspection.thresholds import Threshold
 FASTEST_RATE = Threshold(
     100, "Hz", "ten samples in the 0.1 s in which the rate loop of a middle-sized multirotor rises"
 )
+FASTEST_ATTITUDE = Threshold(
+    50, "Hz", "ten samples in the 0.2 s in which the attitude of a middle-sized multirotor rises"
+)
 SAMPLES_IN_RISE = Threshold(
     3, "1", "a step that rises within fewer logged samples is drawn by interpolation, not by data"
 )

@@ -12,6 +12,11 @@ from flightid.review.tables import cell
 from flightid.review.thresholds import SATURATED, UNBALANCED
 from flightid.review.vibration import Vibration
 
+FAST_GYRO = {
+    "ardupilot": "set INS_LOG_BAT_MASK 1 for raw batches of the first gyroscope",
+    "px4": "set SDLOG_PROFILE 25, with system identification and high rate",
+}
+
 
 def judge_flight(review: FlightReview) -> tuple[Finding, ...]:
     """All verdicts, the worst last, where eyes are on a terminal."""
@@ -28,6 +33,21 @@ def _all(review: FlightReview) -> Iterator[Finding]:
     if review.phases.airborne and not review.vibrations:
         yield Finding(
             "vibration-unknown", Light.UNKNOWN, "the log holds no measure of vibration in the air"
+        )
+    yield from _noise(review)
+
+
+def _noise(review: FlightReview) -> Iterator[Finding]:
+    if review.noise.is_told:
+        tops = ", ".join(f"{peak.frequency_hz:.3g} Hz" for peak in review.noise.peaks)
+        told = f"peaks at {tops}" if tops else "no peak stands out of it"
+        yield Finding("gyro-noise", Light.GREEN, f"noise of the gyroscope: {told}")
+    elif review.phases.airborne:
+        yield Finding(
+            "no-noise-spectrum",
+            Light.UNKNOWN,
+            f"no spectrum of the gyroscope: {review.noise.reason}",
+            FAST_GYRO[review.kind],
         )
 
 

@@ -18,6 +18,7 @@ from flightid.report.blocks import provenance, result_blocks
 from flightid.report.closed_loop import closed_loop_section
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
+from flightid.report.flight import flight_blocks
 from flightid.report.handling_qualities import handling_qualities_blocks
 from flightid.report.tuning import gain_flight_blocks, tuning_section
 from flightid.study.answer import answer_of, in_short
@@ -62,6 +63,7 @@ def study_document(study: StudyResults) -> Document:
             section_of(
                 "The records" if study.inspection is None else "The log", _source_blocks, study
             ),
+            *_review(study),
             Section("Provenance", provenance(study.files, _options(study))),
         ),
         f"Made by flightid {VERSION} from {', '.join(study.files)}.",
@@ -200,6 +202,12 @@ def _picture(study: StudyResults) -> Iterator[Block]:
     for design in [each for each in designs if each.exists][:1]:
         shown = f"New gains of {design.axis} beside the flown; shaded: all that the data allow."
         yield figure_block(time_responses(design), shown)
+
+
+def _review(study: StudyResults) -> Iterator[Section]:
+    """What the flight tells besides its models; its verdicts are not those of the models."""
+    if study.review is not None:
+        yield section_of("The flight", partial(flight_blocks, repeats=True), study.review)
 
 
 def _source_blocks(study: StudyResults) -> Iterator[Block]:

@@ -13,6 +13,7 @@ from flightid.findings import Finding
 from flightid.inspection import Inspection
 from flightid.record import Record
 from flightid.result import Result
+from flightid.review import FlightReview
 from flightid.study.identified import ModelResults
 from flightid.study.output import SCHEMA
 from flightid.study.settings import Settings
@@ -70,6 +71,8 @@ class StudyResults(
         Stages that this run carried out, and those whose results the cache held.
     source : Path or None
         Study file as this run was given it.
+    review : FlightReview or None
+        What the log's flight tells besides; None where records come from files.
     """
 
     settings: Settings
@@ -88,6 +91,7 @@ class StudyResults(
     carried_out: tuple[str, ...] = ()
     from_cache: tuple[str, ...] = ()
     source: Path | None = None
+    review: FlightReview | None = None
 
     @property
     def has_equations(self) -> bool:

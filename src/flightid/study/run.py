@@ -11,9 +11,11 @@ from typing import Any
 from flightid.control.tuning.result import Tuning
 from flightid.export.gains import write_gains
 from flightid.files import sha256_of_file
+from flightid.logs import Log
 from flightid.progress import progress
 from flightid.report.html import to_html
 from flightid.report.text import to_text
+from flightid.review import FlightReview, review_flight
 from flightid.study.error_list import ErrorList
 from flightid.study.faults import Faults
 from flightid.study.flight import fly_again
@@ -140,6 +142,9 @@ def _run(
         qualities = {}
         if rated is not None:
             qualities = rate_models(staged, uses.loops, rated, faults, runner)
+        reviewed = None
+        if taken.log is not None:
+            reviewed = faults.spare("the flight review", _reviewed, None, runner, taken.log)
         study = Study(
             settings,
             final,
@@ -157,6 +162,7 @@ def _run(
             tuple(runner.carried_out),
             tuple(runner.from_cache),
             source,
+            reviewed,
         )
         _write(study, folder)
         advance()
@@ -166,6 +172,11 @@ def _run(
 def _tuned(runner: StageRunner, *inputs: object) -> StageResult[Tuning | None]:
     """Gains, as a stage."""
     return runner.stage("tuning", tune_models, *inputs)
+
+
+def _reviewed(runner: StageRunner, log: StageResult[Log]) -> FlightReview:
+    """What the flight tells besides, as a stage."""
+    return runner.stage("flight review", review_flight, log).value
 
 
 def _flown(runner: StageRunner, *inputs: object) -> GainFlight:
