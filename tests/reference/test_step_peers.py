@@ -26,12 +26,15 @@ def samples() -> LoopSamples:
 
 
 def wiener(r: Array, y: Array, *, cut_hz: float = 25.0) -> Array:
-    """PID-Analyzer: Wiener deconvolution of Hann frames of 1 s, and their mean.
+    """PID-Analyzer: Wiener deconvolution of Hann frames, and their mean.
+
+    Its own frames last 1 s and lose what lasts longer than a part of that (0.78 here, where the
+    truth is 0.92); these last 4 s.
 
     Each frame's pulse response is Y R* / (R R* + 1 / s), s a signal-to-noise of 10 that falls
     smoothly to nothing above the cut; quiet frames do not count.
     """
-    length, padded = 100, 1024
+    length, padded = 400, 1024
     starts = range(0, r.size - length, length // 16)
     taper = np.hanning(length)
     inputs = np.array([r[k : k + length] * taper for k in starts])
@@ -66,8 +69,6 @@ def test_two_other_ways_find_the_same_step(samples: LoopSamples) -> None:
     truth = np.interp(middles, np.arange(ticks.size) / AXIS.loop_hz, ticks)
     # Its damping is meant for deg/s.
     r, y = np.degrees(samples.set_point), np.degrees(samples.measured)
-    for name, theirs in (("Wiener", wiener(r, y)), ("spectra", by_spectra(r, y))):
-        apart = np.abs(theirs - ours)
-        print(name, apart.max(), np.abs(theirs - truth).max(), np.abs(ours - truth).max())
-        assert apart[3:].max() < 0.1, name
     assert np.abs(ours - truth)[1:].max() < 0.03
+    assert np.abs(by_spectra(r, y) - ours).max() < 0.06
+    assert np.abs(wiener(r, y) - ours).max() < 0.08

@@ -16,7 +16,7 @@ from flightid.identification.prediction_error.linear_regression import regress
 from flightid.review.kernel_posterior import kernel_draws
 
 Array = NDArray[np.float64]
-MEMORY_S = (0.3, 0.1, 0.4)
+MEMORY_S = (0.5, 0.1, 0.4)
 """Lags of the measured channel, of its forerunner and of the set-point, in units of `pace_s`."""
 FEWEST_LAGS, MOST_LAGS = 4, 50
 ROWS_PER_LAG = 10

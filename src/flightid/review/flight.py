@@ -12,7 +12,7 @@ from flightid.logs import Log, read_log
 from flightid.review.gyro_noise import gyro_noise
 from flightid.review.identity import flight_identity
 from flightid.review.loops import loop_responses
-from flightid.review.motors import motor_use
+from flightid.review.motors import motor_use, turning, yaw_trim
 from flightid.review.result import FlightReview
 from flightid.review.verdicts import judge_flight
 from flightid.review.vibration import vibrations
@@ -56,6 +56,7 @@ def review_flight(log: Log | str | Path) -> FlightReview:
     actuators = find_actuators(opened)
     start_s, stop_s = log_span(opened)
     phases = flight_phases(opened, actuators)
+    ways = None if actuators is None else turning(opened, len(actuators.names))
     found = FlightReview(
         name=opened.path.name,
         kind=opened.kind,
@@ -66,6 +67,7 @@ def review_flight(log: Log | str | Path) -> FlightReview:
         identity=flight_identity(opened, phases),
         loops=loop_responses(opened, phases.airborne),
         motors=motor_use(actuators, phases.airborne),
+        yaw_trim=yaw_trim(actuators, phases.airborne, ways),
         vibrations=vibrations(opened, phases.airborne),
         noise=gyro_noise(opened, phases.airborne),
     )

@@ -12,16 +12,25 @@ from flightid.control.autopilots.make import LOOP_RATE_PARAMETERS
 from flightid.errors import FlightidError
 from flightid.inspection.advice import logging
 from flightid.inspection.signals import Signal, Span, find, inside, places, records
+from flightid.inspection.thresholds import RATE_LEAST
 from flightid.logs import Log
 from flightid.record import Record
 from flightid.review.deconvolution import LoopDraws, LoopSamples, closed_loop
 from flightid.review.loop_response import LoopResponse
 from flightid.review.step_features import frequency_features, step_features
-from flightid.review.thresholds import FASTEST_ATTITUDE, FASTEST_RATE, SAMPLES_IN_RISE, WIDEST_LEVEL
+from flightid.review.thresholds import (
+    FASTEST_ATTITUDE,
+    FASTEST_RATE,
+    LIVELY_ATTITUDE,
+    LIVELY_RATE,
+    SAMPLES_IN_RISE,
+    WIDEST_LEVEL,
+)
 from flightid.uncertainty.estimate import Estimate, Reading
 from flightid.uncertainty.uneven import LogarithmicEnds
 
 Array = NDArray[np.float64]
+LIVELY = {"rate": LIVELY_RATE, "attitude": LIVELY_ATTITUDE}
 FASTEST = {"rate": FASTEST_RATE, "attitude": FASTEST_ATTITUDE}
 SHORTEST_PIECE_S = 2.0
 WINDOW_S = {"rate": 0.5, "attitude": 1.5}
@@ -219,17 +228,22 @@ def _refusal(
 ) -> LoopResponse | None:
     level, rise = readings[0], readings[2]
     half = level.half_width95
-    if half is None or half > WIDEST_LEVEL.value or rise.value is None:
-        told = "" if half is None else f": the step ends at {level.text}"
-        return replace(begun, reason=f"not enough motion{told}", action=_fly(begun))
-    if rise.value < SAMPLES_IN_RISE.value * sample_time_s:
+    steep = rise.value is not None and rise.value < SAMPLES_IN_RISE.value * sample_time_s
+    told = half is not None and half <= WIDEST_LEVEL.value and rise.value is not None
+    if steep or (not told and begun.loop == "rate" and begun.rate_hz < RATE_LEAST.value):
         return replace(
             begun,
             reason=f"logged at {begun.rate_hz:.3g} Hz, too slowly for a step that rises in less "
             f"than {SAMPLES_IN_RISE.value * sample_time_s:.2g} s",
             action=advised,
         )
-    return None
+    if told:
+        return None
+    why = "" if half is None else f": the step ends at {level.text}"
+    if (begun.moved or 0.0) > LIVELY[begun.loop].value:
+        reason = f"gusts, limits or the other axes move it more than the set-point does{why}"
+        return replace(begun, reason=reason, action="see motors at limits; fly in calm air")
+    return replace(begun, reason=f"not enough motion{why}", action=_fly(begun))
 
 
 def _fly(begun: LoopResponse) -> str:

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from flightid.inspection.actuators import Actuators
 from flightid.inspection.saturation import EDGE
 from flightid.inspection.signals import Span, inside
+from flightid.logs import Log
 from flightid.uncertainty.estimate import Estimate
 
+QUADROTOR = 4
 STRETCHES = 10
 """Stretches of equal length whose scatter makes the intervals."""
 
@@ -62,6 +64,37 @@ def motor_use(actuators: Actuators | None, spans: tuple[Span, ...]) -> tuple[Mot
         )
         for place, name in enumerate(actuators.names)
     )
+
+
+def turning(log: Log, count: int) -> tuple[int, ...] | None:
+    """Which way each motor turns, 1 or -1; None where the parameters do not tell.
+
+    PX4 by the sign of CA_ROTORn_KM, ArduPilot for quadrotors of frame types + and X: motors 1 and 2
+    turn counter-clockwise, 3 and 4 clockwise (AP_MotorsMatrix).
+    """
+    parameters = log.parameters
+    if log.kind == "px4":
+        moments = [parameters.get(f"CA_ROTOR{i}_KM", 0.0) for i in range(count)]
+        return tuple(1 if m > 0 else -1 for m in moments) if all(moments) else None
+    quadrotor = parameters.get("FRAME_CLASS") == 1.0 and parameters.get("FRAME_TYPE") in (0.0, 1.0)
+    in_order = all(parameters.get(f"SERVO{i}_FUNCTION") == 32.0 + i for i in range(1, 5))
+    return (1, 1, -1, -1) if quadrotor and in_order and count == QUADROTOR else None
+
+
+def yaw_trim(
+    actuators: Actuators | None, spans: tuple[Span, ...], ways: tuple[int, ...] | None
+) -> Estimate | None:
+    """How much harder motors work that turn one way than those that turn the other, of the mean."""
+    if actuators is None or ways is None:
+        return None
+    mask = inside(actuators.time_s, spans)
+    if np.count_nonzero(mask) < 2 * STRETCHES:
+        return None
+    shares = (actuators.values[:, mask] - actuators.low) / (actuators.high - actuators.low)
+    one, other = (shares[np.array(ways) == way].mean(axis=0) for way in (1, -1))
+    parts = np.array_split(np.vstack([one - other, 0.5 * (one + other)]), STRETCHES, axis=1)
+    ratios = np.array([part[0].mean() / part[1].mean() for part in parts if part[1].mean() > 0.0])
+    return _mean("counter-clockwise less clockwise motors", ratios) if ratios.size > 2 else None
 
 
 def _mean(name: str, parts: NDArray[np.float64]) -> Estimate:

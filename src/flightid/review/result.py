@@ -18,6 +18,7 @@ from flightid.review.loop_response import LoopResponse
 from flightid.review.motors import MotorUse
 from flightid.review.vibration import Vibration
 from flightid.table import Cell, Column, Table
+from flightid.uncertainty.estimate import Estimate
 
 
 @dataclass(frozen=True, repr=False)
@@ -40,6 +41,8 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
         Rate and attitude loops of each axis.
     motors : tuple of MotorUse
         Time at limits and balance.
+    yaw_trim : Estimate or None
+        How much harder motors work that turn one way than those that turn the other.
     vibrations : tuple of Vibration
         Levels against published limits.
     noise : GyroNoise
@@ -64,6 +67,7 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
     identity: FlightIdentity
     loops: tuple[LoopResponse, ...]
     motors: tuple[MotorUse, ...]
+    yaw_trim: Estimate | None
     vibrations: tuple[Vibration, ...]
     noise: GyroNoise
     findings: tuple[Finding, ...] = ()

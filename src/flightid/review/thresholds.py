@@ -10,6 +10,10 @@ FASTEST_RATE = Threshold(
 FASTEST_ATTITUDE = Threshold(
     50, "Hz", "ten samples in the 0.2 s in which the attitude of a middle-sized multirotor rises"
 )
+LIVELY_RATE = Threshold(
+    0.5, "rad/s", "30 deg/s rms: quick sticks; a loop that follows them shows in half a minute"
+)
+LIVELY_ATTITUDE = Threshold(0.17, "rad", "10 deg rms: quick sticks, as above")
 SAMPLES_IN_RISE = Threshold(
     3, "1", "a step that rises within fewer logged samples is drawn by interpolation, not by data"
 )

@@ -98,6 +98,19 @@ def _loops(review: FlightReview) -> Iterator[Finding]:
 
 
 def _motors(review: FlightReview) -> Iterator[Finding]:
+    trim = review.yaw_trim
+    ends = None if trim is None else trim.interval95
+    twisted = ends is not None and (ends[0] > UNBALANCED.value or ends[1] < -UNBALANCED.value)
+    if twisted and ends is not None:
+        way = "counter-clockwise" if ends[0] > 0.0 else "clockwise"
+        size = cell(trim, 100.0 if ends[0] > 0.0 else -100.0)
+        yield Finding(
+            "yaw-trimmed",
+            Light.AMBER,
+            f"the motors that turn {way} work {size} % of the mean harder than the others: they "
+            "hold a steady yaw moment",
+            "look for twisted motor mounts or arms, then for a worn motor or propeller",
+        )
     for motor in review.motors:
         for share, limit, action in (
             (motor.at_upper, "upper", "less weight, larger propellers, or gentler flying"),
@@ -115,7 +128,8 @@ def _motors(review: FlightReview) -> Iterator[Finding]:
                     "the air: loops are not what they were tuned to be there",
                     action,
                 )
-        yield from _balance(motor)
+        if not twisted:
+            yield from _balance(motor)
 
 
 def _balance(motor: MotorUse) -> Iterator[Finding]:
