@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,8 @@ class RecordBlock:
     residual : ndarray, shape (n_outputs, n_samples)
     answering : ndarray, shape (n_rows, n), optional
         How residuals go down with the parameters, where `projected` are instruments instead.
+    half : int, optional
+        First sample of the second half; default: by what the sensitivities tell.
     """
 
     projected: Array
@@ -37,6 +40,18 @@ class RecordBlock:
     triangle: Array
     residual: Array
     answering: Array | None = None
+    half: int | None = None
+
+    @cached_property
+    def middle(self) -> int:
+        """First sample of the second half: halves hold the same information, not the same time.
+
+        A quiet tail tells nothing by itself.
+        """
+        if self.half is not None:
+            return self.half
+        shares = _information(self.projected).reshape(self.residual.shape)
+        return middle_of(shares.sum(axis=0))
 
     @classmethod
     def of(cls, shared: Array, own: Array, residual: Array) -> RecordBlock:
@@ -55,6 +70,7 @@ class RecordBlock:
             projected=self.projected @ directions,
             shared_on_own=self.shared_on_own @ directions,
             answering=answering,
+            half=self.middle,
         )
 
 
@@ -106,17 +122,14 @@ def levels(blocks: Sequence[RecordBlock]) -> Array:
 
 
 def _halves(block: RecordBlock) -> Array:
-    """[basis, projected in the first half, projected in the second], (n_outputs, n, m + 2 n).
-
-    Halves hold the same information, not the same time: a quiet tail tells nothing by itself.
-    """
+    """[basis, projected in the first half, projected in the second], (n_outputs, n, m + 2 n)."""
     n_outputs, n_samples = block.residual.shape
     own, shared = (
         part.reshape(n_outputs, n_samples, -1) for part in (block.basis, block.projected)
     )
     m, count = own.shape[2], shared.shape[2]
     wide = np.zeros((n_outputs, n_samples, m + 2 * count))
-    half = middle_of(_information(block.projected).reshape(n_outputs, n_samples).sum(axis=0))
+    half = block.middle
     wide[:, :, :m] = own
     wide[:, :half, m : m + count] = shared[:, :half]
     wide[:, half:, m + count :] = shared[:, half:]

@@ -103,9 +103,10 @@ class FitResponse:
         lagged = [
             np.concatenate([_lagged(each[j], lags) for j in moving], axis=1) for each in inputs
         ]
-        found = []
+        squares = [u.T @ u for u in lagged]
+        plain, found = np.asarray(sum(squares)), []
         for output in range(len(self.models)):
-            raw, covariance, plain = self._of_output(output, lagged)
+            raw, covariance = self._of_output(output, lagged, squares)
             power = sum(
                 float(block.residual[output] @ block.residual[output]) for block in self.blocks
             )
@@ -116,27 +117,38 @@ class FitResponse:
                 )
         return tuple(found)
 
-    def _of_output(self, output: int, lagged: Sequence[Array]) -> tuple[Array, Array, Array]:
-        """Uᵀe, its covariance, and UᵀU."""
+    def _of_output(
+        self, output: int, lagged: Sequence[Array], squares: Sequence[Array]
+    ) -> tuple[Array, Array]:
+        """Uᵀe and its covariance; `squares` are UᵀU by record."""
         n = len(self.gain)
         parts = [_parts(block, output) for block in self.blocks]
         raw = sum(
             u.T @ block.residual[output] for u, block in zip(lagged, self.blocks, strict=True)
         )
-        scores = sum(x[:, x.shape[1] - n :].T @ u for x, u in zip(parts, lagged, strict=True))
-        through = self.gain.T @ scores
+        met = [x.T @ u for x, u in zip(parts, lagged, strict=True)]
+        through = self.gain.T @ sum(each[len(each) - n :] for each in met)
         covariance = through.T @ self.beside @ through
         noise = self.models[output]
-        for x, u, answer, level in zip(
-            parts, lagged, self.answers, levels(self.blocks)[:, output], strict=True
+        for x, u, own, square, answer, level in zip(
+            parts,
+            lagged,
+            met,
+            squares,
+            self.answers,
+            levels(self.blocks)[:, output],
+            strict=True,
         ):
-            taken = np.vstack([x[:, : x.shape[1] - n].T @ u, through])
-            square = level * noise.squared(np.concatenate([u, x], axis=1))
-            k = u.shape[1]
-            cross = square[:k, k:] @ taken
-            covariance = covariance + square[:k, :k] - cross - cross.T + taken.T @ answer @ taken
-        plain = sum(u.T @ u for u in lagged)
-        return np.asarray(raw), np.asarray(covariance), np.asarray(plain)
+            taken = np.vstack([own[: len(own) - n], through])
+            if noise.weights.size:
+                whole = noise.squared(np.concatenate([u, x], axis=1))
+                k = u.shape[1]
+                heard, cross = whole[:k, :k], whole[:k, k:] @ taken
+            else:
+                heard, cross = noise.lags[0] * square, noise.lags[0] * (own.T @ taken)
+            around = level * (heard - cross - cross.T)
+            covariance = covariance + around + taken.T @ answer @ taken
+        return np.asarray(raw), np.asarray(covariance)
 
     def _judged(
         self,

@@ -72,15 +72,8 @@ class Autoregression:
         n = len(columns)
         length = _length(n)
         spectrum = fft.rfft(_ring(self.autocovariance(n), length)).real
-        twice = np.full(spectrum.size, 2.0 / length)
-        twice[0] = 1.0 / length
-        if length % 2 == 0:
-            twice[-1] = 1.0 / length
-        moved = fft.rfft(np.ascontiguousarray(columns.T), length, axis=1)
-        weight = spectrum * twice
-        return np.asarray(
-            (moved.real * weight) @ moved.real.T + (moved.imag * weight) @ moved.imag.T
-        )
+        moved = _transform(columns, length)
+        return np.asarray((moved * _both(_twice(length) * spectrum / length)) @ moved.T)
 
     def freedom(self) -> float:
         """Degrees of freedom of the model's level at zero frequency, where slow sensitivities look.
@@ -275,7 +268,8 @@ def noise_models(
     outputs = range(n_outputs)
     seen = np.array([pooled([each[o][:, None] for each in residuals], length) for o in outputs])
     directions = [
-        fft.rfft(np.concatenate([each.own, each.shared], axis=2), length, axis=1) for each in taken
+        [_transform(part, length) for part in np.concatenate([each.own, each.shared], axis=2)]
+        for each in taken
     ]
     lost = np.zeros_like(seen)
     models: list[Autoregression] = []
@@ -295,7 +289,7 @@ def noise_models(
 
 def _lost(
     models: Sequence[Autoregression],
-    directions: Sequence[Array],
+    directions: Sequence[Sequence[Array]],
     lengths: Sequence[int],
     n_own: Sequence[int],
 ) -> Array:
@@ -306,17 +300,9 @@ def _lost(
     """
     length = models[0].length
     spectra = [model.spectrum() for model in models]
-    twice = np.full(len(spectra[0]), 2.0)
-    twice[0] = 1.0
-    if length % 2 == 0:
-        twice[-1] = 1.0
+    weights = [_both(_twice(length) * spectrum / length) for spectrum in spectra]
     inner = [
-        np.asarray(
-            sum(
-                (each.conj().T @ (each * (twice * spectrum / length)[:, None])).real
-                for each, spectrum in zip(parts, spectra, strict=True)
-            )
-        )
+        np.sum([(e * w) @ e.T for e, w in zip(parts, weights, strict=True)], axis=0)
         for parts in directions
     ]
     shared = sum(each[m:, m:] for each, m in zip(inner, n_own, strict=True))
@@ -324,12 +310,33 @@ def _lost(
     for parts, each, m, n in zip(directions, inner, n_own, lengths, strict=True):
         each[m:, m:] = shared
         for o, (part, spectrum, model) in enumerate(zip(parts, spectra, models, strict=True)):
-            shaped = part * spectrum[:, None]
+            shaped = part * _both(spectrum)
             if model.weights.size:
                 # Noise ends with the record.
-                shaped = fft.rfft(fft.irfft(shaped, length, axis=0)[:n], length, axis=0)
-            lost[o] += np.sum(((2.0 * shaped - part @ each) * part.conj()).real, axis=1)
+                ended = fft.irfft(shaped.view(np.complex128), length)[:, :n]
+                shaped = fft.rfft(ended, length).view(np.float64)
+            power = np.einsum("kb,kb->b", 2.0 * shaped - each @ part, part)
+            lost[o] += power[::2] + power[1::2]
     return lost / sum(lengths)
+
+
+def _transform(columns: Array, length: int) -> Array:
+    """Transforms of columns (n, k), real and imaginary parts in turn: (k, 2 n_bins)."""
+    return np.asarray(fft.rfft(np.ascontiguousarray(columns.T), length).view(np.float64))
+
+
+def _both(weights: Array) -> Array:
+    """Weights of bins for the real and the imaginary part of each."""
+    return np.repeat(weights, 2)
+
+
+def _twice(length: int) -> Array:
+    """How often each bin of a real transform stands in the whole one."""
+    twice = np.full(length // 2 + 1, 2.0)
+    twice[0] = 1.0
+    if length % 2 == 0:
+        twice[-1] = 1.0
+    return twice
 
 
 def _ring(first: Array, length: int) -> Array:
