@@ -20,6 +20,8 @@ from flightid.uncertainty.coloured_residuals import white_covariance
 
 Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array, Array, Array]
+Run = tuple[Array, Array, Array]
+"""Errors of a record, its states, and its free motions."""
 DISTINCT = 1e-12
 """Least share of an error that the other outputs do not hold, below which it is rounding."""
 BATCH = 2**20
@@ -99,7 +101,7 @@ class Predictor:
         free = (a, b, c, d, k) if self.direct else (a, b, c, k)
         return np.concatenate([matrix.ravel() for matrix in free])
 
-    def errors(self, matrices: Matrices) -> list[tuple[Array, Array, Array]]:
+    def errors(self, matrices: Matrices) -> list[Run]:
         """Errors, states and free motions of each record, those of levels after those of states."""
         a, b, c, d, k = matrices
         closed, found = a - k @ c, []
@@ -117,10 +119,15 @@ class Predictor:
             found.append((error, state, moved))
         return found
 
-    def residuals(self, matrices: Matrices, whiten: Array) -> tuple[list[Array], list[Array]]:
-        """Whitened errors of each record after the initial state, and the bases taken out."""
+    def residuals(
+        self, matrices: Matrices, whiten: Array, runs: list[Run] | None = None
+    ) -> tuple[list[Array], list[Array]]:
+        """Whitened errors of each record after the initial state, and the bases taken out.
+
+        `runs` are the `errors` of these matrices, where they are known.
+        """
         c, out, bases = matrices[2], [], []
-        for error, _, moved in self.errors(matrices):
+        for error, _, moved in self.errors(matrices) if runs is None else runs:
             basis = self._basis(whiten @ self._seen(c, moved))
             flat = (whiten @ error).ravel()
             out.append(flat - basis @ (basis.T @ flat))
@@ -159,16 +166,26 @@ class Predictor:
             for row, y in zip(rows, self.data.outputs, strict=True)
         )
 
-    def jacobian(self, matrices: Matrices, whiten: Array, basis: Array) -> Array:
+    def jacobian(
+        self,
+        matrices: Matrices,
+        whiten: Array,
+        basis: Array,
+        runs: list[Run] | None = None,
+        bases: list[Array] | None = None,
+    ) -> Array:
         """Derivatives of `residuals` along the columns of a basis, shape (rows, n_basis).
+
+        `runs` and `bases` are what `errors` and `residuals` made of these matrices, where known.
 
         Reference: Kaufman (1975), *BIT* 15, for the elimination of the initial states.
         """
         c = matrices[2]
         parts = []
-        for (error, state, moved), u in zip(self.errors(matrices), self.data.inputs, strict=True):
+        runs = self.errors(matrices) if runs is None else runs
+        bases = self.residuals(matrices, whiten, runs)[1] if bases is None else bases
+        for (error, state, moved), taken, u in zip(runs, bases, self.data.inputs, strict=True):
             seen = self._seen(c, moved)
-            taken = self._basis(whiten @ seen)
             columns = seen.reshape(len(moved), error.size).T
             own = np.linalg.lstsq(columns, error.ravel(), rcond=RANK)[0]
             made = np.zeros((basis.shape[1], *error.shape))
@@ -330,6 +347,7 @@ def _search(
     basis = _tangent(predictor, matrices)
     origin = predictor.pack(matrices)
     rows = sum(y.size for y in predictor.data.outputs)
+    last: dict[bytes, tuple[Matrices, list[Run], list[Array]]] = {}
 
     def residuals(step: Array) -> Array:
         trial = predictor.unpack(origin + basis @ step)
@@ -337,10 +355,18 @@ def _search(
             return np.full(rows, np.inf)
         if predictor.stable and spectral_radius(trial[0]) >= STABLE:
             return np.full(rows, np.inf)
-        return np.concatenate(predictor.residuals(trial, whiten)[0])
+        runs = predictor.errors(trial)
+        found, taken = predictor.residuals(trial, whiten, runs)
+        last.clear()
+        last[step.tobytes()] = trial, runs, taken
+        return np.concatenate(found)
 
     def jacobian(step: Array) -> Array:
-        return predictor.jacobian(predictor.unpack(origin + basis @ step), whiten, basis)
+        known = last.get(step.tobytes())
+        if known is None:
+            return predictor.jacobian(predictor.unpack(origin + basis @ step), whiten, basis)
+        at, runs, bases = known
+        return predictor.jacobian(at, whiten, basis, runs, bases)
 
     free = np.full(basis.shape[1], np.inf)
     end = DenseEnd.searched(
