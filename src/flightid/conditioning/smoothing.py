@@ -215,8 +215,7 @@ def fourier_smooth(
     True
     """
     samples = np.asarray(values, dtype=np.float64)
-    if samples.ndim != 1 or samples.size < 16:
-        raise DataError("too few samples for a Fourier series", found=samples.shape, needed="16")
+    _require_series(samples)
     if not sample_time_s > 0 or (cutoff_hz is not None and not 0 < cutoff_hz * sample_time_s < 0.5):
         raise OptionError(
             "cut-off does not lie in the band",
@@ -224,13 +223,8 @@ def fourier_smooth(
             needed="between 0 and half the sampling rate",
         )
     count = samples.size
-    ramp = np.arange(count) / (count - 1)
-    line = samples[0] + (samples[-1] - samples[0]) * ramp
-    coefficients = fft.dst((samples - line)[1:-1], type=1) / (count - 1)
-    order = np.arange(1, count - 1)
-    frequency_hz = order / (2 * (count - 1) * sample_time_s)
-    upper = coefficients[order > count // 2]
-    level = float(np.median(upper**2)) / CHI_SQUARE_MEDIAN
+    line, coefficients, level = _sines(samples)
+    frequency_hz = np.arange(1, count - 1) / (2 * (count - 1) * sample_time_s)
     knee = _knee(coefficients**2, level) if cutoff_hz is None else None
     cutoff = float(frequency_hz[knee]) if knee is not None else float(cutoff_hz or 0.0)
     weight = 1 / (1 + (frequency_hz / cutoff) ** 6)
@@ -242,9 +236,46 @@ def fourier_smooth(
         (count - 1) * sample_time_s
     )
     smooth = line + np.concatenate(([0.0], inside, [0.0]))
-    # Each coefficient of white noise of deviation s has variance 2 s² / (n - 1).
-    noise = float(np.sqrt(level * (count - 1) / 2))
-    return SmoothSignal(smooth, np.asarray(slope), cutoff, noise)
+    return SmoothSignal(smooth, np.asarray(slope), cutoff, _deviation(level, count))
+
+
+def white_deviation(samples: NDArray[np.float64]) -> float:
+    """Standard deviation of the white noise of a signal, as `fourier_smooth` finds it.
+
+    Raises
+    ------
+    DataError
+        Fewer than 16 samples.
+
+    Example
+    -------
+    >>> noise = np.random.default_rng(0).standard_normal(4000)
+    >>> round(white_deviation(np.sin(np.arange(4000) / 50) + noise), 1)
+    1.0
+    """
+    _require_series(samples)
+    return _deviation(_sines(samples)[2], samples.size)
+
+
+def _require_series(samples: NDArray[np.float64]) -> None:
+    if samples.ndim != 1 or samples.size < 16:
+        raise DataError("too few samples for a Fourier series", found=samples.shape, needed="16")
+
+
+def _sines(
+    samples: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    """Line through the ends, coefficients of what is left, and the level of their upper half."""
+    count = samples.size
+    line = samples[0] + (samples[-1] - samples[0]) * (np.arange(count) / (count - 1))
+    coefficients = np.asarray(fft.dst((samples - line)[1:-1], type=1) / (count - 1))
+    upper = coefficients[count // 2 :]
+    return line, coefficients, float(np.median(upper**2)) / CHI_SQUARE_MEDIAN
+
+
+def _deviation(level: float, count: int) -> float:
+    """Each coefficient of white noise of deviation s has variance 2 s² / (n - 1)."""
+    return float(np.sqrt(level * (count - 1) / 2))
 
 
 def _knee(power: NDArray[np.float64], level: float) -> int:

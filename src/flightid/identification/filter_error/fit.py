@@ -172,7 +172,7 @@ def _problem(
     else:
         noisy = _places(options.process_noise, list(model.states))
     spread = np.sqrt(np.mean([np.var(each.outputs, axis=1) for each in data], axis=0))
-    found = [white_levels(each.outputs, each.sample_time_s) for each in data]
+    found = [white_levels(each.outputs) for each in data]
     level = np.sqrt(np.mean([levels**2 for levels in found], axis=0))
     reach = sizes_of_states(point, spread)
     made = replace(

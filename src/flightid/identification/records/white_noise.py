@@ -7,15 +7,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.conditioning.smoothing import fourier_smooth
+from flightid.conditioning.smoothing import white_deviation
 from flightid.errors import DataError
 from flightid.record import Record
 
 Array = NDArray[np.float64]
-QUARTER_RATE = 0.25
 
 
-def white_levels(rows: Array, sample_time_s: float) -> Array:
+def white_levels(rows: Array) -> Array:
     """Standard deviation of the white noise of each channel.
 
     Biased where a sensor's filter has taken the noise from the upper half of the band: too small.
@@ -23,7 +22,6 @@ def white_levels(rows: Array, sample_time_s: float) -> Array:
     Parameters
     ----------
     rows : ndarray, shape (n_channels, n_samples)
-    sample_time_s : float
 
     Returns
     -------
@@ -37,17 +35,16 @@ def white_levels(rows: Array, sample_time_s: float) -> Array:
     Example
     -------
     >>> time_s, noise = np.arange(400) / 50, np.random.default_rng(0).standard_normal(400)
-    >>> bool(abs(white_levels(np.array([np.sin(time_s) + 0.1 * noise]), 0.02)[0] - 0.1) < 0.01)
+    >>> bool(abs(white_levels(np.array([np.sin(time_s) + 0.1 * noise]))[0] - 0.1) < 0.01)
     True
     """
-    cutoff = QUARTER_RATE / sample_time_s
-    return np.array([fourier_smooth(row, sample_time_s, cutoff_hz=cutoff).noise for row in rows])
+    return np.array([white_deviation(row) for row in rows])
 
 
 def explained_percent(records: Sequence[Record], outputs: Sequence[str]) -> Mapping[str, float]:
     """Percent of each output's variance that its white noise makes; none of short records."""
     try:
-        levels = [white_levels(each.matrix(outputs), each.sample_time_s) for each in records]
+        levels = [white_levels(each.matrix(outputs)) for each in records]
     except DataError:
         return {}
     noise = sum(each.n_samples * level**2 for each, level in zip(records, levels, strict=True))

@@ -27,7 +27,7 @@ LIMIT = 0.5
 
 def state_noise(motions: Sequence[StateMeasurements]) -> list[Array]:
     """Standard deviation of the white noise of each state, by record."""
-    return [white_levels(motion.states, motion.sample_time_s) for motion in motions]
+    return [white_levels(motion.states) for motion in motions]
 
 
 def attenuation(
@@ -86,7 +86,7 @@ def noise_energy(
     noisier = []
     for motion in motions:
         rows = np.vstack([motion.states, motion.others])
-        draw = white_levels(rows, motion.sample_time_s)[:, None]
+        draw = white_levels(rows)[:, None]
         draw = draw * generator.standard_normal(rows.shape)
         states, others = np.split(draw, [len(motion.states)])
         noisier.append(
