@@ -15,6 +15,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flightid.responses.errors.unseen_peaks import has_unseen_peak
+
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
@@ -229,6 +231,8 @@ def _fit_output(data: _Spectra) -> Pilot | None:
             if 2 * data.size < SPENT * unknowns:
                 break
             state = _search(data, order, scale, weights)
+            if has_unseen_peak(data.omega, state.numerators, state.denominator, scale):
+                continue
             # The criterion for an unknown variance of the noise.
             height = 2.0 * data.size * np.log(max(state.cost, LEAST))
             height += 2.0 * unknowns / (1.0 - (unknowns + 1.0) / (2.0 * data.size))
