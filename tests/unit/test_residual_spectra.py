@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.errors import OptionError
+from flightid.errors import DataError, OptionError
 from flightid.plot.residuals import residual_spectra as draw_spectra
 from flightid.plot.residuals import spectrum_comparison
 from flightid.validation import compare_spectra, residual_spectra
+from flightid.validation.spectra.spectra import lags_of_spectrum
 from tests.closeness import assert_close
 
 SAMPLE_TIME_S = 0.02
@@ -100,3 +101,22 @@ def test_a_comparison_needs_both_sides_once() -> None:
     with pytest.raises(OptionError, match="one measurement and one prediction"):
         compare_spectra(record)
     assert len(residual_spectra([record, record]).outputs) == 1
+
+
+def test_lags_span_the_slowest_peak_up_to_a_bound_and_need_one() -> None:
+    rng = np.random.default_rng(3)
+    time_s = np.arange(6000) * SAMPLE_TIME_S
+    driven = fid.Record.from_arrays(time_s, inputs={"u": rng.normal(size=6000)})
+    lags, finding = lags_of_spectrum([fid.simulate(_mode(25.0), driven)], ["u"], "y")
+    assert (lags, str(finding.light)) == (
+        pytest.approx(2 * np.pi / 25 / SAMPLE_TIME_S, abs=1),
+        "green",
+    )
+    lags, finding = lags_of_spectrum([fid.simulate(_mode(4.0), driven)], ["u"], "y")
+    assert (lags, str(finding.light)) == (20, "amber")
+    assert "resample records to 0.07" in finding.action
+    silent = _record(rng.normal(size=6000), rng.normal(size=6000))
+    with pytest.raises(
+        DataError, match="no peak with 5 % of the power stands out of the spectrum of e"
+    ):
+        lags_of_spectrum([silent], ["u"], "e")

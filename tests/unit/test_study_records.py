@@ -195,6 +195,19 @@ def test_a_narx_model_is_searched_and_tested(folder: Path) -> None:
 
 
 @pytest.mark.usefixtures("no_report")
+def test_lags_of_a_narx_model_follow_from_the_spectrum(folder: Path) -> None:
+    head = units_in_mat(LINEAR).split("structure")[0]
+    head = head.replace("[0.0, 40.0]", "[0.0, 80.0]")
+    text = NARX.replace("[2, 3]", '"spectrum"').replace("[4.0, 8.0]", "8.0")
+    fit = fid.run_study(written(folder, head + text), output=folder / "lags").identified[0].fit
+    (said,) = (each for each in fit.findings if each.code == "lags-of-spectrum")
+    assert f"{fit.structure.output_lags} lags" in said.message
+    assert abs(fit.structure.output_lags - 14) <= 2, "2 pi over the angle of the truth's poles"
+    with pytest.raises(StudyError, match=r"or a list of them, or 'spectrum'"):
+        fid.run_study(written(folder, head + text.replace("spectrum", "spectral")))
+
+
+@pytest.mark.usefixtures("no_report")
 def test_one_structure_needs_no_choice(folder: Path) -> None:
     text = units_in_mat(LINEAR).replace('select = "choice"\n', "")
     text = re.sub(r"na = .*\nnb = .*\nnc = .*\nnk = .*", "na = 2\nnb = 1\nnc = 2\nnk = 2", text)

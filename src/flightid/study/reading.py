@@ -78,8 +78,10 @@ class TableReader:
 
         return int(self._take(key, default, fits, f"a whole number from {minimum} on"))
 
-    def integers(self, key: str, default: Iterable[int] | None = None) -> tuple[int, ...]:
-        """Different whole numbers from 0 on; one alone may stand for a list of one."""
+    def integers(
+        self, key: str, default: Iterable[int] | None = None, *, word: str = ""
+    ) -> tuple[int, ...]:
+        """Different whole numbers from 0 on, or one alone; none where a word stands for them."""
 
         def fits(value: object) -> bool:
             listed = value if isinstance(value, list) else [value]
@@ -87,10 +89,15 @@ class TableReader:
                 isinstance(item, int) and not isinstance(item, bool) and item >= 0
                 for item in listed
             )
-            return whole and bool(listed) and len(set(listed)) == len(listed)
+            return value == word != "" or (
+                whole and bool(listed) and len(set(listed)) == len(listed)
+            )
 
         usual = REQUIRED if default is None else default
-        found = self._take(key, usual, fits, "a whole number from 0 on, or a list of them")
+        instead = f", or {word!r}" if word else ""
+        needed = f"a whole number from 0 on, or a list of them{instead}"
+        found = self._take(key, usual, fits, needed)
+        found = () if isinstance(found, str) else found
         return (found,) if isinstance(found, int) else tuple(found)
 
     def number(self, key: str, default: float = REQUIRED) -> float:

@@ -21,6 +21,8 @@ ORDERS: dict[str, tuple[str, ...]] = {
     ANY: tuple(EVERY_ORDER),
 }
 """Orders of each structure, of which several may be tried."""
+WORDS = {"output_lags": "spectrum"}
+"""What may stand for an order's numbers: they follow from the data."""
 CHOICES = ("balanced", "free_run", "simplest", "bic")
 
 
@@ -45,7 +47,8 @@ class StructureSettings:
     coherence : tuple of str
         Records of the coherence test and of the spectra.
     orders : mapping of str to tuple of int
-        Orders to try by name; for ``"narx"`` output_lags and input_lags.
+        Orders to try by name; for ``"narx"`` output_lags, none where the spectrum of the output
+        tells them, and input_lags.
     widths : tuple of float
         Widths of radial functions to try.
     choose : str
@@ -96,7 +99,10 @@ def read_structure(reader: TableReader, identify: tuple[str, ...]) -> StructureS
         reader.names("outputs"),
         reader.names("select", ()),
         reader.names("coherence", identify),
-        {name: reader.integers(name, usual.get(name)) for name in ORDERS[kind]},
+        {
+            name: reader.integers(name, usual.get(name), word=WORDS.get(name, ""))
+            for name in ORDERS[kind]
+        },
         reader.numbers("width", (NarxStructure.width,)) if is_narx else (),
         reader.choice("choose", CHOICES, CHOOSE.get(kind, CHOICES[0])),
         _options(kind, reader),

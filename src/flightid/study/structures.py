@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from flightid.conventions import Light
@@ -15,6 +16,7 @@ from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
 from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
 from flightid.validation.order_scan.result import OrderTrial, is_settled
 from flightid.validation.order_scan.scan_orders import fit_of
+from flightid.validation.spectra.spectra import lags_of_spectrum
 
 Choice = OrderScan | NarxSearch
 AS_GOOD = 0.10
@@ -110,6 +112,10 @@ def _narx(
     settings: StructureSettings, inputs: tuple[str, ...], flown: list[Record], unseen: list[Record]
 ) -> tuple[Fit, NarxSearch | None]:
     outputs_back, inputs_back = settings.orders["output_lags"], settings.orders["input_lags"]
+    told: tuple[Finding, ...] = ()
+    if not outputs_back:
+        count, finding = lags_of_spectrum(flown, inputs, settings.outputs[0])
+        outputs_back, told = (count,), (finding,)
     asked = NarxStructure(
         inputs,
         settings.outputs[0],
@@ -118,11 +124,12 @@ def _narx(
         width=settings.widths[0],
         **settings.options,
     )
-    if not settings.is_scanned:
-        return identify(asked, flown), None
-    pairs = [(a, b) for a in outputs_back for b in inputs_back]
-    search = search_narx(asked, flown, unseen, lags=pairs, widths=settings.widths)
-    return search.best, search
+    search = None
+    if settings.is_scanned:
+        pairs = [(a, b) for a in outputs_back for b in inputs_back]
+        search = search_narx(asked, flown, unseen, lags=pairs, widths=settings.widths)
+    fit = identify(asked, flown) if search is None else search.best
+    return replace(fit, findings=(*told, *fit.findings)), search
 
 
 def goal_findings(fit: Fit | None) -> tuple[Finding, ...]:

@@ -10,7 +10,7 @@ from scipy import signal
 from scipy.special import chdtri
 
 from flightid.conventions import Light
-from flightid.errors import OptionError
+from flightid.errors import DataError, OptionError
 from flightid.findings import Finding
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
@@ -33,6 +33,10 @@ PEAK_PERCENT = 5.0
 """Of the measured power: what a peak that one spectrum has alone must be worth to count."""
 SAME_PEAK = 0.25
 """Largest relative distance of frequencies of a measured peak and the predicted one it matches."""
+PEAK_LEVEL = 0.99
+"""Of intervals that a peak must stand out of: those of 95 % find one in 7 of 25 white records."""
+MOST_LAGS = 20
+"""Lags of an output that a spectrum may ask for: a model of more fits noise, not dynamics."""
 
 
 def residual_spectra(
@@ -189,6 +193,62 @@ def compare_spectra(
     )  # fmt: skip
 
 
+def lags_of_spectrum(
+    records: Sequence[Record], inputs: Iterable[str], output: str
+) -> tuple[int, Finding]:
+    """Lags of an output that span the period of its spectrum's slowest peak; at most `MOST_LAGS`.
+
+    A peak counts that stands out of its random error and holds `PEAK_PERCENT` of the power.
+
+    Returns
+    -------
+    int
+        Lags, samples.
+    Finding
+        Peak, period and bound; amber where the bound is shorter than the period.
+
+    Raises
+    ------
+    DataError
+        No peak stands out of the spectrum's random error, or records too short.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> rng = np.random.default_rng(0)
+    >>> mode = fid.LinearSystem([[0.0, 1.0], [-16.0, -0.8]], [[0.0], [16.0]], [[1.0, 0.0]],
+    ...                         [[0.0]], ("u",), ("y",))
+    >>> driven = fid.Record.from_arrays(np.arange(3000) * 0.1,
+    ...                                 inputs={"u": rng.normal(size=3000)})
+    >>> lags_of_spectrum([fid.simulate(mode, driven)], ["u"], "y")[0]  # 2 pi / 4 rad/s = 1.57 s
+    16
+    """
+    response = _estimate(records, inputs, [output], None, None)
+    omega = response.omega_rad_s
+    density, low, high = (each[0] for each in _with_bounds(response, PEAK_LEVEL))
+    share = _excess_percent(omega, density, np.zeros_like(density))
+    peaks = [at for at, _ in _peaks(omega, density, low, high) if share(at) >= PEAK_PERCENT]
+    if not peaks:
+        raise DataError(
+            f"no peak with {PEAK_PERCENT:g} % of the power stands out of the spectrum of {output}",
+            needed="a resonance that the records resolve",
+            action="give output_lags as a number, or several to rank by free run",
+        )
+    slowest, step_s = peaks[0], records[0].sample_time_s
+    period_s = 2.0 * np.pi / slowest
+    asked = int(np.ceil(period_s / step_s))
+    said = f"the slowest peak of {output}, {slowest:.3g} rad/s, has a period of {period_s:.3g} s"
+    if asked <= MOST_LAGS:
+        message = f"{said}: {asked} lags of the output span it (at most {MOST_LAGS} are taken)"
+        return asked, Finding("lags-of-spectrum", Light.GREEN, message)
+    return MOST_LAGS, Finding(
+        "lags-of-spectrum",
+        Light.AMBER,
+        f"{said}: {asked} lags would span it, {MOST_LAGS} are taken",
+        f"resample records to {period_s / MOST_LAGS:.2g} s",
+    )
+
+
 def _residual_records(residuals: Verification | Record | Sequence[Record]) -> tuple[Record, ...]:
     if isinstance(residuals, Record):
         return (residuals,)
@@ -226,12 +286,14 @@ def _estimate(
     )
 
 
-def _with_bounds(response: FrequencyResponse) -> tuple[NDArray[np.float64], ...]:
-    """Auto-spectra with their 95 % intervals, each shape (n_out, n_f)."""
+def _with_bounds(
+    response: FrequencyResponse, level: float = LEVEL
+) -> tuple[NDArray[np.float64], ...]:
+    """Auto-spectra with their intervals, each shape (n_out, n_f)."""
     density = np.asarray(response.output_spectrum, dtype=np.float64)
     degrees = 2.0 * response.n_independent[:, 0, :] / overlap_factor(shifts_of(OVERLAP)) ** 2
-    low = density * degrees / chdtri(degrees, 0.5 - 0.5 * LEVEL)
-    high = density * degrees / chdtri(degrees, 0.5 + 0.5 * LEVEL)
+    low = density * degrees / chdtri(degrees, 0.5 - 0.5 * level)
+    high = density * degrees / chdtri(degrees, 0.5 + 0.5 * level)
     return density, low, high
 
 
