@@ -71,7 +71,7 @@ def checked_history(record: Record) -> tuple[Step, ...]:
     """History of a record with what was found in its own span when it entered, or is found now."""
     if not any(step.operation in ENTRIES for step in record.history):
         channels = [(channel, record.time_s, record[n]) for n, channel in record.channels.items()]
-        return (*record.history, *entry_steps(channels))
+        return (*record.history, *record.once(CHECK, lambda: entry_steps(channels)))
     first, last = float(record.time_s[0]), float(record.time_s[-1])
     return tuple(step for step in record.history if _touches(step, first, last))
 

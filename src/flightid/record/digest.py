@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -121,6 +121,10 @@ def record_sha256(record: Record, names: Iterable[str] | None = None) -> str:
 def digest_of(record: Record, names: Iterable[str]) -> RecordDigest:
     """Digest of the named channels of a record; those that it lacks are left out."""
     held = [name for name in names if name in record]
+    return record.once(("digest", *held), lambda: _digested(record, held))
+
+
+def _digested(record: Record, held: Sequence[str]) -> RecordDigest:
     marks = {name: _smallest(_hashes(record[name])) for name in held}
     return RecordDigest(
         record.name,

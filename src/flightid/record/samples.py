@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from flightid.record.validation import (
 
 if TYPE_CHECKING:
     import xarray as xr
+
+T = TypeVar("T")
 
 
 class LabelledSamples:
@@ -40,8 +42,8 @@ class LabelledSamples:
     """
 
     __slots__ = (
-        "_channels", "_history", "_input_shape", "_name", "_sample_time_s", "_samples", "_time_s",
-        "_trim",
+        "_channels", "_found", "_history", "_input_shape", "_name", "_sample_time_s", "_samples",
+        "_time_s", "_trim",
     )  # fmt: skip
 
     def __init__(
@@ -66,11 +68,27 @@ class LabelledSamples:
         self._trim = dict(trim or {})
         self._history = tuple(history)
         self._input_shape = input_shape or InputShape()
+        self._found: dict[Hashable, Any] = {}
 
     @property
     def name(self) -> str:
         """Name of the manoeuvre."""
         return self._name
+
+    def once(self, name: Hashable, make: Callable[[], T]) -> T:
+        """What `make` finds in these samples under a name, found once: they never change.
+
+        Example
+        -------
+        >>> from flightid.record import Record
+        >>> record = Record.from_arrays([0.0, 0.1], outputs={"p": [1.0, 2.0]})
+        >>> record.once("peak", lambda: 2.0), record.once("peak", lambda: 7.0)
+        (2.0, 2.0)
+        """
+        if name not in self._found:
+            self._found[name] = make()
+        found: T = self._found[name]
+        return found
 
     @property
     def dataset(self) -> xr.Dataset:
