@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from flightid.cli.program import run
+
 PAGES = sorted((Path(__file__).parent.parent.parent / "docs").glob("*.md"))
 BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
@@ -33,3 +35,16 @@ def test_python_blocks_run(
     namespace: dict[str, object] = {"__name__": page.stem}
     for block in BLOCK.findall(text):
         exec(compile(block, str(page), "exec"), namespace)
+
+
+def test_the_law_of_blocks_of_the_export_page_flies(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`flightid fly MODEL --blocks law.toml` with the page's own law."""
+    (page,) = (each for each in PAGES if each.stem == "export")
+    (law,) = re.findall(
+        r"^```toml\n(\[\[block\]\].*?)^```", page.read_text(), re.MULTILINE | re.DOTALL
+    )
+    (tmp_path / "law.toml").write_text(law, encoding="utf-8")
+    words = ["fly", "fixed_wing_longitudinal", "--blocks", str(tmp_path / "law.toml")]
+    assert run([*words, "--duration", "0.2"]) == 0, capsys.readouterr().err

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -92,6 +94,8 @@ def test_shared_and_tied_parameters_over_two_responses() -> None:
     ratio = fit.parameters["M"].stderr / fit.parameters["L"].stderr
     assert_close(ratio, 0.4, rtol=1e-9, why="error follows the tie")
     assert list(fit.costs) == ["p/u", "q/u"]
+    assert replace(fit, costs={"p/u": 2.0, "q/u": 1.0}).ranked == ("q/u", "p/u"), "best first"
+    assert replace(fit, costs={"p/u": 1.0, "q/u": 2.0}).ranked == ("p/u", "q/u")
 
 
 def test_coherence_weight_has_the_exponent_of_the_book() -> None:
