@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
+from scipy.optimize import Bounds, milp
 
 from flightid.control.tuning.limits import TARGET
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
@@ -346,12 +346,11 @@ def _linear_step(linear: Linear, low: Array, high: Array) -> Array | None:
             np.hstack([-level_slopes, np.ones((len(levels), 1)), np.zeros((len(levels), 1))]),
         ]
     )
-    found = linprog(
+    # A mixed-integer problem without integers: the same solver as `linprog`, checked less often.
+    found = milp(
         np.concatenate([np.zeros(n), [-1.0, PENALTY]]),
-        A_ub=above,
-        b_ub=np.concatenate([limits, levels]),
-        bounds=[*zip(low, high, strict=True), (None, None), (0.0, None)],
-        method="highs",
+        constraints=(above, -np.inf, np.concatenate([limits, levels])),
+        bounds=Bounds(np.append(low, [-np.inf, 0.0]), np.append(high, [np.inf, np.inf])),
     )
     return None if found.x is None else np.asarray(found.x[:n])
 
