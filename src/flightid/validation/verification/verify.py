@@ -30,6 +30,7 @@ from flightid.record.several import as_records
 from flightid.responses import FrequencyResponse
 from flightid.validation.verification.baseline import baseline_findings
 from flightid.validation.verification.comparison import Comparison, compared
+from flightid.validation.verification.contradiction import contradictions
 from flightid.validation.verification.held_otherwise import hold_findings
 from flightid.validation.verification.judgement import THEIL_GUIDE, judge
 from flightid.validation.verification.muad import mismatch
@@ -197,7 +198,10 @@ def verify(
         seen = None if responses is None else mismatch(model, responses)
         own = left_by_fit(each, THEIL_GUIDE[0])
         judged = judge(tuple(made), chosen, request, seen, own)
-        beside = baseline_findings(each, made, request)
+        beside = (
+            *baseline_findings(each, made, request),
+            *contradictions(each, way, made, request),
+        )
         in_time = way is predict_continuous
         taken = remembered(each).assumed_hold
         said = hold_findings(held, judged, request, taken, run) if in_time else ()

@@ -1,0 +1,50 @@
+"""Records that contradict a model's own bars, and those that do not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import flightid as fid
+from flightid.conventions import Light
+from flightid.validation.verification.contradiction import CODE
+
+TIME_S = np.arange(800) / 20.0
+
+
+def flown(seed: int, gain: float, *, noise: float = 0.05, name: str = "flown") -> fid.Record:
+    random = np.random.default_rng(seed)
+    u = np.repeat(np.sign(random.standard_normal(160)), 5)
+    y = lfilter([0.0, 0.2 * gain], [1.0, -0.8], u) + noise * random.standard_normal(u.size)
+    return fid.Record.from_arrays(TIME_S, inputs={"u": u}, outputs={"y": y}, name=name)
+
+
+STRUCTURES = (
+    fid.PolynomialModel.oe("u", "y", nb=1, nf=1),
+    fid.InnovationsModel.subspace("u", "y", order=1),
+)
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+@pytest.mark.parametrize(
+    ("gain", "noise", "light"),
+    [(1.0, 0.05, None), (1.0, 0.08, None), (1.25, 0.05, Light.AMBER), (2.5, 0.05, Light.RED)],
+)
+def test_a_record_beyond_the_bars_is_not_green(
+    structure: object, gain: float, noise: float, light: Light | None, tmp_path: Path
+) -> None:
+    fit = fid.identify(structure, flown(1, 1.0))
+    told = flown(2, gain, noise=noise)
+    fid.write_model(fit, tmp_path / "model.toml")
+    for source in (fit, fid.load_model(tmp_path / "model.toml")):
+        found = [each.light for each in fid.verify(source, told).findings if each.code == CODE]
+        assert found == ([] if light is None else [light])
+
+
+def test_bars_of_the_parameters_allow_for_what_the_fit_could_not_tell() -> None:
+    short = flown(3, 1.0, noise=3.0)
+    fit = fid.identify(STRUCTURES[0], short.segment(0.0, 10.0))
+    assert not [each for each in fid.verify(fit, flown(4, 1.2)).findings if each.code == CODE]
