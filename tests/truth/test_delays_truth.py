@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 import flightid as fid
+from flightid.identification.advice.delays import delays_to_scan
 
 KINDS = ("white", "prbs", "sweep", "coloured", "periodic", "multisine")
 
@@ -76,3 +77,15 @@ def test_two_hundred_delays_within_a_sample_and_no_loop_where_there_is_none():
     assert unsure <= 10
     # 1 % is nominal: 7 of 200 has a chance of 0.5 %.
     assert loops <= 6
+
+
+def test_a_scan_tries_delays_about_those_that_the_data_tell() -> None:
+    """Twelve samples of delay lie inside the range, and so do lower ones that hold weak starts."""
+    random = np.random.default_rng(5)
+    u, noise = np.repeat(random.choice([-1.0, 1.0], 200), 4), random.standard_normal(800)
+    y = lfilter([0.0] * 12 + [0.3, 0.2], [1.0, -1.4, 0.6], u) + 0.05 * noise
+    record = fid.Record.from_arrays(np.arange(800) / 20, inputs={"u": u}, outputs={"y": y})
+    tried = delays_to_scan([record], ("u",), "y")
+    assert tried[0] <= 10
+    assert 12 in tried[1:-1]
+    assert len(tried) <= 7

@@ -16,7 +16,7 @@ from flightid.cli.records import FILES, read_files, reading
 if TYPE_CHECKING:
     from flightid.options import Options
 
-HIGHEST = {"na": 4, "nb": 4, "nc": 3, "nd": 2, "nf": 4, "nk": 1}
+HIGHEST = {"na": 4, "nb": 4, "nc": 3, "nd": 2, "nf": 4}
 
 
 def _fields() -> dict[str, type[Options]]:
@@ -37,7 +37,8 @@ def _fields() -> dict[str, type[Options]]:
 @click.option(
     "--scan",
     is_flag=True,
-    help="Try the orders that are repeated; of one that is given once all up to it.",
+    help="Try the orders that are repeated; of one that is given once all up to it. Delays "
+    "that are not given are about those that the records tell.",
 )
 @click.option(
     "--validation", type=FILES, multiple=True, help="File of records that the fit does not see."
@@ -79,6 +80,7 @@ def command(
     if scan:
         if not unseen:
             raise click.UsageError("--scan ranks by free run: name unseen records by --validation")
+        from flightid.identification.advice.delays import delays_to_scan
         from flightid.models.polynomial.orders import ANY, EVERY_ORDER
 
         tried: dict[str, Any] = {
@@ -86,6 +88,9 @@ def command(
         }
         if kind == ANY:
             tried |= {name: each for name, each in EVERY_ORDER.items() if name not in orders}
+        tried["nk"] = (
+            _tried(orders["nk"]) if "nk" in orders else delays_to_scan(records, inputs, output)
+        )
         scanned = flightid.scan_orders(
             records, unseen, inputs=inputs, outputs=output, kind=kind, **tried, **given
         )

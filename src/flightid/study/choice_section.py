@@ -41,7 +41,8 @@ def choice_blocks(item: ModelResults) -> tuple[Block, ...]:
     if structure.choose == "balanced":
         words += (
             ". Free runs do not see the noise model; so of all structures whose free-run error "
-            "lies within 10 % of the smallest the one with the smallest BIC is taken"
+            "lies within 10 % of the smallest the one with the smallest BIC is taken, before those "
+            "with fewer coefficients of B than of F, which no sampled system has"
         )
     if taken is not None and taken is not ranked(choice, structure.choose)[0]:
         words += (

@@ -11,10 +11,11 @@ from flightid.findings import Finding
 from flightid.identification import Fit, identify
 from flightid.identification.prediction_error.findings import CANCELLATION
 from flightid.models import InnovationsModel, NarxStructure, PolynomialModel
+from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
 from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
-from flightid.validation.order_scan.result import OrderTrial, is_settled
+from flightid.validation.order_scan.result import OrderTrial, Structure, is_settled
 from flightid.validation.order_scan.scan_orders import fit_of
 from flightid.validation.spectra.spectra import lags_of_spectrum
 
@@ -97,7 +98,7 @@ def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
         return [first]
     limit = (1 + AS_GOOD) * first.free_run_rms
     alike = [
-        (trial.criteria.bic, place)
+        (not _has_zeros_of_sampling(trial.structure), trial.criteria.bic, place)
         for place, trial in enumerate(scan.trials)
         if trial.criteria is not None
         and trial.settled
@@ -105,7 +106,18 @@ def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
         and trial.free_run_rms <= limit
     ]
     order = sorted(alike) if how == "balanced" else alike
-    return [scan.trials[place] for _, place in order] or [first]
+    return [scan.trials[each[-1]] for each in order] or [first]
+
+
+def _has_zeros_of_sampling(structure: Structure) -> bool:
+    """Whether B has as many coefficients as F: a held input sampled leaves no fewer.
+
+    Where slow inputs hardly tell them, fewer make every bar at high frequencies too short: what
+    the structure forbids has no share in them (Åström, Hagander & Sternby (1984), Automatica 20).
+    """
+    if not isinstance(structure, PolynomialStructure):
+        return True
+    return all(nb >= nf for nb, nf in zip(structure.nb, structure.nf, strict=True))
 
 
 def _narx(

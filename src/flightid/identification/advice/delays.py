@@ -17,7 +17,8 @@ from scipy.signal import lfilter
 from scipy.stats import f as f_distribution
 
 from flightid.identification.prediction_error.linear_regression import reflected, regress
-from flightid.models.sampled.channels import SampledChannels
+from flightid.models.sampled.channels import SampledChannels, gather_channels
+from flightid.record import Record
 
 Array = NDArray[np.float64]
 LEVEL = 0.01
@@ -43,6 +44,12 @@ HOPELESS = 20.0 * UNCERTAIN
 """Such a difference beyond which no delay further away is tried."""
 WIDE = 2
 """Most samples between the ends of a range for its best value to be told."""
+LONGEST = 39
+"""Longest delay that is looked for before a scan, samples."""
+BEFORE, BEHIND = 2, 1
+"""Delays of a scan on either side of what the data do not refuse: weak first samples drown."""
+UNTOLD = (1, 2, 3)
+"""Delays of a scan where no effect stands out."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +132,31 @@ def find_delays(data: SampledChannels, largest: int) -> list[InputDelay]:
         alike = [delay for delay, cost in costs.items() if cost <= least + UNCERTAIN]
         found.append(InputDelay.of(first[place], alike))
     return found
+
+
+def delays_to_scan(
+    records: Sequence[Record], inputs: Sequence[str], output: str
+) -> tuple[int, ...]:
+    """Delays that a scan has to try, alike for all inputs: about those that data do not refuse.
+
+    Parameters
+    ----------
+    records : sequence of Record
+    inputs : sequence of str
+    output : str
+
+    Raises
+    ------
+    DataError
+        Constant channels, or sample times that differ.
+    """
+    data = gather_channels(list(records), output, tuple(inputs), "mean")
+    data.require_change()
+    ends = [each.interval for each in find_delays(data, LONGEST) if each.interval is not None]
+    if not ends:
+        return UNTOLD
+    low, high = min(end[0] for end in ends), max(end[1] for end in ends)
+    return tuple(range(max(low - BEFORE, min(low, 1)), high + BEHIND + 1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,8 @@ import numpy as np
 from flightid.conventions import Light
 from flightid.errors import FlightidError, StudyError
 from flightid.findings import Finding
+from flightid.identification.advice.delays import delays_to_scan
+from flightid.models.polynomial.orders import USED
 from flightid.models.save import toml_value
 from flightid.record import Record, read_records
 from flightid.study.proposal.columns import Columns, columns_of
@@ -23,9 +25,8 @@ from flightid.validation import scan_orders
 
 TIME_COLUMN = "time"
 KINDS = ("arx", "armax", "oe")
-ORDERS = {"na": (1, 2, 3, 4), "nb": (1, 2, 3), "nc": (1, 2), "nf": (1, 2, 3, 4), "nk": (1, 2, 3)}
-USED = {"arx": ("na", "nb", "nk"), "armax": ("na", "nb", "nc", "nk"), "oe": ("nb", "nf", "nk")}
-"""Orders that are tried: two modes with their delays; a scan says where its edge is the best."""
+ORDERS = {"na": (1, 2, 3, 4), "nb": (1, 2, 3), "nc": (1, 2), "nf": (1, 2, 3, 4)}
+"""Orders that are tried: two modes; delays are those that the record tells."""
 FITTED, CHOSEN, ALONE = 0.6, 1.0, (0.5, 0.75)
 """Part of a record that is fitted, the rest ranks structures; and where it also has to verify."""
 AS_GOOD = 1.02
@@ -217,11 +218,11 @@ def _model(
         template = [f"template = {toml_value(model)}", 'fit = { method = "output_error" }']
         return iter(["", "[[model]]", f"name = {toml_value(name)}", *template, *lines])
     record = group.records[0]
-    kind, found = _structure(record, group.inputs, output, segments)
+    kind, found, orders_of = _structure(record, group.inputs, output, segments)
     span_s = record.duration_s * FITTED
     low = CYCLES * math.tau / span_s
     high = math.tau * record.sample_rate_hz / SAMPLES_PER_CYCLE
-    orders = [f"{order} = {toml_value(list(ORDERS[order]))}" for order in USED[kind]]
+    orders = [f"{order} = {toml_value(list(orders_of[order]))}" for order in USED[kind]]
     coherent = (
         (f"band_rad_s = {toml_value([_round(low), _round(high)])}",) if high > 2 * low else ()
     )
@@ -238,17 +239,18 @@ def _model(
 
 def _structure(
     record: Record, inputs: tuple[str, ...], output: str, segments: _Segments
-) -> tuple[str, str]:
-    """The structure whose best orders run freely with the least error, and what each reached."""
+) -> tuple[str, str, dict[str, tuple[int, ...]]]:
+    """The structure that runs freely with the least error, what each reached, and orders tried."""
     seen, unseen = (
         record.select([*inputs, output]).with_roles(
             **dict.fromkeys(inputs, "input"), **{output: "output"}
         ).segment(*span)
         for span in segments.spans
     )  # fmt: skip
+    orders = ORDERS | {"nk": delays_to_scan([seen], inputs, output)}
     reached: dict[str, float] = {}
     for kind in KINDS:
-        tried: dict[str, Any] = {order: ORDERS[order] for order in USED[kind]}
+        tried: dict[str, Any] = {order: orders[order] for order in USED[kind]}
         scan = scan_orders(seen, unseen, inputs=inputs, outputs=output, kind=kind, **tried)
         best = scan.trials[0].free_run_rms
         if best is not None:
@@ -259,7 +261,7 @@ def _structure(
     least = min(reached.values())
     # What comes last assumes least of the noise, so that its intervals hold for more of it.
     good = [kind for kind, value in reached.items() if value <= AS_GOOD * least]
-    return good[-1], f"{said} {record.unit(output)}".rstrip()
+    return good[-1], f"{said} {record.unit(output)}".rstrip(), orders
 
 
 def _head(paths: Sequence[Path], columns: Columns, missed: Sequence[Finding]) -> list[str]:
