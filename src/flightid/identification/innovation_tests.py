@@ -44,6 +44,9 @@ FEWEST_LAGS = 5
 """Beyond the parameters that were fitted: below it there is no test."""
 ROUNDING = 1e-8
 """Errors over outputs below which there is rounding alone."""
+NOISE_MODEL = (
+    "fit a noise model beside the vehicle (Box-Jenkins): it tells slow noise from missing dynamics"
+)
 ORDERS = "raise the orders of the input's part, check its delay, or look for feedback"
 WIDEST = 10.0
 """Times a standard error by which a bias may widen it before there is none."""
@@ -68,6 +71,9 @@ class InnovationTests:
         By how much the statistics of whiteness and of independence exceed their mean by chance,
         summed over outputs and inputs: squared size, in standard deviations of the errors, of what
         should not be there.
+    slow : float or None
+        Independent samples that errors amount to, where they are so few that slow noise alone
+        seems to follow the inputs.
     """
 
     white: float | None
@@ -75,6 +81,7 @@ class InnovationTests:
     worth_percent: float | None = None
     past_percent: float | None = None
     excess: tuple[float, float] = (0.0, 0.0)
+    slow: float | None = None
 
     @property
     def is_white(self) -> bool:
@@ -101,6 +108,12 @@ class InnovationTests:
                 return (
                     f"inputs seem to foretell the prediction errors (p = {self.independent:.2g}), "
                     "though by nothing that can be told from chance"
+                )
+            if self.slow is not None:
+                return (
+                    f"inputs seem to foretell the prediction errors (p = {self.independent:.2g}), "
+                    f"which are so slow (worth {self.slow:.2g} independent samples) that missing "
+                    "dynamics cannot be told from noise"
                 )
             size = "" if worth is None else f", worth {worth:.2g} % of the output"
             return (
@@ -166,6 +179,7 @@ class InnovationTests:
         if not self.is_independent:
             light = Light.RED if is_material(self.worth_percent) else Light.AMBER
             words = self.why_biased if times is None else f"{self.why_biased}; {bars}"
+            action = action if self.slow is None else NOISE_MODEL
             return [Finding("inputs-in-errors", light, words, action)]
         if self.is_white or not biased:
             return []

@@ -8,14 +8,16 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from flightid.identification.innovation_tests import ROUNDING, InnovationTests, innovation_tests
+from flightid.identification.left_by_fit import independent_samples
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.coloured_errors import (
     has_noise_model,
     output_error_covariance,
 )
-from flightid.identification.prediction_error.findings import NOISE_AT_CIRCLE
+from flightid.identification.prediction_error.findings import ELSEWHERE, NOISE_AT_CIRCLE
 from flightid.identification.prediction_error.part_blocks import errors_at, part_blocks
 from flightid.identification.prediction_error.roots import farthest
 from flightid.identification.residual_evidence import NOTHING, least_gain
@@ -23,7 +25,10 @@ from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 from flightid.uncertainty.agreement import Agreement
 from flightid.uncertainty.blocks import RecordBlock
-from flightid.uncertainty.coloured_residuals import residual_covariance, white_covariance
+from flightid.uncertainty.coloured_residuals import (
+    residual_covariance,
+    white_covariance,
+)
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.uncertainty.foretold import chance_share, likelihood_gain
@@ -31,6 +36,13 @@ from flightid.uncertainty.foretold import chance_share, likelihood_gain
 Array = NDArray[np.float64]
 UNDETERMINED = "the data do not tell the coefficients apart"
 NOISE_MODEL = "prediction errors are not white, so the noise model's coefficients are not its truth"
+
+SLOW = 0.05
+"""Independent samples over samples below which noise seems to follow inputs: AR(0.95)."""
+ALIKE = float(chdtri(1, 0.05))
+"""Twice the difference of two logarithms of likelihoods that chance makes in one of 20."""
+FAR = 5.0
+"""Bars between two minima beyond which neither's hold the other."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +140,27 @@ def compared(
     times = tests.widening(biased=shares_poles(structure))
     if times is None:
         return replace(found, covariance=None, reason=tests.why_biased)
+    if _fits_elsewhere(found):
+        return replace(found, covariance=None, reason=ELSEWHERE)
     return found if times == 1.0 else widened(found, times)
+
+
+def _fits_elsewhere(found: SearchResult) -> bool:
+    """Whether another minimum, many bars away, fits as well within chance.
+
+    Likelihoods are compared by the ratio of the sums of squares; colour leaves fewer samples.
+    """
+    if found.covariance is None:
+        return False
+    best, *others = found.minima
+    bars = np.sqrt(np.diag(found.covariance))
+    samples = found.degrees / max(found.colour[1], 1.0) ** 2
+    return any(
+        samples * np.log(each.objective / best.objective) < ALIKE
+        and np.max(np.abs(np.array(list(each.values.values())) - found.theta) / bars) > FAR
+        for each in others
+        if best.objective > 0.0 and each.objective > best.objective
+    )
 
 
 def widened(found: SearchResult, times: float) -> SearchResult:
@@ -152,7 +184,9 @@ def judged_tests(
     about = np.concatenate([data.output[span] - data.output[span].mean() for span in spans])
     ratio = float(np.sqrt(errors @ errors / max(about @ about, np.finfo(float).tiny)))
     seen = found.correlations if ratio > ROUNDING else ()
-    return tests.fitted(seen, [ratio]).beside(found.agreement)
+    made = tests.fitted(seen, [ratio]).beside(found.agreement)
+    told = independent_samples([errors[span] for span in spans])
+    return replace(made, slow=told) if told < SLOW * errors.size else made
 
 
 def _by_colour(

@@ -28,6 +28,7 @@ HARDLY_SEEN = 0.5
 cancel; a pair that may change it by more was not shown to."""
 
 NOISE_AT_CIRCLE = "a root of C may lie on the unit circle, where errors to first order do not hold"
+ELSEWHERE = "another minimum far away fits as well within chance: bars about either hold nothing"
 CANCELLATION = "pole-zero-cancellation"
 
 
@@ -42,7 +43,7 @@ def judge_polynomial(
 ) -> tuple[Finding, ...]:
     """All verdicts that the fit itself allows; residual tests say more."""
     return (
-        *_ending(minima),
+        *_ending(minima, reason),
         *_circle(model, reason),
         *_stability(structure, model),
         *(() if structure.kernel else _cancellation(model, roots)),
@@ -50,7 +51,7 @@ def judge_polynomial(
     )
 
 
-def _ending(minima: Sequence[LocalMinimum]) -> list[Finding]:
+def _ending(minima: Sequence[LocalMinimum], reason: str) -> list[Finding]:
     best = minima[0]
     found = []
     if best.termination not in CONVERGED:
@@ -63,7 +64,10 @@ def _ending(minima: Sequence[LocalMinimum]) -> list[Finding]:
             )
         )
     others = [m for m in minima[1:] if m.objective > best.objective * (1 + SAME_MINIMUM)]
-    if others:
+    if reason == ELSEWHERE:
+        action = "lower the orders, fit a noise model (Box-Jenkins), or take longer records"
+        found.append(Finding("local-minima", Light.AMBER, reason, action))
+    elif others:
         found.append(
             Finding(
                 "local-minima",
