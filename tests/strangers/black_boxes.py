@@ -66,6 +66,41 @@ def under_control(random: np.random.Generator, noise: Noise) -> fid.Record:
     return recorded(u, y)
 
 
+OTHER = [1.0, -1.2, 0.55]
+"""Poles from a second input where they are not those of the first."""
+SECOND = [0.0, 0.0, -2.0, 1.0]
+
+
+def fly_two(seed: int, *, noise: Noise, structure: object, shared: bool) -> Trial:
+    """Modes and gains of two inputs whose poles are the same or not; the choice is the data's."""
+    random = np.random.default_rng(seed)
+    below = A if shared else OTHER
+    u, v = steps(random), np.repeat(random.standard_normal(SAMPLES // 5), 5)
+    y = lfilter(B, A, u) + lfilter(SECOND, below, v)
+    y += SHARE * y.std() * noise(random, SAMPLES)
+    inputs, time_s = {"u": u, "v": v}, np.arange(SAMPLES) * STEP_S
+    record = fid.Record.from_arrays(time_s, inputs=inputs, outputs={"y": y}, hold="zero")
+    begun = time.perf_counter()
+    try:
+        fit = fid.identify(structure, record, loop="open")
+    except fid.FlightidError as error:
+        return Trial(refusal=str(error))
+    seconds = time.perf_counter() - begun
+    readings = [Reading("one denominator", shared, fit.model.denominators == "common")]
+    for name, polynomial, above in (("u", A, B), ("v", below, SECOND)):
+        pole = np.log(complex(np.roots(polynomial)[0])) / STEP_S
+        readings.append(_reading(fit.details.gains[f"y/{name}"], sum(above) / sum(polynomial)))
+        modes = [each for each in fit.details.modes if each.response == f"y/{name}"]
+        for each in modes[:1]:
+            readings.append(_reading(each.natural_frequency, abs(pole)))
+            readings.append(_reading(each.damping, -pole.real / abs(pole)))
+    return Trial(tuple(readings), str(fit.evidence.light), seconds)
+
+
+def _reading(item: fid.Estimate, truth: float) -> Reading:
+    return Reading(item.name.split(" at ")[0], truth, item.value, item.stderr, item.interval95)
+
+
 Flight = Callable[[np.random.Generator], fid.Record]
 
 
@@ -181,8 +216,22 @@ BOXES: dict[str, tuple[object, Flight, str | None]] = {
     "subspace, order 4 of 2": (HIGH, partial(in_equation, noise=WHITE), None),
     "subspace, order 4 of 2, noise of the sensor": (HIGH, partial(in_output, noise=WHITE), None),
 }
+TWO = {"inputs": ("u", "v"), "outputs": "y", "nb": 2, "nf": 2, "nk": (1, 2)}
+TWO_INPUTS: dict[str, tuple[object, Noise]] = {
+    "oe, white": (P.oe(**TWO), WHITE),
+    "oe, AR(1) 0.9": (P.oe(**TWO), RED),
+    "bj, AR(1) 0.9": (P.bj(**TWO, nc=0, nd=1), RED),
+}
 
 CASES = (
+    *(
+        Case(
+            f"{name}, {'common' if shared else 'separate'} poles of two inputs",
+            partial(fly_two, noise=noise, structure=made, shared=shared),
+        )
+        for name, (made, noise) in TWO_INPUTS.items()
+        for shared in (True, False)
+    ),
     *(
         Case(f"black box, {name}", partial(fly, flight=flight, structure=made, loop=loop))
         for name, (made, flight, loop) in BOXES.items()

@@ -184,7 +184,9 @@ def identify(
     _require_roles(model, flat(data))
     held = hold_for(chosen.options, flat(data), options)
     given = options if held is None else {**options, "hold": held.hold}
-    fit = replace(chosen.run(model, data, given), structure=model, method=chosen.name)
+    fit = chosen.run(model, data, given)
+    # Where data chose among structures the fit knows which.
+    fit = replace(fit, structure=fit.structure or model, method=chosen.name)
     told = options if loop is None else {**options, "loop": loop}
     channels = (*fit.model.inputs, *fit.model.outputs)
     known = data_provenance(flat(data), channels)

@@ -9,6 +9,7 @@ pub mod order_scan;
 pub mod orthogonal_least_squares;
 pub mod polynomial_fit;
 pub mod polynomial_normal;
+pub mod polynomial_orders;
 pub mod polynomial_predictor;
 pub mod radial_basis;
 pub(crate) mod remainder;

@@ -8,7 +8,8 @@ use rayon::prelude::*;
 
 use crate::black_box::digital_filter::add_product;
 use crate::black_box::polynomial_fit::{Before, PredictionError};
-use crate::black_box::polynomial_predictor::{Orders, Polynomials, Samples};
+use crate::black_box::polynomial_orders::Orders;
+use crate::black_box::polynomial_predictor::{Polynomials, Samples};
 use crate::error::CoreError;
 use crate::fits::least_squares::{Options, Problem};
 use crate::fits::levenberg_marquardt::minimise;

@@ -9,9 +9,8 @@
 
 use crate::black_box::digital_filter::divide;
 use crate::black_box::polynomial_normal::{add_products, factorise, remove_square};
-use crate::black_box::polynomial_predictor::{
-    Derivatives, Orders, Past, Polynomials, Run, Samples, run,
-};
+use crate::black_box::polynomial_orders::Orders;
+use crate::black_box::polynomial_predictor::{Derivatives, Past, Polynomials, Run, Samples, run};
 use crate::error::CoreError;
 use crate::fits::least_squares::{Minimum, Options, Problem, Progress};
 use crate::fits::levenberg_marquardt::minimise;
@@ -65,7 +64,9 @@ impl<'a> PredictionError<'a> {
         stable: bool,
     ) -> Result<Self, CoreError> {
         let needed = orders.b.len();
-        for (what, found) in [("F polynomials", orders.f.len()), ("delays", orders.delays.len())] {
+        let shared = orders.f.len() == 1 && needed > 1;
+        let below = if shared { needed } else { orders.f.len() };
+        for (what, found) in [("F polynomials", below), ("delays", orders.delays.len())] {
             if found != needed {
                 return Err(CoreError::Shape { what, found, needed });
             }

@@ -1,52 +1,15 @@
 //! The one-step predictor of A y = Σ (Bᵢ/Fᵢ) uᵢ + (C/D) e: its errors, their derivatives as shifts of
 //! a few filtered signals, and what the unknown past adds. (Python side: models/polynomial/model.py)
 //!
-//! With wᵢ = (Bᵢ/Fᵢ) uᵢ and s = A y − Σ wᵢ the prediction error is e = (D/C) s.
+//! With wᵢ = (Bᵢ/Fᵢ) uᵢ and s = A y − Σ wᵢ the prediction error is e = (D/C) s. One F may stand under
+//! all inputs: w = (Σ Bᵢ uᵢ)/F.
 //!
 //! Reference: Ljung, *System Identification*, 2nd ed., sections 4.2 and 10.3, eqs. 10.50 to 10.53.
 
 use crate::black_box::digital_filter::{add_product, divide, divide_together};
+use crate::black_box::polynomial_orders::Orders;
 use crate::error::CoreError;
 use crate::numerics::householder::{dot, norm};
-
-/// How many coefficients each polynomial has, and the delay of each input.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Orders {
-    /// Degree of A.
-    pub a: usize,
-    /// Coefficients of each B, from the delay on.
-    pub b: Vec<usize>,
-    /// Degree of C.
-    pub c: usize,
-    /// Degree of D.
-    pub d: usize,
-    /// Degree of each F.
-    pub f: Vec<usize>,
-    /// Samples until each input acts.
-    pub delays: Vec<usize>,
-}
-
-impl Orders {
-    /// Number of coefficients.
-    pub fn n_parameters(&self) -> usize {
-        self.a + self.c + self.d + self.b.iter().chain(&self.f).sum::<usize>()
-    }
-
-    /// Samples of the past that enter the predictor through input `i` before its denominator.
-    fn span(&self, i: usize) -> usize {
-        if self.b[i] == 0 { 0 } else { self.b[i] + self.delays[i] - 1 }
-    }
-
-    /// Unknown values that stand for the past: one run for each F, then one for the noise.
-    pub fn memory(&self) -> (Vec<usize>, usize) {
-        let of_input = |i: usize| if self.f[i] > 0 { self.f[i].max(self.span(i)) } else { 0 };
-        let inputs: Vec<usize> = (0..self.b.len()).map(of_input).collect();
-        let direct = (0..self.b.len()).filter(|&i| self.f[i] == 0).map(|i| self.span(i));
-        let past = direct.chain([self.a]).max().unwrap_or(0);
-        let through_d = if past > 0 || self.d > 0 { past + self.d } else { 0 };
-        (inputs, self.c.max(through_d))
-    }
-}
 
 /// The polynomials in q⁻¹; all but B start with one.
 #[derive(Debug, Clone)]
@@ -59,7 +22,7 @@ pub struct Polynomials {
     pub c: Vec<f64>,
     /// D.
     pub d: Vec<f64>,
-    /// F of each input.
+    /// F of each input, or the one of all.
     pub f: Vec<Vec<f64>>,
 }
 
@@ -116,7 +79,7 @@ pub struct Run {
     pub error: Vec<f64>,
     /// s, the error before the noise model.
     pub disturbance: Vec<f64>,
-    /// w of each input.
+    /// What comes out of each F.
     pub responses: Vec<Vec<f64>>,
     /// Constant that was fitted to D s, where there was one.
     pub level: f64,
@@ -126,23 +89,28 @@ pub struct Run {
 /// after them the level where one is fitted.
 pub fn run(orders: &Orders, p: &Polynomials, samples: &Samples<'_>, memory: &[f64]) -> Run {
     let n = samples.output.len();
-    let (of_inputs, of_noise) = orders.memory();
+    let (through_f, of_noise) = orders.memory();
     let mut disturbance = vec![0.0; n];
     add_product(1.0, &p.a, 0, samples.output, &mut disturbance);
-    let mut responses = Vec::with_capacity(p.b.len());
+    let mut responses = Vec::with_capacity(p.f.len());
     let mut used = 0;
-    for (i, input) in samples.inputs.iter().enumerate() {
-        if orders.f[i] == 0 {
-            add_product(-1.0, &p.b[i], orders.delays[i], input, &mut disturbance);
+    for (j, denominator) in p.f.iter().enumerate() {
+        let driven = |sign: f64, target: &mut [f64]| {
+            for i in orders.over(j) {
+                add_product(sign, &p.b[i], orders.delays[i], samples.inputs[i], target);
+            }
+        };
+        if orders.f[j] == 0 {
+            driven(-1.0, &mut disturbance);
             responses.push(Vec::new());
             continue;
         }
         let mut response = vec![0.0; n];
-        add_product(1.0, &p.b[i], orders.delays[i], input, &mut response);
+        driven(1.0, &mut response);
         // What the unknown past adds to the first samples is remembered by the filter after it.
-        add_past(&mut response, memory, used, of_inputs[i]);
-        used += of_inputs[i];
-        divide(&p.f[i], &mut response);
+        add_past(&mut response, memory, used, through_f[j]);
+        used += through_f[j];
+        divide(denominator, &mut response);
         disturbance.iter_mut().zip(&response).for_each(|(s, w)| *s -= w);
         responses.push(response);
     }
@@ -204,7 +172,7 @@ impl Derivatives {
         }
         for (i, input) in samples.inputs.iter().enumerate().filter(|&(i, _)| orders.b[i] > 0) {
             made.push(with_d(input), orders.delays[i], orders.b[i], -1.0);
-            last.push(Some(i));
+            last.push(Some(orders.denominator(i)));
         }
         if orders.c > 0 {
             made.push(run.error.clone(), 1, orders.c, -1.0);
@@ -214,9 +182,9 @@ impl Derivatives {
             made.push(run.disturbance.clone(), 1, orders.d, 1.0);
             last.push(None);
         }
-        for (i, response) in run.responses.iter().enumerate().filter(|&(i, _)| orders.f[i] > 0) {
-            made.push(with_d(response), 1, orders.f[i], 1.0);
-            last.push(Some(i));
+        for (j, response) in run.responses.iter().enumerate().filter(|&(j, _)| orders.f[j] > 0) {
+            made.push(with_d(response), 1, orders.f[j], 1.0);
+            last.push(Some(j));
         }
         // Each recursion waits for its own last sample: three side by side fill the wait.
         for group in made.signals.chunks_mut(3) {
@@ -227,8 +195,8 @@ impl Derivatives {
             }
         }
         for (signal, denominator) in made.signals.iter_mut().zip(last) {
-            if let Some(i) = denominator {
-                divide(&p.f[i], signal);
+            if let Some(j) = denominator {
+                divide(&p.f[j], signal);
             }
         }
         made
@@ -278,14 +246,14 @@ const DEPENDENT: f64 = 1e-9;
 impl Past {
     /// Directions for a record of `n` samples whose first `skip` errors do not count.
     pub fn new(orders: &Orders, p: &Polynomials, n: usize, skip: usize) -> Self {
-        let (of_inputs, of_noise) = orders.memory();
+        let (through_f, of_noise) = orders.memory();
         let mut made = Self::empty();
-        made.n_unknowns = of_inputs.iter().sum::<usize>() + of_noise;
+        made.n_unknowns = through_f.iter().sum::<usize>() + of_noise;
         let mut unknown = 0;
-        for (i, &count) in of_inputs.iter().enumerate().filter(|&(_, &count)| count > 0) {
+        for (j, &count) in through_f.iter().enumerate().filter(|&(_, &count)| count > 0) {
             let mut response = impulse(&p.d, n);
             divide_together(&p.c, [&mut response]);
-            divide(&p.f[i], &mut response);
+            divide(&p.f[j], &mut response);
             made.add(&response, -1.0, count, &mut unknown, skip);
         }
         if of_noise > 0 {

@@ -6,12 +6,13 @@ use crate::interrupt;
 use flightid_core::CoreError;
 use flightid_core::black_box::order_scan::{Scan, scan};
 use flightid_core::black_box::polynomial_fit::{Before, PredictionError, fit_from, regress};
-use flightid_core::black_box::polynomial_predictor::{Orders, Samples};
+use flightid_core::black_box::polynomial_orders::Orders;
+use flightid_core::black_box::polynomial_predictor::Samples;
 use flightid_core::fits::least_squares::{Minimum, Options};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
-/// Degrees of A, coefficients of each B, degrees of C, D and each F, delays.
+/// Degrees of A, coefficients of each B, degrees of C, D and each F (or of one of all inputs), delays.
 type OrderTuple = (usize, Vec<usize>, usize, usize, Vec<usize>, Vec<usize>);
 
 fn orders_of((a, b, c, d, f, delays): OrderTuple) -> Orders {

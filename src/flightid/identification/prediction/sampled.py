@@ -207,7 +207,7 @@ def _motion_from(model: SampledModel, start: Array, n_samples: int) -> Array:
 def _order(model: SampledModel) -> int:
     """Numbers of the initial state."""
     if isinstance(model, PolynomialModel):
-        return np.size(model.a) - 1 + sum(np.size(row) - 1 for row in model.f)
+        return np.size(model.a) - 1 + sum(row.size - 1 for row in model.distinct_f)
     return model.order
 
 

@@ -88,8 +88,8 @@ def _sensitivities(
 ) -> tuple[Array, Array]:
     """Derivatives of the output by the coefficients; directions of what was before and of levels.
 
-    ŷᵢ = Bᵢ/Fᵢ uᵢ: ∂ŷᵢ/∂b_k = q⁻ᵏ/Fᵢ uᵢ and ∂ŷᵢ/∂f_k = −q⁻ᵏ/Fᵢ ŷᵢ. What was before a record runs out
-    as impulses through 1/Fᵢ; each ŷᵢ holds its part of that.
+    ŷᵢ = Bᵢ/Fᵢ uᵢ: ∂ŷᵢ/∂b_k = q⁻ᵏ/Fᵢ uᵢ and ∂ŷᵢ/∂f_k = −q⁻ᵏ/Fᵢ ŷᵢ, summed over the inputs of one F.
+    What was before a record runs out as impulses through 1/Fᵢ; each ŷᵢ holds its part of that.
     """
     n = modelled.size
     numerators, denominators = _polynomials(structure, theta)
@@ -102,25 +102,32 @@ def _sensitivities(
         starts.append(lfilter([1.0], f, impulses, axis=0))
     own = np.concatenate([*starts, level], axis=1)
     shares = np.linalg.lstsq(own, modelled - np.sum(driven, axis=0), rcond=INDEPENDENT)[0]
-    of_b, of_f, first = [], [], 0
+    of_b, turned, first = [], [], 0
     for i, (row, b, f) in enumerate(zip(inputs, numerators, denominators, strict=True)):
         whole = driven[i] + starts[i] @ shares[first : first + starts[i].shape[1]]
         first += starts[i].shape[1]
         moved = lfilter([1.0], f, row)
         of_b += [_late(moved, lag) for lag in range(structure.nk[i], b.size)]
-        turned = lfilter([1.0], f, whole)
-        of_f += [-_late(turned, lag) for lag in range(1, f.size)]
+        turned.append(lfilter([1.0], f, whole))
+    if structure.is_common:
+        turned = [np.sum(turned, axis=0)]
+    degrees = structure.degrees_of_f
+    of_f = [
+        -_late(row, lag)
+        for row, degree in zip(turned, degrees, strict=True)
+        for lag in range(1, degree + 1)
+    ]
     return np.array([*of_b, *of_f]).T, _independent(own)
 
 
 def _polynomials(structure: PolynomialStructure, theta: Array) -> tuple[list[Array], list[Array]]:
     """B with its delay and F with its leading one, by input."""
-    counts = [*structure.nb, *structure.nf]
-    parts = np.split(theta, np.cumsum(counts)[:-1])
-    above, below = parts[: len(structure.nb)], parts[len(structure.nb) :]
+    m = len(structure.nb)
+    parts = np.split(theta, np.cumsum([*structure.nb, *structure.degrees_of_f])[:-1])
+    below = [np.concatenate([[1.0], f]) for f in parts[m:]]
     return (
-        [np.concatenate([np.zeros(k), b]) for k, b in zip(structure.nk, above, strict=True)],
-        [np.concatenate([[1.0], f]) for f in below],
+        [np.concatenate([np.zeros(k), b]) for k, b in zip(structure.nk, parts[:m], strict=True)],
+        below * m if structure.is_common else below,
     )
 
 

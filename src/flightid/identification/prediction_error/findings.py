@@ -84,12 +84,18 @@ def _circle(model: PolynomialModel, reason: str) -> list[Finding]:
     action = "difference or detrend the data less, or lower the order"
     found = [
         f"a root of F of {name} lies at the unit circle, where intervals do not hold"
-        for name, row in zip(model.inputs, model.f, strict=True)
-        if np.max(np.abs(polynomial_roots(np.asarray(row))), initial=0.0) > 1.0 - AT_CIRCLE
+        for name, row in zip(_over_each(model), model.distinct_f, strict=True)
+        if np.max(np.abs(polynomial_roots(row)), initial=0.0) > 1.0 - AT_CIRCLE
     ]
     if reason == NOISE_AT_CIRCLE:
         found.append(f"{reason}: they have no intervals")
     return [Finding("root-at-circle", Light.AMBER, words, action) for words in found]
+
+
+def _over_each(model: PolynomialModel) -> tuple[str, ...]:
+    """Inputs over each F."""
+    alone = len(model.distinct_f) == len(model.inputs)
+    return model.inputs if alone else (", ".join(model.inputs),)
 
 
 def _stability(structure: PolynomialStructure, model: PolynomialModel) -> list[Finding]:

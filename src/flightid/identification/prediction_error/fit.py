@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.errors import DataError, FitError
+from flightid.findings import Finding
 from flightid.identification.black_box import (
     COLOURED,
     WHITE,
@@ -31,6 +32,7 @@ from flightid.identification.prediction_error.coefficient_covariance import (
     spent,
     tests_of,
 )
+from flightid.identification.prediction_error.denominators import preferred
 from flightid.identification.prediction_error.details import FitScore, PolynomialDetails
 from flightid.identification.prediction_error.findings import judge_polynomial
 from flightid.identification.prediction_error.information_criteria import criteria
@@ -74,9 +76,17 @@ def fit_polynomial(structure: PolynomialStructure, data: Record | Sequence[Recor
     records = as_records(data)
     channels = gather_channels(records, structure.output, structure.inputs, structure.offsets)
     channels.require_change()
-    _require_samples(structure, channels)
-    found = _search(structure, channels)
-    return _assemble(structure, records, channels, found)
+    ends, problem = [], None
+    for each in structure.alternatives:
+        try:
+            _require_samples(each, channels)
+            ends.append((each, _search(each, channels)))
+        except (DataError, FitError) as error:
+            problem = error
+    if problem is not None and not ends:
+        raise problem
+    (structure, found), choice = preferred(ends, channels)
+    return replace(_assemble(structure, records, channels, found, choice), structure=structure)
 
 
 def _require_samples(structure: PolynomialStructure, data: SampledChannels) -> None:
@@ -231,6 +241,7 @@ def _assemble(
     records: tuple[Record, ...],
     data: SampledChannels,
     found: SearchResult,
+    choice: tuple[Finding, ...],
 ) -> Fit:
     data = about_levels(structure, data, found.memory, found.theta)
     errors = errors_at(structure, data, found.memory, found.theta)
@@ -282,6 +293,7 @@ def _assemble(
         iterations=found.iterations,
         noise_covariance=np.array([[squares / found.degrees]]),
         findings=(
+            *choice,
             *judge_polynomial(structure, model, parameters, roots, minima, n_counted, found.reason),
             *colour_findings(*found.colour),
             *tests.findings(

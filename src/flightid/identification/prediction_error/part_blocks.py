@@ -55,12 +55,11 @@ def about_levels(
     if not data.levels:
         return data
     _, constants = _run(structure, data, memory, theta)
-    counts = [structure.na, *structure.nb, structure.nc, structure.nd, *structure.nf]
-    parts = np.split(theta, np.cumsum(counts)[:-1])
+    parts = np.split(theta, np.cumsum(structure.counts)[:-1])
     m = len(structure.inputs)
     noise, steady = 1.0 + parts[m + 2].sum(), 1.0 + parts[0].sum()
-    below = [1.0 + each.sum() for each in parts[m + 3 :]]
-    slopes = np.array([b.sum() / f for b, f in zip(parts[1 : m + 1], below, strict=True)])
+    below = np.array([1.0 + each.sum() for each in parts[m + 3 :]])
+    slopes = np.array([b.sum() for b in parts[1 : m + 1]]) / below
     output, inputs, offsets = data.output.copy(), data.inputs.copy(), []
     for span, constant, before in zip(data.spans, constants, data.offsets, strict=True):
         reach, moved = float(np.ptp(output[span])), np.zeros(m)

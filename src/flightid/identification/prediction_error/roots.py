@@ -129,9 +129,12 @@ def _places(model: PolynomialModel) -> dict[tuple[str, int], slice]:
     counts = {("a", 0): np.size(model.a) - 1}
     counts |= {("b", i): np.size(row) for i, row in enumerate(model.b)}
     counts |= {("c", 0): np.size(model.c) - 1, ("d", 0): np.size(model.d) - 1}
-    counts |= {("f", i): np.size(row) - 1 for i, row in enumerate(model.f)}
+    counts |= {("f", i): row.size - 1 for i, row in enumerate(model.distinct_f)}
     ends = np.cumsum([0, *counts.values()])
-    return {key: slice(int(a), int(b)) for key, a, b in zip(counts, ends, ends[1:], strict=False)}
+    found = {key: slice(int(a), int(b)) for key, a, b in zip(counts, ends, ends[1:], strict=False)}
+    return found | {
+        ("f", i): found["f", 0] for i in range(len(model.distinct_f), len(model.inputs))
+    }
 
 
 def _roots(

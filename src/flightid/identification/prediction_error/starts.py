@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -22,9 +23,17 @@ LARGEST = 1e100
 
 @dataclass(frozen=True, eq=False)
 class _Plant:
+    """A, B of each input and F of each, or the one that all share."""
+
     a: Array
     b: list[Array]
     f: list[Array]
+
+    @property
+    def responses(self) -> Iterator[tuple[Array, Array]]:
+        """B and F of each input."""
+        below = self.f if len(self.f) == len(self.b) else self.f * len(self.b)
+        return zip(self.b, below, strict=True)
 
 
 def polynomial_starts(structure: PolynomialStructure, data: SampledChannels) -> Array:
@@ -95,13 +104,17 @@ def _plants(
 ) -> list[_Plant]:
     if not any(structure.nf):
         return [_with_innovations(structure, data, innovations), _plain(structure, data)]
-    reduced = [
-        _reduced(long_a, b, n_b, n_f)
-        for b, n_b, n_f in zip(long_b, structure.nb, structure.nf, strict=True)
-    ]
-    at_once = _filtered(structure, data)
-    one = _Plant(np.zeros(structure.na), [b for b, _ in reduced], [f for _, f in reduced])
-    return [one, at_once]
+    every = range(len(structure.inputs))
+    sizes = np.std(data.inputs, axis=1)
+    b, f = [], []
+    for i, n_f in enumerate(structure.degrees_of_f):
+        over = list(every) if structure.is_common else [i]
+        above, below = _reduced(
+            long_a, [long_b[j] for j in over], [structure.nb[j] for j in over], n_f, sizes[over]
+        )
+        b += above
+        f.append(below)
+    return [_Plant(np.zeros(structure.na), b, f), _filtered(structure, data)]
 
 
 def _split(structure: PolynomialStructure, theta: Array) -> tuple[Array, list[Array]]:
@@ -110,7 +123,7 @@ def _split(structure: PolynomialStructure, theta: Array) -> tuple[Array, list[Ar
 
 
 def _empty(structure: PolynomialStructure) -> list[Array]:
-    return [np.zeros(n) for n in structure.nf]
+    return [np.zeros(n) for n in structure.degrees_of_f]
 
 
 def _with_innovations(
@@ -138,17 +151,33 @@ def _plain(structure: PolynomialStructure, data: SampledChannels) -> _Plant:
     return _Plant(*_split(structure, theta), _empty(structure))
 
 
-def _reduced(long_a: Array, long_b: Array, nb: int, nf: int) -> tuple[Array, Array]:
-    """B/F whose pulse response is that of the long model's channel, its delay aside."""
-    length = 20 * long_a.size
-    pulse = np.zeros(length)
-    pulse[0] = 1.0
+def _reduced(
+    long_a: Array, long_b: Sequence[Array], nb: Sequence[int], nf: int, sizes: Array
+) -> tuple[list[Array], Array]:
+    """B/F, one F, whose pulse responses are those of the long model's channels, delays aside.
+
+    Each response counts by the size of its input, as one record beside the others.
+    """
+    length, m = 20 * long_a.size, len(long_b)
+    pulses = np.zeros((m, m, length))
+    pulses[range(m), range(m), 0] = sizes / np.max(sizes)
     with np.errstate(over="ignore", invalid="ignore"):
-        response = lfilter(long_b, long_a, pulse)
-    size = np.max(np.abs(response))
-    if nb == 0 or not np.isfinite(size) or size == 0.0 or abs(response[-1]) > 0.5 * size:
-        return np.pad(long_b[:nb], (0, max(nb - len(long_b), 0))), np.zeros(nf)
-    return _steiglitz_mcbride(response, pulse[None], [length], [nb], nf, [0], levels=False)
+        responses = np.array([lfilter(b, long_a, pulses[i, i]) for i, b in enumerate(long_b)])
+    size = np.max(np.abs(responses), axis=1)
+    ended = np.abs(responses[:, -1]) <= 0.5 * size
+    if min(nb) == 0 or not np.all(np.isfinite(size) & (size > 0.0) & ended):
+        plain = [np.pad(b[:n], (0, max(n - len(b), 0))) for b, n in zip(long_b, nb, strict=True)]
+        return plain, np.zeros(nf)
+    b, f = _steiglitz_mcbride(
+        responses.ravel(),
+        pulses.transpose(1, 0, 2).reshape(m, -1),
+        [length] * m,
+        list(nb),
+        nf,
+        [0] * m,
+        levels=False,
+    )
+    return list(np.split(b, np.cumsum(nb)[:-1])), f
 
 
 def _filtered(structure: PolynomialStructure, data: SampledChannels) -> _Plant:
@@ -164,7 +193,7 @@ def _filtered(structure: PolynomialStructure, data: SampledChannels) -> _Plant:
         levels=data.levels,
     )
     rows = list(np.split(b, np.cumsum(structure.nb)[:-1]))
-    return _Plant(np.zeros(structure.na), rows, [f[:n] for n in structure.nf])
+    return _Plant(np.zeros(structure.na), rows, [f[:n] for n in structure.degrees_of_f])
 
 
 def _steiglitz_mcbride(
@@ -208,7 +237,7 @@ def _noise(
     left = np.zeros_like(data.output)
     for span in data.spans:
         part = lfilter(np.concatenate([[1.0], plant.a]), [1.0], data.output[span])
-        for row, b, f, k in zip(data.inputs, plant.b, plant.f, structure.nk, strict=True):
+        for row, (b, f), k in zip(data.inputs, plant.responses, structure.nk, strict=True):
             below = reflected(np.concatenate([[1.0], f]))
             part -= lfilter(np.concatenate([np.zeros(k), b]), below, row[span])
         left[span] = part

@@ -18,10 +18,11 @@ from flightid.models.language.reading import (
     require_keys,
 )
 from flightid.models.polynomial.polynomials import Polynomials
+from flightid.models.polynomial.structure import SEPARATE
 
 SCHEMA = "flightid.polynomial_model/1"
 _KEYS = {"schema", "kind", "name", "output", "inputs", "sample_time_s", "a", "c", "d", "units"}
-_KEYS |= {"noise_variance", "covariance", "operating_point"}
+_KEYS |= {"noise_variance", "covariance", "operating_point", "denominators"}
 _INPUT_KEYS = {"b", "f", "nk"}
 
 
@@ -47,6 +48,8 @@ def model_to_table(model: Polynomials) -> dict[str, object]:
         "units": dict(model.units),
         "operating_point": {name: float(value) for name, value in model.operating_point.items()},
     }
+    if model.denominators != SEPARATE:
+        table["denominators"] = model.denominators
     if model.noise_variance is not None:
         table["noise_variance"] = float(model.noise_variance)
     if model.covariance is not None:
@@ -81,6 +84,7 @@ def model_from_table(content: Mapping[str, object]) -> dict[str, Any]:
         "units": read_texts(read_table(content, "units", required=False), "units"),
         "name": read_text(content.get("name", "polynomial model"), "name"),
         "operating_point": read_operating_point(content),
+        "denominators": read_text(content.get("denominators", SEPARATE), "denominators"),
     }
     for letter in "acd":
         made[letter] = _numbers(content.get(letter, [1.0]), letter)

@@ -45,6 +45,8 @@ class PolynomialModel(Polynomials, StructureMakers, TableView):
         were. A channel left out counts from zero.
     estimated : EstimateProvenance or None
         What a fit knew of the parameters, where the model comes from its file.
+    denominators : {"separate", "common"}
+        Whether each input has coefficients of F of its own, or all share those of one.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from flightid.errors import ModelError
 from flightid.models.estimated import EstimateProvenance
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.parameters import Parameter
-from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.polynomial.structure import AUTO, COMMON, SEPARATE, PolynomialStructure
 from flightid.models.sampled.channel_order import require_inputs_first
 from flightid.models.sampled.coefficients import coefficients, replaced
 from flightid.models.sampled.discrete_modes import DiscreteMode, discrete_modes, polynomial_roots
@@ -42,6 +42,7 @@ class Polynomials:
     name: str = "polynomial model"
     operating_point: Mapping[str, float] = field(default_factory=dict)
     estimated: EstimateProvenance | None = field(default=None, compare=False)
+    denominators: str = SEPARATE
 
     def __post_init__(self) -> None:
         require_inputs_first(self.inputs, self.output)
@@ -59,6 +60,13 @@ class Polynomials:
                     needed=f"one for each of {len(inputs)} inputs",
                 )
             object.__setattr__(self, letter, made)
+        unlike = any(not np.array_equal(row, self.f[0]) for row in self.f)
+        if self.denominators not in (COMMON, SEPARATE) or (self.denominators == COMMON and unlike):
+            raise ModelError(
+                "the denominators are not as they are said to be",
+                found=f"{self.denominators!r}, F {'unlike' if unlike else 'alike'}",
+                needed="'separate', or 'common' with the same F for all inputs",
+            )
         object.__setattr__(self, "nk", tuple(self.nk) or (1,) * len(inputs))
         if not (math.isfinite(self.sample_time_s) and self.sample_time_s > 0):
             raise ModelError("the sample time is not positive", found=self.sample_time_s)
@@ -86,10 +94,10 @@ class Polynomials:
     ) -> Self:
         """Model from the coefficients of a structure, in the order of its `names`."""
         values = np.asarray(theta, dtype=np.float64)
-        counts = [structure.na, *structure.nb, structure.nc, structure.nd, *structure.nf]
-        parts = np.split(values, np.cumsum(counts)[:-1])
+        parts = np.split(values, np.cumsum(structure.counts)[:-1])
         n = len(structure.inputs)
         one = np.ones(1)
+        below = [np.concatenate([one, part]) for part in parts[n + 3 :]]
         return cls(
             structure.inputs,
             structure.output,
@@ -98,13 +106,14 @@ class Polynomials:
             parts[1 : n + 1],
             np.concatenate([one, parts[n + 1]]),
             np.concatenate([one, parts[n + 2]]),
-            [np.concatenate([one, part]) for part in parts[n + 3 :]],
+            below * n if structure.is_common else below,
             structure.nk,
             noise_variance,
             covariance,
             units or {},
             name,
             operating_point or {},
+            denominators=COMMON if structure.is_common else SEPARATE,
         )
 
     @property
@@ -119,13 +128,24 @@ class Polynomials:
             np.size(self.d) - 1,
             tuple(np.size(row) - 1 for row in self.f),
             self.nk,
+            denominators=self.denominators if self._is_choice else AUTO,
         )
+
+    @property
+    def _is_choice(self) -> bool:
+        return len(self.inputs) > 1 and any(np.size(row) > 1 for row in self.f)
+
+    @property
+    def distinct_f(self) -> tuple[Array, ...]:
+        """Each F once: of every input, or the one that they share."""
+        rows = tuple(np.asarray(row) for row in self.f)
+        return rows[:1] if self.denominators == COMMON and self._is_choice else rows
 
     @property
     def theta(self) -> Array:
         """Coefficients in the order of `names`, shape (n,)."""
         a, c, d = (np.asarray(row)[1:] for row in (self.a, self.c, self.d))
-        tails = [np.asarray(row)[1:] for row in self.f]
+        tails = [row[1:] for row in self.distinct_f]
         return np.concatenate([a, *map(np.asarray, self.b), c, d, *tails])
 
     @property
@@ -182,19 +202,17 @@ class Polynomials:
 
         Reference: Ljung, *System Identification*, 2nd ed., section 4.3.
         """
-        noise_above, noise_below = self.noise_transfer
-        common = noise_below
-        for row in self.f:
-            common = np.convolve(common, np.asarray(row))
+        noise, common = self.noise_transfer
+        filters = self.distinct_f
+        for row in filters:
+            common, noise = np.convolve(common, row), np.convolve(noise, row)
         above = []
         for i, name in enumerate(self.inputs):
             numerator = np.convolve(self.transfer(name)[0], np.asarray(self.d))
-            for j, row in enumerate(self.f):
-                numerator = numerator if j == i else np.convolve(numerator, np.asarray(row))
+            for j, row in enumerate(filters):
+                own = j == i or len(filters) < len(self.inputs)
+                numerator = numerator if own else np.convolve(numerator, row)
             above.append(numerator)
-        noise = noise_above
-        for row in self.f:
-            noise = np.convolve(noise, np.asarray(row))
         n = max(row.size for row in (*above, common, noise)) - 1
         full = [np.pad(row, (0, n + 1 - row.size)) for row in (common, noise, *above)]
         below, noise, *padded = full

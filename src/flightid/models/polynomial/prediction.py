@@ -55,8 +55,8 @@ def forced_run(model: Polynomials, inputs: Array) -> Array:
 def free_motion(model: Polynomials, n_samples: int) -> Array:
     """What each sample before the record makes of the output, shape (count, n_samples)."""
     below = np.asarray(model.a)
-    for row in model.f:
-        below = np.convolve(below, np.asarray(row))
+    for row in model.distinct_f:
+        below = np.convolve(below, row)
     impulse = np.zeros((below.size - 1, n_samples))
     np.fill_diagonal(impulse, 1.0)
     if below.size == 1:
@@ -68,8 +68,8 @@ def free_motion(model: Polynomials, n_samples: int) -> Array:
 def motion_from(model: Polynomials, past: Array, n_samples: int) -> Array:
     """Free motion of the output, shape (n_samples,), from weights of `free_motion`."""
     below = np.asarray(model.a)
-    for row in model.f:
-        below = np.convolve(below, np.asarray(row))
+    for row in model.distinct_f:
+        below = np.convolve(below, row)
     impulse = np.zeros(n_samples)
     count = min(past.size, n_samples)
     impulse[:count] = past[:count]

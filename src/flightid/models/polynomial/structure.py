@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import TypedDict
+from dataclasses import dataclass, field, replace
+from typing import Self, TypedDict
 
 from flightid.errors import OptionError
 from flightid.models.sampled.channels import OFFSETS
@@ -13,6 +13,8 @@ from flightid.options import Options, option
 INITIAL_STATES = ("estimate", "zero")
 METHODS = ("prediction_error", "iv4")
 KERNELS = ("tc", "dc")
+AUTO, COMMON, SEPARATE = "auto", "common", "separate"
+DENOMINATORS = (AUTO, COMMON, SEPARATE)
 LARGEST = 100
 """Most coefficients of one polynomial, and the longest delay in samples, times ten."""
 
@@ -26,6 +28,7 @@ class PolynomialOptions(TypedDict, total=False):
     backcast: bool
     method: str
     offsets: str
+    denominators: str
     enforce_stability: bool
     kernel: str | None
     starts: int
@@ -62,6 +65,9 @@ class PolynomialStructure(Options):
         nothing (``"none"``). Means are no trims where a record starts away from its working point,
         so with them a constant of each record is fitted beside the coefficients, but not with
         ``"mean_as_trim"``.
+    denominators : str
+        F of several inputs: ``"common"``, the same poles from all, ``"separate"``, each its own,
+        or ``"auto"``, by the data where the degrees are alike: a fit by BIC, a scan by free run.
     enforce_stability : bool
         Keep the roots of A inside the unit circle too; the fit says when that moved it.
     kernel : str or None
@@ -105,6 +111,9 @@ class PolynomialStructure(Options):
     offsets: str = option(
         "mean", choices=OFFSETS, doc="What is taken off each channel of each record."
     )
+    denominators: str = option(
+        AUTO, choices=DENOMINATORS, doc="F of several inputs: one, or each its own; auto: by data."
+    )
     enforce_stability: bool = option(False, doc="Keep the roots of A inside the unit circle.")
     kernel: str | None = option(None, choices=KERNELS, doc="Regularisation of an ARX model.")
     starts: int = option(
@@ -123,6 +132,10 @@ class PolynomialStructure(Options):
                 needed=f"{self.n_parameters}: {', '.join(self.names)}",
             )
         super().__post_init__()
+        if self.denominators == COMMON and len(set(self.nf)) > 1:
+            raise OptionError(
+                "one denominator has one degree", found=f"nf {list(self.nf)}", needed="nf alike"
+            )
         if self.backcast and self.initial_state != "estimate":
             raise OptionError(
                 "backcast estimates the initial state",
@@ -190,9 +203,36 @@ class PolynomialStructure(Options):
         return not (self.nc or self.nd or any(self.nf))
 
     @property
+    def alternatives(self) -> tuple[Self, ...]:
+        """Structures among which data choose: one denominator for all inputs, and one each.
+
+        A `start` belongs to the second.
+        """
+        alike = len(self.inputs) > 1 and any(self.nf) and len(set(self.nf)) == 1
+        if not alike or self.denominators != AUTO:
+            return (self,)
+        common = replace(self, denominators=COMMON, start=())
+        return common, replace(self, denominators=SEPARATE)
+
+    @property
+    def is_common(self) -> bool:
+        """Whether several inputs share one denominator."""
+        return self.denominators == COMMON and len(self.inputs) > 1 and any(self.nf)
+
+    @property
+    def degrees_of_f(self) -> tuple[int, ...]:
+        """Degree of each F that is fitted: one for each input, or one for all."""
+        return self.nf[:1] if self.is_common else self.nf
+
+    @property
+    def counts(self) -> list[int]:
+        """Coefficients of A, each B, C, D and each F that is fitted."""
+        return [self.na, *self.nb, self.nc, self.nd, *self.degrees_of_f]
+
+    @property
     def n_parameters(self) -> int:
         """Number of coefficients."""
-        return self.na + sum(self.nb) + self.nc + self.nd + sum(self.nf)
+        return sum(self.counts)
 
     @property
     def longest_lag(self) -> int:
@@ -214,6 +254,8 @@ class PolynomialStructure(Options):
             found += of_input("b", delay, count, name)
         found += [f"c{lag}" for lag in range(1, self.nc + 1)]
         found += [f"d{lag}" for lag in range(1, self.nd + 1)]
+        if self.is_common:
+            return (*found, *(f"f{lag}" for lag in range(1, self.nf[0] + 1)))
         for name, count in zip(self.inputs, self.nf, strict=True):
             found += of_input("f", 1, count, name)
         return tuple(found)
@@ -221,21 +263,22 @@ class PolynomialStructure(Options):
     @property
     def native(self) -> NativeOrders:
         """Orders as the native half takes them."""
-        return self.na, list(self.nb), self.nc, self.nd, list(self.nf), list(self.nk)
+        return self.na, list(self.nb), self.nc, self.nd, list(self.degrees_of_f), list(self.nk)
+
+    @property
+    def nf_text(self) -> str:
+        """Degrees of F in words: ``"2"``, ``"[2, 1]"``, or ``"2 common"`` to all inputs."""
+        return shown(self.degrees_of_f) + " common" * self.is_common
 
     @property
     def orders_text(self) -> str:
         """Orders that the kind has, in words: ``"na 2, nb 2, nc 1, nk 1"``."""
-
-        def shown(counts: Sequence[int]) -> str:
-            return str(counts[0]) if len(counts) == 1 else str(list(counts))
-
         orders = {
             "na": str(self.na) if self.na else "",
             "nb": shown(self.nb) if self.inputs else "",
             "nc": str(self.nc) if self.nc else "",
             "nd": str(self.nd) if self.nd else "",
-            "nf": shown(self.nf) if any(self.nf) else "",
+            "nf": self.nf_text if any(self.nf) else "",
             "nk": shown(self.nk) if self.inputs else "",
         }
         return ", ".join(f"{name} {value}" for name, value in orders.items() if value)
@@ -244,6 +287,17 @@ class PolynomialStructure(Options):
         """Kind and orders on one line."""
         source = f" from {', '.join(self.inputs)}" if self.inputs else ""
         return f"PolynomialStructure({self.kind}, {self.output!r}{source}, {self.orders_text})"
+
+
+def shown(counts: Sequence[int]) -> str:
+    """Orders of the inputs in words.
+
+    Example
+    -------
+    >>> shown((2,)), shown((2, 1))
+    ('2', '[2, 1]')
+    """
+    return str(counts[0]) if len(counts) == 1 else str(list(counts))
 
 
 def per_input(value: int | Sequence[int], n_inputs: int) -> tuple[int, ...]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 
 from flightid.models.innovations.model import InnovationsModel
 from flightid.models.innovations.structure import SubspaceStructure
 from flightid.models.narx.structure import SIMULATION, NarxStructure
-from flightid.models.polynomial.model import PolynomialModel
-from flightid.models.polynomial.structure import PolynomialOptions, PolynomialStructure
+from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.validation.order_scan.result import OrderTrial, Range, rank_of, whole_numbers
 
 SEARCHED = ("arx", "armax", "oe")
@@ -28,19 +28,14 @@ def _best(trials: Sequence[OrderTrial], kinds: Sequence[str]) -> PolynomialStruc
 
 
 def box_jenkins_of(
-    trials: Sequence[OrderTrial], orders: Mapping[str, Range], options: PolynomialOptions
+    trials: Sequence[OrderTrial], orders: Mapping[str, Range]
 ) -> list[PolynomialStructure]:
     """BJ at the best OE's orders: a free run does not see the noise model, only what it leaves."""
     best = _best(trials, ["OE"])
     if best is None:
         return []
     noise = product(*(whole_numbers(name, orders[name]) for name in ("nc", "nd")))
-    return [
-        PolynomialModel.general(
-            best.inputs, best.output, nb=best.nb, nf=best.nf, nk=best.nk, nc=nc, nd=nd, **options
-        )
-        for nc, nd in noise
-    ]
+    return [replace(best, nc=nc, nd=nd, start=()) for nc, nd in noise]
 
 
 def subspace_of(structures: Sequence[PolynomialStructure]) -> list[SubspaceStructure]:

@@ -262,7 +262,8 @@ def _row(trial: OrderTrial, chosen: dict[str, OrderTrial]) -> tuple[Cell, ...]:
     s, c = trial.structure, trial.criteria
     orders: list[Cell] = [None] * 6
     if isinstance(s, PolynomialStructure):
-        orders = [s.na, _alike(s.nb), s.nc, s.nd, _alike(s.nf), _alike(s.nk)]
+        below = s.nf_text if s.is_common else _alike(s.nf)
+        orders = [s.na, _alike(s.nb), s.nc, s.nd, below, _alike(s.nk)]
     marks = ", ".join(name.upper() for name, item in chosen.items() if item is trial)
     measures: list[Cell] = [None] * 6 if c is None else [c.loss, c.fpe, c.aic, c.aicc, c.bic, c.mdl]
     return (

@@ -87,7 +87,9 @@ def scan_orders(
         Default: all inputs.
     kind : {"armax", "arx", "oe", "bj", "any"}
     na, nb, nc, nd, nf, nk : int or iterable of int
-        Orders to try, those that the kind has; nb, nf and nk alike for all inputs.
+        Orders to try, those that the kind has; nb, nf and nk alike for all inputs. OE and BJ of
+        several inputs are tried with a denominator in common and with one each, unless
+        ``denominators`` says which.
     **options
         Of the fit of the best structure and of OE and BJ fits; see `PolynomialStructure`.
 
@@ -156,7 +158,7 @@ def scan_orders(
         quick = each in ("arx", "armax")
         trials += _native_trials(group, data, check, scan) if quick else _fitted_trials(group, scan)
     if kind == ANY:
-        trials += _fitted_trials(box_jenkins_of(trials, orders, options), scan)
+        trials += _fitted_trials(box_jenkins_of(trials, orders), scan)
         trials += _fitted_trials(subspace_of(structures), scan)
         trials += _fitted_trials(narx_of(trials, whole_numbers("nb", nb)), scan)
     ranked, best = _delivered(trials, scan)
@@ -202,10 +204,10 @@ def _structures(
         raise OptionError(
             "the scan is too large", found=f"{count} structures", needed=f"at most {MOST}"
         )
-    made = []
+    made: list[PolynomialStructure] = []
     for values in product(*choices):
         chosen = dict(zip(used, values, strict=True))
-        made.append(PolynomialModel.general(inputs, output, **chosen, **options))
+        made += PolynomialModel.general(inputs, output, **chosen, **options).alternatives
     return made
 
 

@@ -11,9 +11,20 @@ fn general() -> (Orders, Vec<f64>) {
     (orders, vec![-0.4, 1.0, 0.5, 0.3, 0.2, -0.1, 0.3, -0.5, -0.9, 0.4])
 }
 
-/// The triangle must be that of finite differences: RᵀR = JᵀJ and Rᵀ(Qᵀr) = Jᵀr.
-fn compare_with_differences(before: Before, levels: bool, tolerance: f64) {
+/// The same with one F under both inputs.
+fn shared() -> (Orders, Vec<f64>) {
     let (orders, theta) = general();
+    (Orders { f: vec![2], ..orders }, [&theta[..7], &[-0.9, 0.4]].concat())
+}
+
+fn compare_with_differences(before: &Before, levels: bool, tolerance: f64) {
+    for (orders, theta) in [general(), shared()] {
+        compare(orders, &theta, before.clone(), levels, tolerance);
+    }
+}
+
+/// The triangle must be that of finite differences: RᵀR = JᵀJ and Rᵀ(Qᵀr) = Jᵀr.
+fn compare(orders: Orders, theta: &[f64], before: Before, levels: bool, tolerance: f64) {
     let mut channels: Vec<Vec<f64>> = (0..6).map(|k| noise(k, 900)).collect();
     channels[0].iter_mut().for_each(|y| *y += 3.0);
     let record = |k: usize| Samples {
@@ -27,14 +38,14 @@ fn compare_with_differences(before: Before, levels: bool, tolerance: f64) {
     let m = problem.n_residuals();
     let mut residuals = vec![0.0; m];
     let mut triangle = vec![0.0; (n + 1) * (n + 1)];
-    problem.residuals(&theta, &mut residuals).unwrap();
-    assert!(problem.triangle(&theta, &mut triangle).unwrap());
+    problem.residuals(theta, &mut residuals).unwrap();
+    assert!(problem.triangle(theta, &mut triangle).unwrap());
     let step = 1e-6;
     let mut columns = vec![vec![0.0; m]; n];
     for (k, column) in columns.iter_mut().enumerate() {
         let mut sides = [vec![0.0; m], vec![0.0; m]];
         for (side, sign) in sides.iter_mut().zip([1.0, -1.0]) {
-            let mut moved = theta.clone();
+            let mut moved = theta.to_vec();
             moved[k] += sign * step;
             problem.residuals(&moved, side).unwrap();
         }
@@ -60,18 +71,18 @@ fn compare_with_differences(before: Before, levels: bool, tolerance: f64) {
 
 #[test]
 fn derivatives_from_rest_are_exact() {
-    compare_with_differences(Before::Rest, false, 1e-6);
+    compare_with_differences(&Before::Rest, false, 1e-6);
 }
 
 #[test]
 fn the_gradient_is_exact_where_the_past_is_fitted() {
-    compare_with_differences(Before::Unknown, false, 1e-3);
+    compare_with_differences(&Before::Unknown, false, 1e-3);
 }
 
 #[test]
 fn the_gradient_is_exact_where_a_level_is_fitted() {
-    compare_with_differences(Before::Unknown, true, 1e-3);
-    compare_with_differences(Before::Rest, true, 1e-3);
+    compare_with_differences(&Before::Unknown, true, 1e-3);
+    compare_with_differences(&Before::Rest, true, 1e-3);
 }
 
 #[test]
@@ -100,7 +111,7 @@ fn a_past_that_is_given_enters_the_errors_and_their_derivatives() {
     let (inputs, of_noise) = orders.memory();
     let count = inputs.iter().sum::<usize>() + of_noise;
     let given = Before::Given(vec![noise(20, count), noise(21, count)]);
-    compare_with_differences(given, false, 1e-6);
+    compare_with_differences(&given, false, 1e-6);
 }
 
 #[test]
