@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.conventions import Light
-from flightid.identification.prediction_error.roots import FittedRoot
+from flightid.identification.prediction_error.roots import fitted_roots
 from flightid.identification.prediction_error.sampling_rate import sampling_findings
+from flightid.models.polynomial.model import PolynomialModel
+from tests.closeness import assert_close
 
 STRUCTURES = {
     "output error": fid.PolynomialModel.general(("u",), "y", nb=1, nf=1, nk=1),
@@ -30,8 +33,8 @@ def flown(step_s: float, lag_s: float, n: int = 1500) -> fid.Record:
 @pytest.mark.parametrize(
     ("step_s", "lag_s", "code", "light", "words"),
     [
-        (0.001, 1.0, "sampled-fast", Light.GREEN, "about 1.6 Hz"),
-        (0.1, 0.5, "sampling-rate", Light.GREEN, "sampled at 31."),
+        (0.005, 0.1, "sampled-fast", Light.GREEN, "resample to about 1"),
+        (0.1, 0.5, "sampling-rate", Light.GREEN, "sampled at about 31 "),
         (1.0, 0.2, "sampled-slowly", Light.AMBER, "1.59 Hz or faster"),
     ],
 )
@@ -50,7 +53,28 @@ def test_advice_says_it_before_a_fit() -> None:
     assert "sampled-slowly" in [each.code for each in fid.advise(flown(1.0, 0.2)).findings]
 
 
-def test_integrators_and_alternating_poles_have_no_bandwidth() -> None:
-    roots = [FittedRoot("y/u", "pole", complex(z), None, None, None) for z in (1.0, -0.6)]
-    assert sampling_findings(roots, 0.1) == ()
-    assert sampling_findings([], 0.1) == ()
+def test_poles_that_fit_noise_do_not_move_the_bandwidth() -> None:
+    """y = 0.9 y₋₁ + 0.1 u₋₇ under noise: the usual order has spurious poles."""
+    clock = np.random.default_rng(0)
+    u = np.repeat(clock.choice([-1.0, 1.0], 601), 5)[:3000]
+    y = lfilter([0.1], [1.0, -0.9], np.concatenate([np.zeros(7), u[:-7]]))
+    noisy = {"y": y + 0.2 * clock.standard_normal(3000)}
+    record = fid.Record.from_arrays(
+        0.02 * np.arange(3000), inputs={"u": u}, outputs=noisy, hold="zero"
+    )
+    (found,) = [each for each in fid.advise(record).findings if each.code.startswith("sampl")]
+    times = float(found.message.split()[3])
+    # |ln 0.9| is 1/60 of the sampling rate.
+    assert_close(times, 2 * np.pi / -np.log(0.9), rtol=0.2, why="3 dB of a fit under noise")
+
+
+def test_nothing_is_said_of_what_has_no_bandwidth() -> None:
+    """An integrator, a response that rises to Nyquist, and no pole."""
+    for above, below in (
+        ([0.1], [-1.0]), ([1.0, -0.5], [0.6])
+    ):  # fmt: skip
+        structure = fid.PolynomialModel.general(("u",), "y", nb=len(above), nf=len(below), nk=1)
+        model = PolynomialModel.from_theta(structure, np.array([*above, *below]), 0.1)
+        roots = fitted_roots(model, 100)
+        assert sampling_findings(model, roots, 60.0) == ()
+        assert sampling_findings(model, [], 60.0) == ()

@@ -301,7 +301,7 @@ def _assemble(
                 times=tests.widening(biased=shares_poles(structure)),
             ),
             *nothing_told(found.reason),
-            *sampling_findings(roots, data.sample_time_s),
+            *sampling_findings(model, roots, max(each.duration_s for each in records)),
         ),
         provenance=provenance_of(
             structure.method.replace("_", " "), records, data.offsets, structure.to_dict()

@@ -1,11 +1,13 @@
-"""Whether records were sampled too fast or too slowly, by the place of a fit's discrete poles."""
+"""Whether records were sampled too fast or too slowly, by a fit's bandwidth and poles."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
@@ -14,8 +16,10 @@ from flightid.uncertainty.quantiles import LEVEL, half_width
 
 TIMES_BANDWIDTH = 10.0
 """Sampling rate over bandwidth that suits an identification."""
-CROWDED = 2.0 * math.pi / 100.0
-"""Largest |ln z| of poles that crowd at z = 1: sampling at more than 100 times the bandwidth."""
+MANY = 100.0
+"""Sampling rate over bandwidth above which poles crowd at z = 1."""
+POINTS = 400
+"""Frequencies at which a response is looked at, from one cycle of the record to Nyquist."""
 NEAR_ORIGIN = 0.2
 """|z| of a pole that decays to a fifth and less within one sample."""
 
@@ -24,23 +28,39 @@ SAMPLING = (FAST, SLOW, TOLD)
 """Codes of these findings."""
 
 
-def sampling_findings(roots: Sequence[FittedRoot], sample_time_s: float) -> tuple[Finding, ...]:
-    """What the poles of the plant say of the sampling rate, and the rate that they ask for.
+class Sampled(Protocol):
+    """A model with a response and a sample time."""
 
-    Poles that crowd at z = 1 were sampled too fast; where none is left outside the origin, too
-    slowly. A pole at the origin beside slower ones may be that of noise: it is told, not judged.
-    The bandwidth is taken as the largest natural frequency of a pole off the origin.
+    @property
+    def sample_time_s(self) -> float:
+        """Time between samples, s."""
+
+    def frequency_response(self, omega_rad_s: ArrayLike, /) -> NDArray[np.complex128]:
+        """Response, shape (n_outputs, n_inputs, n_freqs)."""
+
+
+def sampling_findings(
+    model: Sampled, roots: Sequence[FittedRoot], duration_s: float
+) -> tuple[Finding, ...]:
+    """What a fit says of the sampling rate, and the rate that its bandwidth asks for.
+
+    Where the plant has no pole outside the origin it was sampled too slowly. Else the bandwidth is
+    read off the fitted response, where it leaves its peak by 3 dB: poles that only fit noise hardly
+    move that. The fastest response counts; nothing is said where one keeps its gain to the Nyquist
+    frequency, leaves its peak twice, or does so within two cycles of the record (an integrator).
 
     Parameters
     ----------
+    model : PolynomialModel or InnovationsModel
     roots : sequence of FittedRoot
-    sample_time_s : float
-        s.
+        Of the model.
+    duration_s : float
+        Of the longest record, s.
 
     Returns
     -------
     tuple of Finding
-        One, or none where there is no pole.
+        One, or none where nothing can be told.
 
     Reference
     ---------
@@ -48,38 +68,62 @@ def sampling_findings(roots: Sequence[FittedRoot], sample_time_s: float) -> tupl
 
     Example
     -------
-    >>> poles = [FittedRoot("y/u", "pole", 0.995 + 0.01j, None, None, None)]
-    >>> sampling_findings(poles, 0.01)[0].code
-    'sampled-fast'
+    >>> from flightid.models import PolynomialModel
+    >>> structure = PolynomialModel.general(("u",), "y", nb=1, nf=1, nk=1)
+    >>> lag = PolynomialModel.from_theta(structure, np.array([0.095, -0.905]), 0.01)
+    >>> poles = [FittedRoot("y/u", "pole", 0.905 + 0j, None, None, None)]
+    >>> print(sampling_findings(lag, poles, 10.0)[0])
+    [green] sampled at about 63 times the bandwidth of 1.6 Hz, ten suit
     """
     poles = {root.z: root for root in roots if root.kind == POLE}
     if not poles:
         return ()
     sizes = [abs(z) for z in poles]
-    rate_hz = 1.0 / sample_time_s
-    near = f"|z| {min(sizes):.3g} to {max(sizes):.3g}" if len(sizes) > 1 else f"|z| {sizes[0]:.3g}"
-    held = f"plant poles with {near} at {rate_hz:.4g} Hz"
-    slow = [root for root in poles.values() if abs(root.z) > NEAR_ORIGIN]
-    if not slow:
+    rate_hz = 1.0 / model.sample_time_s
+    if max(sizes) <= NEAR_ORIGIN:
         # Where errors reach as far as slower poles, nothing was shown.
         light = Light.AMBER if all(map(_is_near_origin, poles.values())) else Light.GREEN
-        message = f"sampled too slowly: {held} lie at the origin: motion dies within a sample"
+        near = (
+            f"|z| {min(sizes):.3g} to {max(sizes):.3g}" if len(sizes) > 1 else f"|z| {sizes[0]:.3g}"
+        )
+        message = (
+            f"sampled too slowly: plant poles with {near} at {rate_hz:.4g} Hz lie at the origin: "
+            "motion dies within a sample"
+        )
         action = f"log at {TIMES_BANDWIDTH * rate_hz / math.tau:.3g} Hz or faster"
         return (Finding(SLOW, light, message, action),)
-    # A negative real pole has no continuous counterpart, so no frequency; z = 1 has none either.
-    fastest = max((abs(np.log(r.z)) for r in slow if r.z.imag or r.z.real > 0.0), default=None)
-    if not fastest:
+    bandwidth_hz = _bandwidth_hz(model, duration_s)
+    if bandwidth_hz is None:
         return ()
-    advised_hz = TIMES_BANDWIDTH * fastest * rate_hz / math.tau
-    if fastest < CROWDED:
+    advised_hz, times = TIMES_BANDWIDTH * bandwidth_hz, rate_hz / bandwidth_hz
+    # Poles that only fit noise are fast: where there are any, coefficients do not hang together.
+    if times > MANY and max(abs(np.log(z)) for z in poles) < math.tau / MANY:
         message = (
-            f"sampled too fast: {held} crowd at z = 1, {math.tau / fastest:.3g} times their "
-            "bandwidth: coefficients hang together, zeros of sampling appear"
+            f"sampled too fast: plant poles crowd at z = 1, {rate_hz:.4g} Hz is about {times:.2g} "
+            "times the bandwidth: coefficients hang together, zeros of sampling appear"
         )
         action = f"resample to about {advised_hz:.2g} Hz (resample_to_s={1 / advised_hz:.2g})"
         return (Finding(FAST, Light.GREEN, message, action),)
-    message = f"sampled at {math.tau / fastest:.3g} times the bandwidth, ten suit: {held}"
+    message = f"sampled at about {times:.2g} times the bandwidth of {bandwidth_hz:.2g} Hz, ten suit"
     return (Finding(TOLD, Light.GREEN, message),)
+
+
+def _bandwidth_hz(model: Sampled, duration_s: float) -> float | None:
+    """Where the fastest response leaves its peak by 3 dB; None where that cannot be told."""
+    nyquist = math.pi / model.sample_time_s
+    omega = np.geomspace(math.tau / duration_s, nyquist, POINTS)
+    edges: list[float] = []
+    for gain in np.abs(model.frequency_response(omega)).reshape(-1, POINTS):
+        inside = np.flatnonzero(gain >= gain.max() / math.sqrt(2.0))
+        last = int(inside[-1])
+        if (
+            omega[last] < 2.0 * omega[0]
+            or last == POINTS - 1
+            or inside.size != last - inside[0] + 1
+        ):
+            return None
+        edges.append(float(omega[last]) / math.tau)
+    return max(edges)
 
 
 def _is_near_origin(root: FittedRoot) -> bool:

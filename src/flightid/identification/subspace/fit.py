@@ -157,7 +157,7 @@ def _assemble(
                 structure, model, choice, roots, found.termination, spare, at_circle
             ),
             *tests.findings(biased=True, times=times),
-            *sampling_findings(roots, model.sample_time_s),
+            *sampling_findings(model, roots, max(record.duration_s for record in records)),
         ),
         provenance=provenance_of(
             structure.method, records, data.channels.offsets, structure.to_dict()
