@@ -13,6 +13,7 @@ from flightid.uncertainty.agreement import FEWEST_RECORDS, Agreement
 from flightid.uncertainty.foretold import MATERIAL_PERCENT
 
 ONE = "One record does not tell how far flights differ: what is known is of that flight alone"
+AGAIN = "repeat the manoeuvre in a second record or segment"
 HALVES_ACTION = (
     "do not use one set of numbers: look for a vehicle, trim or wind that changed, for a faulty "
     "stretch, or for dynamics that the model lacks, and fit the parts by themselves"
@@ -52,10 +53,11 @@ def agreement_check(found: Agreement, values: NDArray[np.float64] | None = None)
 
 def _compared(found: Agreement, apart: float | None) -> Check:
     if not found.tested:
-        what = (
-            "parts of the data cannot be compared: no two hold the same frequencies and parameters"
-        )
-        return Check(AGREEMENT, Light.UNKNOWN, what, "fly longer, or repeat the manoeuvre")
+        # Longer alone does not help: a longer sweep passes each frequency once all the same.
+        what = "flown once: nothing shows whether a second flight would agree"
+        if found.n_records > 1:
+            what = "records cannot be compared: no two hold the same frequencies and parameters"
+        return Check(AGREEMENT, Light.UNKNOWN, what, AGAIN)
     several = found.n_records > 1
     widened = ""
     if found.factor > 1.0:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from shlex import quote
 from typing import TYPE_CHECKING
 
@@ -75,6 +76,24 @@ def in_short(item: ModelResults) -> Finding:
     return Finding("model", verdict.light, f"{first}; {verdict.message}", verdict.action)
 
 
+def models_in_short(items: Sequence[ModelResults]) -> Lights:
+    """One line about each model; a last reason that several share, and its action, is said once."""
+    lines = [in_short(item) for item in items]
+    groups: dict[tuple[str, str, str], list[int]] = {}
+    for place, line in enumerate(lines):
+        _, found, reason = line.message.rpartition("; ")
+        if found:
+            groups.setdefault((line.light, reason, line.action), []).append(place)
+    for (light, reason, action), places in groups.items():
+        if len(places) > 1:
+            for place in places:
+                said = lines[place].message.removesuffix(f"; {reason}")
+                lines[place] = replace(lines[place], message=said, action="")
+            names = ", ".join(items[place].name for place in places)
+            lines.append(Finding("model", Light(light), f"{names}: {reason}", action))
+    return Lights(tuple(lines), repeats=True)
+
+
 def short_document(study: StudyResults, document: Document) -> Document:
     """A report of one screen: models, gains and, last, the answer with what is next.
 
@@ -85,7 +104,7 @@ def short_document(study: StudyResults, document: Document) -> Document:
         The whole report, whose verdicts count.
     """
     answer = answer_of(study, source=None if study.source is None else quote(str(study.source)))
-    models = Lights(tuple(map(in_short, study.identified)), repeats=True)
+    models = models_in_short(study.identified)
     faults = (Lights(study.faults),) if study.faults else ()
     tables = tuple(map(TableBlock, answer.tables))
     sections = (

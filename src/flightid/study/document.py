@@ -21,7 +21,7 @@ from flightid.report.figures import figure_block
 from flightid.report.flight import flight_blocks
 from flightid.report.handling_qualities import handling_qualities_blocks
 from flightid.report.tuning import gain_flight_blocks, tuning_section
-from flightid.study.answer import answer_of, in_short
+from flightid.study.answer import answer_of, models_in_short
 from flightid.study.estimate_tables import model_table
 from flightid.study.faults import section_of, whole_section
 from flightid.study.model_section import model_section
@@ -179,7 +179,7 @@ def _result(study: StudyResults) -> Iterator[Block]:
         yield Paragraph(study.settings.notes)
     if study.faults:
         yield Lights(study.faults)
-    yield Lights(tuple(map(in_short, study.identified)), repeats=True)
+    yield models_in_short(study.identified)
     # A tied parameter follows another: it would count the same miss twice.
     inside = [
         _inside(parameter, true)
