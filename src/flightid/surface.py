@@ -27,6 +27,8 @@ FIXED = re.compile(r"model\.with_fixed(?:\((?P<names>[^)]*)\))?")
 """How Python holds parameters."""
 ANY_NAME = "NAME"
 """Stands for one of the parameters that the sentence has named."""
+POWER = re.compile(r"(?<![\w.])\d(?:\.\d+)?e\+0[1-5]\b")
+"""A number below a million with a power of ten, as rounding to a few digits leaves it."""
 
 
 @contextmanager
@@ -40,18 +42,24 @@ def speaking(speaker: Speaker) -> Iterator[None]:
 
 
 def spoken(text: str) -> str:
-    """A sentence with its options as they are written where the user stands.
+    """A sentence with its options as they are written where the user stands, and plain numbers.
 
     Example
     -------
+    >>> spoken("1.3e+02 standard errors")
+    '130 standard errors'
     >>> spoken("declare hold='zero'")
     "declare hold='zero'"
     >>> with speaking(as_key):
     ...     spoken("declare hold='zero', or covariance=True")
     'declare hold = "zero", or covariance = true'
     """
-    speaker = _speaker.get()
-    return text if speaker is None or not isinstance(text, str) else speaker(text)
+    speaker = _speaker.get() or str
+    return speaker(POWER.sub(_plain, text))
+
+
+def _plain(number: re.Match[str]) -> str:
+    return f"{float(number[0]):g}"
 
 
 def held_in(text: str, place: str) -> str:

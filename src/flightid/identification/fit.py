@@ -30,6 +30,15 @@ from flightid.uncertainty.fitted_correlation import FittedCorrelation
 from flightid.uncertainty.quantiles import LEVEL, half_width, interval_words, shown
 from flightid.uncertainty.uncertain import Uncertain
 
+GUIDE_BOUND = (
+    "Cramér–Rao: Tischler's guide value of the cost (at most 20 %), which knows nothing of noise "
+    "and bounds no error; standard errors come from the data's own errors."
+)
+WHITE_BOUND = (
+    "Cramér–Rao: the standard error if residuals were white, in percent of the value; the standard "
+    "error beside it allows for their colour."
+)
+
 WITHHOLDING = ("errors-not-white", "inputs-in-errors", "order-too-high")
 """Findings that say why a fit has no covariance."""
 
@@ -294,11 +303,21 @@ class Fit(
             *(text for text in formulas if text not in self.model.response_names),
             *(() if self.details is None else self.details.notes(self.structure)),
             f"Average cost {self.average_cost:.3g} {meaning}; {costs}.",
+            *self._guides(),
             f"Intervals from: {self.intervals_from}.",
             f"Ended by {self.termination} after {self.iterations} iterations.",
             *map(str, self.findings),
             *self.evidence.lines,
         )
+
+    def _guides(self) -> tuple[str, ...]:
+        """What Cramér–Rao bounds stand beside standard errors for, where they do."""
+        known = self.parameters.values()
+        if not any(p.cramer_rao_percent is not None and p.stderr is not None for p in known):
+            return ()
+        if not self.responses:
+            return (WHITE_BOUND,)
+        return (GUIDE_BOUND,)
 
     def _tables(self) -> tuple[Table, ...]:
         beside = () if self.details is None else self.details.tables()

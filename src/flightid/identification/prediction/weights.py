@@ -27,6 +27,18 @@ def guide_weights(record: Record, outputs: tuple[str, ...]) -> NDArray[np.float6
     return np.array(weights)
 
 
+def weighted_error(j_rms: float) -> str:
+    """J_rms in words, which are the same whatever units a table beside it has.
+
+    Example
+    -------
+    >>> weighted_error(1.1)
+    'weighted error J_rms 1.1, in which 1 deg, 1 deg/s, 1 ft/s and 1 ft/s² count one each'
+    """
+    units = "in which 1 deg, 1 deg/s, 1 ft/s and 1 ft/s² count one each"
+    return f"weighted error J_rms {j_rms:.3g}, {units}"
+
+
 def is_vehicle(units: Sequence[str]) -> bool:
     """Whether outputs are of the kinds that the guide of J_rms was made from.
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.identification.prediction.weights import weighted_error
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.validation.verification.result import Verification
@@ -148,7 +149,7 @@ class Comparison(Result, schema="flightid.comparison/1"):
             cells += [result.rms_error[output] for result in each]
             rows.append(tuple(cells))
         notes = [
-            f"{name}: weighted error J_rms {result.j_rms:.3g} (deg, deg/s, ft/s, ft/s²)."
+            f"{name}: {weighted_error(result.j_rms)}."
             for name, result in self.verifications.items()
             if result.j_rms is not None
         ]

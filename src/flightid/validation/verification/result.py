@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from flightid.findings import Finding
 from flightid.identification.prediction.result import Prediction
+from flightid.identification.prediction.weights import weighted_error
 from flightid.record import Record
 from flightid.record.hold import BETWEEN, InputHold
 from flightid.result import Result
@@ -137,7 +138,7 @@ class Verification(Result, schema="flightid.verification/1"):
         ]
         notes = [self.protocol]
         if self.j_rms is not None:
-            notes.append(f"Weighted error J_rms {self.j_rms:.3g} (deg, deg/s, ft/s, ft/s²).")
+            notes.append(f"W{weighted_error(self.j_rms)[1:]}.")
         if len(self.outputs) > 1:
             notes.append(f"Theil coefficient of all outputs together {self.overall_theil:.3f}.")
         return Table(repr(self), columns, tuple(rows), (*notes, *map(str, self.findings)))
