@@ -25,6 +25,8 @@ from flightid.table import Column, Table
 from flightid.version import VERSION
 
 DEFAULT_HEIGHT_PX = 420
+LONG_CELL = 20
+"""Letters of a cell above which its column keeps its width and the table scrolls instead."""
 _VALUE = Column("value", digits=6)
 
 
@@ -108,7 +110,7 @@ def _shown_table(values: dict[str, Any]) -> dict[str, Any]:
         for column, digits in zip(values["columns"], values["digits"], strict=True)
     )
     table = Table(values["title"], columns, tuple(map(tuple, values["rows"])))
-    kinds = ["number" if table.is_numeric(index) else "text" for index in range(len(columns))]
+    kinds = [_kind(table, index) for index in range(len(columns))]
     headings = [
         {"name": column.name, "unit": column.unit, "kind": kind}
         for column, kind in zip(columns, kinds, strict=True)
@@ -144,3 +146,11 @@ def _environment() -> jinja2.Environment:
         undefined=jinja2.StrictUndefined,
         trim_blocks=False,
     )
+
+
+def _kind(table: Table, index: int) -> str:
+    """How a column is set: numbers to the right, sentences with room to be read."""
+    if table.is_numeric(index):
+        return "number"
+    longest = max((len(str(row[index])) for row in table.rows), default=0)
+    return "long" if longest > LONG_CELL else "text"
