@@ -37,7 +37,7 @@ FORMS = {
 class PidLoop(AxisLoop):
     """One loop u = ±(Kp (b r − y) + Ki ∫(r − y) + Kd d/dt (c r − y)/(Tf s + 1)), limits behind it.
 
-    SamplingRatio: backward differences for integral and derivative; every sample the integral is driven
+    Sampled: backward differences for integral and derivative; every sample the integral is driven
     back by T/Tt of what the limits took (back calculation), and by nothing where Tt is zero.
     Continuous (`sampled` False): the same law as written, without a recursion.
 
@@ -155,7 +155,7 @@ class PidLoop(AxisLoop):
         made = [
             f"Set-point weights: b = {b:.4g} (proportional), c = {c:.4g} (derivative).",
             "Action: direct, the error is y − r." if self.direct else "Action: error is r − y.",
-            f"SamplingRatio at {self.loop_rate_hz:g} Hz, backward differences."
+            f"Sampled at {self.loop_rate_hz:g} Hz, backward differences."
             if self.sampled
             else "Continuous: sample at least 30 times as fast as it crosses over.",
         ]

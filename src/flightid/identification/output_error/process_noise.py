@@ -155,7 +155,7 @@ def state_noise(
     ----------
     residuals : sequence of ndarray, shape (n_outputs, n_samples)
     systems : sequence of tuple of ndarray
-        SamplingRatio A (n, n) and C (n_outputs, n) of each record.
+        Sampled A (n, n) and C (n_outputs, n) of each record.
 
     Returns
     -------

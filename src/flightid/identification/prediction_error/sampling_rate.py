@@ -28,7 +28,7 @@ SAMPLING = (FAST, SLOW, TOLD)
 """Codes of these findings."""
 
 
-class SamplingRatio(Protocol):
+class ResponseModel(Protocol):
     """A model with a response and a sample time."""
 
     @property
@@ -40,7 +40,7 @@ class SamplingRatio(Protocol):
 
 
 def sampling_findings(
-    model: SamplingRatio, roots: Sequence[FittedRoot], duration_s: float
+    model: ResponseModel, roots: Sequence[FittedRoot], duration_s: float
 ) -> tuple[Finding, ...]:
     """What a fit says of the sampling rate, and the rate that its bandwidth asks for.
 
@@ -108,7 +108,7 @@ def sampling_findings(
     return (Finding(TOLD, Light.GREEN, message),)
 
 
-def _bandwidth_hz(model: SamplingRatio, duration_s: float) -> float | None:
+def _bandwidth_hz(model: ResponseModel, duration_s: float) -> float | None:
     """Where the fastest response leaves its peak by 3 dB; None where that cannot be told."""
     nyquist = math.pi / model.sample_time_s
     omega = np.geomspace(math.tau / duration_s, nyquist, POINTS)

@@ -94,7 +94,7 @@ def verify(
     weighted least squares in each record, since they belong to the record. u_ref is the record's
     declared trim, or zero. The equations of a nonlinear model are integrated instead, on the
     channels as they are, from the measured state; ``state_bias=True`` solves for a constant shift
-    of each of its inputs, which is never done unasked. SamplingRatio models (ARX …
+    of each of its inputs, which is never done unasked. Sampled models (ARX …
     Box–Jenkins, innovations forms, NARX) run about the operating point of their training records,
     from a state that a first stretch tells, which no score counts; no bias is taken off.
 
