@@ -9,7 +9,7 @@ import pytest
 
 from flightid import Record, run_study
 from flightid.cli.program import run
-from flightid.errors import OptionError, StudyError, UnknownNameError
+from flightid.errors import DataError, OptionError, StudyError, UnknownNameError
 from flightid.study.proposal import Proposal, propose_study
 from flightid.study.proposal.columns import columns_of
 
@@ -123,6 +123,22 @@ def test_records_without_times_take_a_sample_time_into_the_study(tmp_path: Path)
     assert told == ["sample_time_s = 0.1"] * 3
     with pytest.raises(OptionError, match="no time column"):
         propose_study([bare], folder=tmp_path)
+
+
+def test_uneven_stamps_take_a_new_grid_into_the_study(tmp_path: Path) -> None:
+    rig = _rig(tmp_path)
+    head, *rows = rig.read_text().splitlines()
+    parted = [row.split(",", 1) for row in rows]
+    rows = [f"{float(at) + 0.03 * (k % 2):.2f},{rest}" for k, (at, rest) in enumerate(parted)]
+    uneven = tmp_path / "uneven.csv"
+    uneven.write_text("\n".join([head, *rows]))
+    asked = {"folder": tmp_path, "model": "rate_first_order"}
+    with pytest.raises(DataError, match="--resample-to-s"):
+        propose_study([uneven], **asked)
+    made = propose_study([uneven], resample_to_s=0.1, **asked)
+    assert [line for line in made.lines if line.startswith("resample")] == [
+        "resample_to_s = 0.1"
+    ] * 3
 
 
 def test_a_folder_for_gains_is_asked_for_before_the_work(

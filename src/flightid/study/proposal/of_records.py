@@ -49,6 +49,7 @@ class RecordTimes:
 
     time_column: str = TIME_COLUMN
     sample_time_s: float | None = None
+    resample_to_s: float | None = None
 
     @property
     def lines(self) -> tuple[str, ...]:

@@ -24,3 +24,6 @@ class ProposalOptions(Options):
     sample_time_s: float | None = option(
         None, unit="s", above=0.0, doc="Sample time of records without time column."
     )
+    resample_to_s: float | None = option(
+        None, unit="s", above=0.0, doc="Sample time of a new uniform grid for records."
+    )

@@ -22,6 +22,7 @@ def propose_study(
     outputs: Sequence[str] = (),
     time_column: str = TIME_COLUMN,
     sample_time_s: float | None = None,
+    resample_to_s: float | None = None,
     tune: bool = False,
     cache: MutableMapping[str, Any] | None = None,
 ) -> Proposal:
@@ -42,6 +43,8 @@ def propose_study(
         Name of the time column of records.
     sample_time_s : float, optional
         Time between samples of records without a time column, s.
+    resample_to_s : float, optional
+        Sample time of a new uniform grid, s, for records whose stamps are not uniform.
     tune : bool
         Let the study end in gains of the autopilot that flew.
     cache : mutable mapping of str to object, optional
@@ -59,6 +62,7 @@ def propose_study(
         A file cannot be read.
     """
     paths = [Path(file) for file in files]
+    times = RecordTimes(time_column, sample_time_s, resample_to_s)
     logs = [path for path in paths if is_log(path)]
     if not logs:
         return study_of_records(
@@ -67,17 +71,12 @@ def propose_study(
             model=model,
             inputs=tuple(inputs),
             outputs=tuple(outputs),
-            times=RecordTimes(time_column, sample_time_s),
+            times=times,
         )
-    if (
-        len(paths) > 1
-        or inputs
-        or outputs
-        or RecordTimes(time_column, sample_time_s) != RecordTimes()
-    ):
+    if len(paths) > 1 or inputs or outputs or times != RecordTimes():
         raise OptionError(
             "a log is taken alone, and its channels have names and stamps",
             found=", ".join(path.name for path in paths),
-            needed="one log without columns and sample_time_s=, or records from files",
+            needed="one log without columns and times of samples, or records from files",
         )
     return study_of_log(logs[0], Path(folder), model=model, tune=tune, cache=cache)
