@@ -313,7 +313,10 @@ def test_tuned_gains_fly_with_the_margins_that_were_promised(tmp_path: Path) -> 
     results = json.loads((tmp_path / "out" / "results.json").read_text("utf-8"))
     margins = results["gain_flight"]["margins"]
     assert len(margins) == 25
-    assert sum(each["agrees"] for each in margins) >= 23
+    promised = [each for each in margins if each["agrees"] is not None]
+    # Gain margins of the whole loops are read above the identified band: told, not promised.
+    assert len(promised) >= 20
+    assert sum(each["agrees"] for each in promised) >= len(promised) - 2
     for each in margins:
         if each["name"] == "phase margin":
             apart = each["measured"]["value"] - each["promised"]["value"]
