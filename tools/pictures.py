@@ -11,6 +11,11 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 
 from PIL import Image
@@ -27,12 +32,31 @@ OPTIONS = (
     "--disable-background-networking",
     "--disable-component-update",
     "--disable-sync",
-    "--virtual-time-budget=60000",
 )
-PAGE_SIZE = (1180, 2700)
+PAGE_SIZE = (1180, 3400)
 # File name -> (first line, last line) of the page's picture, in px.
-SHOTS = {"report-result.png": (0, 1060), "report-model.png": (1080, 2480)}
+SHOTS = {"report-result.png": (0, 1400), "report-model.png": (2050, 3390)}
 SCALE = 0.7
+WAIT_S = 10.0
+"""For pictures to be unpacked and drawn."""
+
+
+class _Late(BaseHTTPRequestHandler):
+    """Answers after `WAIT_S`."""
+
+    def do_GET(self) -> None:
+        time.sleep(WAIT_S)
+        self.send_response(404)
+        self.end_headers()
+
+
+@contextmanager
+def _shutter() -> Iterator[int]:
+    """Port of a server on this machine that is slow to answer."""
+    with HTTPServer(("127.0.0.1", 0), _Late) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield server.server_port
+        server.shutdown()
 
 
 def photograph(page: Path, picture: Path, size: tuple[int, int] = PAGE_SIZE) -> None:
@@ -40,14 +64,23 @@ def photograph(page: Path, picture: Path, size: tuple[int, int] = PAGE_SIZE) -> 
     browser = shutil.which("chromium") or shutil.which("google-chrome")
     if browser is None:
         raise SystemExit("Chromium is not on this machine.")
-    with tempfile.TemporaryDirectory() as profile:
+    with tempfile.TemporaryDirectory() as profile, _shutter() as port:
+        # A page draws its pictures as they come into sight, after it has loaded: a frame of full
+        # height shows them all, and a picture that never comes holds the shutter back.
+        frame = Path(profile) / "frame.html"
+        frame.write_text(
+            f'<body style="margin:0"><iframe src="{page.resolve().as_uri()}" style="border:0" '
+            f'width="{size[0]}" height="{size[1]}"></iframe>'
+            f'<img src="http://127.0.0.1:{port}" width="1">',
+            encoding="utf-8",
+        )
         command = [
             browser,
             *OPTIONS,
             f"--user-data-dir={profile}",
             f"--window-size={size[0]},{size[1]}",
             f"--screenshot={picture}",
-            page.resolve().as_uri(),
+            frame.as_uri(),
         ]
         subprocess.run(command, check=True, capture_output=True, timeout=120)
 
