@@ -30,6 +30,9 @@ ANY_NAME = "NAME"
 POWER = re.compile(r"(?<![\w.])\d(?:\.\d+)?e\+0[1-5]\b")
 """A number below a million with a power of ten, as rounding to a few digits leaves it."""
 
+NO_CHANCE = re.compile(r"\bp = 0(?![.\d]*\d)")
+"""A probability too small for the machine; none is zero."""
+
 
 @contextmanager
 def speaking(speaker: Speaker) -> Iterator[None]:
@@ -48,6 +51,8 @@ def spoken(text: str) -> str:
     -------
     >>> spoken("1.3e+02 standard errors")
     '130 standard errors'
+    >>> spoken("halves differ (p = 0)")
+    'halves differ (p < 1e-300)'
     >>> spoken("declare hold='zero'")
     "declare hold='zero'"
     >>> with speaking(as_key):
@@ -55,7 +60,7 @@ def spoken(text: str) -> str:
     'declare hold = "zero", or covariance = true'
     """
     speaker = _speaker.get() or str
-    return speaker(POWER.sub(_plain, text))
+    return speaker(NO_CHANCE.sub("p < 1e-300", POWER.sub(_plain, text)))
 
 
 def _plain(number: re.Match[str]) -> str:
