@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, signal
+from scipy import fft, linalg, signal
 
 from flightid.uncertainty.residual_correlation import SMALLEST_EIGENVALUE
 
@@ -153,6 +153,32 @@ def chance_share(row: Array) -> float:
     """
     lags = signal.correlate(row, row, method="fft")[row.size - 1 :][: max(row.size // LONGEST, 2)]
     return 1.0 / (2.0 * float(lags @ lags) / float(lags[0]) ** 2 - 1.0) if lags[0] > 0.0 else 1.0
+
+
+def independent_samples(rows: Sequence[Array]) -> float:
+    """Samples that tell the power of a coloured series as well as so many independent ones.
+
+    ``n / sum_k rho(k)²``, over lags up to a quarter of the series; one at least.
+
+    Example
+    -------
+    >>> white = np.random.default_rng(0).standard_normal(4000)
+    >>> slow = np.repeat(white[:400], 10)
+    >>> 2500 < independent_samples([white]) <= 4000, 300 < independent_samples([slow]) < 700
+    (True, True)
+    """
+    return max(sum(_independent(row) for row in rows), 1.0)
+
+
+def _independent(row: Array) -> float:
+    n = row.size
+    power = np.abs(fft.rfft(row, fft.next_fast_len(2 * n, real=True))) ** 2
+    lags = fft.irfft(power, fft.next_fast_len(2 * n, real=True))[: n // 4 + 1]
+    if not lags[0] > 0.0:
+        return float(n)
+    # What chance leaves of lags without correlation counts for none.
+    rho = np.square(lags[1:] / lags[0])
+    return n / (1.0 + 2.0 * float(np.sum(np.maximum(rho - 1.0 / n, 0.0))))
 
 
 def likelihood_gain(

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from flightid.identification.innovation_tests import ROUNDING, InnovationTests, innovation_tests
-from flightid.identification.left_by_fit import independent_samples
 from flightid.identification.local_minimum import LocalMinimum
 from flightid.identification.prediction_error.coloured_errors import (
     has_noise_model,
@@ -31,7 +30,7 @@ from flightid.uncertainty.coloured_residuals import (
 )
 from flightid.uncertainty.estimate import Estimate
 from flightid.uncertainty.fitted_correlation import FittedCorrelation
-from flightid.uncertainty.foretold import chance_share, likelihood_gain
+from flightid.uncertainty.foretold import chance_share, independent_samples, likelihood_gain
 
 Array = NDArray[np.float64]
 UNDETERMINED = "the data do not tell the coefficients apart"

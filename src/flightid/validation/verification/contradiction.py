@@ -12,13 +12,14 @@ from scipy.stats import f
 from flightid.conventions import Light
 from flightid.errors import FlightidError
 from flightid.findings import Finding
-from flightid.identification.left_by_fit import LEFT, independent_samples
+from flightid.identification.left_by_fit import LEFT
 from flightid.identification.prediction.predict import Predictor
 from flightid.identification.prediction.remembered import of_record, provenance_entry
 from flightid.identification.prediction.request import FREE_RUN, Request
 from flightid.identification.prediction.result import Prediction
 from flightid.identification.uncertain_of import uncertain_of
 from flightid.models.model import model_of
+from flightid.uncertainty.foretold import independent_samples
 
 Array = NDArray[np.float64]
 CODE = "unseen-contradicts"
