@@ -40,7 +40,7 @@ from flightid.identification.prediction_error.instrumental_variables import four
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
 from flightid.identification.prediction_error.linear_regression import (
     inverse_square,
-    regress,
+    regress_structure,
     require_independent,
 )
 from flightid.identification.prediction_error.part_blocks import (
@@ -117,16 +117,7 @@ def _search(structure: PolynomialStructure, data: SampledChannels) -> SearchResu
 def _regression(structure: PolynomialStructure, data: SampledChannels) -> SearchResult:
     """ARX: linear in the coefficients, so no iteration."""
     skip = 0 if structure.initial_state == "zero" else structure.longest_lag
-    made = regress(
-        data.output,
-        data.inputs,
-        data.lengths,
-        structure.na,
-        structure.nb,
-        structure.nk,
-        skip,
-        levels=data.levels,
-    )
+    made = regress_structure(structure, data, skip)
     degrees = made.n_rows - made.theta.size
     if structure.kernel is not None:
         smooth = kernel_estimate(made, (structure.na, *structure.nb), structure.kernel)

@@ -10,7 +10,11 @@ from scipy.signal import lfilter
 
 from flightid.errors import DataError
 from flightid.identification.prediction_error.coloured_errors import instrumental_covariance
-from flightid.identification.prediction_error.linear_regression import reflected, regress
+from flightid.identification.prediction_error.linear_regression import (
+    reflected,
+    regress,
+    regress_structure,
+)
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 from flightid.uncertainty.coloured_residuals import ResidualCovariance
@@ -37,15 +41,7 @@ def four_stage(
     ---------
     Ljung, *System Identification*, 2nd ed., section 15.3, eqs. 15.20 to 15.27.
     """
-    first = regress(
-        data.output,
-        data.inputs,
-        data.lengths,
-        structure.na,
-        structure.nb,
-        structure.nk,
-        levels=data.levels,
-    ).shortest
+    first = regress_structure(structure, data).shortest
     second, _ = _instruments(structure, data, first, np.ones(1))
     left = _left(structure, data, second)
     none = np.empty((0, left.size))

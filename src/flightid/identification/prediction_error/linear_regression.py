@@ -14,6 +14,7 @@ from scipy.linalg.lapack import dpotri, dtrcon
 from flightid import _native
 from flightid.errors import DataError, FitError
 from flightid.models.polynomial.structure import PolynomialStructure
+from flightid.models.sampled.channels import SampledChannels
 
 Array = NDArray[np.float64]
 MANY = 80
@@ -91,6 +92,22 @@ def regress(
     )
     width = theta.size + 1
     return LinearRegression(theta, flat.reshape(width, width).T, n_rows, dependent)
+
+
+def regress_structure(
+    structure: PolynomialStructure, data: SampledChannels, skip: int | None = None
+) -> LinearRegression:
+    """`regress` with A and B of a structure, for the channels of all records."""
+    return regress(
+        data.output,
+        data.inputs,
+        data.lengths,
+        structure.na,
+        structure.nb,
+        structure.nk,
+        skip,
+        levels=data.levels,
+    )
 
 
 def regress_lags(

@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from flightid.errors import FitError
-from flightid.identification.prediction_error.linear_regression import reflected, regress
+from flightid.identification.prediction_error.linear_regression import (
+    reflected,
+    regress,
+    regress_structure,
+)
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
 
@@ -139,15 +143,7 @@ def _with_innovations(
 
 
 def _plain(structure: PolynomialStructure, data: SampledChannels) -> _Plant:
-    theta = regress(
-        data.output,
-        data.inputs,
-        data.lengths,
-        structure.na,
-        structure.nb,
-        structure.nk,
-        levels=data.levels,
-    ).shortest
+    theta = regress_structure(structure, data).shortest
     return _Plant(*_split(structure, theta), _empty(structure))
 
 
