@@ -22,7 +22,7 @@ AS_MUCH = 1.2
 """Largest ratio of two errors that a few hundred coloured samples do not tell apart."""
 
 
-def left_by_fit(source: object, explained: float) -> dict[str, float]:
+def own_errors(source: object, explained: float) -> dict[str, float]:
     """Error of the fitted model in its own records, by output, where it explains those.
 
     Parameters

@@ -34,7 +34,7 @@ from flightid.validation.verification.contradiction import contradictions
 from flightid.validation.verification.held_otherwise import hold_findings
 from flightid.validation.verification.judgement import THEIL_GUIDE, judge
 from flightid.validation.verification.muad import mismatch
-from flightid.validation.verification.of_the_fit import left_by_fit, seen_findings
+from flightid.validation.verification.of_the_fit import own_errors, seen_findings
 from flightid.validation.verification.result import Verification
 
 
@@ -196,7 +196,7 @@ def verify(
         several, models, ways, requests, _scored_alike(runs), holds, strict=True
     ):
         seen = None if responses is None else mismatch(model, responses)
-        own = left_by_fit(each, THEIL_GUIDE[0])
+        own = own_errors(each, THEIL_GUIDE[0])
         judged = judge(tuple(made), chosen, request, seen, own)
         beside = (
             *baseline_findings(each, made, request),
