@@ -46,11 +46,10 @@ def _random_loop(autopilot: str, axis: str, rng: np.random.Generator, per_loop: 
     notch = (rng.uniform(20, 90), rng.uniform(0.7, 4.0), rng.uniform(5, 45))
     if autopilot.startswith("ardu"):
         changes |= {"target_notch": notch, "error_notch": (rng.uniform(20, 90), 2.0, 30.0)}
-        sections, _ = ardupilot_notches(_harmonic_notch(rng), loop.gyro_rate_hz)
+        sections = ardupilot_notches(_harmonic_notch(rng), loop.gyro_rate_hz).sections
     else:
-        sections, _ = px4_notches(
-            {"IMU_GYRO_NF0_FRQ": notch[0], "IMU_GYRO_NF0_BW": 20.0}, loop.gyro_rate_hz
-        )
+        fixed = {"IMU_GYRO_NF0_FRQ": notch[0], "IMU_GYRO_NF0_BW": 20.0}
+        sections = px4_notches(fixed, loop.gyro_rate_hz).sections
         changes["old"] = autopilot == "px4_multicopter" and rng.random() < 0.3
     changes["gyro_notches"] = sections
     if autopilot in ("arduplane", "px4_fixed_wing"):

@@ -18,7 +18,12 @@ from flightid.control.autopilots import (
     gain_ranges,
 )
 from flightid.control.autopilots.arducopter import ArduCopterLoop
-from flightid.control.autopilots.gyro_notches import ardupilot_notches, pid_notch, px4_notches
+from flightid.control.autopilots.gyro_notches import (
+    GyroNotches,
+    ardupilot_notches,
+    pid_notch,
+    px4_notches,
+)
 from flightid.control.autopilots.parameter_table import parameter_entries
 from tests.closeness import assert_close
 
@@ -119,14 +124,14 @@ def test_run_goes_on_from_a_given_state() -> None:
 
 def test_moving_notches_are_named_and_fixed_ones_are_in_the_view() -> None:
     notch = {"INS_HNTCH_ENABLE": 1.0, "INS_HNTCH_MODE": 3.0, "INS_HNTCH_REF": 1.0}
-    sections, moving = ardupilot_notches(notch, 2000.0)
-    assert sections == ()
-    assert "telemetry" in moving[0]
+    found = ardupilot_notches(notch, 2000.0)
+    assert found.sections == ()
+    assert "telemetry" in found.unknown[0]
     loop = axis_loop("arducopter", "roll", COPTER | notch)
-    assert loop.unmodelled == moving
+    assert loop.unknown_notches == found.unknown
     fixed = notch | {"INS_HNTCH_REF": 0.0, "INS_HNTCH_FREQ": 80.0, "INS_HNTCH_BW": 20.0}
-    sections, moving = ardupilot_notches(fixed | {"INS_HNTCH_ATT": 40.0}, 2000.0)
-    assert (len(sections), moving) == (2, ())
+    found = ardupilot_notches(fixed | {"INS_HNTCH_ATT": 40.0}, 2000.0)
+    assert (len(found.sections), found.unknown) == (2, ())
     loop = axis_loop("arducopter", "roll", COPTER | fixed, gyro_rate_hz=2000.0)
     at = 2 * np.pi * np.array([80.0, 160.0])
     plain = axis_loop("arducopter", "roll", COPTER, gyro_rate_hz=2000.0)
@@ -150,9 +155,8 @@ def test_notches_on_target_and_error_come_from_the_filter_table() -> None:
 
 
 def test_px4_dynamic_notches_are_named() -> None:
-    assert px4_notches({}, 4000.0) == ((), ())
-    _, moving = px4_notches({"IMU_GYRO_DNF_EN": 1.0}, 4000.0)
-    assert "follow the motors" in moving[0]
+    assert px4_notches({}, 4000.0) == GyroNotches()
+    assert "follows the motors" in px4_notches({"IMU_GYRO_DNF_EN": 1.0}, 4000.0).unknown[0]
 
 
 @pytest.mark.parametrize(
@@ -243,7 +247,7 @@ def test_double_and_triple_notches_stand_beside_the_centre() -> None:
     }  # fmt: skip
     spread = 40.0 / (32 * 80.0)
     for options, offsets in ((0.0, [0.0]), (1.0, [-spread, spread]), (16.0, [0, -spread, spread])):
-        sections, _ = ardupilot_notches(notch | {"INS_HNTCH_OPTS": options}, 2000.0)
+        sections = ardupilot_notches(notch | {"INS_HNTCH_OPTS": options}, 2000.0).sections
         # b1 = −2 cos(ω0) s and 1 + a2 = 2 s, with s = 1/(1 + α); α = sin(ω0)/(2 Q).
         centers = [np.arccos(-b1 / (1 + a2)) * 2000 / (2 * np.pi) for _, b1, _, _, a2 in sections]
         expected = 80.0 * (1 + np.array(offsets))
@@ -253,4 +257,4 @@ def test_double_and_triple_notches_stand_beside_the_centre() -> None:
         alpha = (1 - sections[0][4]) / (1 + sections[0][4])
         exact = np.sin(2 * np.pi * expected[0] / 2000) / (2 * quality)
         assert_close(alpha, exact, rtol=1e-9, why="each takes its share of the bandwidth")
-    assert ardupilot_notches(notch | {"INS_HNTCH_FREQ": 970.0}, 2000.0)[0] == ()
+    assert ardupilot_notches(notch | {"INS_HNTCH_FREQ": 970.0}, 2000.0).sections == ()

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from flightid import _native
 from flightid.control.autopilots.ardupilot_loop import ArduPilotLoop
-from flightid.control.autopilots.axis_loop import LoopFlags
 from flightid.control.autopilots.filters import Omega, Response, delay_operator, difference_response
+from flightid.control.autopilots.loop_run import LoopFlags
 
 LEAK_SHARE = 0.02
 """Part of the excess over ILMI that a helicopter's integrator loses in each loop."""

@@ -11,22 +11,21 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid import _native
-from flightid.control.autopilots.axis_loop import (
-    AxisLoop,
-    Gyro,
-    LoopFlags,
-    LoopRun,
-    LoopState,
-    samples,
+from flightid.control.autopilots.axis_loop import AxisLoop, Gyro, samples
+from flightid.control.autopilots.filter_stages import (
+    FilterPath,
+    FilterStage,
+    notch_stage,
+    pole_stage,
 )
 from flightid.control.autopilots.filters import (
     Omega,
     Response,
-    Section,
     difference_response,
     one_pole_response,
     sections_response,
 )
+from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, LoopState
 
 NOTCH_OFF = (0.0, 0.0, 0.0)
 PID_COLUMNS = ("Tar", "Err", "P", "I", "D", "FF", "DFF", "Dmod", "SRate")
@@ -53,6 +52,22 @@ class ArduPilotLoop(AxisLoop):
     def _pole(self, role: str, omega: Omega) -> Response:
         return one_pole_response(self.values[role], omega, self.loop_rate_hz)
 
+    def _stages(self) -> tuple[FilterStage, ...]:
+        rate, names, values = self.loop_rate_hz, self.names, self.values
+
+        def notch(role: str, path: FilterPath, at: tuple[float, float, float]) -> FilterStage:
+            section = _native.ardupilot_notch_section(rate, *at)
+            return notch_stage(names[role], path, rate, [section])
+
+        return (
+            *self._gyro_stages(),
+            notch("nef", "error", self.error_notch),
+            pole_stage(names["flte"], values["flte"], "error", rate),
+            pole_stage(names["fltd"], values["fltd"], "derivative", rate),
+            notch("ntf", "target", self.target_notch),
+            pole_stage(names["fltt"], values["fltt"], "target", rate),
+        )
+
     def _target_filter(self, omega: Omega) -> Response:
         return self._notch(self.target_notch, omega) * self._pole("fltt", omega)
 
@@ -64,10 +79,6 @@ class ArduPilotLoop(AxisLoop):
         error = self._notch(self.error_notch, omega) * self._pole("flte", omega)
         slope = difference_response(omega, self.loop_rate_hz) * self._pole("fltd", omega)
         return {"p": error, "i": error * self._integrator(omega), "d": error * slope}
-
-    def _gyro_sections(self) -> tuple[Section, ...]:
-        low_pass = _native.gyro_low_pass_section(self.gyro_rate_hz, self.values["gyro_filter"])
-        return self.gyro_notches + ((low_pass,) if low_pass else ())
 
     def _filtered(self, raw: ArrayLike, single_precision: bool) -> np.ndarray:
         rate, _ = _native.gyro_filters(

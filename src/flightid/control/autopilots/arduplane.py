@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from flightid.control.autopilots.ardupilot_loop import ArduPilotLoop
-from flightid.control.autopilots.axis_loop import LoopFlags, LoopState
 from flightid.control.autopilots.filters import Omega, Response, difference_response
+from flightid.control.autopilots.loop_run import LoopFlags, LoopState
 from flightid.errors import OptionError
 
 DEGREES = float(np.degrees(1.0))

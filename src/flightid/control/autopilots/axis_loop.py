@@ -9,8 +9,10 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from flightid import _native
+from flightid.control.autopilots.filter_stages import FilterStage, gyro_stages
 from flightid.control.autopilots.filters import (
     Omega,
     Response,
@@ -18,84 +20,13 @@ from flightid.control.autopilots.filters import (
     hold_response,
     sections_response,
 )
+from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, Samples
 from flightid.control.autopilots.parameter_table import GainRange, gain_ranges
 from flightid.errors import DataError, OptionError, ShapeError, UnknownNameError
 from flightid.result import Result
 from flightid.table import Column, Table
 
 Gyro = Literal["raw", "filtered"]
-Samples = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class LoopState:
-    """State of a controller after a loop, in the units of its inside.
-
-    Attributes
-    ----------
-    target, error : float
-        Filtered target and error, rad/s (planes: times the square of the airspeed scaling).
-    derivative : float
-        Filtered derivative of the error, rad/s² (PX4 does not keep it).
-    integrator : float
-        Integrator.
-    rate : float
-        Filtered rate, rad/s, which PX4's old controller differences.
-    """
-
-    target: float = 0.0
-    error: float = 0.0
-    derivative: float = 0.0
-    integrator: float = 0.0
-    rate: float = 0.0
-
-
-@dataclass(frozen=True)
-class LoopFlags:
-    """What else than set-point and rate a loop looks at; left out: false, and full thrust.
-
-    Attributes
-    ----------
-    limited : ndarray of bool, shape (n,) or (n, 2)
-        The actuators cannot give more: in both directions, or (PX4) upwards and downwards.
-    landed : ndarray of bool, shape (n,)
-        On the ground; PX4 then does not integrate.
-    thrust : ndarray, shape (n,)
-        Thrust set-point 0…1; PX4's controller until 2017 integrates only with thrust.
-    acceleration : ndarray, shape (n,)
-        Filtered angular acceleration, rad/s², as PX4 logs it; left out: made from the rate.
-    start : LoopState
-        State of the loop before the first sample; left out: at rest.
-    """
-
-    limited: NDArray[np.bool_] | None = None
-    landed: NDArray[np.bool_] | None = None
-    thrust: Samples | None = None
-    acceleration: Samples | None = None
-    start: LoopState | None = None
-
-
-@dataclass(frozen=True)
-class LoopRun:
-    """What a controller computed from set-point and rate.
-
-    Attributes
-    ----------
-    output : ndarray, shape (n,)
-        Sum of all terms, in `AxisLoop.output_unit`.
-    terms : mapping of str to ndarray
-        ``P``, ``I``, ``D``, ``FF`` and what else the autopilot has, under its log's names.
-    rate : ndarray, shape (n,)
-        Filtered rate that the controller took, rad/s.
-    """
-
-    output: Samples
-    terms: Mapping[str, Samples]
-    rate: Samples
-
-    def __repr__(self) -> str:
-        """Length and terms on one line."""
-        return f"LoopRun({self.output.size} loops, terms {', '.join(self.terms)})"
 
 
 @dataclass(frozen=True)
@@ -119,7 +50,10 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
         From the gyro sample to the output, s. No parameter holds it; a plant identified from logged
         outputs already includes it, and it stays zero then.
     gyro_notches : tuple of Section
-        Fixed notches on the gyro, at `gyro_rate_hz`.
+        Notches on the gyro, at `gyro_rate_hz`; those that move at the middle of where they were.
+    unknown_notches : tuple of str
+        Sentences on notches whose place nothing tells, or that moved far. A plant that ends at
+        the filtered rate holds them.
     assumed : tuple of str
         Parameters that the vehicle's firmware did not have.
     unmodelled : tuple of str
@@ -142,6 +76,7 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     gyro_rate_hz: float
     computation_delay_s: float = 0.0
     gyro_notches: tuple[Section, ...] = ()
+    unknown_notches: tuple[str, ...] = ()
     assumed: tuple[str, ...] = ()
     unmodelled: tuple[str, ...] = ()
     autopilot: ClassVar[str] = ""
@@ -323,9 +258,25 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     def _forward_terms(self, omega: Omega) -> dict[str, Response]:
         """From the rate set-point, by role, per unit of the gain."""
 
-    @abstractmethod
+    def filter_stages(self) -> tuple[FilterStage, ...]:
+        """Filters that are on, from the gyro to the output."""
+        return tuple(stage for stage in self._stages() if stage.sections)
+
+    def _stages(self) -> tuple[FilterStage, ...]:
+        """Filters; those that are off have no sections."""
+        return ()
+
     def _gyro_sections(self) -> tuple[Section, ...]:
-        """Second-order sections on the gyro."""
+        """Second-order sections on the gyro: notches, then the low-pass."""
+        return tuple(section for stage in self._gyro_stages() for section in stage.sections)
+
+    def _gyro_stages(self) -> tuple[FilterStage, ...]:
+        if "gyro_filter" not in self.values:
+            return ()
+        cutoff = self.values["gyro_filter"]
+        low_pass = _native.gyro_low_pass_section(self.gyro_rate_hz, cutoff)
+        name = self.names["gyro_filter"]
+        return gyro_stages(self.gyro_notches, low_pass, name, cutoff, self.gyro_rate_hz)
 
     def _shared(
         self, terms: dict[str, Response], common: Response, omega: Omega, hold: bool
@@ -359,7 +310,7 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
             (name, value, *_range_cells(ranges.get(name))) for name, value in self.gains.items()
         )
         columns = tuple(map(Column, ("parameter", "value", "low", "high", "unit", "note")))
-        return Table(repr(self), columns, rows, self.unmodelled)
+        return Table(repr(self), columns, rows, self.unmodelled + self.unknown_notches)
 
     def _computed(self) -> dict[str, object]:
         return {

@@ -41,6 +41,12 @@ def one_pole_weight(cutoff_hz: float, rate_hz: float) -> float:
     return step / (step + 1 / (2 * math.pi * cutoff_hz))
 
 
+def one_pole_section(cutoff_hz: float, rate_hz: float) -> Section:
+    """One-pole low-pass as a section."""
+    weight = one_pole_weight(cutoff_hz, rate_hz)
+    return (weight, 0.0, 0.0, weight - 1.0, 0.0)
+
+
 def one_pole_response(cutoff_hz: float, omega: Omega, rate_hz: float) -> Response:
     """One-pole low-pass, y ← y + α (x − y)."""
     weight = one_pole_weight(cutoff_hz, rate_hz)

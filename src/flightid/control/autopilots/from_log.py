@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.autopilots.make import LOOP_RATE_PARAMETERS, axis_loop
+from flightid.control.autopilots.notch_tracking import notch_tracking
 from flightid.control.autopilots.parameter_table import parameter_entries
 from flightid.errors import DataError
+from flightid.inspection.actuators import find_actuators
+from flightid.inspection.flight_phases import flight_phases
+from flightid.inspection.signals import Span
+from flightid.inspection.stamps import log_span
 from flightid.logs import Log
 
 AUTOPILOT_OF = {
@@ -100,13 +106,14 @@ def axis_loop_of(
     autopilot = autopilot_of(log)
     parameters = _chosen_parameters(log, autopilot, axis, at_s)
     rate_hz = loop_rate_hz or _loop_rate(log, parameters)
-    options: dict[str, float | None] = {"gyro_rate_hz": _gyro_rate(log, rate_hz)}
+    options: dict[str, Any] = {"gyro_rate_hz": _gyro_rate(log, rate_hz)}
     notes = _notes(parameters)
+    options["notch_tracking"] = notch_tracking(log, _counted(log, at_s))
     if autopilot in ("arduplane", "px4_fixed_wing"):
         scale, note = _airspeed_scale(log, parameters, airspeed_scale)
         options["airspeed_scale"] = scale
         notes += note
-    loop = axis_loop(autopilot, axis, parameters, loop_rate_hz=rate_hz, **options)  # type: ignore[arg-type]
+    loop = axis_loop(autopilot, axis, parameters, loop_rate_hz=rate_hz, **options)
     return loop.with_notes(notes)
 
 
@@ -125,6 +132,13 @@ def _chosen_parameters(log: Log, autopilot: str, axis: str, at_s: float | None) 
             action="pass at_s, on the autopilot's clock",
         )
     return log.parameters
+
+
+def _counted(log: Log, at_s: float | None) -> list[Span]:
+    """Where notches count: the sweeps, else what was flown, else the whole log."""
+    if at_s is None and log.sid_runs:
+        return [(run.start_s, run.stop_s) for run in log.sid_runs]
+    return list(flight_phases(log, find_actuators(log)).airborne) or [log_span(log)]
 
 
 def _loop_rate(log: Log, parameters: Mapping[str, float]) -> float | None:

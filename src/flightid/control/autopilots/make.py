@@ -8,6 +8,7 @@ from flightid.control.autopilots.arducopter import ArduCopterLoop, ArduHeliLoop
 from flightid.control.autopilots.arduplane import ArduPlaneLoop
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.autopilots.gyro_notches import ardupilot_notches, pid_notch, px4_notches
+from flightid.control.autopilots.notch_tracking import NotchTracking
 from flightid.control.autopilots.parameter_table import AXES, Axis, defaults, resolve
 from flightid.control.autopilots.px4_loop import Px4FixedWingLoop, Px4MulticopterLoop
 from flightid.errors import OptionError
@@ -26,6 +27,7 @@ def axis_loop(
     computation_delay_s: float = 0.0,
     airspeed_scale: float = 1.0,
     eas2tas: float = 1.0,
+    notch_tracking: NotchTracking | None = None,
 ) -> AxisLoop:
     """Rate and angle controllers of one axis, exactly as an autopilot runs them.
 
@@ -48,6 +50,8 @@ def axis_loop(
         it already.
     airspeed_scale, eas2tas : float
         Scaling speed over airspeed, and true over equivalent airspeed (planes only).
+    notch_tracking : NotchTracking, optional
+        What notches that move followed; `axis_loop_of` reads it from a log.
 
     Raises
     ------
@@ -59,8 +63,8 @@ def axis_loop(
     Assumes
     -------
     Small signals for `feedback` and `forward`: no limit, no slew limiter at work, P and D not
-    scaled by throttle (ATC_THR_G_BOOST). Notches that move in flight are left out and named in
-    `unmodelled`.
+    scaled by throttle (ATC_THR_G_BOOST). Notches that move in flight stand where `notch_tracking`
+    has them; without it they are left out and named in `unknown_notches`.
 
     Reference
     ---------
@@ -87,14 +91,14 @@ def axis_loop(
     kept: Axis = AXES[AXES.index(axis)]
     shared = (kept, found.values, found.names, rate_hz, gyro_hz, computation_delay_s)
     if autopilot.startswith("px4"):
-        notches, moving = px4_notches(known, gyro_hz)
-        rest = (notches, found.assumed, moving)
+        notches = px4_notches(known, gyro_hz, notch_tracking, AXES.index(kept))
+        rest = (notches.sections, notches.unknown, found.assumed, ())
         if autopilot == "px4_fixed_wing":
             return Px4FixedWingLoop(*shared, *rest, airspeed_scale=airspeed_scale)
         old = found.names["k"] in found.assumed
         return Px4MulticopterLoop(*shared, *rest, old=old)
-    notches, moving = ardupilot_notches(known, gyro_hz)
-    rest = (notches, found.assumed, moving)
+    notches = ardupilot_notches(known, gyro_hz, notch_tracking)
+    rest = (notches.sections, notches.unknown, found.assumed, ())
     pair = (pid_notch(known, found.values["ntf"]), pid_notch(known, found.values["nef"]))
     if autopilot == "arduplane":
         return ArduPlaneLoop(*shared, *rest, *pair, airspeed_scale=airspeed_scale, eas2tas=eas2tas)

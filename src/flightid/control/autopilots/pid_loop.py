@@ -9,20 +9,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flightid.control.autopilots.axis_loop import (
-    AxisLoop,
-    Gyro,
-    LoopFlags,
-    LoopRun,
-    samples,
-)
+from flightid.control.autopilots.axis_loop import AxisLoop, Gyro, samples
 from flightid.control.autopilots.filters import (
     Omega,
     Response,
-    Section,
     difference_response,
     one_pole_response,
 )
+from flightid.control.autopilots.loop_run import LoopFlags, LoopRun
 from flightid.control.autopilots.parameter_table import GainRange
 from flightid.table import Column, Table
 
@@ -235,9 +229,6 @@ class PidLoop(AxisLoop):
         corner = 1.0 / (2.0 * np.pi * lag) if lag else 0.0
         pole = one_pole_response(corner, omega, self.loop_rate_hz)
         return difference_response(omega, self.loop_rate_hz) * pole
-
-    def _gyro_sections(self) -> tuple[Section, ...]:
-        return ()
 
     def _tables(self) -> tuple[Table, ...]:
         return (self.summary(), self.form_table())

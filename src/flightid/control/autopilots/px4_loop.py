@@ -9,15 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flightid import _native
-from flightid.control.autopilots.axis_loop import AxisLoop, Gyro, LoopFlags, LoopRun, samples
+from flightid.control.autopilots.axis_loop import AxisLoop, Gyro, samples
+from flightid.control.autopilots.filter_stages import FilterStage, pole_stage
 from flightid.control.autopilots.filters import (
     Omega,
     Response,
-    Section,
     delay_operator,
     difference_response,
     one_pole_response,
 )
+from flightid.control.autopilots.loop_run import LoopFlags, LoopRun
 from flightid.errors import OptionError, ShapeError
 
 
@@ -49,9 +50,15 @@ class Px4Loop(AxisLoop):
     def _output_cutoff_hz(self) -> float:
         return self.values.get("output_cutoff", 0.0)
 
-    def _gyro_sections(self) -> tuple[Section, ...]:
-        low_pass = _native.gyro_low_pass_section(self.gyro_rate_hz, self.values["gyro_filter"])
-        return self.gyro_notches + ((low_pass,) if low_pass else ())
+    def _stages(self) -> tuple[FilterStage, ...]:
+        slope = 0.0 if self.old else self._derivative_cutoff_hz
+        name = self.names["derivative_filter"]
+        output = self.names.get("output_cutoff", "output")
+        return (
+            *self._gyro_stages(),
+            pole_stage(name, slope, "derivative", self.gyro_rate_hz),
+            pole_stage(output, self._output_cutoff_hz, "output", self.loop_rate_hz),
+        )
 
     def _output_response(self, omega: Omega) -> Response:
         return one_pole_response(self._output_cutoff_hz, omega, self.loop_rate_hz)

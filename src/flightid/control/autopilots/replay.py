@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots.ardupilot_loop import ArduPilotLoop
-from flightid.control.autopilots.axis_loop import AxisLoop, LoopFlags, LoopRun, LoopState
+from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.autopilots.from_log import axis_loop_of
+from flightid.control.autopilots.loop_run import LoopFlags, LoopRun, LoopState
 from flightid.control.autopilots.replay_findings import Circumstances, replay_findings
 from flightid.control.autopilots.replay_result import Replay, compare
 from flightid.control.autopilots.replay_signals import (

@@ -45,7 +45,10 @@ def replay_findings(terms: tuple[TermReplay, ...], c: Circumstances) -> tuple[Fi
     found = [verdict, *_per_row(c), *_lags(c)]
     if verdict.light != Light.GREEN:
         found += [*_scales(c), *_rate(c), *_limits(c), *_changes(c), *_rest(c)]
-        found += [Finding("unmodelled", Light.UNKNOWN, text) for text in c.loop.unmodelled]
+        found += [
+            Finding("unmodelled", Light.UNKNOWN, text)
+            for text in c.loop.unmodelled + c.loop.unknown_notches
+        ]
     found += _source(c)
     return tuple(found)
 

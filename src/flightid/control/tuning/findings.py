@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.control.autopilots import AxisLoop
+from flightid.control.autopilots.axis_loop import Gyro
 from flightid.control.margins.findings import COHERENCE
 from flightid.control.tuning.axis_tuning import AxisResult
 from flightid.control.tuning.gain_search import INTEGRAL
@@ -71,6 +72,7 @@ def remarks(
     changes: Sequence[TunedGain],
     stages: Sequence[Stage],
     couplings: Sequence[str],
+    gyro: Gyro,
 ) -> Iterator[Finding]:
     """What else is to be known.
 
@@ -82,6 +84,8 @@ def remarks(
     changes, stages : sequence of TunedGain and of Stage
     couplings : sequence of str
         Other rates of the model that no loop of the design closes.
+    gyro : {"raw", "filtered"}
+        Which rate the plants end at; those of the filtered rate hold the notches that flew.
     """
     held = result.flown_stable
     if held is None:
@@ -143,7 +147,7 @@ def remarks(
             Light.AMBER,
             "feed-forward is kept as flown: it moves no margin, but it does move the step",
         )
-    for text in flown.unmodelled:
+    for text in flown.unmodelled + (flown.unknown_notches if gyro == "raw" else ()):
         yield Finding("unmodelled", Light.AMBER, text)
 
 

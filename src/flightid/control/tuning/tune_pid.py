@@ -273,7 +273,7 @@ def design_of(
         result.problem,
         (
             verdict(result, drawn if known else 0),
-            *remarks(result, flown, changes, stages, couplings),
+            *remarks(result, flown, changes, stages, couplings, setting.gyro),
             *low_coherence(result, setting.coherence_of(place)),
             *beyond_findings(result.beyond, setting.evidence.band_rad_s),
             *setting.evidence.findings,

@@ -1,0 +1,82 @@
+"""What a controller's recursion starts from, looks at, and computes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Samples = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LoopState:
+    """State of a controller after a loop, in the units of its inside.
+
+    Attributes
+    ----------
+    target, error : float
+        Filtered target and error, rad/s (planes: times the square of the airspeed scaling).
+    derivative : float
+        Filtered derivative of the error, rad/s² (PX4 does not keep it).
+    integrator : float
+        Integrator.
+    rate : float
+        Filtered rate, rad/s, which PX4's old controller differences.
+    """
+
+    target: float = 0.0
+    error: float = 0.0
+    derivative: float = 0.0
+    integrator: float = 0.0
+    rate: float = 0.0
+
+
+@dataclass(frozen=True)
+class LoopFlags:
+    """What else than set-point and rate a loop looks at; left out: false, and full thrust.
+
+    Attributes
+    ----------
+    limited : ndarray of bool, shape (n,) or (n, 2)
+        The actuators cannot give more: in both directions, or (PX4) upwards and downwards.
+    landed : ndarray of bool, shape (n,)
+        On the ground; PX4 then does not integrate.
+    thrust : ndarray, shape (n,)
+        Thrust set-point 0…1; PX4's controller until 2017 integrates only with thrust.
+    acceleration : ndarray, shape (n,)
+        Filtered angular acceleration, rad/s², as PX4 logs it; left out: made from the rate.
+    start : LoopState
+        State of the loop before the first sample; left out: at rest.
+    """
+
+    limited: NDArray[np.bool_] | None = None
+    landed: NDArray[np.bool_] | None = None
+    thrust: Samples | None = None
+    acceleration: Samples | None = None
+    start: LoopState | None = None
+
+
+@dataclass(frozen=True)
+class LoopRun:
+    """What a controller computed from set-point and rate.
+
+    Attributes
+    ----------
+    output : ndarray, shape (n,)
+        Sum of all terms, in `AxisLoop.output_unit`.
+    terms : mapping of str to ndarray
+        ``P``, ``I``, ``D``, ``FF`` and what else the autopilot has, under its log's names.
+    rate : ndarray, shape (n,)
+        Filtered rate that the controller took, rad/s.
+    """
+
+    output: Samples
+    terms: Mapping[str, Samples]
+    rate: Samples
+
+    def __repr__(self) -> str:
+        """Length and terms on one line."""
+        return f"LoopRun({self.output.size} loops, terms {', '.join(self.terms)})"
