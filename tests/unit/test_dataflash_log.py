@@ -94,8 +94,10 @@ def test_a_file_that_has_become_shorter_is_refused(tmp_path: Path) -> None:
     log = fid.read_log(path)
     with path.open("r+b") as file:
         file.truncate(5000)
-    with pytest.raises(LogFormatError, match="the log changed while it was read"):
-        log.table("IMU")["GyrX"]
+    # Where the pages are gone the read itself meets it; what is left of the last page is zeros.
+    for _ in range(2):
+        with pytest.raises(LogFormatError, match="the log changed while it was read"):
+            log.table("IMU")["GyrX"]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="named pipes are of Unix")

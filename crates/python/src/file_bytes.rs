@@ -1,20 +1,24 @@
-//! The bytes of a log file: mapped where the system can, else read.
+//! The bytes of a log file: mapped where the system can and can survive a cut, else read.
 
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use memmap2::{Mmap, MmapOptions};
 use pyo3::prelude::*;
 
-use flightid_logs::LogError;
-
-use crate::error::from_logs;
+#[cfg(unix)]
+use {
+    crate::error::from_logs,
+    crate::taken_pages::Watch,
+    flightid_logs::LogError,
+    memmap2::{Mmap, MmapOptions},
+};
 
 /// Bytes that stay as they are as long as nobody writes to the file.
 pub enum FileBytes {
     /// Pages of the file itself, and the file, to ask for its size.
-    Mapped(Mmap, File),
+    #[cfg(unix)]
+    Mapped(Watch, Mmap, File),
     /// A copy.
     Owned(Vec<u8>),
 }
@@ -23,22 +27,26 @@ impl FileBytes {
     /// Map a file; what cannot be mapped (a pipe, an empty file) is read.
     pub fn open(path: &Path) -> std::io::Result<Self> {
         let mut file = File::open(path)?;
-        if let Some(map) = map(&file) {
-            return Ok(Self::Mapped(map, file));
+        #[cfg(unix)]
+        if let Some(map) = map(&file)
+            && let Some(watch) = Watch::over(&map)
+        {
+            return Ok(Self::Mapped(watch, map, file));
         }
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
         Ok(Self::Owned(bytes))
     }
 
-    /// Refuse to touch a mapping whose file has become shorter.
+    /// Refuse what was read of a mapping whose file has become shorter; call it after reading.
     ///
     /// # Errors
-    /// The end of the file lies before the end of the mapping.
+    /// The end of the file lies before the end of the mapping, or lay there while it was read.
     pub fn require_whole(&self) -> PyResult<()> {
-        if let Self::Mapped(map, file) = self {
+        #[cfg(unix)]
+        if let Self::Mapped(watch, map, file) = self {
             let size = file.metadata()?.len();
-            if size < map.len() as u64 {
+            if watch.is_cut() || size < map.len() as u64 {
                 return Err(from_logs(LogError::Changed { at: size }));
             }
         }
@@ -49,12 +57,14 @@ impl FileBytes {
 impl AsRef<[u8]> for FileBytes {
     fn as_ref(&self) -> &[u8] {
         match self {
-            Self::Mapped(map, _) => map,
+            #[cfg(unix)]
+            Self::Mapped(_, map, _) => map,
             Self::Owned(bytes) => bytes,
         }
     }
 }
 
+#[cfg(unix)]
 fn map(file: &File) -> Option<Mmap> {
     let kind = file.metadata().ok()?;
     if !kind.is_file() || kind.len() == 0 {
@@ -64,8 +74,8 @@ fn map(file: &File) -> Option<Mmap> {
     // others. A process that writes to the file while we read changes the bytes under a shared
     // slice, which Rust does not allow; the readers take nothing from the bytes on trust (every
     // access is checked, no invariant outlives a read), so what comes of it are other numbers. A
-    // process that shortens the file takes pages away: reading them ends this process with SIGBUS.
-    // `require_whole` turns that into an error where the file was cut before a call; a cut during a
-    // call remains. Files that are replaced (written aside and renamed) are not affected.
+    // process that shortens the file takes pages away: `Watch` puts zeros in their place and
+    // `require_whole` makes an error of that. Files that are replaced (written aside and renamed)
+    // are not affected.
     unsafe { MmapOptions::new().populate().map(file) }.ok()
 }

@@ -13,6 +13,8 @@ pub mod interrupt;
 pub mod logs;
 pub mod models;
 pub mod simulation;
+#[cfg(unix)]
+pub mod taken_pages;
 pub mod vehicles;
 
 /// version() -> str

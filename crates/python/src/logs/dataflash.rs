@@ -23,7 +23,7 @@ struct DataflashFile(Dataflash<FileBytes>);
 
 /// open_dataflash(path: str) -> DataflashFile
 ///
-/// Map and index a log. The file must not be shortened while it is in use.
+/// Map and index a log. Of a file that is shortened while it is in use every reading fails.
 #[pyfunction]
 fn open_dataflash(py: Python<'_>, path: PathBuf) -> PyResult<DataflashFile> {
     let bytes = py.detach(|| FileBytes::open(&path))?;
@@ -39,13 +39,21 @@ fn index_dataflash(py: Python<'_>, data: &[u8]) -> PyResult<DataflashFile> {
 }
 
 fn index(py: Python<'_>, bytes: FileBytes) -> PyResult<DataflashFile> {
-    py.detach(|| Dataflash::open(bytes)).map(DataflashFile).map_err(from_logs)
+    let log = py.detach(|| Dataflash::open(bytes));
+    let log = log.map(DataflashFile).map_err(from_logs)?;
+    log.0.source().require_whole()?;
+    Ok(log)
 }
 
 impl DataflashFile {
-    /// Every reading of rows comes through here.
-    fn table_at(&self, table: usize) -> PyResult<&Table> {
+    /// Every reading of rows comes through here: what was read of a file that was cut is refused.
+    fn read<T: Send>(&self, py: Python<'_>, work: impl Send + FnOnce() -> T) -> PyResult<T> {
+        let made = py.detach(work);
         self.0.source().require_whole()?;
+        Ok(made)
+    }
+
+    fn table_at(&self, table: usize) -> PyResult<&Table> {
         self.0.tables().get(table).ok_or_else(|| missing("table", table))
     }
 
@@ -85,11 +93,11 @@ impl DataflashFile {
     /// Instances of a table, and its first stamp, last stamp and median step in s.
     fn describe(&self, py: Python<'_>, table: usize) -> PyResult<Description> {
         let table = self.table_at(table)?;
-        Ok(py.detach(|| {
+        self.read(py, || {
             let instances = self.0.instances(table);
             let stamps = self.0.describe(table, &instances);
             (instances, stamps.map(|found| (found.first_s, found.last_s, found.interval_s)))
-        }))
+        })
     }
 
     /// skipped(self) -> list[tuple[int, int, str]]
@@ -113,7 +121,7 @@ impl DataflashFile {
     #[pyo3(signature = (table, instance))]
     fn rows(&self, py: Python<'_>, table: usize, instance: Option<i64>) -> PyResult<usize> {
         let table = self.table_at(table)?;
-        Ok(py.detach(|| self.0.rows(table, instance)))
+        self.read(py, || self.0.rows(table, instance))
     }
 
     /// numbers(self, table: int, field: int, instance: int | None) -> NDArray[np.float64]
@@ -128,7 +136,7 @@ impl DataflashFile {
         instance: Option<i64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let (table, field) = self.field_at(table, field)?;
-        Ok(py.detach(|| self.0.numbers(table, field, instance)).into_pyarray(py))
+        Ok(self.read(py, || self.0.numbers(table, field, instance))?.into_pyarray(py))
     }
 
     /// columns(self, table: int, fields: list[int], instance: int | None) -> list[NDArray[np.float64]]
@@ -145,7 +153,7 @@ impl DataflashFile {
         let field_at = |field| self.field_at(table, field).map(|(_, field)| field);
         let fields: Vec<&Field> = fields.into_iter().map(field_at).collect::<PyResult<_>>()?;
         let table = self.table_at(table)?;
-        let columns = py.detach(|| self.0.columns(table, &fields, instance));
+        let columns = self.read(py, || self.0.columns(table, &fields, instance))?;
         Ok(columns.into_iter().map(|values| values.into_pyarray(py)).collect())
     }
 
@@ -160,7 +168,7 @@ impl DataflashFile {
         instance: Option<i64>,
     ) -> PyResult<Option<Bound<'py, PyArray1<f64>>>> {
         let table = self.table_at(table)?;
-        let stamps = py.detach(|| self.0.stamps(table, instance));
+        let stamps = self.read(py, || self.0.stamps(table, instance))?;
         Ok(stamps.map(|values| values.into_pyarray(py)))
     }
 
@@ -176,7 +184,7 @@ impl DataflashFile {
         instance: Option<i64>,
     ) -> PyResult<Vec<String>> {
         let (table, field) = self.field_at(table, field)?;
-        Ok(py.detach(|| self.0.texts(table, field, instance)))
+        self.read(py, || self.0.texts(table, field, instance))
     }
 }
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from flightid.errors import FileFormatError
 from flightid.reading import decoding, require_memory
 from flightid.record.formats.columns import VALUE_BYTES
+from flightid.record.formats.hdf5_heaps import require_sound_heaps
 
 MAXIMUM_OBJECTS = 100_000
 DEEPEST = 16
@@ -30,6 +31,7 @@ def plain_datasets(path: Path) -> Iterator[Mapping[str, h5py.Dataset]]:
     FileFormatError
         The file is damaged, or holds too many objects or samples.
     """
+    require_sound_heaps(path)
     with decoding(path.name, WHOLE):
         file = h5py.File(path, "r")
     with file:
