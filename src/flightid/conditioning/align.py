@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
@@ -173,7 +173,7 @@ def estimate_skew(
             "search range twice",
             action="give window_s or largest_s, or take a longer record",
         )
-    first, second = (signal.detrend(record[name]) for name in (reference, channel))
+    first, second = (scipy.signal.detrend(record[name]) for name in (reference, channel))
     for name, values in ((reference, first), (channel, second)):
         if not np.std(values) > 0:
             raise DataError(f"channel {name!r} does not move", needed="a varying signal")
@@ -209,7 +209,7 @@ def _coarse(
     first: NDArray[np.float64], second: NDArray[np.float64], largest: int
 ) -> tuple[float, float]:
     """Whole samples of lag, and the sign of the relation."""
-    correlation = signal.correlate(second, first, mode="full", method="fft")
+    correlation = scipy.signal.correlate(second, first, mode="full", method="fft")
     middle = first.size - 1
     near = correlation[middle - largest : middle + largest + 1]
     best = int(np.argmax(np.abs(near)))
@@ -260,7 +260,7 @@ def _phase_slope(
 def _spectrum(
     first: NDArray[np.float64], second: NDArray[np.float64], length: int
 ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
-    frequency, density = signal.csd(
+    frequency, density = scipy.signal.csd(
         first,
         second,
         fs=1.0,

@@ -8,8 +8,8 @@ from enum import StrEnum
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import signal
 
 from flightid.conditioning.detrend import chosen_channels
 from flightid.errors import DataError, OptionError
@@ -41,18 +41,18 @@ class _Filter:
 
     def apply(self, values: NDArray[np.float64], *, zero_phase: bool) -> NDArray[np.float64]:
         if self.sections is not None and zero_phase:
-            return np.asarray(signal.sosfiltfilt(self.sections, values))
+            return np.asarray(scipy.signal.sosfiltfilt(self.sections, values))
         if self.sections is not None:
             # Start in the steady state of the first sample: a filter at rest would ring.
-            state = signal.sosfilt_zi(self.sections) * values[0]
-            return np.asarray(signal.sosfilt(self.sections, values, zi=state)[0])
+            state = scipy.signal.sosfilt_zi(self.sections) * values[0]
+            return np.asarray(scipy.signal.sosfilt(self.sections, values, zi=state)[0])
         taps = np.asarray(self.taps)
         half = (taps.size - 1) // 2
         if zero_phase:
             padded = np.pad(values, half, mode="reflect", reflect_type="odd")
-            return np.asarray(signal.oaconvolve(padded, taps, mode="valid"))
+            return np.asarray(scipy.signal.oaconvolve(padded, taps, mode="valid"))
         padded = np.concatenate([np.full(taps.size - 1, values[0]), values])
-        return np.asarray(signal.oaconvolve(padded, taps, mode="valid"))
+        return np.asarray(scipy.signal.oaconvolve(padded, taps, mode="valid"))
 
     def delay_samples(self, frequency: float) -> float:
         """Group delay at a frequency in cycles per sample."""
@@ -60,7 +60,7 @@ class _Filter:
             return (self.taps.size - 1) / 2
         total = 0.0
         for section in np.asarray(self.sections):
-            _, delay = signal.group_delay((section[:3], section[3:]), [2 * np.pi * frequency])
+            _, delay = scipy.signal.group_delay((section[:3], section[3:]), [2 * np.pi * frequency])
             total += float(delay[0])
         return total
 
@@ -185,13 +185,13 @@ def _design(
     if kind is FilterDesign.BUTTERWORTH:
         if not 1 <= order <= 12:
             raise OptionError("order is out of range", found=order, needed="1 to 12")
-        made = signal.butter(
+        made = scipy.signal.butter(
             order, edges if n_edges == 2 else edges[0], band, fs=rate_hz, output="sos"
         )
         return _Filter(np.asarray(made), None)
     if order < 2 or order % 2:
         raise OptionError("order of an FIR filter is not even", found=order, needed="2, 4, 6, …")
-    taps = signal.firwin(order + 1, edges, pass_zero=band, fs=rate_hz)
+    taps = scipy.signal.firwin(order + 1, edges, pass_zero=band, fs=rate_hz)
     return _Filter(None, np.asarray(taps))
 
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from flightid._native import reconstruct_kinematics
 from flightid.conventions import STANDARD_GRAVITY_M_S2
@@ -77,7 +77,9 @@ class KinematicModel:
         table = np.zeros((2 * n - 1, len(INPUTS)))
         for column, name in enumerate(INPUTS):
             if name in self.inputs:
-                table[:, column] = CubicSpline(self.time_s, self.inputs[name])(fine)
+                table[:, column] = scipy.interpolate.CubicSpline(self.time_s, self.inputs[name])(
+                    fine
+                )
         return table
 
     def predict(self, theta: Sequence[float] | Array) -> KinematicOutputs:
@@ -156,9 +158,9 @@ class KinematicModel:
         drift = np.zeros_like(y)
         if delay is not None:
             late = self.time_s - delay
-            spline = CubicSpline(self.time_s, y)
+            spline = scipy.interpolate.CubicSpline(self.time_s, y)
             y, drift = spline(late), spline(late, 1)
-            slope = CubicSpline(self.time_s, slope, axis=0)(late)
+            slope = scipy.interpolate.CubicSpline(self.time_s, slope, axis=0)(late)
         gain = 1 + value.get(f"scale_{name}", 0.0)
         slope = gain * slope
         for kind, own in (("bias", 1.0), ("scale", y), ("delay", -gain * drift)):

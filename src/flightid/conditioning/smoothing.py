@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import fft, signal
 
 from flightid.conventions import Role
 from flightid.errors import DataError, OptionError
@@ -100,7 +100,7 @@ def local_derivative(
         raise DataError(
             "too few samples for a local derivative", found=samples.shape, needed=f"{window}"
         )
-    slope = signal.savgol_filter(
+    slope = scipy.signal.savgol_filter(
         samples, window, polyorder=2, deriv=1, delta=sample_time_s, mode="interp"
     )
     return np.asarray(slope, dtype=np.float64)
@@ -230,9 +230,9 @@ def fourier_smooth(
     weight = 1 / (1 + (frequency_hz / cutoff) ** 6)
     kept = weight * coefficients
     # A sine series and its derivative, a cosine series, back by the same transforms.
-    inside = fft.dst(kept, type=1) / 2
+    inside = scipy.fft.dst(kept, type=1) / 2
     cosines = np.concatenate(([0.0], kept * 2 * np.pi * frequency_hz, [0.0]))
-    slope = fft.dct(cosines, type=1) / 2 + (samples[-1] - samples[0]) / (
+    slope = scipy.fft.dct(cosines, type=1) / 2 + (samples[-1] - samples[0]) / (
         (count - 1) * sample_time_s
     )
     smooth = line + np.concatenate(([0.0], inside, [0.0]))
@@ -268,7 +268,7 @@ def _sines(
     """Line through the ends, coefficients of what is left, and the level of their upper half."""
     count = samples.size
     line = samples[0] + (samples[-1] - samples[0]) * (np.arange(count) / (count - 1))
-    coefficients = np.asarray(fft.dst((samples - line)[1:-1], type=1) / (count - 1))
+    coefficients = np.asarray(scipy.fft.dst((samples - line)[1:-1], type=1) / (count - 1))
     upper = coefficients[count // 2 :]
     return line, coefficients, float(np.median(upper**2)) / CHI_SQUARE_MEDIAN
 

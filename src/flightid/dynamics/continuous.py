@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import expm, logm, schur, solve_sylvester
 
 from flightid.errors import DataError, ModelError, OptionError
 from flightid.models import InnovationsModel
@@ -148,12 +148,14 @@ def _without_delays(
     a: Array, b: Array, c: Array, d: Array
 ) -> tuple[Array, Array, Array, Array, Array]:
     """The model without its poles at the origin, and the samples of delay of each input."""
-    solve: Any = schur
+    solve: Any = scipy.linalg.schur
     upper, turn, kept = solve(a, output="complex", sort=lambda z: abs(z) > AT_ORIGIN)
     n, m = a.shape[0], b.shape[1]
     if kept == n:
         return a, b, c, d, np.zeros(m)
-    split = solve_sylvester(upper[:kept, :kept], -upper[kept:, kept:], -upper[:kept, kept:])
+    split = scipy.linalg.solve_sylvester(
+        upper[:kept, :kept], -upper[kept:, kept:], -upper[:kept, kept:]
+    )
     to = np.vstack([np.hstack([np.eye(kept), -split]) @ turn.conj().T, turn.conj().T[kept:]])
     parked = (to @ b)[kept:]
     nilpotent = upper[kept:, kept:]
@@ -189,12 +191,12 @@ def _holds(a: Array, step: float) -> tuple[Array, Array, Array]:
     n = a.shape[0]
     eye, none = np.eye(n), np.zeros((n, n))
     chain = np.block([[a * step, eye * step, none], [none, none, eye], [none, none, none]])
-    made = expm(chain)
+    made = scipy.linalg.expm(chain)
     return made[:n, :n], made[:n, n : 2 * n], made[:n, 2 * n :]
 
 
 def _from_hold(a: Array, b: Array, c: Array, d: Array, step: float, hold: str) -> Four:
-    logarithm: Any = logm(a) if a.size else np.zeros(a.shape)
+    logarithm: Any = scipy.linalg.logm(a) if a.size else np.zeros(a.shape)
     rate = np.real(logarithm) / step
     phi, full, ramp = _holds(rate, step)
     if hold == "zero":

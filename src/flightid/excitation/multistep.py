@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq, minimize_scalar
 
 from flightid.errors import ShapeError
 from flightid.excitation.checks import require_not_negative, require_positive, whole_samples
@@ -301,15 +301,19 @@ def multistep_band(
     values = multistep_energy(grid, widths=widths, levels=levels, step_s=1.0)
     top = int(np.argmax(values))
     around = (grid[max(top - 1, 0)], grid[min(top + 1, grid.size - 1)])
-    found = minimize_scalar(lambda x: -energy(x), bounds=around, options={"xatol": 1e-10})
+    found = scipy.optimize.minimize_scalar(
+        lambda x: -energy(x), bounds=around, options={"xatol": 1e-10}
+    )
     peak = float(found.x) if top > 0 else 0.0
     half = 0.5 * energy(peak)
     below = np.flatnonzero(values[:top] < half)
     above = top + np.flatnonzero(values[top:] < half)
     low = 0.0
     if below.size:
-        low = brentq(lambda x: energy(x) - half, grid[below[-1]], grid[below[-1] + 1])
-    high = brentq(lambda x: energy(x) - half, grid[above[0] - 1], grid[above[0]])
+        low = scipy.optimize.brentq(
+            lambda x: energy(x) - half, grid[below[-1]], grid[below[-1] + 1]
+        )
+    high = scipy.optimize.brentq(lambda x: energy(x) - half, grid[above[0] - 1], grid[above[0]])
     return float(low) / step_s, peak / step_s, float(high) / step_s
 
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize
 
 NORMS = (4, 8, 16, 32, 64, 128)
 POINTS_PER_CYCLE = 8
@@ -103,7 +103,7 @@ def start_at_zero(lines: Lines, phases: NDArray[np.float64]) -> NDArray[np.float
     rising = np.flatnonzero((wave <= 0) & (np.roll(wave, -1) > 0))
     # A sum of harmonics without a mean changes sign: there is always one.
     start = int(rising[0])
-    turn = brentq(
+    turn = scipy.optimize.brentq(
         lambda at: lines.at(at, phases), start / count, (start + 1) / count, xtol=1e-16, rtol=1e-15
     )
     return np.asarray(phases + 2 * np.pi * lines.harmonics * turn)
@@ -112,7 +112,7 @@ def start_at_zero(lines: Lines, phases: NDArray[np.float64]) -> NDArray[np.float
 def _lower_peak(lines: Lines, phases: NDArray[np.float64]) -> NDArray[np.float64]:
     count = lines.fine()
     for order in NORMS:
-        found = minimize(
+        found = scipy.optimize.minimize(
             _log_norm,
             phases,
             args=(lines, order, count),

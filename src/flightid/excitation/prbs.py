@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import max_len_seq
 
 from flightid.errors import OptionError
 from flightid.excitation.checks import require_positive, whole_samples
@@ -82,7 +82,7 @@ def prbs(
             needed=f"order {LOWEST_ORDER} to {HIGHEST_ORDER}, one period and one input or more",
         )
     held = whole_samples(1 / clock_hz, sample_rate_hz, "one level at this clock")
-    sequence = 2.0 * max_len_seq(order)[0].astype(np.float64) - 1.0
+    sequence = 2.0 * scipy.signal.max_len_seq(order)[0].astype(np.float64) - 1.0
     length = sequence.size
     moved = [np.roll(sequence, (index * length) // len(names)) for index in range(len(names))]
     signals = amplitude * np.repeat(np.tile(np.array(moved), periods), held, axis=1)

@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from flightid import _native
 from flightid.errors import OptionError
@@ -266,4 +266,4 @@ def _coloured_noise(count: int, cutoff_rad: float, seed: int) -> NDArray[np.floa
     """First-order low-passed Gaussian noise of unit deviation; cutoff in rad per sample."""
     pole = math.exp(-cutoff_rad)
     white = np.random.default_rng(seed).standard_normal(count)
-    return np.asarray(math.sqrt(1 - pole**2) * lfilter([1.0], [1.0, -pole], white))
+    return np.asarray(math.sqrt(1 - pole**2) * scipy.signal.lfilter([1.0], [1.0, -pole], white))

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
 
 from flightid.errors import ModelError
 from flightid.excitation.checks import require_positive
@@ -134,7 +134,7 @@ class RateAxis(Options):
         self, signal: NDArray[np.float64], sample_time_s: float
     ) -> tuple[NDArray[np.float64], NDArray[np.complex128]]:
         silent = int(np.ceil((MEMORY * self.slowest_s() + self.delay_s) / sample_time_s))
-        total = next_fast_len(signal.size + silent, real=True)
+        total = scipy.fft.next_fast_len(signal.size + silent, real=True)
         total += total % 2
         omega = np.asarray(2 * np.pi * np.fft.rfftfreq(total, sample_time_s), dtype=np.float64)
         return omega, np.fft.rfft(signal, total)

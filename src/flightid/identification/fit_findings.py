@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 from flightid.conventions import Light
 from flightid.evidence.gather import CORRELATED, CRAMER_RAO, INSENSITIVE
@@ -71,7 +71,7 @@ class NoiseCost:
             return 0.0
         # A sum of squares of few independent parts: chi-square of the same mean and variance.
         scale = self.deviation**2 / (2.0 * self.mean)
-        return float(chdtrc(self.mean / scale, cost / scale))
+        return float(scipy.special.chdtrc(self.mean / scale, cost / scale))
 
 
 def judge_cost(

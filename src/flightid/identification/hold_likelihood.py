@@ -13,9 +13,8 @@ from dataclasses import dataclass, fields, replace
 from typing import Any, Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
 from flightid.errors import DataError
 from flightid.identification.fit import Fit
@@ -121,7 +120,7 @@ def _whitening(left: Sequence[Array]) -> list[Array]:
         lags = min(LAGS, *(row.size // LAGS for row in rows))
         own = np.array([sum(float(r[: r.size - k] @ r[k:]) for r in rows) for k in range(lags + 1)])
         own[0] = own[0] * (1.0 + RIDGE) + np.finfo(float).tiny
-        past = solve_toeplitz(own[:-1], own[1:]) if lags else np.empty(0)
+        past = scipy.linalg.solve_toeplitz(own[:-1], own[1:]) if lags else np.empty(0)
         found.append(np.concatenate([[1.0], -past]))
     return found
 
@@ -131,7 +130,10 @@ def _whitened(values: Array, filters: Sequence[Array] | None) -> Array:
     if filters is None:
         return values
     return np.stack(
-        [lfilter(f, [1.0], row, axis=0) for f, row in zip(filters, values, strict=True)]
+        [
+            scipy.signal.lfilter(f, [1.0], row, axis=0)
+            for f, row in zip(filters, values, strict=True)
+        ]
     )
 
 

@@ -12,9 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.optimize import minimize_scalar
 
 from flightid.conventions import Axis, Light
 from flightid.findings import Finding
@@ -186,7 +185,7 @@ def _check_axis(log: LogContents, run: SidRun, axis: Axis, loop_time_s: float) -
     rms = float(np.sqrt(np.mean(left**2)))
     if rms <= QUIET * float(np.std(signal)):
         return AxisCheck(axis, rms, 0.0, 0.0, 0.0, 0.0)
-    spline = CubicSpline(clock_s, signal)
+    spline = scipy.interpolate.CubicSpline(clock_s, signal)
     lag_s = _best_lag(left, at_s, spline, loop_time_s)
     correlation, gain = _projection(left, spline(at_s - lag_s))
     return AxisCheck(axis, rms, correlation, gain, lag_s, lag_s / loop_time_s)
@@ -209,7 +208,10 @@ def mixer_residual(
 
 
 def _best_lag(
-    left: NDArray[np.float64], at_s: NDArray[np.float64], spline: CubicSpline, loop_time_s: float
+    left: NDArray[np.float64],
+    at_s: NDArray[np.float64],
+    spline: scipy.interpolate.CubicSpline,
+    loop_time_s: float,
 ) -> float:
     """Delay with the largest correlation: a search over half loops, then a refinement."""
 
@@ -218,7 +220,7 @@ def _best_lag(
 
     grid = np.arange(LOOPS[0], LOOPS[1] + 0.25, 0.5)
     best = float(grid[np.argmin([loss(float(loops)) for loops in grid])])
-    found = minimize_scalar(loss, bounds=(best - 0.5, best + 0.5), method="bounded")
+    found = scipy.optimize.minimize_scalar(loss, bounds=(best - 0.5, best + 0.5), method="bounded")
     return float(found.x) * loop_time_s
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.signal import StateSpace, dlti, lti
+import scipy
 
 from flightid.errors import ExportError, ModelError
 from flightid.models.linear.linear_system import LinearSystem
@@ -165,7 +165,7 @@ def to_scipy(
     pade_order: int | None = None,
     sample_time_s: float | None = None,
     hold: str = "zero",
-) -> StateSpace:
+) -> scipy.signal.StateSpace:
     """A model, fit or system as a state space of SciPy (``dlti`` where it is sampled).
 
     Parameters
@@ -200,7 +200,7 @@ def to_scipy(
 
 
 def from_scipy(
-    system: lti | dlti,
+    system: scipy.signal.lti | scipy.signal.dlti,
     *,
     inputs: Iterable[str],
     outputs: Iterable[str],
@@ -234,11 +234,11 @@ def from_scipy(
     >>> fid.from_scipy(scipy.signal.lti([3.0], [1.0, 5.0]), inputs=["u"], outputs=["p"])
     LinearSystem(1 state, inputs [u], outputs [p])
     """
-    if not isinstance(system, lti | dlti):
+    if not isinstance(system, scipy.signal.lti | scipy.signal.dlti):
         raise ModelError(
             "this is no linear system of SciPy", found=type(system).__name__, needed="lti or dlti"
         )
-    step = system.dt if isinstance(system, dlti) else None
+    step = system.dt if isinstance(system, scipy.signal.dlti) else None
     if step is True:
         raise ModelError(
             "a discrete system has no sample time", found="dt=True", needed="dt in seconds"

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.signal import lfilter
 
 from flightid.errors import DataError
 from flightid.identification.prediction_error.linear_regression import regress
@@ -72,7 +71,7 @@ class LoopDraws:
         """
         ones = np.ones(count)
         rows = zip(self.numerators, self.denominators, strict=True)
-        return np.array([lfilter(b, a, ones) for b, a in rows])
+        return np.array([scipy.signal.lfilter(b, a, ones) for b, a in rows])
 
     def response(self, omega_rad_s: Array) -> NDArray[np.complex128]:
         """Frequency responses, shape (1 + draws, n_omega)."""
@@ -179,7 +178,7 @@ def _predicted(
     driven = np.vstack([mean, drawn])
     left = wanted[:past] - driven @ triangle[:past, past:].T
     left[1:] += math.sqrt(variance) * random.standard_normal((DRAWS, past))
-    freely = solve_triangular(triangle[:past, :past], left.T).T
+    freely = scipy.linalg.solve_triangular(triangle[:past, :past], left.T).T
     freely[:, : lags[0]] *= -1.0
     return np.hstack([freely, driven])
 

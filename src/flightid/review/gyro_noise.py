@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
-from scipy.stats import chi2, spearmanr
 
 from flightid.inspection.signals import Signal, Span, find, inside
 from flightid.logs import Log
@@ -118,7 +117,7 @@ class GyroNoise(Result, schema="flightid.gyro_noise/1"):
         Bendat & Piersol, *Random Data*, 4th ed., eq. 8.159.
         """
         low, high = tails(shown(level))
-        above, below = (self.freedom / chi2.ppf(q, self.freedom) for q in (low, high))
+        above, below = (self.freedom / scipy.stats.chi2.ppf(q, self.freedom) for q in (low, high))
         return self.spectrum * below, self.spectrum * above
 
     def summary(self) -> Table:
@@ -229,7 +228,7 @@ def _peaks(frequency: Array, mean: Array, freedom: float) -> list[tuple[int, flo
     count = int(np.count_nonzero(inside_band))
     if count < 8:
         return []
-    limit = chi2.ppf(1.0 - FALSE_PEAKS / (3 * count), freedom) / freedom
+    limit = scipy.stats.chi2.ppf(1.0 - FALSE_PEAKS / (3 * count), freedom) / freedom
     found: list[tuple[int, float, float]] = []
     for axis, power in enumerate(mean):
         ratio = power / _floor(frequency, power)
@@ -254,7 +253,7 @@ def _floor(frequency: Array, power: Array) -> Array:
     grid = np.geomspace(frequency[0], frequency[-1], 400)
     level = np.interp(grid, frequency, np.log(np.maximum(power, np.finfo(float).tiny)))
     width = 2 * int(0.5 * np.log1p(FLOOR_WIDTH) / np.log(grid[1] / grid[0]) + 1.0) + 1
-    return np.asarray(np.exp(np.interp(frequency, grid, median_filter(level, width))))
+    return np.asarray(np.exp(np.interp(frequency, grid, scipy.ndimage.median_filter(level, width))))
 
 
 def _motor_hz(log: Log, spans: tuple[Span, ...]) -> tuple[float, float] | None:
@@ -288,7 +287,7 @@ def _source(
     if throttle.size < 12 or np.ptp(throttle) < 0.1 * np.mean(throttle) or near.sum() < 5:
         return ""
     tops = frequency[near][np.argmax(powers[:, near], axis=1)]
-    rank, chance = spearmanr(throttle, tops)
+    rank, chance = scipy.stats.spearmanr(throttle, tops)
     if np.isfinite(rank) and chance < FALSE_PEAKS:
         return MOVES if rank > 0.0 else FALLS
     still = np.ptp(tops) <= 4.0 * slack and np.ptp(throttle) > 0.3 * np.mean(throttle)

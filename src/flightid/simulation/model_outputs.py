@@ -11,9 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
-from scipy.linalg import expm, schur, solve_sylvester
 
 from flightid import _native
 from flightid.errors import ModelError
@@ -112,8 +111,8 @@ def split_modes(system: System, duration_s: float) -> list[ModeSubset]:
     edges = np.concatenate([[SLOW], between, [FAST]])
     widest = int(np.argmax(np.diff(edges)))
     parting = 0.5 * (edges[widest] + edges[widest + 1]) / duration_s
-    triangle, turn, n = schur(a, output="real", sort=lambda re, _: re <= parting)
-    cross = solve_sylvester(triangle[:n, :n], -triangle[n:, n:], -triangle[:n, n:])
+    triangle, turn, n = scipy.linalg.schur(a, output="real", sort=lambda re, _: re <= parting)
+    cross = scipy.linalg.solve_sylvester(triangle[:n, :n], -triangle[n:, n:], -triangle[:n, n:])
     to_modes, from_modes = turn.T.copy(), turn.copy()
     to_modes[:n] -= cross @ turn.T[n:]
     from_modes[:, n:] += turn[:, :n] @ cross
@@ -148,7 +147,9 @@ def between_samples(values: Array, hold: str) -> Array:
         return values
     n = values.shape[1]
     fine = np.arange(FINER * (n - 1) + 1) / FINER
-    spline = make_interp_spline(np.arange(n), values, k=min(SPLINE_DEGREE, n - 1), axis=1)
+    spline = scipy.interpolate.make_interp_spline(
+        np.arange(n), values, k=min(SPLINE_DEGREE, n - 1), axis=1
+    )
     dense = np.array(spline(fine))
     # Straight lines between points weaken ω by sinc²(ωT/2) = 1 − (ωT)²/12 + …: given back here.
     dense[:, 1:-1] -= np.diff(dense, 2, axis=1) / 12.0
@@ -206,7 +207,7 @@ def _free(modes: ModeSubset, n_samples: int, sample_time_s: float) -> Array:
     system = np.zeros((n + m, n + m))
     system[:n] = np.hstack([a, b])
     ahead = -sample_time_s if modes.backwards else sample_time_s
-    power = expm(ahead * system)
+    power = scipy.linalg.expm(ahead * system)
     rows, needed = np.hstack([c, d]), n_samples * len(c)
     with np.errstate(over="ignore", invalid="ignore"):  # who asks tells a run that explodes
         while len(rows) < needed:

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from flightid.errors import ModelError, OptionError, UnknownNameError
 from flightid.models import LinearModel, StateSpaceModel
@@ -186,7 +186,7 @@ def sampled_noise(a: Array, density: Array, sample_time_s: float) -> tuple[Array
     size = float(np.abs(a).sum(axis=1).max(initial=0.0)) * sample_time_s
     doublings = max(0, math.ceil(math.log2(size))) if size > 1.0 else 0
     step = sample_time_s / 2**doublings
-    made = expm(np.block([[-a, density], [np.zeros((n, n)), a.T]]) * step)
+    made = scipy.linalg.expm(np.block([[-a, density], [np.zeros((n, n)), a.T]]) * step)
     transition = np.asarray(made[n:, n:].T)
     covariance = np.asarray(transition @ made[:n, n:])
     for _ in range(doublings):

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import bdtrc
 
 from flightid.conventions import Light
 from flightid.findings import Finding
@@ -99,7 +99,7 @@ def recovered(inside: NDArray[np.bool_]) -> Finding:
     message = f"{inside.size - missed} of {inside.size} true values lie inside their 95 % intervals"
     if missed == 0:
         return Finding("truth-recovered", Light.GREEN, message + ".")
-    chance = float(bdtrc(missed - 1, inside.size, 0.05))
+    chance = float(scipy.special.bdtrc(missed - 1, inside.size, 0.05))
     message += f"; honest intervals miss as many in {100 * chance:.2g} % of flights."
     if chance > UNLIKELY:
         return Finding("truth-recovered", Light.GREEN, message)

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from flightid.conventions import Light
 from flightid.errors import FitError
@@ -322,7 +321,7 @@ def _inverse_root(triangle: Array) -> Array:
             needed="residuals that answer to each by itself",
             action="lower the orders, or leave out a channel that repeats another",
         )
-    return np.asarray(solve_triangular(triangle / size, np.eye(len(size))) / size[:, None])
+    return np.asarray(np.linalg.inv(np.triu(triangle / size)) / size[:, None])
 
 
 def _gain(beside: JointResiduals | None, blocks: Sequence[RecordBlock]) -> Array:

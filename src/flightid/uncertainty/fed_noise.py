@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from itertools import product
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 from flightid.uncertainty.feedback import LAGS, LEVEL, past, usable_order
 
@@ -105,7 +105,7 @@ def _fed(
         spread = inverse[np.ix_(places, places)] * float(left[:, i] @ left[:, i])
         spread /= max(len(left) - len(way), 1)
         height = float(way[places, i] @ np.linalg.pinv(spread, hermitian=True) @ way[places, i])
-        if chdtrc(LAGS + 1, height) < LEVEL / (n_in * n_out):
+        if scipy.special.chdtrc(LAGS + 1, height) < LEVEL / (n_in * n_out):
             found[i].append(o)
     return found
 

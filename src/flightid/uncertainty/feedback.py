@@ -20,9 +20,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
-from scipy.special import fdtrc
 
 from flightid.errors import OptionError
 from flightid.record.hold import LOOPS
@@ -271,7 +270,7 @@ def _shares(
         whole = max(float(fresh[:, k] @ fresh[:, k]), tiny)
         share = max(0.0, 1.0 - float(rest[:, k] @ rest[:, k]) / whole)
         f = share / n_moved / max((1.0 - share) / free, tiny)
-        found.append((share, float(fdtrc(n_moved, free, f))))
+        found.append((share, float(scipy.special.fdtrc(n_moved, free, f))))
     return found
 
 
@@ -298,7 +297,7 @@ def _shares_at_once(pairs: Sequence[tuple[Array, Array]], order: int) -> list[tu
     tiny = np.finfo(float).tiny
     f = np.maximum(gain, 0.0) / now.shape[1] / np.maximum(rest / free, tiny)
     is_new = fresh > SMALLEST_NOISE * np.sum(now_in**2, axis=0)
-    chance = np.where(is_new, fdtrc(now.shape[1], free, f), 1.0)
+    chance = np.where(is_new, scipy.special.fdtrc(now.shape[1], free, f), 1.0)
     shares = np.maximum(0.0, 1.0 - rest / np.maximum(fresh, tiny))
     return list(zip(shares.tolist(), chance.tolist(), strict=True))
 
@@ -307,6 +306,6 @@ def _left(known: Array, targets: Array) -> Array:
     """What least squares on the known columns leave of the targets."""
     size = np.maximum(np.sqrt(np.sum(known**2, axis=0)), np.finfo(float).tiny)
     columns = known / size
-    factor = linalg.cho_factor(columns.T @ columns + RIDGE * np.eye(columns.shape[1]))
-    weights = linalg.cho_solve(factor, columns.T @ targets)
+    factor = scipy.linalg.cho_factor(columns.T @ columns + RIDGE * np.eye(columns.shape[1]))
+    weights = scipy.linalg.cho_solve(factor, columns.T @ targets)
     return np.asarray(targets - columns @ weights)

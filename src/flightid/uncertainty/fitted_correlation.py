@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 from flightid.uncertainty.blocks import RecordBlock, levels
 from flightid.uncertainty.residual_noise import Autoregression
@@ -183,7 +183,7 @@ class FitResponse:
                 np.sqrt(np.maximum(np.diag(covariance), 0.0)) / scale,
                 statistic,
                 degrees,
-                float(chdtrc(degrees, statistic)),
+                float(scipy.special.chdtrc(degrees, statistic)),
                 min(max(share, 0.0), 1.0),
             )
         ]

@@ -10,8 +10,8 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft, linalg, signal
 
 from flightid.uncertainty.residual_correlation import SMALLEST_EIGENVALUE
 
@@ -48,7 +48,7 @@ def share_from_past(values: Array, n_samples: int) -> float:
     0.81
     """
     known = np.concatenate(([1.0], values[:-1]))
-    weights = linalg.lstsq(linalg.toeplitz(known), values)[0]
+    weights = scipy.linalg.lstsq(scipy.linalg.toeplitz(known), values)[0]
     return _within(float(values @ weights) - values.size / n_samples)
 
 
@@ -80,11 +80,11 @@ def share_from_inputs(values: Array, own: Array, covariance: Array, n_samples: i
     >>> round(share_from_inputs(np.array([0.5, 0.0]), white, white, 10_000), 3)
     0.25
     """
-    spread, directions = linalg.eigh(linalg.toeplitz(own[: values.size]))
+    spread, directions = scipy.linalg.eigh(scipy.linalg.toeplitz(own[: values.size]))
     kept = spread > SMALLEST_EIGENVALUE * spread[-1]
     along = directions[:, kept]
     found = (along.T @ values) ** 2
-    chance = np.sum(along * (linalg.toeplitz(covariance[: values.size]) @ along), axis=0)
+    chance = np.sum(along * (scipy.linalg.toeplitz(covariance[: values.size]) @ along), axis=0)
     return _within(float(np.sum((found - chance / n_samples) / spread[kept])))
 
 
@@ -147,11 +147,13 @@ def chance_share(row: Array) -> float:
     Example
     -------
     >>> white = np.random.default_rng(0).standard_normal(4000)
-    >>> smooth = signal.lfilter([1.0], np.poly([0.9, 0.9]), white)
+    >>> smooth = scipy.signal.lfilter([1.0], np.poly([0.9, 0.9]), white)
     >>> round(chance_share(white), 1), round(chance_share(smooth), 2)
     (0.9, 0.03)
     """
-    lags = signal.correlate(row, row, method="fft")[row.size - 1 :][: max(row.size // LONGEST, 2)]
+    lags = scipy.signal.correlate(row, row, method="fft")[row.size - 1 :][
+        : max(row.size // LONGEST, 2)
+    ]
     return 1.0 / (2.0 * float(lags @ lags) / float(lags[0]) ** 2 - 1.0) if lags[0] > 0.0 else 1.0
 
 
@@ -172,8 +174,8 @@ def independent_samples(rows: Sequence[Array]) -> float:
 
 def _independent(row: Array) -> float:
     n = row.size
-    power = np.abs(fft.rfft(row, fft.next_fast_len(2 * n, real=True))) ** 2
-    lags = fft.irfft(power, fft.next_fast_len(2 * n, real=True))[: n // 4 + 1]
+    power = np.abs(scipy.fft.rfft(row, scipy.fft.next_fast_len(2 * n, real=True))) ** 2
+    lags = scipy.fft.irfft(power, scipy.fft.next_fast_len(2 * n, real=True))[: n // 4 + 1]
     if not lags[0] > 0.0:
         return float(n)
     # What chance leaves of lags without correlation counts for none.

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc, fdtrc
 
 Array = NDArray[np.float64]
 LEAST_INFORMATION = 1e-6
@@ -114,7 +114,9 @@ def chance_alike(flights: Sequence[RecordParts], freedom: float) -> float | None
     # The level of the noise is an estimate too, and of as much freedom.
     share = max(square, 0.0) / degrees
     return float(
-        fdtrc(degrees, freedom, share) if np.isfinite(freedom) else chdtrc(degrees, share * degrees)
+        scipy.special.fdtrc(degrees, freedom, share)
+        if np.isfinite(freedom)
+        else scipy.special.chdtrc(degrees, share * degrees)
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-from scipy.special import ndtr, ndtri, stdtrit
+import scipy
 
 from flightid.errors import OptionError
 
@@ -95,10 +95,10 @@ def half_width(level: float = LEVEL, freedom: float | None = None) -> float:
     """
     upper = 0.5 + 0.5 * checked_level(level)
     if freedom is None or math.isinf(freedom):
-        return float(ndtri(upper))
+        return float(scipy.special.ndtri(upper))
     if not freedom > 0.0:
         raise OptionError("degrees of freedom must be positive", found=freedom, needed="above 0")
-    return float(stdtrit(freedom, upper))
+    return float(scipy.special.stdtrit(freedom, upper))
 
 
 def checked_level(level: float) -> float:
@@ -142,7 +142,7 @@ def two_sided_chance(deviations: float) -> float:
     >>> round(two_sided_chance(1.959964), 3)
     0.05
     """
-    return float(2.0 * ndtr(-abs(deviations)))
+    return float(2.0 * scipy.special.ndtr(-abs(deviations)))
 
 
 def interval_words(level: float) -> str:

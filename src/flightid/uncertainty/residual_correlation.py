@@ -7,9 +7,8 @@ two records, and all records count as one sample of their total length.
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft, linalg, signal
-from scipy.special import bdtr, chdtrc
 
 from flightid.errors import DataError, OptionError, ShapeError
 from flightid.uncertainty.quantiles import half_width
@@ -87,8 +86,10 @@ def cross_correlation(a: Series, b: Series, maximum_lag: int) -> Array:
         raise DataError("a series does not change", needed="a correlation needs variation")
     total = np.zeros(2 * maximum_lag + 1)
     for x, y in zip(first, second, strict=True):
-        length = fft.next_fast_len(x.size + maximum_lag, real=True)
-        ring = fft.irfft(np.conj(fft.rfft(x, length)) * fft.rfft(y, length), length)
+        length = scipy.fft.next_fast_len(x.size + maximum_lag, real=True)
+        ring = scipy.fft.irfft(
+            np.conj(scipy.fft.rfft(x, length)) * scipy.fft.rfft(y, length), length
+        )
         total += np.concatenate((ring[length - maximum_lag :], ring[: maximum_lag + 1]))
     return np.asarray(total / np.sqrt(power))
 
@@ -144,7 +145,7 @@ def lag_covariance(a: Series, b: Series, n_lags: int) -> Array:
     modelled = model.autocovariance(max(reach, LARGEST_ORDER) + 1)[: reach + 1]
     # Scaled by its own first value, so that a white b leaves the autocorrelation of a untouched.
     of_b = np.concatenate((modelled[:0:-1], modelled)) / modelled[0]
-    both = signal.fftconvolve(of_a, of_b)
+    both = scipy.signal.fftconvolve(of_a, of_b)
     middle = both.size // 2
     return np.asarray(both[middle : middle + n_lags])
 
@@ -178,7 +179,7 @@ def white_portmanteau(values: Array, n_samples: int, fitted: int) -> tuple[float
     weights = 1.0 / (n_samples - np.arange(1, values.size + 1))
     statistic = float(n_samples * (n_samples + 2) * (values**2 @ weights))
     degrees = values.size - fitted
-    return statistic, degrees, float(chdtrc(degrees, statistic))
+    return statistic, degrees, float(scipy.special.chdtrc(degrees, statistic))
 
 
 def independence_portmanteau(
@@ -216,12 +217,12 @@ def independence_portmanteau(
     >>> round(statistic, 9), degrees
     (1.0, 2)
     """
-    spread, directions = linalg.eigh(linalg.toeplitz(covariance[: values.size]))
+    spread, directions = scipy.linalg.eigh(scipy.linalg.toeplitz(covariance[: values.size]))
     kept = spread > SMALLEST_EIGENVALUE * spread[-1]
     along = directions[:, kept].T @ values
     statistic = float(n_samples * np.sum(along**2 / spread[kept]))
     degrees = int(np.count_nonzero(kept)) - fitted
-    return statistic, degrees, float(chdtrc(max(degrees, 1), statistic))
+    return statistic, degrees, float(scipy.special.chdtrc(max(degrees, 1), statistic))
 
 
 def pointwise_factor() -> float:
@@ -253,7 +254,9 @@ def exceedance_limit(n_lags: int) -> int:
     >>> exceedance_limit(25), exceedance_limit(51)
     (3, 5)
     """
-    return int(np.searchsorted(bdtr(np.arange(n_lags + 1), n_lags, 1.0 - LEVEL), LEVEL))
+    return int(
+        np.searchsorted(scipy.special.bdtr(np.arange(n_lags + 1), n_lags, 1.0 - LEVEL), LEVEL)
+    )
 
 
 def _power(series: Series) -> float:

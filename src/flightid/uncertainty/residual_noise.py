@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft, linalg, signal
 
 Array = NDArray[np.float64]
 LARGEST_ORDER = 20
@@ -59,8 +59,8 @@ class Autoregression:
         if order:
             # Beyond its order the model continues its autocovariance by its own recursion.
             denominator = np.concatenate(([1.0], -self.weights))
-            state = signal.lfiltic([1.0], denominator, y=result[order:0:-1])
-            result[order + 1 :] = signal.lfilter(
+            state = scipy.signal.lfiltic([1.0], denominator, y=result[order:0:-1])
+            result[order + 1 :] = scipy.signal.lfilter(
                 [1.0], denominator, np.zeros(n_lags - order - 1), zi=state
             )[0]
         return result
@@ -71,7 +71,7 @@ class Autoregression:
             return np.asarray(self.lags[0] * (columns.T @ columns))
         n = len(columns)
         length = _length(n)
-        spectrum = fft.rfft(_ring(self.autocovariance(n), length)).real
+        spectrum = scipy.fft.rfft(_ring(self.autocovariance(n), length)).real
         moved = _transform(columns, length)
         return np.asarray((moved * _both(_twice(length) * spectrum / length)) @ moved.T)
 
@@ -87,7 +87,7 @@ class Autoregression:
             innovation = float(self.lags[0] - self.weights @ self.lags[1 : order + 1])
             ones = np.ones(order)
             try:
-                known = float(linalg.solve_toeplitz(self.lags[:order], ones) @ ones)
+                known = float(scipy.linalg.solve_toeplitz(self.lags[:order], ones) @ ones)
             except np.linalg.LinAlgError:
                 return LEAST_FREEDOM
             short = (1.0 - float(self.weights.sum())) ** 2
@@ -100,7 +100,7 @@ class Autoregression:
         """Spectrum at the frequencies of `periodogram`."""
         order = self.weights.size
         innovation = max(float(self.lags[0] - self.weights @ self.lags[1 : order + 1]), 0.0)
-        gain = fft.rfft(np.concatenate(([1.0], -self.weights)), self.length)
+        gain = scipy.fft.rfft(np.concatenate(([1.0], -self.weights)), self.length)
         # A pole that rounding puts onto the circle: no line holds more than all power, by far.
         most = SHARPEST * self.length * max(float(self.lags[0]), np.finfo(float).tiny)
         least = max(innovation / most, np.finfo(float).tiny)
@@ -167,7 +167,7 @@ def _fitted(power: Array, n: int, length: int) -> Autoregression:
 def periodogram(columns: Array, length: int | None = None) -> Array:
     """Mean periodogram of columns (n, k), zero-padded to the next fast length from 2 n."""
     n = columns.shape[0]
-    transform = fft.rfft(columns, _length(n) if length is None else length, axis=0)
+    transform = scipy.fft.rfft(columns, _length(n) if length is None else length, axis=0)
     return np.asarray(np.mean(np.abs(transform) ** 2, axis=1) / n)
 
 
@@ -179,20 +179,20 @@ def pooled(records: Sequence[Array], length: int) -> Array:
 
 def _length(n: int) -> int:
     """Fast transform length with room for all lags of n samples."""
-    return int(fft.next_fast_len(2 * n, real=True))
+    return int(scipy.fft.next_fast_len(2 * n, real=True))
 
 
 def _leaking(spectrum: Array, lengths: Sequence[int], length: int) -> Array:
     """Mean periodogram of records with this spectrum: lag k is seen n - k times in n."""
     k = np.arange(max(lengths))
     seen = sum(np.maximum(n - k, 0) for n in lengths) / sum(lengths)
-    lags = fft.irfft(spectrum, length)[: k.size] * seen
-    return np.asarray(2 * fft.rfft(lags, length).real - lags[0])
+    lags = scipy.fft.irfft(spectrum, length)[: k.size] * seen
+    return np.asarray(2 * scipy.fft.rfft(lags, length).real - lags[0])
 
 
 def _lags(power: Array, length: int, largest: int) -> Array:
     """Autocovariance at lags 0 to `largest` from a zero-padded periodogram."""
-    return np.asarray(fft.irfft(power, length)[: largest + 1])
+    return np.asarray(scipy.fft.irfft(power, length)[: largest + 1])
 
 
 def _weights(sample: Array, n: int) -> tuple[Array, bool]:
@@ -313,8 +313,8 @@ def _lost(
             shaped = part * _both(spectrum)
             if model.weights.size:
                 # Noise ends with the record.
-                ended = fft.irfft(shaped.view(np.complex128), length)[:, :n]
-                shaped = fft.rfft(ended, length).view(np.float64)
+                ended = scipy.fft.irfft(shaped.view(np.complex128), length)[:, :n]
+                shaped = scipy.fft.rfft(ended, length).view(np.float64)
             power = np.einsum("kb,kb->b", 2.0 * shaped - each @ part, part)
             lost[o] += power[::2] + power[1::2]
     return lost / sum(lengths)
@@ -322,7 +322,7 @@ def _lost(
 
 def _transform(columns: Array, length: int) -> Array:
     """Transforms of columns (n, k), real and imaginary parts in turn: (k, 2 n_bins)."""
-    return np.asarray(fft.rfft(np.ascontiguousarray(columns.T), length).view(np.float64))
+    return np.asarray(scipy.fft.rfft(np.ascontiguousarray(columns.T), length).view(np.float64))
 
 
 def _both(weights: Array) -> Array:

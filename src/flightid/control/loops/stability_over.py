@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from flightid.control.loops.delayed_roots import count_right, line_right_of_axis, newton_root
 from flightid.control.loops.interconnection import Interconnection
@@ -30,7 +30,7 @@ def followed_poles(loops: Interconnection, known: Complex) -> Complex:
     if parts is None:
         poles = loops.poles()
         distance = np.abs(known[:, None] - poles[None, :])
-        rows, columns = linear_sum_assignment(distance)
+        rows, columns = scipy.optimize.linear_sum_assignment(distance)
         found = np.full(len(known), np.nan, dtype=np.complex128)
         found[rows] = poles[columns]
         return found

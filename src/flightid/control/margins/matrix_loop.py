@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import block_diag
 
 from flightid.control.margins.loop_grid import Roots, loop_grid, roots_of, whole_grid
 from flightid.control.margins.loop_source import (
@@ -211,7 +211,7 @@ def uncertain_at(loops: MatrixLoop, omega: Array) -> Uncertain[Any]:
         return Uncertain(centre, None, make, None, unknown)
     if chosen.errors is None:
         blocks = [np.asarray(part.covariance) for part in parts]
-        return Uncertain(centre, block_diag(*blocks), make, None, parts[0].reason)
+        return Uncertain(centre, scipy.linalg.block_diag(*blocks), make, None, parts[0].reason)
     rows = np.split(np.eye(len(centre)), len(parts), axis=1)
     points = [
         Points(k, np.arange(shape[1]), np.arange(shape[2])) for k in range(len(chosen.outputs))

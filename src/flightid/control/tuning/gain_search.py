@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, milp
 
 from flightid.control.tuning.limits import TARGET
 from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
@@ -347,10 +347,12 @@ def _linear_step(linear: Linear, low: Array, high: Array) -> Array | None:
         ]
     )
     # A mixed-integer problem without integers: the same solver as `linprog`, checked less often.
-    found = milp(
+    found = scipy.optimize.milp(
         np.concatenate([np.zeros(n), [-1.0, PENALTY]]),
         constraints=(above, -np.inf, np.concatenate([limits, levels])),
-        bounds=Bounds(np.append(low, [-np.inf, 0.0]), np.append(high, [np.inf, np.inf])),
+        bounds=scipy.optimize.Bounds(
+            np.append(low, [-np.inf, 0.0]), np.append(high, [np.inf, np.inf])
+        ),
     )
     return None if found.x is None else np.asarray(found.x[:n])
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from scipy.special import betaincinv
+import scipy
 
 from flightid.errors import OptionError
 
@@ -78,7 +78,7 @@ def least_share(good: int, count: int, confidence: float = CONFIDENCE) -> float:
         raise OptionError("counts do not fit", found=f"{good} of {count}", needed="0 to all")
     if good == 0:
         return 0.0
-    return float(betaincinv(good, count - good + 1, 1.0 - confidence))
+    return float(scipy.special.betaincinv(good, count - good + 1, 1.0 - confidence))
 
 
 def _require(count: int, confidence: float) -> None:

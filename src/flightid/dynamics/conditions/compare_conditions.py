@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from flightid.conventions import Light
 from flightid.dynamics.conditions.ratios import chance_of, holm, ratio_of
@@ -162,7 +162,7 @@ def _match(
     alone: dict[str, tuple[str, ...]] = {}
     for other in others:
         cost = np.array([[_distance(a, b) for b in other.modes] for a in base.modes])
-        rows, columns = linear_sum_assignment(cost)
+        rows, columns = scipy.optimize.linear_sum_assignment(cost)
         taken = set()
         for row, column in zip(map(int, rows), map(int, columns), strict=True):
             if cost[row, column] < FAR:

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from flightid.dynamics.derivatives.nondimensional import FORCES, MOMENTS, Normalisation
 from flightid.errors import ModelError, UnitError
@@ -294,7 +294,7 @@ def _owners(model: StateSpaceModel) -> list[str]:
     """State whose rate each equation gives, by the pattern of the left sides."""
     m = model.matrices().m
     cost = 1000.0 * (m == 0.0) + (1.0 - np.eye(len(m)))
-    _, columns = linear_sum_assignment(cost)
+    _, columns = scipy.optimize.linear_sum_assignment(cost)
     states = list(model.states)
     return [states[k] for k in columns]
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from flightid.dynamics.handling_qualities.branch import Branch, branch_of
 from flightid.errors import DataError, UnknownNameError
@@ -176,7 +176,9 @@ class GainPhaseCurve:
     def _between(self, place: int, part: int, level: float) -> float:
         left = float(self.omega[place])
         right = float(self.omega[min(place + 1, len(self.omega) - 1)])
-        return float(brentq(lambda at: self.at(at)[part] - level, left, right, xtol=1e-12))
+        return float(
+            scipy.optimize.brentq(lambda at: self.at(at)[part] - level, left, right, xtol=1e-12)
+        )
 
 
 def smoother_of(response: FrequencyResponse, pair: Pair) -> Array | None:

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
-from scipy.signal.windows import tukey
 
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
@@ -169,7 +168,7 @@ def _periodogram(record: Record, channel: str) -> _Periodogram:
     moved = values - values.mean()
     if not np.any(np.abs(moved) > 1e-12 * max(1e-300, float(np.max(np.abs(values))))):
         raise DataError(f"{channel} does not move", found="a constant", needed="a pilot's control")
-    taper = tukey(len(moved), TAPER)
+    taper = scipy.signal.windows.tukey(len(moved), TAPER)
     power = np.mean(taper**2)
     shaped = taper * (moved - np.sum(taper * moved) / np.sum(taper)) / np.sqrt(power)
     spectrum = power_spectrum(shaped[None], record.sample_time_s, (channel,), record.unit(channel))
@@ -223,7 +222,7 @@ def _relative_errors(
         inside = (part.omega >= omega[0]) & (part.omega <= omega[-1])
         squares = 0.5 * float(np.sum(part.density[inside] ** 2)) * part.step
         variance += (part.n_samples / total) ** 2 * part.variance_factor * part.step * squares
-    running = cumulative_trapezoid(density, omega, initial=0)
+    running = scipy.integrate.cumulative_trapezoid(density, omega, initial=0)
     low = max(cutoff / NEIGHBOURHOOD, float(omega[0]))
     high = min(cutoff * NEIGHBOURHOOD, float(omega[-1]))
     near = float(np.interp(high, omega, running) - np.interp(low, omega, running)) / (high - low)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eig, matrix_balance
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -140,10 +140,10 @@ def eigenpairs(a: Array, directions: Array | None = None) -> Iterator[Eigenpair]
     if not len(a):
         return
     # In balanced coordinates the units of the states do not decide what is small.
-    outcome: Any = matrix_balance(a, permute=False, separate=True)
+    outcome: Any = scipy.linalg.matrix_balance(a, permute=False, separate=True)
     balanced, scale = outcome[0], outcome[1][0]
     spread = None if directions is None else directions * (scale / scale[:, None])
-    solved: Any = eig(balanced, left=True, right=True)
+    solved: Any = scipy.linalg.eig(balanced, left=True, right=True)
     values, left, right = solved
     shifts = None if spread is None else _departures(balanced, values, left, right, spread)
     for place in np.lexsort((values.imag, -values.real)):

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import toeplitz
 
 from flightid.conventions import Light
 from flightid.errors import DataError, FitError, OptionError, SingularError
@@ -193,7 +193,7 @@ def excitation_order(row: Array, data: SampledChannels) -> int:
         part = row[span] - row[span].mean()
         for lag in range(size):
             sums[lag] += part[lag:] @ part[: part.size - lag]
-    values = np.linalg.eigvalsh(toeplitz(sums / row.size))
+    values = np.linalg.eigvalsh(scipy.linalg.toeplitz(sums / row.size))
     # A record's end leaks a share of 1/N into directions that the input itself does not excite.
     floor = max(SMALLEST_SHARE, 4.0 / row.size)
     return int(np.sum(values > floor * values[-1]))

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.signal import lfilter
-from scipy.stats import f as f_distribution
 
 from flightid.identification.prediction_error.linear_regression import reflected, regress
 from flightid.models.sampled.channels import SampledChannels, gather_channels
@@ -204,7 +203,7 @@ class _ArxScan:
         if whole <= 0.0 or free < 1:
             return without > whole
         ratio = (without - whole) / self.span / (whole / free)
-        return float(f_distribution.sf(ratio, self.span, free)) < LEVEL / self.n_inputs
+        return float(scipy.stats.f.sf(ratio, self.span, free)) < LEVEL / self.n_inputs
 
     def best(self, place: int) -> int:
         """Delay of the best structure, the other inputs with all their lags."""
@@ -254,7 +253,9 @@ class _Signals:
         """Every channel of every record through one filter."""
         rows = np.vstack([self.output, self.inputs])
         with np.errstate(over="ignore", invalid="ignore"):
-            made = np.hstack([lfilter(top, below, rows[:, span]) for span in self.spans])
+            made = np.hstack(
+                [scipy.signal.lfilter(top, below, rows[:, span]) for span in self.spans]
+            )
         return _Signals(made[0], made[1:], self.lengths, self.levels)
 
 

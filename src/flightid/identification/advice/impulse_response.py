@@ -7,9 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
-from scipy.special import chdtrc
 
 from flightid.errors import DataError, OptionError
 from flightid.identification.advice.delays import InputDelay, find_delays
@@ -213,7 +212,7 @@ def impulse_response(
     Example
     -------
     >>> u = np.random.default_rng(0).standard_normal(800)
-    >>> y = lfilter([0.0, 0.0, 0.0, 1.0], [1.0, -0.7], u)
+    >>> y = scipy.signal.lfilter([0.0, 0.0, 0.0, 1.0], [1.0, -0.7], u)
     >>> y += 0.1 * np.random.default_rng(1).standard_normal(800)
     >>> record = Record.from_arrays(np.arange(800) / 50, inputs={"u": u}, outputs={"y": y})
     >>> impulse_response(record).delays
@@ -313,7 +312,7 @@ def _ends(values: Array, covariance: Array, count: int) -> bool:
 def _chance(values: Array, covariance: Array) -> float:
     """Probability of values as large, if they are zero."""
     inverse = np.linalg.pinv(covariance, hermitian=True)
-    return float(chdtrc(values.size, float(values @ inverse @ values)))
+    return float(scipy.special.chdtrc(values.size, float(values @ inverse @ values)))
 
 
 def _require(names: tuple[str, ...], n_lags: int, negative_lags: int, kernel: str | None) -> None:
@@ -349,7 +348,7 @@ def _estimate(
     left, start = np.array(data.output), first.shortest
     for i, row in enumerate(data.inputs):
         for span in data.spans:
-            left[span] -= lfilter(start[i * n : (i + 1) * n], [1.0], row[span])
+            left[span] -= scipy.signal.lfilter(start[i * n : (i + 1) * n], [1.0], row[span])
     inside = np.concatenate([left[span][n - 1 :] for span in data.spans])
     lengths = [length - n + 1 for length in data.lengths]
     noise = regress(
@@ -358,7 +357,7 @@ def _estimate(
     whitener = np.concatenate([[1.0], noise])
     signals = np.vstack([data.output, data.inputs])
     for span in data.spans:
-        signals[:, span] = lfilter(whitener, [1.0], signals[:, span])
+        signals[:, span] = scipy.signal.lfilter(whitener, [1.0], signals[:, span])
     final = regress_lags(
         signals[0], signals[1:], data.lengths, n, n - 1 + WHITENER, levels=data.levels
     )

@@ -8,8 +8,8 @@ from functools import cached_property
 from itertools import groupby
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from flightid.errors import FitError
 from flightid.identification.fit_findings import APPROXIMATE, UNKNOWN
@@ -225,4 +225,4 @@ def coherence_sensitivity(
             )
             start += size
         blocks.append(block)
-    return np.asarray(block_diag(*blocks))
+    return np.asarray(scipy.linalg.block_diag(*blocks))

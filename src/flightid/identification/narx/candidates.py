@@ -9,8 +9,8 @@ from itertools import combinations_with_replacement, product
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.cluster.vq import kmeans2
 
 from flightid.errors import FitError, OptionError
 from flightid.models.narx.structure import NarxStructure
@@ -123,5 +123,7 @@ def _clusters(regressors: Array, count: int, seed: int) -> Array:
     generator = np.random.default_rng(seed)
     # Spread-out first centres take a time with the square of their number.
     first: Literal["++", "points"] = "++" if count <= SPREAD_OUT else "points"
-    centres, label = kmeans2(some, count, iter=ITERATIONS, minit=first, rng=generator)
+    centres, label = scipy.cluster.vq.kmeans2(
+        some, count, iter=ITERATIONS, minit=first, rng=generator
+    )
     return np.ascontiguousarray(centres[np.unique(label)])

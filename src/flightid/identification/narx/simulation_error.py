@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dtbtrs
 
 from flightid.identification.multistart import DenseEnd
 from flightid.models.narx.model import NarxModel
@@ -210,5 +210,5 @@ def _through_recursion(direct: Array, slopes: Array) -> Array:
     band[0] = 1.0
     for j in range(1, n_y + 1):
         band[j, : n - j] = -slopes[j - 1, j:]
-    solved, _ = dtbtrs(band, np.asfortranarray(direct.T), uplo="L", diag="U")
+    solved, _ = scipy.linalg.lapack.dtbtrs(band, np.asfortranarray(direct.T), uplo="L", diag="U")
     return np.asarray(solved)

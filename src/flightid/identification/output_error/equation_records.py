@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import schur
 
 from flightid import _native
 from flightid.conventions import Light
@@ -194,7 +194,9 @@ def _conditions(transition: Array, limit: float) -> tuple[Array, int]:
     """Rows that see the modes which do not grow, then those which see the growing ones alone."""
 
     def rows(grows: bool) -> tuple[Array, int]:
-        _, basis, n = schur(transition.T, output="real", sort=lambda re, _im: (re > limit) == grows)
+        _, basis, n = scipy.linalg.schur(
+            transition.T, output="real", sort=lambda re, _im: (re > limit) == grows
+        )
         return np.asarray(basis[:, :n].T), n
 
     (still, _), (growing, n_growing) = rows(False), rows(True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_discrete_are
 
 from flightid.models.sampled.recursion import run_recursion, spectral_radius
 
@@ -67,7 +67,9 @@ def _first_gain(a: Array, c: Array) -> Array | None:
     shown = np.linalg.norm(c, axis=0)
     moves = np.diag((0.1 / np.where(shown > 0.0, shown, 1.0)) ** 2)
     try:
-        covariance = solve_discrete_are(a.T, c.T, moves + 1e-12 * np.eye(n), 0.5 * np.eye(p))
+        covariance = scipy.linalg.solve_discrete_are(
+            a.T, c.T, moves + 1e-12 * np.eye(n), 0.5 * np.eye(p)
+        )
     except (np.linalg.LinAlgError, ValueError):
         return None
     spread = c @ covariance @ c.T + 0.5 * np.eye(p)

@@ -16,9 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
-from scipy.special import chdtrc
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
@@ -114,7 +113,8 @@ def judge_process_noise(
     if any(np.any(_level(each) <= ROUNDING * _level(y)) for each, (_, y, _) in pairs):
         return []
     found = state_noise(
-        residuals, [(expm(a * dt), c) for (a, c), dt in zip(systems, steps, strict=True)]
+        residuals,
+        [(scipy.linalg.expm(a * dt), c) for (a, c), dt in zip(systems, steps, strict=True)],
     )
     if found is None or not found.is_found:
         return []
@@ -195,7 +195,11 @@ def state_noise(
     left = _variances([each[:, ORDER:] for each in ahead]) / _variances(tails)
     oscillates = any(np.any(np.abs(np.imag(np.linalg.eigvals(a))) > 0.0) for a, _ in placed)
     return StateNoise(
-        float(chdtrc(n * p, max(gain, 0.0))), float(bic), crossed(sensors), bool(oscillates), left
+        float(scipy.special.chdtrc(n * p, max(gain, 0.0))),
+        float(bic),
+        crossed(sensors),
+        bool(oscillates),
+        left,
     )
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtrc
 
 from flightid import _native
 from flightid.identification.output_error.innovation_gain import ORDER, SETTLED, SHARES, STEPS
@@ -35,7 +35,7 @@ def crossed(errors: Array) -> float:
         square = (unit[:, lag:] @ unit[:, :-lag].T) ** 2
         total += n / (n - lag) * n * float(np.sum(square) - np.trace(square))
         count += p * (p - 1)
-    return float(chdtrc(count, total)) if count else 1.0
+    return float(scipy.special.chdtrc(count, total)) if count else 1.0
 
 
 def sensor_errors(residuals: Sequence[Array]) -> tuple[Array, int]:
@@ -84,7 +84,10 @@ def is_white(residuals: Sequence[Array]) -> bool:
     for place in range(residuals[0].shape[0]):
         lags = np.sum([_autocovariance(each[place]) for each in residuals], axis=0)
         sizes = (lags[1:] / lags[0]) ** 2 / (n - np.arange(1, ORDER + 1))
-        if chdtrc(ORDER, n * (n + 2) * sizes.sum()) < FALSE_ALARMS / residuals[0].shape[0]:
+        if (
+            scipy.special.chdtrc(ORDER, n * (n + 2) * sizes.sum())
+            < FALSE_ALARMS / residuals[0].shape[0]
+        ):
             return False
     return True
 

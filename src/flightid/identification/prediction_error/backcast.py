@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from flightid import _native
 from flightid.errors import FitError
@@ -48,7 +48,7 @@ def backcast(model: PolynomialModel, data: SampledChannels) -> list[list[float]]
     for span in data.spans:
         disturbance = np.array(data.output[span])
         for name, row in zip(model.inputs, data.inputs, strict=True):
-            disturbance -= lfilter(*model.transfer(name), row[span])
+            disturbance -= scipy.signal.lfilter(*model.transfer(name), row[span])
         noise = _past(disturbance, above, below, reach, of_noise)
         found.append([0.0] * sum(of_inputs) + noise.tolist())
     return found
@@ -56,10 +56,10 @@ def backcast(model: PolynomialModel, data: SampledChannels) -> list[list[float]]
 
 def _past(disturbance: Array, above: Array, below: Array, reach: int, count: int) -> Array:
     """What the disturbance and errors before the record add to C e at its first samples."""
-    backwards = lfilter(below, above, disturbance[::-1])
-    longer = lfilter(above, below, np.concatenate([backwards, np.zeros(reach)]))
+    backwards = scipy.signal.lfilter(below, above, disturbance[::-1])
+    longer = scipy.signal.lfilter(above, below, np.concatenate([backwards, np.zeros(reach)]))
     before = longer[disturbance.size :][::-1]
-    errors = lfilter(below, above, before)
+    errors = scipy.signal.lfilter(below, above, before)
     added = np.zeros(count)
     for t in range(count):
         for j in range(t + 1, below.size):

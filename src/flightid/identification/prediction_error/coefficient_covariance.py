@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from flightid.identification.innovation_tests import ROUNDING, InnovationTests, innovation_tests
 from flightid.identification.local_minimum import LocalMinimum
@@ -38,8 +38,8 @@ NOISE_MODEL = "prediction errors are not white, so the noise model's coefficient
 
 SLOW = 0.05
 """Independent samples over samples below which noise seems to follow inputs: AR(0.95)."""
-ALIKE = float(chdtri(1, 0.05))
-"""Twice the difference of two logarithms of likelihoods that chance makes in one of 20."""
+ALIKE = 0.05
+"""Chance of twice the difference of two logarithms of likelihoods below which two minima differ."""
 FAR = 5.0
 """Bars between two minima beyond which neither's hold the other."""
 
@@ -155,7 +155,7 @@ def _fits_elsewhere(found: SearchResult) -> bool:
     bars = np.sqrt(np.diag(found.covariance))
     samples = found.degrees / max(found.colour[1], 1.0) ** 2
     return any(
-        samples * np.log(each.objective / best.objective) < ALIKE
+        samples * np.log(each.objective / best.objective) < scipy.special.chdtri(1, ALIKE)
         and np.max(np.abs(np.array(list(each.values.values())) - found.theta) / bars) > FAR
         for each in others
         if best.objective > 0.0 and each.objective > best.objective

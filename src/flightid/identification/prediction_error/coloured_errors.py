@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.models.sampled.channels import SampledChannels
@@ -95,20 +95,20 @@ def _sensitivities(
     numerators, denominators = _polynomials(structure, theta)
     driven, starts = [], []
     for row, b, f in zip(inputs, numerators, denominators, strict=True):
-        driven.append(lfilter(b, f, row))
+        driven.append(scipy.signal.lfilter(b, f, row))
         reach = min(max(b.size - 1, f.size - 1), n)
         impulses = np.zeros((n, reach))
         impulses[np.arange(reach), np.arange(reach)] = 1.0
-        starts.append(lfilter([1.0], f, impulses, axis=0))
+        starts.append(scipy.signal.lfilter([1.0], f, impulses, axis=0))
     own = np.concatenate([*starts, level], axis=1)
     shares = np.linalg.lstsq(own, modelled - np.sum(driven, axis=0), rcond=INDEPENDENT)[0]
     of_b, turned, first = [], [], 0
     for i, (row, b, f) in enumerate(zip(inputs, numerators, denominators, strict=True)):
         whole = driven[i] + starts[i] @ shares[first : first + starts[i].shape[1]]
         first += starts[i].shape[1]
-        moved = lfilter([1.0], f, row)
+        moved = scipy.signal.lfilter([1.0], f, row)
         of_b += [_late(moved, lag) for lag in range(structure.nk[i], b.size)]
-        turned.append(lfilter([1.0], f, whole))
+        turned.append(scipy.signal.lfilter([1.0], f, whole))
     if structure.is_common:
         turned = [np.sum(turned, axis=0)]
     degrees = structure.degrees_of_f

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from scipy.special import chdtri
+import scipy
 
 from flightid.conventions import Light
 from flightid.evidence.gather import OVERFIT
@@ -150,7 +150,7 @@ def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[F
             widest = max(float(np.max(np.linalg.eigvalsh(errors))), 0.0)
             spread = QUANTILE * float(np.sqrt(widest))
             seen = (abs(gap) + spread) / abs(1.0 - abs(pole.z))
-            together = statistic < chdtri(n, 0.05)
+            together = statistic < scipy.special.chdtri(n, 0.05)
             if together and seen < HARDLY_SEEN:
                 found.append(
                     Finding(

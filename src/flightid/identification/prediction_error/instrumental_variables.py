@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from flightid.errors import DataError
 from flightid.identification.prediction_error.coloured_errors import instrumental_covariance
@@ -53,7 +53,7 @@ def four_stage(
 
 
 def _filtered(above: Array, below: Array, row: Array, spans: Sequence[slice]) -> Array:
-    return np.concatenate([lfilter(above, below, row[span]) for span in spans])
+    return np.concatenate([scipy.signal.lfilter(above, below, row[span]) for span in spans])
 
 
 def _numerators(structure: PolynomialStructure, theta: Array) -> list[Array]:

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, solve_triangular
-from scipy.optimize import minimize
 
 from flightid.errors import DataError
 from flightid.identification.prediction_error.linear_regression import LinearRegression
@@ -118,7 +117,7 @@ def kernel_estimate(
             first = span.stop
         np.fill_diagonal(rows[count:], noise)
         rows[:count, -1] = wanted
-        return block_diag(*roots), np.asarray(np.linalg.qr(rows, mode="r"))
+        return scipy.linalg.block_diag(*roots), np.asarray(np.linalg.qr(rows, mode="r"))
 
     def evidence(x: Array) -> float:
         _, triangle = posterior(unpack(x))
@@ -128,11 +127,11 @@ def kernel_estimate(
     width = 3 if kind == "dc" else 2
     start = np.tile([0.0, 1.5, 1.0][:width], len(used))
     limits = [(-12.0, 12.0), (-6.0, 9.0), (-3.0, 3.0)][:width] * len(used)
-    best = minimize(evidence, start, method="L-BFGS-B", bounds=limits)
+    best = scipy.optimize.minimize(evidence, start, method="L-BFGS-B", bounds=limits)
     settings = unpack(best.x)
     root, triangle = posterior(settings)
     # Uncorrelated directions of one size each: coefficients are L R⁻¹ of them.
-    spread = solve_triangular(triangle[:-1, :-1], root.T, trans="T").T
+    spread = scipy.linalg.solve_triangular(triangle[:-1, :-1], root.T, trans="T").T
     rest = (n - count) * math.log(variance) + regression.sum_of_squares / variance
     return KernelEstimate(
         spread @ triangle[:-1, -1],

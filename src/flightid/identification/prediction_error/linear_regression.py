@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.linalg.lapack import dpotri, dtrcon
 
 from flightid import _native
 from flightid.errors import DataError, FitError
@@ -63,7 +62,7 @@ class LinearRegression:
         scale = np.linalg.norm(self.factor, axis=0)
         scale[scale == 0.0] = 1.0
         # No singular value is less than this bound, times √n, over the largest: none is left out.
-        if dtrcon(self.factor / scale)[0] > len(scale) * SMALLEST:
+        if scipy.linalg.lapack.dtrcon(self.factor / scale)[0] > len(scale) * SMALLEST:
             return self.theta
         wanted = -self.triangle[:-1, -1]
         return np.asarray(np.linalg.lstsq(self.factor / scale, wanted, rcond=SMALLEST)[0] / scale)
@@ -138,7 +137,7 @@ def regress_lags(
     if not np.diag(lower).min() > FEWEST_DIGITS:
         return regress(output, inputs, lengths, 0, [n] * count, [0] * count, skip, levels=levels)
     triangle = (scale[:, None] * lower).T
-    theta = -solve_triangular(triangle[:-1, :-1], triangle[:-1, -1])
+    theta = -scipy.linalg.solve_triangular(triangle[:-1, :-1], triangle[:-1, -1])
     return LinearRegression(np.asarray(theta), triangle, rows, None)
 
 
@@ -177,7 +176,7 @@ def _sums(output: Array, inputs: Array, n: int, skip: int) -> Array:
 
 def inverse_square(factor: Array) -> Array:
     """(RᵀR)⁻¹ of a triangle, shape (n, n)."""
-    upper = np.triu(dpotri(factor)[0])
+    upper = np.triu(scipy.linalg.lapack.dpotri(factor)[0])
     return np.asarray(upper + np.triu(upper, 1).T)
 
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from flightid.errors import OptionError, UnknownNameError
 from flightid.options import Options, option
@@ -71,7 +71,7 @@ class RecordOptions(Options):
         if np.isinf(self.limit):
             return 1.0
         k = self.limit
-        inside = float(ndtr(k) - ndtr(-k))
+        inside = float(scipy.special.ndtr(k) - scipy.special.ndtr(-k))
         return (
             inside
             - 2.0 * k * math.exp(-0.5 * k**2) / math.sqrt(2.0 * math.pi)

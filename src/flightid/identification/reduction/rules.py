@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import chdtri
+import scipy
 
 from flightid.identification.fit import Fit
 from flightid.identification.fit_findings import (
@@ -80,7 +80,9 @@ class ReductionLimits(Options):
         limit = self.maximum_total_cost_rise_percent / 100.0 * start
         if not explained:
             return limit
-        together = chdtri(len(explained), 1.0 - EXPLAINED_LEVEL) / chdtri(1, 1.0 - EXPLAINED_LEVEL)
+        together = scipy.special.chdtri(
+            len(explained), 1.0 - EXPLAINED_LEVEL
+        ) / scipy.special.chdtri(1, 1.0 - EXPLAINED_LEVEL)
         return max(limit, float(together * np.mean(explained)))
 
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import fft
 
 from flightid.errors import DataError, OptionError
 
@@ -110,7 +110,7 @@ class Harmonics:
         ndarray of complex, shape (..., n_f)
             Unit of the samples times s.
         """
-        spectrum = fft.fft(samples[..., : self.n_samples - 1], axis=-1)[..., self.numbers]
+        spectrum = scipy.fft.fft(samples[..., : self.n_samples - 1], axis=-1)[..., self.numbers]
         return np.asarray(self.sample_time_s * spectrum)
 
     @property
@@ -134,5 +134,5 @@ class Harmonics:
         period = self.n_samples - 1
         spectrum = np.zeros((len(integrals), period // 2 + 1), dtype=np.complex128)
         spectrum[:, self.numbers] = integrals / self.sample_time_s
-        samples = fft.irfft(spectrum, period, axis=1)
+        samples = scipy.fft.irfft(spectrum, period, axis=1)
         return np.concatenate([samples, samples[:, :1]], axis=1)

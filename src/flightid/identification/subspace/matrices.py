@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_discrete_are
 
 from flightid.errors import FitError
 from flightid.identification.subspace.data import SubspaceData
@@ -44,7 +44,7 @@ def steady_gain(a: Array, c: Array, k: Array, r: Array) -> Array:
 
 def _riccati(a: Array, c: Array, q: Array, s: Array, r: Array) -> Array | None:
     try:
-        p = np.asarray(solve_discrete_are(a.T, c.T, q, r, s=s))
+        p = np.asarray(scipy.linalg.solve_discrete_are(a.T, c.T, q, r, s=s))
         gain = np.asarray(np.linalg.solve((c @ p @ c.T + r).T, (a @ p @ c.T + s).T).T)
     except (np.linalg.LinAlgError, ValueError):
         return None

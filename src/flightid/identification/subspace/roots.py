@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eig
 
 from flightid.identification.prediction_error.roots import (
     DOUBLE,
@@ -85,7 +85,7 @@ def predictor_reach(model: InnovationsModel, covariance: Array, *, direct: bool)
     It is a zero of the noise model: see `prediction_error.roots.farthest`.
     """
     a, _, c, _, k = model.matrices
-    solved: Any = eig(a - k @ c, left=True, right=True)
+    solved: Any = scipy.linalg.eig(a - k @ c, left=True, right=True)
     reach = 0.0
     for z, left, right in zip(solved[0], solved[1].conj().T, solved[2].T, strict=True):
         if z.imag != 0.0:
@@ -103,7 +103,7 @@ def predictor_reach(model: InnovationsModel, covariance: Array, *, direct: bool)
 
 
 def _poles(model: InnovationsModel, *, direct: bool) -> Iterator[tuple[complex, Complex | None]]:
-    solved: Any = eig(model.matrices[0], left=True, right=True)
+    solved: Any = scipy.linalg.eig(model.matrices[0], left=True, right=True)
     values, left, right = solved
     for place, z in enumerate(values):
         if z.imag < 0.0:

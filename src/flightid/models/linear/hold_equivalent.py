@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 Array = NDArray[np.float64]
 Hold = Literal["zero", "first"]
@@ -54,7 +54,7 @@ def hold_equivalent(
     size = int(starts[-1])
     transition, forced = np.zeros((size, size)), np.zeros((size, m))
     seen, direct = np.zeros((len(c), size)), np.zeros((len(c), m))
-    transition[:n, :n], seen[:, :n] = expm(a * sample_time_s), c
+    transition[:n, :n], seen[:, :n] = scipy.linalg.expm(a * sample_time_s), c
     for j, each in enumerate(taps):
         for place in range(memory[j]):
             row = starts[j] + place
@@ -85,7 +85,7 @@ def _taps(
     part = samples - whole
     part = 0.0 if abs(part) < WHOLE else part
     moved, early = _integrals(a, b, part * step), _integrals(a, b, (1.0 - part) * step)
-    later = expm(a * (1.0 - part) * step)
+    later = scipy.linalg.expm(a * (1.0 - part) * step)
     first, first_ramp = later @ moved[0], later @ moved[1] / step
     last, last_ramp = early[0], early[1] / step
     none = np.zeros_like(d)
@@ -105,5 +105,5 @@ def _integrals(a: Array, b: Array, duration: float) -> tuple[Array, Array]:
     n = len(a)
     block = np.zeros((n + 2, n + 2))
     block[:n, :n], block[:n, n], block[n, n + 1] = a, b, 1.0
-    found = expm(block * duration)
+    found = scipy.linalg.expm(block * duration)
     return found[:n, n], found[:n, n + 1]

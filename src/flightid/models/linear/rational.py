@@ -7,8 +7,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.signal import StateSpace
 
 from flightid.errors import ExportError, ModelError
 from flightid.models.linear.realisation import Matrices
@@ -109,7 +109,7 @@ class Rational:
         pade_order: int | None = None,
         sample_time_s: float | None = None,
         hold: str = "zero",
-    ) -> StateSpace:
+    ) -> scipy.signal.StateSpace:
         """The system as a state space of SciPy; `flightid.to_scipy` says the options."""
         system = self.without_delays(pade_order=pade_order, sample_time_s=sample_time_s, hold=hold)
         a, b, c, d, _ = system.state_space()
@@ -117,7 +117,11 @@ class Rational:
             # SciPy takes no empty matrices: a state that nothing moves and nobody sees.
             a, b, c = np.zeros((1, 1)), np.zeros((1, b.shape[1])), np.zeros((c.shape[0], 1))
         step = system.sample_time_s
-        return StateSpace(a, b, c, d) if step is None else StateSpace(a, b, c, d, dt=step)
+        return (
+            scipy.signal.StateSpace(a, b, c, d)
+            if step is None
+            else scipy.signal.StateSpace(a, b, c, d, dt=step)
+        )
 
 
 def control_library() -> Any:  # noqa: ANN401 - python-control has no types

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.io import loadmat, savemat
 
 from flightid.errors import ModelError
 from flightid.files import as_path, write_atomically
@@ -194,11 +194,11 @@ def _save_mat(system: LinearSystem, extra: Mapping[str, object], path: Path) -> 
         is_texts = isinstance(value, list) and all(isinstance(each, str) for each in value)
         made = _cells(tuple(value)) if is_texts else np.asarray(value, dtype=np.float64)  # type: ignore[arg-type]
         content[f"parameter_{key}"] = made
-    savemat(str(path), content, format="5", oned_as="column", appendmat=False)
+    scipy.io.savemat(str(path), content, format="5", oned_as="column", appendmat=False)
 
 
 def _from_mat(content: bytes) -> dict[str, object]:
-    found = loadmat(inflated("the file", content))  # type: ignore[arg-type] # its stub knows paths alone
+    found = scipy.io.loadmat(inflated("the file", content))  # type: ignore[arg-type] # its stub knows paths alone
     missing = {"A", "B", "C", "D", "inputs", "outputs"} - set(found)
     if missing:
         raise ModelError("the file lacks variables", found=", ".join(sorted(missing)))

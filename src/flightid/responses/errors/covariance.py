@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
 
 from flightid.responses.errors.noise import NoiseSpectrum
 from flightid.responses.errors.random_error import Points, union
@@ -115,7 +115,7 @@ class WindowedErrors:
     ) -> tuple[int, NDArray[np.intp]]:
         """Length of the noise's Fourier transform, and its bins that reach the estimate."""
         longest = max(share.plan.length for share in self.windows.shares)
-        length = int(next_fast_len(n_samples + longest // 2, real=True))
+        length = int(scipy.fft.next_fast_len(n_samples + longest // 2, real=True))
         highest = float(self.windows.omega[frequencies].max()) + self._reach()
         last = min(length // 2, int(highest * length / (2.0 * np.pi)) + 1)
         return length, np.arange(last + 1)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import fdtrc
 
 from flightid.conventions import Light
 from flightid.errors import DataError
@@ -185,7 +185,7 @@ def starting_periods(outputs: NDArray[np.float64], length: int) -> int | None:
     power = np.maximum(power, ROUNDING * np.var(outputs, axis=1)[:, None])
     freedom = max(length / COLOURED, 2.0)
     ratio = power / np.maximum(power[:, -1:], np.finfo(float).tiny)
-    large = np.any(fdtrc(freedom, freedom, ratio) < STARTING / len(outputs), axis=0)
+    large = np.any(scipy.special.fdtrc(freedom, freedom, ratio) < STARTING / len(outputs), axis=0)
     moving = np.flatnonzero(large)
     dropped = int(moving[-1]) + 1 if len(moving) else 0
     return None if parts.shape[1] - dropped < FEWEST_PERIODS and dropped else dropped

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy import signal
-from scipy.special import chdtri
 
 from flightid.conventions import Light
 from flightid.errors import DataError, OptionError
@@ -292,8 +291,8 @@ def _with_bounds(
     """Auto-spectra with their intervals, each shape (n_out, n_f)."""
     density = np.asarray(response.output_spectrum, dtype=np.float64)
     degrees = 2.0 * response.n_independent[:, 0, :] / overlap_factor(shifts_of(OVERLAP)) ** 2
-    low = density * degrees / chdtri(degrees, 0.5 - 0.5 * level)
-    high = density * degrees / chdtri(degrees, 0.5 + 0.5 * level)
+    low = density * degrees / scipy.special.chdtri(degrees, 0.5 - 0.5 * level)
+    high = density * degrees / scipy.special.chdtri(degrees, 0.5 + 0.5 * level)
     return density, low, high
 
 
@@ -328,7 +327,7 @@ def _peaks(
     """Frequency and density of each peak that stands out of its own uncertainty."""
     level = 10.0 * np.log10(np.maximum(density, np.finfo(float).tiny))
     width = 10.0 * np.log10(np.maximum(high, 1e-300) / np.maximum(low, 1e-300))
-    places, _ = signal.find_peaks(level, prominence=np.maximum(PEAK_DB, width))
+    places, _ = scipy.signal.find_peaks(level, prominence=np.maximum(PEAK_DB, width))
     return [(float(omega[place]), float(density[place])) for place in places]
 
 

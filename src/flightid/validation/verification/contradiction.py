@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import f
 
 from flightid.conventions import Light
 from flightid.errors import FlightidError
@@ -90,7 +90,7 @@ def _judged(
         return None
     own += _by_parameters(source, way, run, request, name)
     freedom = (independent_samples([error]), float(left["independent_samples"]))
-    chance = float(f.sf(size / max(own, np.finfo(float).tiny), *freedom))
+    chance = float(scipy.stats.f.sf(size / max(own, np.finfo(float).tiny), *freedom))
     if not _is_beyond(size, own, power) or chance > FALSE_ALARMS:
         return None
     share = (size - own) / power
