@@ -206,3 +206,44 @@ def rest_of(flights: Sequence[RecordParts], beside: JointResiduals | None) -> Re
     return RecordParts(
         np.asarray(score)[None], (beside.slopes.T @ beside.total)[None], noise[None, :, None]
     )
+
+
+def freedom_of(
+    shared: Array,
+    variances: Array,
+    models: Sequence[Autoregression],
+    blocks: Sequence[RecordBlock],
+    half: Array,
+) -> Array:
+    """Degrees of freedom of each estimate's variance: noise models are themselves estimates.
+
+    Parameters
+    ----------
+    shared : ndarray, shape (n, n)
+        Covariance.
+    variances : ndarray, shape (n_outputs, n, n)
+        What each output's noise makes of it.
+    models : sequence of Autoregression
+        By output.
+    blocks : sequence of RecordBlock
+    half : ndarray, shape (n, n)
+        From scores of the blocks to changes of the estimates.
+
+    Reference
+    ---------
+    Satterthwaite (1946), Biometrics Bulletin 2(6), eq. 17.
+    """
+    diagonals = np.diagonal(variances, axis1=1, axis2=2)
+    doubt = np.zeros(len(half))
+    for output, (variance, model) in enumerate(zip(diagonals, models, strict=True)):
+        levels = None
+        if model.drift is not None:
+            # Of unit noise: what an estimate's variance says of the level where it looks.
+            parts = [b.projected.reshape(*b.residual.shape, -1)[output] @ half.T for b in blocks]
+            levels = variance / np.sum([np.sum(part**2, axis=0) for part in parts], axis=0)
+        doubt = doubt + variance**2 / model.freedom(levels)
+    # Errors that are known leave no doubt, nor does a residual that vanishes.
+    doubtful = doubt > 0.0
+    return np.asarray(
+        np.where(doubtful, np.diag(shared) ** 2 / np.where(doubtful, doubt, 1.0), np.inf)
+    )

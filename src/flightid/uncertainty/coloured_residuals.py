@@ -24,6 +24,7 @@ from flightid.uncertainty.blocks import (
     JointResiduals,
     RecordBlock,
     flights_of,
+    freedom_of,
     joined,
     noise_heard,
     rest_of,
@@ -229,7 +230,7 @@ def residual_covariance(
         crossed.append(direct.T @ heard_here @ gain - through @ others)
     plain = half
     white = np.asarray(root @ root.T) if blocks[0].answering is None else plain @ plain.T
-    freedom = _freedom(shared, variances, models)
+    freedom = freedom_of(shared, variances, models, whitened, half)
     # Random walks from noise of inputs join whatever parts a record is cut into.
     compared = []
     if noise is None:
@@ -245,7 +246,7 @@ def residual_covariance(
         agreed.freedom,
         tuple(own),
         tuple(crossed),
-        tuple(model.weights.size for model in models),
+        tuple(model.order for model in models),
         agreed.agreement,
         tested,
     )
@@ -367,18 +368,6 @@ def _of_walks(block: RecordBlock, noise: InputNoise, whitener: Array) -> Array:
     sensitivities = block.projected.reshape(*block.residual.shape, -1)
     paths = noise.transposed(sensitivities * whitener[:, None, None])
     return np.asarray(paths.reshape(-1, paths.shape[2]))
-
-
-def _freedom(shared: Array, variances: Array, models: Sequence[Autoregression]) -> Array:
-    diagonals = np.diagonal(variances, axis1=1, axis2=2)
-    doubt = sum(
-        variance**2 / model.freedom() for variance, model in zip(diagonals, models, strict=True)
-    )
-    # Errors that are known leave no doubt, nor does a residual that vanishes.
-    doubtful = doubt > 0.0
-    return np.asarray(
-        np.where(doubtful, np.diag(shared) ** 2 / np.where(doubtful, doubt, 1.0), np.inf)
-    )
 
 
 def _lifted(covariance: Array, plain: Array) -> Array:

@@ -3,7 +3,8 @@
 Least squares leave residuals that are orthogonal to the sensitivities, whatever the noise: their
 correlations with an input lie below what independent series give, and coloured noise that the fit
 follows comes back turned. With U the input at neighbouring lags, P the projection of the fit and Ω
-the noise's covariance, the correlations Uᵀe have the covariance Uᵀ(I − P) Ω (I − P)ᵀU.
+the noise's covariance, the correlations Uᵀe have the covariance Uᵀ(I − P) Ω (I − P)ᵀU. Slow noise
+hides what quick inputs foretell: it is told by Ω⁻¹U in place of U, the score of missing lags.
 """
 
 from __future__ import annotations
@@ -105,15 +106,26 @@ class FitResponse:
         ]
         squares = [u.T @ u for u in lagged]
         plain, found = np.asarray(sum(squares)), []
-        for output in range(len(self.models)):
+        for output, noise in enumerate(self.models):
             raw, covariance = self._of_output(output, lagged, squares)
+            score, scale = (raw, covariance), np.diag(plain)
+            if not noise.is_white:
+                sharp = [noise.unshaped(u) for u in lagged]
+                own = [u.T @ u for u in sharp]
+                score, scale = self._of_output(output, sharp, own), np.diag(np.asarray(sum(own)))
             power = sum(
                 float(block.residual[output] @ block.residual[output]) for block in self.blocks
             )
             for place, j in enumerate(moving):
                 span = slice(place * lags.size, (place + 1) * lags.size)
+                chance = _quadratic(score[0][span], score[1][span, span], scale[span])
                 found += self._judged(
-                    (output, j), lags, raw[span], covariance[span, span], plain[span, span], power
+                    (output, j),
+                    (lags, chance),
+                    raw[span],
+                    covariance[span, span],
+                    plain[span, span],
+                    power,
                 )
         return tuple(found)
 
@@ -140,7 +152,7 @@ class FitResponse:
             strict=True,
         ):
             taken = np.vstack([own[: len(own) - n], through])
-            if noise.weights.size:
+            if not noise.is_white:
                 whole = noise.squared(np.concatenate([u, x], axis=1))
                 k = u.shape[1]
                 heard, cross = whole[:k, :k], whole[:k, k:] @ taken
@@ -153,20 +165,17 @@ class FitResponse:
     def _judged(
         self,
         places: tuple[int, int],
-        lags: NDArray[np.int64],
+        tested: tuple[NDArray[np.int64], tuple[float, int] | None],
         raw: Array,
         covariance: Array,
         plain: Array,
         power: float,
     ) -> list[FittedCorrelation]:
-        size = np.sqrt(np.maximum(np.diag(plain), np.finfo(float).tiny))
-        spread, axes = np.linalg.eigh(covariance / np.outer(size, size))
-        kept = spread > SMALLEST * spread[-1]
-        degrees = int(np.count_nonzero(kept))
-        if not (power > 0.0 and spread[-1] > 0.0 and np.all(np.isfinite(spread))):
+        lags, score = tested
+        if score is None or not power > 0.0:
             return []
-        along = axes[:, kept].T @ (raw / size)
-        statistic = float(np.sum(along**2 / spread[kept]))
+        statistic, degrees = score
+        size = np.sqrt(np.maximum(np.diag(plain), np.finfo(float).tiny))
         sizes, turned = np.linalg.eigh(plain / np.outer(size, size))
         sound = sizes > SMALLEST * sizes[-1]
         seen = (turned[:, sound].T @ (raw / size)) ** 2
@@ -187,6 +196,19 @@ class FitResponse:
                 min(max(share, 0.0), 1.0),
             )
         ]
+
+
+def _quadratic(raw: Array, covariance: Array, squares: Array) -> tuple[float, int] | None:
+    """Form in the inverse of a covariance, and its degrees; None where nothing can be told."""
+    size = np.sqrt(np.maximum(squares, np.finfo(float).tiny))
+    if not np.all(np.isfinite(covariance)):
+        return None
+    spread, axes = np.linalg.eigh(covariance / np.outer(size, size))
+    kept = spread > SMALLEST * spread[-1]
+    if not spread[-1] > 0.0:
+        return None
+    along = axes[:, kept].T @ (raw / size)
+    return float(np.sum(along**2 / spread[kept])), int(np.count_nonzero(kept))
 
 
 def _parts(block: RecordBlock, output: int) -> Array:

@@ -10,11 +10,13 @@ one, the recursion over the orders meets no reflection of one or more, and the m
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+
+from flightid.uncertainty.slow_drift import Drift, apart
 
 Array = NDArray[np.float64]
 LARGEST_ORDER = 20
@@ -24,6 +26,8 @@ TONE = 1.0 - 1e-9
 """Reflection above which a residual predicts itself to rounding, as a pure tone does."""
 SHARPEST = 1e6
 """Power of one line over the whole power that no sound model reaches."""
+VALLEY = 0.02
+"""Share of the mean power below which a spectrum is not believed."""
 LEAST_FREEDOM = 1.0
 """Below it Student's distribution has no mean, and its interval no meaning."""
 
@@ -42,15 +46,32 @@ class Autoregression:
         Number of samples of the residual.
     length : int
         Transform length of its periodogram.
+    drift : Drift or None
+        Slow noise beside that of `lags` and `weights`.
     """
 
     lags: Array
     weights: Array
     n: int
     length: int
+    drift: Drift | None = None
+
+    @property
+    def is_white(self) -> bool:
+        """Whether no sample tells of another."""
+        return not self.weights.size and self.drift is None
+
+    @property
+    def order(self) -> int:
+        """Of the recursion, and of the drift's."""
+        return self.weights.size + (self.drift is not None)
 
     def autocovariance(self, n_lags: int) -> Array:
         """Autocovariance at lags 0 to ``n_lags - 1``."""
+        fast = self._fast_autocovariance(n_lags)
+        return fast if self.drift is None else fast + self.drift.autocovariance(n_lags)
+
+    def _fast_autocovariance(self, n_lags: int) -> Array:
         order = self.weights.size
         if n_lags <= order:
             return self.lags[:n_lags].copy()
@@ -67,7 +88,7 @@ class Autoregression:
 
     def squared(self, columns: Array) -> Array:
         """Columns' covariance by this noise: XᵀΩX, shape (k, k)."""
-        if not self.weights.size:
+        if self.is_white:
             return np.asarray(self.lags[0] * (columns.T @ columns))
         n = len(columns)
         length = _length(n)
@@ -75,8 +96,10 @@ class Autoregression:
         moved = _transform(columns, length)
         return np.asarray((moved * _both(_twice(length) * spectrum / length)) @ moved.T)
 
-    def freedom(self) -> float:
+    def freedom(self, levels: Array | None = None) -> Array | float:
         """Degrees of freedom of the model's level at zero frequency, where slow sensitivities look.
+
+        Beside a drift: where the spectrum comes down to each of some `levels`.
 
         Weights are known to ``innovation / n`` times the inverse of their autocovariance, and the
         level goes with the inverse square of one less their sum.
@@ -94,10 +117,31 @@ class Autoregression:
             if not short > 0.0:
                 return LEAST_FREEDOM
             share += 4.0 * max(known * innovation / self.n, 0.0) / short
-        return max(2.0 / share, LEAST_FREEDOM)
+        if self.drift is None or levels is None:
+            return max(2.0 / share, LEAST_FREEDOM)
+        fast = self._fast_spectrum()
+        whole = fast + self.drift.spectrum(self.length)
+        bins = np.array([int(np.argmax(whole <= level)) for level in levels])
+        drifting = self.drift.doubt(fast, self.n, self.length)
+        doubt = ((fast / whole) ** 2 * share + drifting)[bins]
+        return np.asarray(np.maximum(2.0 / doubt, LEAST_FREEDOM))
+
+    def unshaped(self, columns: Array) -> Array:
+        """Columns by the inverse of this noise's covariance, but for their ends: Ω⁻¹X, (n, k).
+
+        Deep valleys of a sharp spectrum are filled by what its peaks leak: no model tells them.
+        """
+        spectrum = self.spectrum()
+        level = np.maximum(spectrum, VALLEY * np.mean(spectrum))
+        parts = scipy.fft.rfft(columns, self.length, axis=0) / level[:, None]
+        return np.asarray(scipy.fft.irfft(parts, self.length, axis=0)[: len(columns)])
 
     def spectrum(self) -> Array:
         """Spectrum at the frequencies of `periodogram`."""
+        fast = self._fast_spectrum()
+        return fast if self.drift is None else fast + self.drift.spectrum(self.length)
+
+    def _fast_spectrum(self) -> Array:
         order = self.weights.size
         innovation = max(float(self.lags[0] - self.weights @ self.lags[1 : order + 1]), 0.0)
         gain = scipy.fft.rfft(np.concatenate(([1.0], -self.weights)), self.length)
@@ -140,7 +184,8 @@ def autoregression(
     length = _length(n) if length is None else length
     model = _fitted(power, n, length)
     if known is None:
-        return model
+        fast, drift = apart(model, power, n, length, lambda part: _fitted(part, n, length))
+        return replace(fast, drift=drift)
     for _ in range(SEPARATIONS):
         own = model.spectrum()
         share = own / np.maximum(own + known, np.finfo(float).tiny)
@@ -311,7 +356,7 @@ def _lost(
         each[m:, m:] = shared
         for o, (part, spectrum, model) in enumerate(zip(parts, spectra, models, strict=True)):
             shaped = part * _both(spectrum)
-            if model.weights.size:
+            if not model.is_white:
                 # Noise ends with the record.
                 ended = scipy.fft.irfft(shaped.view(np.complex128), length)[:, :n]
                 shaped = scipy.fft.rfft(ended, length).view(np.float64)

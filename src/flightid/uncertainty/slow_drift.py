@@ -1,0 +1,166 @@
+"""A slow drift beside faster noise: a first-order process whose corner no short recursion reaches.
+
+A walk that ends a standard deviation of white noise away stands above it in a few bins alone. An
+autoregression of few samples does not see these, and slow sensitivities look nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+SLOWEST = 1.5
+"""Corner over the inverse of the number of samples, rad: below it a record knows no corner."""
+FASTEST = 0.05
+"""Corner (rad per sample) from which on an autoregression serves."""
+STEP = 4.0
+"""Ratio of neighbouring corners that are tried."""
+LOOKS, ROUNDS = 10, 30
+"""Rounds of expectation and maximisation at each corner, and at the best of them."""
+NUMBERS = 2
+"""Variance and corner."""
+STARTED = 0.3
+"""Share of the mean power that a drift begins with."""
+SEEN, OCTAVES = 1.5, (4, 8, 16, 32)
+"""Standard deviations by which the power of so many half cycles makes a drift worth a look."""
+
+
+@dataclass(frozen=True)
+class Drift:
+    """First-order autoregression with a slow corner.
+
+    Attributes
+    ----------
+    variance : float
+        Square of the residual's unit.
+    corner : float
+        One less the pole, rad per sample.
+    """
+
+    variance: float
+    corner: float
+
+    def autocovariance(self, n_lags: int) -> Array:
+        """Autocovariance at lags 0 to ``n_lags - 1``."""
+        return np.asarray(self.variance * (1.0 - self.corner) ** np.arange(n_lags))
+
+    def spectrum(self, length: int) -> Array:
+        """Spectrum at the bins of a real transform of this length."""
+        power, under = self._parts(length)
+        return np.asarray(self.variance * power / under)
+
+    def doubt(self, fast: Array, n: int, length: int) -> Array:
+        """Variance of the logarithm of the whole level at each bin.
+
+        By Whittle's information of n samples on both levels and the corner; `fast` is the spectrum
+        of the other noise.
+        """
+        corner, pole = self.corner, 1.0 - self.corner
+        power, under = self._parts(length)
+        own = self.variance * power / under
+        bend = 2.0 * pole / power - (2.0 * corner - (under - corner**2) / pole) / under
+        slopes = np.array([fast, own, corner * bend * own]) / (fast + own)
+        information = 0.5 * n * (slopes @ slopes.T) / len(fast)
+        inverse = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
+        return np.asarray(np.einsum("ib,ij,jb->b", slopes, inverse, slopes))
+
+    def _parts(self, length: int) -> tuple[float, Array]:
+        """Power of the drive of unit variance, and what the recursion divides by at each bin."""
+        pole = 1.0 - self.corner
+        turn = 1.0 - np.cos(2.0 * np.pi * np.arange(length // 2 + 1) / length)
+        return 1.0 - pole**2, self.corner**2 + 2.0 * pole * turn
+
+
+class Spectral(Protocol):
+    """A model of noise: its order and its spectrum."""
+
+    @property
+    def weights(self) -> Array:
+        """One number for each order."""
+
+    def spectrum(self) -> Array:
+        """At the bins of the power that it was made of."""
+
+
+M = TypeVar("M", bound=Spectral)
+
+
+def apart(
+    plain: M, power: Array, n: int, length: int, fitted: Callable[[Array], M]
+) -> tuple[M, Drift | None]:
+    """Noise and the drift beside it; the noise as it was where nothing speaks for a drift.
+
+    Expectation and maximisation over the spectrum, at corners a factor apart; Whittle's likelihood
+    and the Bayesian criterion say whether the drift is worth its numbers.
+
+    Parameters
+    ----------
+    plain : model
+        Of all power.
+    power : ndarray, shape (n_bins,)
+        Periodogram at the bins of a real transform of `length`.
+    n : int
+        Number of samples.
+    length : int
+    fitted : callable
+        Makes a model of a power.
+
+    Reference
+    ---------
+    Dempster, Laird & Rubin (1977), J. Royal Statistical Society B 39(1), section 2; Whittle (1953),
+    Estimation and information in stationary time series, Arkiv foer Matematik 2(23).
+    """
+    level = np.maximum(plain.spectrum(), np.finfo(float).tiny)
+    if not _is_slow(power / level, n, length):
+        return plain, None
+    whole = np.maximum(power, 0.0)
+    count = max(2, 1 + round(np.log(FASTEST * n / SLOWEST) / np.log(STEP)))
+    start = STARTED * float(np.mean(whole))
+    found = [
+        _parted(fitted, whole, length, (plain, Drift(start, corner)), LOOKS)
+        for corner in np.geomspace(SLOWEST / n, FASTEST, count)
+    ]
+
+    def worth(pair: tuple[M, Drift]) -> float:
+        fast, drift = pair
+        both = fast.spectrum() + drift.spectrum(length)
+        return _criterion(both, fast.weights.size + NUMBERS, whole, n)
+
+    best = _parted(fitted, whole, length, max(found, key=worth), ROUNDS)
+    alone = _criterion(level, plain.weights.size, whole, n)
+    return best if worth(best) > alone else (plain, None)
+
+
+def _parted(
+    fitted: Callable[[Array], M], whole: Array, length: int, pair: tuple[M, Drift], rounds: int
+) -> tuple[M, Drift]:
+    """Both models after some rounds."""
+    fast, drift = pair
+    ends = 1.0 if length % 2 == 0 else 2.0
+    for _ in range(rounds):
+        other, own = fast.spectrum(), drift.spectrum(length)
+        share = own / np.maximum(other + own, np.finfo(float).tiny)
+        slow = share**2 * whole + share * other
+        fast = fitted((1.0 - share) ** 2 * whole + share * other)
+        total = 2.0 * np.sum(slow) - slow[0] - (2.0 - ends) * slow[-1]
+        drift = replace(drift, variance=float(total) / length)
+    return fast, drift
+
+
+def _criterion(spectrum: Array, numbers: int, whole: Array, n: int) -> float:
+    """Twice Whittle's likelihood less what its numbers cost."""
+    fit = np.log(spectrum) + whole / spectrum
+    return float(-n * np.mean(fit) - numbers * np.log(n))
+
+
+def _is_slow(ratio: Array, n: int, length: int) -> bool:
+    """Whether octaves of the slowest bins hold more power than a model gives them."""
+    sums = np.cumsum(ratio - 1.0)
+    last = (np.array(OCTAVES) * length) // n
+    last = last[last < len(ratio)]
+    return bool(np.any(sums[last] * n / length > SEEN * np.sqrt(last * n / length)))

@@ -1,0 +1,60 @@
+"""Slow noise: drifts beside faster noise are found, and hide no missing dynamics."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+import flightid as fid
+from flightid.uncertainty.residual_noise import autoregression, periodogram
+from flightid.uncertainty.slow_drift import Drift
+from tests.closeness import assert_close
+from tests.strangers import noises, output_error
+
+N = 1500
+
+
+def test_a_drifts_spectrum_is_that_of_its_autocovariance() -> None:
+    drift = Drift(2.0, 0.05)
+    found = np.fft.irfft(drift.spectrum(4096), 4096)[:40]
+    assert_close(found, drift.autocovariance(40), why="poles fade over 4096", rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_walk_under_white_noise_is_found(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    pole = 0.995
+    drive = np.sqrt(0.3 * (1.0 - pole**2)) * random.standard_normal(N + 4000)
+    slow = lfilter([1.0], [1.0, -pole], drive)[4000:]
+    noise = random.standard_normal(N) + slow - slow.mean()
+    model = autoregression(periodogram(noise[:, None]), N)
+    assert model.drift is not None
+    assert not model.is_white
+    # White noise of unit variance, and within a factor what the walk adds to slow bins.
+    assert_close(model.lags[0], 1.0, why="1500 samples", rtol=0.15)
+    truth = Drift(0.3, 1.0 - pole).spectrum(model.length)
+    octave = slice(2, 9)
+    ratio = np.mean(model.drift.spectrum(model.length)[octave]) / np.mean(truth[octave])
+    assert 0.2 < ratio < 5.0
+    # What is known of its level: some bins at zero frequency, nearly all samples far above it.
+    slow_level, fast_level = model.freedom(np.array([np.inf, 1.05 * float(model.lags[0])]))
+    assert slow_level < 8.0
+    assert fast_level > 40.0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_white_noise_has_none(seed: int) -> None:
+    noise = np.random.default_rng(seed).standard_normal((N, 1))
+    model = autoregression(periodogram(noise), N)
+    assert model.is_white
+    assert model.order == 0
+
+
+def test_slow_noise_does_not_hide_a_missing_lag() -> None:
+    late = output_error.late(3, 0.01, 0.1, partial(noises.ar1, pole=0.9))
+    fit = fid.identify(output_error.model(), late, method="output_error")
+    assert any(found.code == "inputs-in-errors" for found in fit.findings)
+    assert fit.covariance is None
