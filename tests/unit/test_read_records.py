@@ -60,6 +60,17 @@ def test_csv_numbers_are_read_to_the_last_bit(tmp_path: Path) -> None:
     assert record["y"].tobytes() == values.tobytes()
 
 
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_csv_of_every_line_end_in_many_blocks(tmp_path: Path, end: str) -> None:
+    numbers = np.random.default_rng(1).standard_normal(120_000)
+    rows = [f"{0.01 * k:.2f},{value!r},r{k // 60_000}" for k, value in enumerate(numbers.tolist())]
+    text = end.join(["# note", "time,p,record", *rows])
+    (tmp_path / "a.csv").write_bytes(text.encode())
+    first, second = read_records(tmp_path / "a.csv", outputs=["p"])
+    assert (first.name, second.name) == ("r0", "r1")
+    np.testing.assert_array_equal(np.concatenate([first["p"], second["p"]]), numbers)
+
+
 def test_without_roles_every_numeric_column_is_other(tmp_path: Path) -> None:
     (record,) = read_records(_csv(tmp_path, "time,a,b\n" + ROWS))
     assert list(record.channels) == ["a", "b"]
@@ -178,7 +189,11 @@ def test_milliseconds_are_asked_about_and_never_taken_for_seconds(tmp_path: Path
         ),
         ("time,p\n0,a\n1,b\n", {"outputs": ["p"]}, DataError, "does not hold real numbers"),
         ("time,p\n0,1\n1,\n2,3\n", {"outputs": ["p"]}, DataError, "not finite: found 1 of 3"),
-        ("time,p\n0,1\n1\n", {}, FileFormatError, "not a table of numbers"),
+        ("time,p\n0,1\n1\n", {}, FileFormatError, "line 3 has 1 cells where the heading has 2"),
+        ("time,p\n0,1\n1,2,3\n", {}, FileFormatError, "line 3 has more cells"),
+        ('time,p\n0,1\n1,"2\n', {}, FileFormatError, "line 3 has a quote without its end"),
+        ("time,p\n0,a\n1,1\n", {"outputs": ["p"]}, DataError, "does not hold real numbers"),
+        ("time,p\n0,1\n1,a\n", {"outputs": ["p"]}, DataError, "does not hold real numbers"),
         ("time,p\n", {}, FileFormatError, "holds headings only"),
         ("# nothing\n", {}, FileFormatError, "holds no row"),
         ("0,1\n1,2\n", {}, FileFormatError, "no heading row"),

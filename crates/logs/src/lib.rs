@@ -4,6 +4,7 @@
 //! memory in proportion to a number that the file merely claims.
 
 pub mod dataflash;
+pub mod delimited;
 pub mod error;
 pub mod ulog;
 

@@ -40,6 +40,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     models::lookup_table::register(module)?;
     simulation::loop_simulation::register(module)?;
     logs::dataflash::register(module)?;
+    logs::delimited::register(module)?;
     logs::ulog::register(module)?;
     vehicles::quadrotor::register(module)?;
     models::equation_records::register(module)?;

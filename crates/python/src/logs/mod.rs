@@ -1,4 +1,5 @@
 //! Log files: bytes to columns.
 
 pub mod dataflash;
+pub mod delimited;
 pub mod ulog;

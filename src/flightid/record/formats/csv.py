@@ -6,20 +6,20 @@ import codecs
 import csv
 import re
 from pathlib import Path
+from typing import Any
 
-import pyarrow as pa
-from pyarrow import csv as pa_csv
+import numpy as np
+from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.errors import FileFormatError
-from flightid.files import BLOCK_BYTES
+from flightid.reading import memory_budget, require_memory
 from flightid.record.formats.columns import (
     ColumnTable,
     is_unit,
     require_distinct,
-    require_readable_size,
     split_headings,
 )
-from flightid.record.formats.parquet import plain_values
 
 DELIMITERS = (",", ";", "\t")
 LONGEST_LINE = 1 << 20
@@ -32,7 +32,7 @@ def read_columns(path: Path) -> ColumnTable:
     Lines that begin with ``#`` may stand above the headings. The delimiter is the one that the
     heading row holds: comma, semicolon or tab. Beside the latter two a comma may be the decimal
     point. Quotes may hold delimiters; dates (2024-05-01T10:00:00) become s from the first row.
-    Numbers are read to the last bit.
+    Numbers are read to the last bit; empty cells and NA are not-a-number, true and false 1 and 0.
 
     Parameters
     ----------
@@ -52,65 +52,37 @@ def read_columns(path: Path) -> ColumnTable:
     has_unit_row = not units and _is_unit_row(second)
     if has_unit_row:
         units = {name: text for name, text in zip(names, second, strict=False) if text}
-    require_readable_size(path, _most_cells(path, delimiter.encode()))
     skipped = lines[1] if has_unit_row else lines[0]
-    table = _read(path, names, skipped, delimiter, ".", encoding)
-    if delimiter != "," and _has_decimal_commas(table):
-        table = _read(path, names, skipped, delimiter, ",", encoding)
-    if not table.num_rows:
+    columns = _columns(path, skipped, len(names), delimiter, encoding)
+    n_rows = columns[0].size
+    if not n_rows:
         raise FileFormatError(
             f"{path.name} holds headings only", needed="rows of numbers below the headings"
         )
-    return ColumnTable(
-        path,
-        dict.fromkeys(names, table.num_rows),
-        lambda name: plain_values(table.column(name)),
-        units,
-    )
+    by_name = dict(zip(names, columns, strict=True))
+    return ColumnTable(path, dict.fromkeys(names, n_rows), by_name.__getitem__, units)
 
 
-def _read(
-    path: Path, names: list[str], skipped: int, delimiter: str, point: str, encoding: str
-) -> pa.Table:
+def _columns(
+    path: Path, skipped: int, n_columns: int, delimiter: str, encoding: str
+) -> list[NDArray[Any]]:
     try:
-        # Arrow rounds decimal text correctly, refuses ragged rows, and reads in parallel.
-        return pa_csv.read_csv(
-            path,
-            read_options=pa_csv.ReadOptions(
-                skip_rows=skipped, column_names=names, encoding=encoding
-            ),
-            parse_options=pa_csv.ParseOptions(delimiter=delimiter),
-            convert_options=pa_csv.ConvertOptions(decimal_point=point),
+        read = _native.read_delimited(
+            str(path), skipped, n_columns, delimiter, encoding == "utf-16", memory_budget()
         )
-    except pa.ArrowException as error:
+    except MemoryError as fault:
+        require_memory(path.name, fault.args[0])
+        raise
+    except ValueError as fault:
         raise FileFormatError(
             f"{path.name} is not a table of numbers under its headings",
-            found=str(error).strip().split("\n")[0],
+            found=str(fault),
             needed="rows with one cell for each heading",
-        ) from error
-
-
-def _has_decimal_commas(table: pa.Table) -> bool:
-    """Whether a column that is no number becomes one when its commas are decimal."""
-    texts = [
-        column.slice(0, 100).to_pylist()
-        for column in table.columns
-        if pa.types.is_string(column.type)
+        ) from fault
+    return [
+        np.array(texts, dtype=object)[codes] if numbers is None else numbers
+        for numbers, codes, texts in read
     ]
-    return any(
-        any("," in str(cell) for cell in cells)
-        and all(_is_number(str(cell).replace(",", ".", 1)) for cell in cells if cell)
-        for cells in texts
-    )
-
-
-def _most_cells(path: Path, delimiter: bytes) -> int:
-    """Every cell ends with a delimiter or a line; those inside quotes are counted too."""
-    cells = 1
-    with path.open("rb") as stream:
-        while block := stream.read(BLOCK_BYTES):
-            cells += block.count(delimiter) + max(block.count(b"\n"), block.count(b"\r"))
-    return cells
 
 
 def _encoding(path: Path) -> str:
