@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.identification.advice.delays import delays_to_scan
+from tests.strangers import rig_lights
 
 KINDS = ("white", "prbs", "sweep", "coloured", "periodic", "multisine")
 
@@ -89,3 +90,20 @@ def test_a_scan_tries_delays_about_those_that_the_data_tell() -> None:
     assert tried[0] <= 10
     assert 12 in tried[1:-1]
     assert len(tried) <= 7
+
+
+@pytest.mark.parametrize("seed", [5, 29, 33])
+def test_a_slow_sweep_does_not_take_any_delay(seed: int) -> None:
+    """In a narrow band a phase is a delay to an ARX model: it took 19 to 33 samples for 2 and 4."""
+    random = np.random.default_rng([seed, 1212])
+    swept = rig_lights.SOUND["sweep"](random)
+    truth = {5: 4, 29: 2, 33: 2}[seed]
+    half = swept["u"].size // 2
+    record = fid.Record.from_arrays(
+        np.arange(swept["u"].size - half) * rig_lights.STEP_S,
+        inputs={"u": swept["u"][half:]},
+        outputs={"y": swept["y"][half:]},
+    )
+    tried = delays_to_scan([record], ("u",), "y")
+    assert truth in tried
+    assert tried[-1] <= 12

@@ -6,7 +6,7 @@ response and the noise is whitened, so that slow, periodic and band-limited inpu
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -28,19 +28,19 @@ WINDOW = (2, 4, 8)
 """Coefficients of B in the first scan."""
 POLES = (1, 2, 3)
 """Orders of the second scan."""
+COARSE = 4
+"""Samples between delays that output-error structures try before those around the best."""
 AROUND = 4
-"""Delays on either side of the first scan's that the second tries."""
+"""Delays on either side of the best of these that are tried one by one."""
 ROUNDS = 8
 """Of the Steiglitz-McBride iteration."""
-SETTLED = 0.1
+SETTLED = 1.0
 """Change of twice the log likelihood below which that iteration ends."""
 LONG = 40
-MOST_SAMPLES = 20_000
+MOST_SAMPLES = 6_000
 """The second scan takes the first records up to so many samples."""
 UNCERTAIN = 10.0
 """Difference of twice the log likelihood above which a delay is refused: odds of 1 to 150."""
-HOPELESS = 20.0 * UNCERTAIN
-"""Such a difference beyond which no delay further away is tried."""
 WIDE = 2
 """Most samples between the ends of a range for its best value to be told."""
 LONGEST = 39
@@ -82,7 +82,9 @@ def find_delays(data: SampledChannels, largest: int) -> list[InputDelay]:
     """Delay of each input.
 
     ARX structures of all orders and delays are compared from one triangle by the Bayesian
-    information criterion; around the best, output-error structures on whitened signals.
+    information criterion. Where an input moves in a narrow band they take almost any delay: a
+    few of all delays beside the best are compared by output-error structures on whitened signals,
+    then those about the best of them.
 
     Parameters
     ----------
@@ -110,27 +112,36 @@ def find_delays(data: SampledChannels, largest: int) -> list[InputDelay]:
     acts = [scan.acts(place) for place in range(len(data.inputs))]
     first = [scan.best(place) for place in range(len(data.inputs))]
     whitened = _whitened(_shortened(data))
+    for place in (i for i, seen in enumerate(acts) if seen):
+        costs = _costs(whitened, first, place, {*range(0, scan.largest + 1, COARSE), first[place]})
+        first[place] = min(costs, key=lambda delay: costs[delay])
     found = []
     for place, seen in enumerate(acts):
         if not seen:
             found.append(InputDelay())
             continue
-        low = max(0, first[place] - AROUND)
-        tried = range(low, min(first[place] + AROUND, scan.largest) + 1)
-        skip = max([*first, tried[-1]]) + max(POLES)
-        costs: dict[int, float] = {}
-        for way in (range(first[place], tried[-1] + 1), range(first[place] - 1, low - 1, -1)):
-            poles = [np.ones(1)] * len(POLES)
-            for delay in way:
-                delays = [*first[:place], delay, *first[place + 1 :]]
-                costs[delay], poles = _cost(whitened, delays, skip, poles)
-                if costs[delay] > min(costs.values()) + HOPELESS:
-                    break
+        low, high = max(0, first[place] - AROUND), min(first[place] + AROUND, scan.largest)
+        costs = _costs(whitened, first, place, range(low, high + 1))
         least = min(costs.values())
         first[place] = min(costs, key=lambda delay: costs[delay])
         alike = [delay for delay, cost in costs.items() if cost <= least + UNCERTAIN]
         found.append(InputDelay.of(first[place], alike))
     return found
+
+
+def _costs(
+    data: _Signals, delays: Sequence[int], place: int, tried: Iterable[int]
+) -> dict[int, float]:
+    """Least criterion of each delay of one input, each search begun by the poles of neighbours."""
+    way = sorted(tried)
+    skip = max(*delays, *way) + max(POLES)
+    costs = dict.fromkeys(way, np.inf)
+    poles = [np.ones(1)] * len(POLES)
+    for delay in (*way, *reversed(way)):
+        asked = [*delays[:place], delay, *delays[place + 1 :]]
+        cost, poles = _cost(data, asked, skip, poles)
+        costs[delay] = min(costs[delay], cost)
+    return costs
 
 
 def delays_to_scan(
@@ -274,14 +285,17 @@ def _shortened(data: SampledChannels) -> _Signals:
 
 
 def _whitened(data: _Signals) -> _Signals:
-    """Signals filtered so that what a long model leaves of the output is white."""
+    """Signals filtered so that what a long model leaves of the output is white, starts cut off."""
     m, n = len(data.inputs), data.output.size
     long = max(1, min(LONG, n // (8 * (m + 1)), min(data.lengths) // 4))
     made = regress(
         data.output, data.inputs, data.lengths, long, [long + 1] * m, [0] * m, levels=data.levels
     )
     # The longer an ARX model, the more its A is the inverse of the noise model alone.
-    return data.filtered(np.concatenate([[1.0], made.shortest[:long]]), np.ones(1))
+    white = data.filtered(np.concatenate([[1.0], made.shortest[:long]]), np.ones(1))
+    kept = np.concatenate([np.arange(span.start + long, span.stop) for span in data.spans])
+    lengths = tuple(length - long for length in data.lengths)
+    return _Signals(white.output[kept], white.inputs[:, kept], lengths, data.levels)
 
 
 def _cost(
@@ -301,25 +315,45 @@ def _cost(
 def _output_error(
     data: _Signals, delays: Sequence[int], order: int, skip: int, below: Array
 ) -> tuple[float, Array]:
-    m = len(delays)
     criterion = np.inf
     for _ in range(ROUNDS):
         flat = data.filtered(np.ones(1), below)
         if not np.all(np.isfinite(flat.output)):
             break
-        made = regress(
-            flat.output,
-            flat.inputs,
-            flat.lengths,
-            order,
-            [order] * m,
-            list(delays),
-            skip,
-            levels=flat.levels,
-        )
-        # Started from whatever state: only a simulation from rest would have to know it.
-        before, criterion = criterion, _criterion(made.sum_of_squares, made.n_rows, made.theta.size)
+        parts = [_rows(flat, span, delays, order, skip, below) for span in data.spans]
+        rows = np.concatenate(parts)
+        triangle = np.asarray(np.linalg.qr(rows, mode="r"))
+        before = criterion
+        criterion = _criterion(triangle[-1, -1] ** 2, len(rows), triangle.shape[1] - 1)
         if abs(criterion - before) < SETTLED:
             break
-        below = reflected(np.concatenate([[1.0], made.shortest[:order]]))
+        found = np.linalg.lstsq(triangle[:-1, :-1], triangle[:-1, -1])[0]
+        below = reflected(np.concatenate([[1.0], found[:order]]))
     return criterion, below
+
+
+def _rows(
+    data: _Signals, span: slice, delays: Sequence[int], order: int, skip: int, below: Array
+) -> Array:
+    """Regressors of one record and its output, without its level and whatever state it began in.
+
+    Filtering from rest leaves 1/F of what was before: free responses of that denominator.
+    """
+    lags = range(1, order + 1)
+    output, inputs = data.output[span], data.inputs[:, span]
+    columns = [-_later(output, lag) for lag in lags]
+    columns += [
+        _later(row, delay + lag - 1)
+        for row, delay in zip(inputs, delays, strict=True)
+        for lag in lags
+    ]
+    own = np.ones((output.size, order + int(data.levels)))
+    own[:, :order] = lfilter([1.0], below, np.eye(output.size, order), axis=0)
+    # Directions that rounding leaves of responses that are over cost a sample each, no more.
+    basis = np.linalg.qr(own[skip:])[0]
+    rows = np.array([*columns, output]).T[skip:]
+    return np.asarray(rows - basis @ (basis.T @ rows))
+
+
+def _later(row: Array, lag: int) -> Array:
+    return np.concatenate([np.zeros(lag), row[: row.size - lag]])
