@@ -33,6 +33,7 @@ from flightid.models.narx.structure import NarxStructure
 from flightid.models.polynomial.orders import ScanOptions
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.options import Options, options_of
+from flightid.planning.options import PlanOptions
 from flightid.record.options import ChannelOptions, ReadOptions
 from flightid.responses.options import ResponseOptions
 from flightid.simulation.fly_options import FlyOptions
@@ -90,6 +91,7 @@ def sections() -> dict[str, type[Options]]:
         "excitation.plan (design)": DesignOptions,
         "RateAxis: the guess of a design": RateAxis,
         "Limits of a design": Limits,
+        "plan_flight (plan)": PlanOptions,
         "Reading tables": ReadOptions,
         "Part of a log or record": PartOptions,
         "Channels": ChannelOptions,

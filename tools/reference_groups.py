@@ -50,7 +50,7 @@ GROUPS = {
     "flight": Group(
         "Flight review",
         "flight.md",
-        ("review_flight", "FlightReview", "LoopResponse"),
+        ("review_flight", "FlightReview", "LoopResponse", "plan_flight", "SweepPlan"),
     ),
     "responses": Group(
         "Responses",

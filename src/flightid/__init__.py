@@ -104,6 +104,7 @@ if TYPE_CHECKING:
         write_model,
         write_system,
     )
+    from flightid.planning import SweepPlan, plan_flight
     from flightid.record import Channel, Record, read_records, write_records
     from flightid.responses import (
         CoherentPairs,
@@ -237,8 +238,10 @@ _HOMES = {
     "read_log": "flightid.logs",
     "reduce": "flightid.identification.reduction.reduce",
     "residual_tests": "flightid.validation.residuals.residual_tests",
+    "SweepPlan": "flightid.planning",
     "FlightReview": "flightid.review",
     "LoopResponse": "flightid.review",
+    "plan_flight": "flightid.planning",
     "review_flight": "flightid.review",
     "run_study": "flightid.study",
     "simulate": "flightid.simulation.simulate",
@@ -256,7 +259,7 @@ __all__ = [
     "Margins", "ModelBuilder", "Modes", "NarxModel", "NarxStructure", "Noise", "OrderScan",
     "Output", "PairResponse", "Parameter", "Parameters", "PidDesign", "PolynomialModel",
     "Prediction", "Record", "Reduction", "Replay", "ResidualTests", "RotorPhysics",
-    "StateSpaceModel", "StructureComparison", "Study", "Table", "TransferFunction",
+    "StateSpaceModel", "StructureComparison", "Study", "SweepPlan", "Table", "TransferFunction",
     "TransferFunctionModel", "Tuning", "TuningRequirements", "Uncertain", "Verification",
     "__version__", "advise", "approximate_modes", "attitude_bandwidth", "axis_loop",
     "axis_loop_of", "close_loop", "coherent_pairs", "compare_conditions", "compare_structures",
@@ -264,12 +267,12 @@ __all__ = [
     "estimate_response", "excitation", "export", "feedback_test", "from_control", "from_scipy",
     "handling_qualities", "identify", "impulse_response", "inspect_log", "interpret",
     "library_names", "load_model", "loops", "lower_order", "margins", "modes", "open_loop",
-    "pilot_cutoff", "plot", "predict", "px4_autotune_gains", "read_log", "read_parameters",
-    "read_records", "read_system", "reduce", "replay", "residual_tests", "response_band",
-    "review_flight", "rotor_physics", "run_study", "scan_orders", "simulate", "to_continuous",
-    "to_control", "to_discrete", "to_scipy", "tune", "tune_controller", "tune_pid",
-    "validation", "verify", "without_bias", "write_ardupilot_parameters", "write_model",
-    "write_px4_parameters", "write_records", "write_system",
+    "pilot_cutoff", "plan_flight", "plot", "predict", "px4_autotune_gains", "read_log",
+    "read_parameters", "read_records", "read_system", "reduce", "replay", "residual_tests",
+    "response_band", "review_flight", "rotor_physics", "run_study", "scan_orders", "simulate",
+    "to_continuous", "to_control", "to_discrete", "to_scipy", "tune", "tune_controller",
+    "tune_pid", "validation", "verify", "without_bias", "write_ardupilot_parameters",
+    "write_model", "write_px4_parameters", "write_records", "write_system",
 ]  # fmt: skip
 
 

@@ -116,6 +116,10 @@ OWN = {
         "expected fixed flight lock_number n_alpha normalisation output_is response_type "
         "rotor_speed_rad_s sign signs speed states t_theta2_s task",
     ),
+    "planning": (
+        "a sweep and what the vehicle may do meanwhile",
+        "amplitude attitude_rad control n_records rate_rad_s",
+    ),
     "plot": (
         "the result that is drawn, by its own noun, and guides in it",
         "curves disk estimates found gain_guide_db loops margins panels phase_guide_deg size",
@@ -123,8 +127,8 @@ OWN = {
     "evidence": ("checks of the gate", "checks required"),
     "excitation": (
         "the shape of a manoeuvre; injection clocks are stated in hertz by their firmware",
-        "amplitude chirp clock_hz control current excitation fade_in_s fade_out_s hold_cycles "
-        "integrator_off lead_s level_db levels limits magnitude mean_square n_inputs n_records "
+        "amplitude clock_hz control excitation fade_in_s fade_out_s hold_cycles "
+        "lead_s level_db levels limits magnitude mean_square n_inputs n_records "
         "noise_fraction optimise periods power record_s sample_rate_hz single_precision start_hz "
         "step_s stop_hz tail_s whole_run widths",
     ),

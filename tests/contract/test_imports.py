@@ -39,6 +39,7 @@ ORDER = [
     "dynamics",
     "control",
     "review",
+    "planning",
     "vehicles",
     "export",
 ]

@@ -29,6 +29,7 @@ from flightid.logs import Log
 from flightid.logs.options import PartOptions
 from flightid.models.polynomial.orders import ScanOptions
 from flightid.options import Options, options_of
+from flightid.planning.options import PlanOptions
 from flightid.record.options import ReadOptions
 from flightid.responses.options import ResponseOptions
 from flightid.simulation.options import SimulationOptions
@@ -47,7 +48,6 @@ OF_COMMANDS = {
     "axis": "roll, pitch or yaw, or an autopilot's number of it",
     "csv": "file of samples",
     "debug": "traceback of an error",
-    "fixed_wing": "kind of vehicle that parameters are for",
     "format": "tool that an export is for",
     "gains": "file of tuned gains to fly",
     "help": "this text",
@@ -64,8 +64,6 @@ OF_COMMANDS = {
     "output": "file or folder that is written",
     "pair": "output and input of a saved response",
     "overwrite": "whether a file may be replaced",
-    "param": "file of ArduPilot parameters",
-    "params": "file of PX4 parameters",
     "quiet": "no progress",
     "records": "records beside the data",
     "records_span_s": "part of those records",
@@ -99,6 +97,7 @@ VERBS: dict[Callable[..., Any], tuple[type[Options], set[str]]] = {
     fid.verify: (VerifyOptions, set()),
     fid.read_records: (ReadOptions, set()),
     fid.excitation.plan: (DesignOptions, set()),
+    fid.plan_flight: (PlanOptions, set()),
     Log.record: (PartOptions, set()),
     fid.scan_orders: (ScanOptions, {"na", "nb", "nc", "nd", "nf", "nk"}),  # ranges by default
 }
@@ -203,8 +202,8 @@ def test_commands_with_options_of_fields_read_them_all() -> None:
     assert reading == {
         "advise", "compare-structures", "consistency", "design", "disk-margin",
         "disturbance-rejection", "export", "fly", "handling-qualities", "identify", "lower-order",
-        "margins", "new", "pilot-cutoff", "polynomial", "predict", "response", "rotor-physics",
-        "run", "simulate model", "tune", "verify",
+        "margins", "new", "pilot-cutoff", "plan", "polynomial", "predict", "response",
+        "rotor-physics", "run", "simulate model", "tune", "verify",
     }  # fmt: skip
     for name, found in _commands():
         if isinstance(found, OptionsCommand):

@@ -24,6 +24,7 @@ WITHOUT_PICTURE = {
     "DerivativeTable": "a table",
     "Evidence": "lights with reasons",
     "ExportFiles": "files",
+    "SweepPlan": "a card to print",
     "Flight": "a simulated log, drawn from its records",
     "FlownSession": "its record draws itself",
     "Inspection": "tables and lights",

@@ -14,14 +14,12 @@ from hypothesis import strategies as st
 from flightid import excitation
 from flightid.cli import design as design_command
 from flightid.cli.program import run
-from flightid.errors import ModelError, OptionError, UnknownNameError
-from flightid.excitation import Limits, ParameterFile, Plan, RateAxis
+from flightid.errors import ModelError, OptionError
+from flightid.excitation import Limits, Plan, RateAxis
 from flightid.excitation.design import KINDS
-from flightid.logs.dataflash.writer import DataflashWriter
 from flightid.plot.excitation import excitation_history, plan_spectrum
 from tests.closeness import assert_close
 from tests.examples import examples
-from tests.ulog_builder import UlogBuilder
 
 AXIS = RateAxis(
     gain=40.0, time_constant_s=0.2, delay_s=0.01, rate_feedback=0.1, attitude_feedback_per_s=4.0
@@ -194,65 +192,6 @@ def test_windows_follow_the_rules() -> None:
     assert excitation.window_lengths((1.0, 3.0), 60.0, 4) == (30.0,)
 
 
-def test_ardupilot_file_is_what_the_methodic_configurator_expects(tmp_path: Path) -> None:
-    chirp = excitation.ardupilot_chirp(**TEMPLATE, axis=11)
-    made = excitation.ardupilot_parameters(chirp, current={"LOG_BITMASK": 65534.0})
-    lines = made.write(tmp_path / "54_system_id_mixer_pitch.param").read_text().splitlines()
-    settings = dict(line.split(",") for line in lines if not line.startswith("#"))
-    assert settings == {
-        "ATC_RATE_FF_ENAB": "0", "ATC_RAT_PIT_I": "0", "LOG_BITMASK": "65535", "SID_AXIS": "11",
-        "SID_MAGNITUDE": "0.15", "SID_F_START_HZ": "0.05", "SID_F_STOP_HZ": "5",
-        "SID_T_FADE_IN": "5", "SID_T_FADE_OUT": "5", "SID_T_REC": "130",
-    }  # fmt: skip
-    assert all("#" not in line for line in lines if not line.startswith("#"))
-    before = dict.fromkeys(made.values, 3.0)
-    back = made.rollback(before)
-    assert back.values["ATC_RAT_PIT_I"] == 3
-    assert set(back.values) == set(made.values)
-    with pytest.raises(UnknownNameError, match="present values are needed"):
-        made.rollback({"SID_AXIS": 0.0})
-
-
-def test_axes_without_a_mixer_leave_the_rate_loop_alone() -> None:
-    chirp = excitation.ardupilot_chirp(**{**TEMPLATE, "magnitude": 5.0}, axis=1)
-    made = excitation.ardupilot_parameters(chirp)
-    assert not any(name.startswith("ATC") for name in made.values)
-    assert "ATTITUDE_FAST" in made.notes[-1]
-
-
-def test_px4_file_says_what_px4_cannot_do(tmp_path: Path) -> None:
-    copter = excitation.px4_parameters(vehicle="multicopter", amplitude=1.5)
-    text = copter.write(tmp_path / "quad.params").read_text()
-    assert "1\t1\tSDLOG_PROFILE\t25\t6" in text
-    assert "1\t1\tMC_AT_SYSID_AMP\t1.5\t9" in text
-    assert "companion computer" in text
-    plane = excitation.px4_parameters(
-        vehicle="fixed_wing", start_hz=0.5, stop_hz=10.0, duration_s=30.0
-    )
-    assert plane.values["FW_AT_SYSID_TYPE"] == 2
-    assert plane.values["FW_AT_SYSID_F1"] == 10.0
-
-
-def test_exports_refuse(tmp_path: Path) -> None:
-    with pytest.raises(OptionError, match="ArduPilot can fly its own chirp only"):
-        excitation.ardupilot_parameters(
-            excitation.doublet(amplitude=0.1, step_s=0.5, sample_rate_hz=50.0)
-        )
-    with pytest.raises(OptionError, match="SID_T_FADE_OUT leaves the autopilot's range"):
-        excitation.ardupilot_parameters(
-            excitation.ardupilot_chirp(**{**TEMPLATE, "fade_out_s": 6.0})
-        )
-    with pytest.raises(OptionError, match="cannot inject a sweep"):
-        excitation.px4_parameters(vehicle="multicopter", stop_hz=10.0)
-    with pytest.raises(OptionError, match="MC_AT_SYSID_AMP leaves"):
-        excitation.px4_parameters(vehicle="multicopter", amplitude=9.0)
-    with pytest.raises(OptionError, match="vehicle is not known"):
-        excitation.px4_parameters(vehicle="boat")  # type: ignore[arg-type]
-    with pytest.raises(OptionError, match="parameters have another suffix"):
-        ParameterFile("px4", {"A": 1}).write(tmp_path / "a.param")
-    assert not list(tmp_path.iterdir())
-
-
 def test_csv_reads_back_to_twelve_digits(tmp_path: Path) -> None:
     made = excitation.ardupilot_chirp(**{**TEMPLATE, "magnitude": 5.0}, axis=7, sample_rate_hz=50.0)
     path = excitation.write_csv(made, tmp_path / "chirp.csv")
@@ -277,76 +216,13 @@ COMMAND = [
 
 
 def test_command_designs_and_exports(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    files = [tmp_path / name for name in ("a.csv", "a.param", "a.html")]
-    options = [
-        *("--csv", str(files[0])), *("--param", str(files[1])), *("--html", str(files[2])),
-    ]  # fmt: skip
+    files = [tmp_path / name for name in ("a.csv", "a.html")]
+    options = ["--csv", str(files[0]), "--html", str(files[1])]
     assert run([*COMMAND, *options, "--json"]) == 0
     shown = capsys.readouterr()
     assert json.loads(shown.out)["go"] is True
-    assert shown.err.count("Wrote") == 3
-    assert "SID_AXIS,11" in files[1].read_text()
-    assert "Go or no-go" in files[2].read_text()
-
-
-def test_parameters_for_a_flight_count_the_loops_that_stay_on(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    open_loop = [*COMMAND[:9], "--axis", "11"]
-    sizes = []
-    for name in ("", "a.param"):
-        options = ["--param", str(tmp_path / name)] if name else []
-        assert run([*open_loop, *options, "--json"]) == 0
-        shown = capsys.readouterr()
-        sizes.append(json.loads(shown.out)["axes"][0]["peak_control"])
-    assert "Loops kept on: arducopter pitch, P 0.135, angle gain 4.5 1/s" in shown.err
-    assert sizes[1] > 5.0 * sizes[0]
-
-
-def flown(folder: Path, **parameters: float) -> Path:
-    """A log that holds an autopilot's parameters and little else."""
-    writer = DataflashWriter()
-    writer.message(10_000_000, "ArduCopter V4.6.0 (test)")
-    for name, value in parameters.items():
-        writer.parameter(name, value)
-    return writer.write(folder / "flown.bin")
-
-
-def test_parameters_of_a_log_are_taken_back_by_a_second_file(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    before = {"ATC_RAT_RLL_I": 0.226, "ATC_RATE_FF_ENAB": 0.0, "SID_AXIS": 0.0}
-    before["LOG_BITMASK"] = 176126.0
-    file = tmp_path / "sid.param"
-    base = [*COMMAND[:-1], "10", "--param", str(file)]
-    assert run([*base, "--log", str(flown(tmp_path, **before))]) == 0
-    undone = (tmp_path / "sid.rollback.param").read_text().splitlines()[1:]
-    back = {name: float(value) for name, value in (line.split(",") for line in undone)}
-    assert back.pop("ATC_RAT_RLL_I") == pytest.approx(0.226, rel=1e-7)  # single precision
-    assert back == {"ATC_RATE_FF_ENAB": 0.0, "LOG_BITMASK": 176126.0, "SID_AXIS": 0.0}
-    assert "LOG_BITMASK,176127" in file.read_text()
-    assert "restore 0.226 after" in file.read_text()
-    swept = flown(tmp_path, **{**before, "ATC_RAT_RLL_I": 0.0})
-    capsys.readouterr()
-    assert run([*base, "--log", str(swept)]) == 2
-    assert "is there with other values" in capsys.readouterr().err
-    assert run(base) == 0
-    assert "No file takes it back: give --log" in capsys.readouterr().err
-
-
-def test_settings_for_one_autopilot_refuse_the_log_of_another(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    px4 = tmp_path / "px4.ulg"
-    px4.write_bytes(bytes(UlogBuilder()))
-    file = tmp_path / "s.param"
-    assert run([*COMMAND, "--param", str(file), "--log", str(px4)]) == 2
-    assert "needed a log of ardupilot, copter" in capsys.readouterr().err
-    quad = flown(tmp_path)
-    sweep = ["design", "sweep", *COMMAND[2:-2], "--params", f"{file}s", "--log", str(quad)]
-    assert run(sweep) == 2
-    assert "needed a log of px4, copter" in capsys.readouterr().err
-    assert not list(tmp_path.glob("*.param*"))
+    assert shown.err.count("Wrote") == 2
+    assert "Go or no-go" in files[1].read_text()
 
 
 def test_a_sweep_is_not_told_to_become_one() -> None:
@@ -360,21 +236,9 @@ def test_a_sweep_is_not_told_to_become_one() -> None:
     assert "[green]" in _findings(longer, "design-coverage")[0]
 
 
-def test_command_writes_what_px4_can_do(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "wing.params"
-    base = ["design", "sweep", *COMMAND[2:-2], "--params", str(file)]
-    assert run(base) == 0
-    assert "FW_AT" not in file.read_text()
-    assert run([*base, "--fixed-wing"]) == 0
-    assert "FW_AT_SYSID_F1\t4.77464829\t9" in file.read_text()
-    assert "Wrote" in capsys.readouterr().err
-
-
 def test_command_leaves_with_one_for_no_go(capsys: pytest.CaptureFixture[str]) -> None:
     assert run([*COMMAND, "--amplitude", "3"]) == 1
     assert "[red]" in capsys.readouterr().out
-    assert run(["design", "sweep", *COMMAND[2:-2], "--param", "x.param"]) == 2
-    assert "--param needs" in capsys.readouterr().err
 
 
 def test_command_offers_every_kind() -> None:

@@ -25,6 +25,7 @@ ORDER = (
     "inspect",
     "flight",
     "new",
+    "plan",
     "design",
     "response",
     "response-arithmetic",

@@ -8,12 +8,7 @@ Excitation('doublet', 1 input, 350 samples, 50 Hz, 7 s, relative peak factor 1.8
 from flightid.excitation.assess import assess, window_lengths
 from flightid.excitation.design import plan
 from flightid.excitation.excitation import Excitation
-from flightid.excitation.export import (
-    ParameterFile,
-    ardupilot_parameters,
-    px4_parameters,
-    write_csv,
-)
+from flightid.excitation.export import write_csv
 from flightid.excitation.multisine import deal_harmonics, multisine
 from flightid.excitation.multistep import (
     doublet,
@@ -33,12 +28,10 @@ __all__ = [
     "AxisForecast",
     "Excitation",
     "Limits",
-    "ParameterFile",
     "Plan",
     "RateAxis",
     "Spectrum",
     "ardupilot_chirp",
-    "ardupilot_parameters",
     "assess",
     "deal_harmonics",
     "doublet",
@@ -51,7 +44,6 @@ __all__ = [
     "noise",
     "plan",
     "prbs",
-    "px4_parameters",
     "sweep",
     "uniform_noise",
     "window_lengths",

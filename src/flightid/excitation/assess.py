@@ -167,7 +167,7 @@ def _forecast(
     control = flown["input"]
     density = np.real(smoothed_matrix(control[None, :], dt, omega)[0, 0])
     signal = np.abs(vehicle.response(omega)) ** 2 * density
-    noise_density = 2 * dt * vehicle.noise_rad_s**2
+    noise_density = vehicle.noise_density(omega, dt)
     coherence = np.maximum(signal / (signal + noise_density), LEAST_COHERENCE)
     total_s = n_records * excitation.duration_s
     averages = total_s / _window_at(omega, windows, excitation.duration_s)

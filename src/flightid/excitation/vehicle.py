@@ -1,8 +1,8 @@
 """A rough guess of one rate axis, and what an excitation would make of it.
 
-``p = K exp(-tau s) / (T s + 1) u`` with ``u = r - k_p (p + k_phi phi)``: a first-order rate axis
-under the stabilising loop that stays on in flight. All signals are worked out in the frequency
-domain, with a silent end as long as the loop's memory, so that any delay is exact.
+``p = K exp(-tau s) / ((T s + 1) (T_m s + 1)) u`` with ``u = r - k_p (p + k_phi phi)``: a rate axis
+behind its motors, under the stabilising loop that stays on in flight. All signals are worked out in
+the frequency domain, with a silent end as long as the loop's memory, so that any delay is exact.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ class RateAxis(Options):
         Lag, s.
     delay_s : float
         Pure delay, s.
+    motor_lag_s : float
+        Lag of motors or actuators, s; taken as known.
     noise_rad_s : float
         Deviation of the white noise on the measured rate, rad/s.
     rate_feedback : float
@@ -49,6 +51,9 @@ class RateAxis(Options):
     gain: float = option(unit="rad/s", doc="Guess: steady rate for a unit of input.")
     time_constant_s: float = option(unit="s", above=0.0, doc="Guess: lag of the rate.")
     delay_s: float = option(0.0, unit="s", minimum=0.0, doc="Guess: pure delay.")
+    motor_lag_s: float = option(
+        0.0, unit="s", minimum=0.0, doc="Guess: lag of motors or actuators."
+    )
     noise_rad_s: float = option(
         0.02, unit="rad/s", above=0.0, doc="Deviation of the noise on the measured rate."
     )
@@ -64,7 +69,23 @@ class RateAxis(Options):
     def response(self, omega_rad_s: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Rate over input without feedback, (rad/s)/unit."""
         s = 1j * omega_rad_s
-        return np.asarray(self.gain * np.exp(-self.delay_s * s) / (self.time_constant_s * s + 1))
+        lags = (self.time_constant_s * s + 1) * (self.motor_lag_s * s + 1)
+        return np.asarray(self.gain * np.exp(-self.delay_s * s) / lags)
+
+    def noise_density(
+        self, omega_rad_s: NDArray[np.float64], sample_time_s: float
+    ) -> NDArray[np.float64]:
+        """One-sided density of what moves the rate beside the input, (rad/s)²/Hz."""
+        return np.full(omega_rad_s.size, 2 * sample_time_s * self.noise_rad_s**2)
+
+    def entry(self, omega_rad_s: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """From what is injected to the input that it adds; 1 where it is injected at the input."""
+        return np.ones(omega_rad_s.size, dtype=np.complex128)
+
+    def feedback_slope(self, omega_rad_s: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Feedback from rate and attitude to the input, times s: finite at rest, per rad."""
+        s = 1j * omega_rad_s
+        return np.asarray(self.rate_feedback * (s + self.attitude_feedback_per_s))
 
     def sensitivities(self, omega_rad_s: NDArray[np.float64]) -> NDArray[np.complex128]:
         """Derivatives of `response` by gain, time constant and delay, shape (3, n_freqs)."""
@@ -103,22 +124,23 @@ class RateAxis(Options):
         """
         count = excitation.size
         omega, transform = self._transform(excitation, sample_time_s)
-        s = 1j * omega
-        loop = self.response(omega) * self.rate_feedback
+        transform = transform * self.entry(omega)
+        s, rate = 1j * omega, self.response(omega)
+        slope = self.feedback_slope(omega)
+        # Written so that nothing is divided by s, which is zero at rest.
         if self.attitude_feedback_per_s > 0:
-            # Written so that nothing is divided by s, which is zero at rest.
-            below = s * (1 + loop) + loop * self.attitude_feedback_per_s
-            control, attitude = s / below, self.response(omega) / below
-            angle = np.fft.irfft(attitude * transform)[:count]
+            below = s + rate * slope
+            control = s / below
+            angle = np.fft.irfft(rate / below * transform)[:count]
         else:
-            control = 1 / (1 + loop)
+            control = 1 / (1 + rate * self.rate_feedback)
             angle = None
-        rate = np.fft.irfft(self.response(omega) * control * transform)[:count]
+        rates = np.fft.irfft(rate * control * transform)[:count]
         if angle is None:
-            angle = sample_time_s * (np.cumsum(rate) - 0.5 * rate)
+            angle = sample_time_s * (np.cumsum(rates) - 0.5 * rates)
         return {
             "input": np.fft.irfft(control * transform)[:count],
-            "rate": rate,
+            "rate": rates,
             "attitude": angle,
         }
 
@@ -144,9 +166,9 @@ class RateAxis(Options):
         h = self.delay_s
         over = np.array([-(h**3), 12 * h**2, -60 * h, 120.0])
         under = np.array([h**3, 12 * h**2, 60 * h, 120.0])
-        lag = np.array([self.time_constant_s, 1.0])
+        lag = np.polymul([self.time_constant_s, 1.0], [self.motor_lag_s, 1.0])
         if self.rate_feedback == 0:
-            return np.array([-1 / self.time_constant_s], dtype=np.complex128)
+            return np.asarray(np.roots(lag), dtype=np.complex128)
         loop_gain = self.gain * self.rate_feedback
         if self.attitude_feedback_per_s == 0:
             total = np.polyadd(np.polymul(lag, under), loop_gain * over)

@@ -53,7 +53,7 @@ def to_html(document: Document, *, packed: bool = True) -> str:
     script = _resource("page.js")
     hashes = [_script_hash(text) for text in ([script, library] if has_plots else [script])]
     return (
-        _environment()
+        environment()
         .get_template("page.html")
         .render(
             **{key: tree[key] for key in ("title", "subtitle", "verdict", "tally", "footer")},
@@ -139,7 +139,8 @@ def _resource(name: str) -> str:
 
 
 @cache
-def _environment() -> jinja2.Environment:
+def environment() -> jinja2.Environment:
+    """What draws the templates: everything that comes from a log is text."""
     return jinja2.Environment(
         loader=jinja2.FunctionLoader(_resource),
         autoescape=True,

@@ -1,0 +1,72 @@
+"""``flightid plan``: what to fly so that the next log can be identified."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from flightid.cli.option_fields import OptionsCommand, parted
+from flightid.cli.output import emit_values, json_option, leave_by_verdict, note
+
+if TYPE_CHECKING:
+    from flightid.options import Options
+
+
+def _fields() -> dict[str, type[Options]]:
+    from flightid.planning.options import PlanOptions
+
+    return {"the sweeps": PlanOptions}
+
+
+@click.command(
+    cls=OptionsCommand,
+    fields_of=_fields,
+    short_help="Say what to fly next: sweeps, settings with the way back, a card.",
+)
+@click.argument("log", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option(
+    "--output",
+    type=click.Path(file_okay=False, path_type=Path),
+    help="Folder of card and settings; default: <log>-plan beside the log.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace files of settings that exist.")
+@json_option
+def command(
+    log: Path | None,
+    output: Path | None,
+    overwrite: bool,
+    as_json: bool,
+    **options: Any,  # noqa: ANN401 — read from the fields
+) -> None:
+    """Plan the sweeps of the vehicle that LOG was flown with, or of a typical --vehicle.
+
+    LOG is any flight: its loops stay on while the sweep is flown, so they decide, with the axis as
+    this flight showed it, which amplitude gives which rates, attitudes and coherence. Writes
+    card.html, one page to print and take to the field, and the settings of each axis with the file
+    that takes them back. The exit code is 1 for no-go.
+    """
+    from flightid import plan_flight
+    from flightid.files import write_atomically
+    from flightid.progress import progress
+    from flightid.report.flight_card import card_html
+
+    (asked,) = parted(options, _fields())
+    if (log is None) == ("vehicle" not in asked):
+        raise click.UsageError("name a LOG, or without one a --vehicle")
+    if log is not None and "autopilot" in asked:
+        raise click.UsageError("--autopilot belongs to --vehicle: a log tells its own")
+    with progress(None, "planning"):
+        plan = plan_flight(log, **asked)
+    if as_json:
+        emit_values(plan.to_dict())
+    else:
+        click.echo("\n\n".join(str(table) for table in reversed(plan._tables())))
+    place = output or (
+        Path(f"{asked['vehicle']}-plan") if log is None else log.parent / f"{log.stem}-plan"
+    )
+    for path in plan.write(place, overwrite=overwrite):
+        note(f"Wrote {path}")
+    note(f"Wrote {write_atomically(place / 'card.html', card_html(plan))}: print it")
+    leave_by_verdict(plan.findings)

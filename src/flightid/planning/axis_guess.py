@@ -1,0 +1,171 @@
+"""What to expect of an axis: measured in an ordinary flight, or typical under its gains."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flightid.control.autopilots.axis_loop import AxisLoop
+from flightid.errors import DataError, FlightidError
+from flightid.inspection.signals import Span, find, places, records
+from flightid.logs import Log
+from flightid.planning.flown_axis import Entry, FlownAxis
+from flightid.planning.still_rate import still_rate
+from flightid.record import Record
+from flightid.responses import estimate_response
+
+CHANNELS = {
+    "roll": ("tau_phi", "p", "phi_ref"),
+    "pitch": ("tau_theta", "q", "theta_ref"),
+    "yaw": ("tau_psi", "r", "psi_ref"),
+}
+"""Command, rate and attitude set-point of each axis."""
+LOWEST_RAD_S, HIGHEST_RAD_S, N_OMEGA = 2.0, 60.0, 24
+SAMPLES_IN_CYCLE = 5.0
+SHORTEST_S = 5.0
+LEAST_COHERENCE, FEWEST_POINTS = 0.6, 6
+"""A frequency counts as measured from this coherence; so many make an axis measured."""
+BACKWARDS = 0.35
+"""Least distance of the broken loop from -1 at which a response is the vehicle's."""
+PHASE_MARGIN_RAD = {
+    "roll": math.radians(60.0),
+    "pitch": math.radians(60.0),
+    "yaw": math.radians(85.0),
+}
+"""At which the gains that fly cross over: yaw is tuned softly."""
+TYPICAL = {
+    "multirotor": FlownAxis(1.0, 0.5, 0.012, motor_lag_s=0.05),
+    "helicopter": FlownAxis(1.0, 0.1, 0.02, motor_lag_s=0.05),
+    "aeroplane": FlownAxis(1.0, 0.15, 0.03, motor_lag_s=0.05),
+}
+"""Time constant, delay and motor lag of middle-sized vehicles, s; the gain follows from the gains
+that fly."""
+
+
+@dataclass(frozen=True)
+class AxisGuess:
+    """An axis as it is expected, and where that comes from.
+
+    Attributes
+    ----------
+    vehicle : FlownAxis
+    measured : bool
+        Whether an ordinary flight told it; else it is typical of vehicles with these gains.
+    reason : str
+        Why it was not measured; empty where it was.
+    """
+
+    vehicle: FlownAxis
+    measured: bool
+    reason: str = ""
+
+
+def guess_axis(
+    axis: str, loop: AxisLoop, kind: str, enters: Entry, log: Log | None, spans: tuple[Span, ...]
+) -> AxisGuess:
+    """An axis from the flight in a log, or a typical one where the flight does not tell it.
+
+    Parameters
+    ----------
+    axis : {"roll", "pitch", "yaw"}
+    loop : AxisLoop
+        Controllers that stay on meanwhile.
+    kind : {"multirotor", "helicopter", "aeroplane"}
+        Whose typical lags to take.
+    enters : {"mixer", "rate", "angle"}
+        Where the sweep is added.
+    log : Log, optional
+    spans : tuple of (float, float)
+        In the air, s.
+
+    Reference
+    ---------
+    Ljung, *System Identification*, 2nd ed., section 13.4 (direct approach): the response of command
+    to rate by a model of the noise, which a closed loop without excitation asks for.
+    """
+    usual = _typical(loop, kind)
+    base = replace(usual, enters=enters)
+    if log is None:
+        return AxisGuess(base, False, "no log was given")
+    pieces = _pieces(log, axis, spans)
+    still = still_rate(pieces)
+    if still is not None:
+        base = replace(base, still_omega_rad_s=still[0], still_density=still[1])
+    try:
+        return AxisGuess(_measured(axis, pieces, base, loop), True)
+    except FlightidError as error:
+        return AxisGuess(base, False, f"{error.problem}: found {error.found}")
+
+
+def _pieces(log: Log, axis: str, spans: tuple[Span, ...]) -> list[Record]:
+    """Unbroken pieces of command, rate and attitude set-point, where they were logged."""
+    command, rate, angle = CHANNELS[axis]
+    first, streams = find(log, command), places(log, rate)
+    if first is None or not streams:
+        return []
+    message = first.label.split(".")[0]
+    same = [each for each in streams if each.label.split(".")[0] == message]
+    signals = [first, (same or streams)[0]]
+    reference = find(log, angle)
+    if reference is not None and reference.rate_hz > 0.9 * min(each.rate_hz for each in signals):
+        signals.append(reference)
+    made = records(signals, {command}, spans)
+    return [record for record in made if record.duration_s >= SHORTEST_S]
+
+
+def _measured(axis: str, pieces: list[Record], base: FlownAxis, loop: AxisLoop) -> FlownAxis:
+    """The axis as it flew, by a model of the noise; typical in shape where the flight is silent.
+
+    Raises
+    ------
+    FlightidError
+        The flight does not tell them.
+    """
+    command, rate, _ = CHANNELS[axis]
+    if not pieces:
+        raise DataError("no span in the air holds command and rate", found=f"{command}, {rate}")
+    rate_hz = min(record.sample_rate_hz for record in pieces)
+    highest = min(HIGHEST_RAD_S, 2.0 * np.pi * rate_hz / SAMPLES_IN_CYCLE)
+    if highest < 4.0 * LOWEST_RAD_S:
+        raise DataError("the log is too slow for a rate loop", found=f"{rate_hz:.3g} Hz")
+    response = estimate_response(
+        pieces, inputs=command, outputs=rate, band_rad_s=(LOWEST_RAD_S, highest),
+        n_omega=N_OMEGA, estimator="prewhitened",
+    )  # fmt: skip
+    flown = response.response[0, 0]
+    around = flown * loop.feedback(response.omega_rad_s, gyro="filtered", with_hold=False)
+    # Gusts that the loop answers show the controller backwards: around the loop that is -1.
+    coherent = (response.coherence[0, 0] >= LEAST_COHERENCE) & (abs(1.0 + around) > BACKWARDS)
+    if np.count_nonzero(coherent) < FEWEST_POINTS:
+        share = float(np.mean(coherent))
+        raise DataError(
+            "the flight moves the axis too little", found=f"coherence in {share:.0%} of the band"
+        )
+    omega = response.omega_rad_s[coherent]
+    ratio = np.log(flown[coherent] / base.response(omega))
+    turned = np.real(ratio) + 1j * np.unwrap(np.imag(ratio))
+    return replace(base, told_omega_rad_s=tuple(omega), told_ratio=tuple(turned))
+
+
+def _typical(loop: AxisLoop, kind: str) -> FlownAxis:
+    """An axis that the flown gains suit: by feed-forward, or by 60 deg of phase margin.
+
+    Feed-forward is the inverse of a steady gain; without it, P is what a multirotor's rate loop
+    crosses over with.
+    """
+    base = replace(TYPICAL[kind], loop=loop, attitude_feedback_per_s=loop.angle_gain_1_s)
+    omega = np.geomspace(0.5, 100.0, 400)
+    terms, names = loop.forward_basis(omega[:1], with_hold=False)
+    forward = loop.names.get("ff", "")
+    fed = 0.0
+    if forward in names:
+        fed = loop.gains[forward] * float(abs(terms[names.index(forward), 0]))
+    if kind != "multirotor" and fed > 0.0:
+        return replace(base, gain=1.0 / fed, rate_feedback=fed)
+    opened = base.response(omega) * loop.feedback(omega, gyro="filtered", with_hold=False)
+    phase = np.unwrap(np.angle(opened))
+    place = int(np.argmin(np.abs(phase - (PHASE_MARGIN_RAD[loop.axis] - np.pi))))
+    gain = float(1.0 / abs(opened[place]))
+    return replace(base, gain=gain, rate_feedback=loop.values["p"] or 1.0 / gain)

@@ -1,0 +1,265 @@
+"""The noun of the room: what to fly, how large, how long, and what it would show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from flightid.control.autopilots.parameter_files import (
+    GainChange,
+    write_ardupilot_parameters,
+    write_px4_parameters,
+)
+from flightid.conventions import Light
+from flightid.excitation import Plan
+from flightid.files import write_atomically
+from flightid.findings import Finding, worst
+from flightid.planning.axis_guess import AxisGuess
+from flightid.planning.flight_time import FlightTime
+from flightid.planning.procedures import STOP, Procedure
+from flightid.planning.settings import BETAFLIGHT_CLI, INTEGERS
+from flightid.result import Result
+from flightid.table import Cell, Column, Table
+
+DEGREES = math.degrees(1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class AxisSweep:
+    """The sweep of one axis.
+
+    Attributes
+    ----------
+    axis : str
+    guess : AxisGuess or None
+        What the axis is expected to be; None where the autopilot sizes its sweep itself.
+    plan : Plan or None
+        The sweep with what it would show.
+    changes : tuple of GainChange
+        Settings that make the autopilot fly and log it.
+    """
+
+    axis: str
+    guess: AxisGuess | None
+    plan: Plan | None
+    changes: tuple[GainChange, ...]
+
+    @property
+    def amplitude(self) -> float | None:
+        """Peak of the sweep: share of full command, rad/s or rad."""
+        return None if self.plan is None else float(self.plan.excitation.peak[0])
+
+    @property
+    def size(self) -> str:
+        """The amplitude as a pilot or a parameter has it."""
+        if self.plan is None or self.amplitude is None:
+            return ""
+        unit = self.plan.excitation.unit
+        if unit == "1":
+            return f"{self.amplitude:.3g} of full"
+        return f"{DEGREES * self.amplitude:.2g} {unit.replace('rad', 'deg')}"
+
+    @property
+    def coherence(self) -> float | None:
+        """Predicted coherence of sweep and rate, its mean over the band."""
+        return None if self.plan is None else float(self.plan.axes[0].coherence.mean())
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values."""
+        return {
+            "axis": self.axis,
+            "measured": self.guess is not None and self.guess.measured,
+            "reason": "" if self.guess is None else self.guess.reason,
+            "amplitude": self.amplitude,
+            "coherence": self.coherence,
+            "plan": None if self.plan is None else self.plan.to_dict(),
+            "changes": {each.name: each.value for each in self.changes},
+        }
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SweepPlan(Result, schema="flightid.sweep_plan/1"):
+    """What to fly next: sweeps of each axis, their settings with the way back, time and battery.
+
+    Attributes
+    ----------
+    name : str
+        Log, or kind of vehicle.
+    firmware : str
+        As logged; empty without a log.
+    procedure : Procedure
+        How this autopilot sweeps.
+    sweeps : tuple of AxisSweep
+    n_records : int
+        Sweeps of each axis.
+    flight_time : FlightTime
+    logging : str
+        What to set so that the log is fast enough.
+    findings : tuple of Finding
+        Go or no-go.
+
+    Example
+    -------
+    >>> import flightid as fid
+    >>> plan = fid.plan_flight(vehicle="quad")
+    >>> plan
+    SweepPlan('quad', ArduCopter, 3 axes, go)
+    """
+
+    name: str
+    firmware: str
+    procedure: Procedure
+    sweeps: tuple[AxisSweep, ...]
+    n_records: int
+    flight_time: FlightTime
+    logging: str
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def is_go(self) -> bool:
+        """Whether nothing on the list is red."""
+        return worst(self.findings) is not Light.RED
+
+    def summary(self) -> Table:
+        """A line for each axis: what to fly."""
+        columns = (
+            *(Column("axis"), Column("amplitude"), Column("from", "Hz", 2), Column("to", "Hz", 2)),
+            *(Column("sweep", "s", 3), Column("runs"), Column("settings")),
+        )
+        rows: list[tuple[Cell, ...]] = []
+        for each in self.sweeps:
+            file = self.file_of(each)
+            if each.plan is None:
+                rows.append((each.axis, *[None] * 4, self.n_records, file))
+                continue
+            low, high = (edge / math.tau for edge in each.plan.band_rad_s)
+            length_s = each.plan.excitation.duration_s
+            rows.append((each.axis, each.size, low, high, length_s, self.n_records, file))
+        notes = tuple(self._notes())
+        return Table(self.title, columns, tuple(rows), notes).without_empty_columns()
+
+    def expected(self) -> Table:
+        """What the log will show where the plan holds; rows only for axes that flightid sizes."""
+        columns = (
+            *(
+                Column("axis"),
+                Column("command to", "± % of full", 2),
+                Column("rate to", "± deg/s", 2),
+            ),
+            *(Column("attitude to", "± deg", 2), Column("coherence", digits=2), Column("rests on")),
+        )
+        rows: list[tuple[Cell, ...]] = []
+        for each in self.sweeps:
+            if each.plan is None or each.guess is None:
+                continue
+            told, size = each.plan.axes[0], 100.0 / self.full_command
+            rows.append(
+                (
+                    *(each.axis, size * told.peak_control, DEGREES * told.peak_rate_rad_s),
+                    *(DEGREES * told.peak_attitude_rad, each.coherence),
+                    "this flight" if each.guess.measured else "a typical vehicle",
+                )
+            )
+        notes = ("Peaks are of the sweep with the loops closed; coherence, of sweep and rate, is a "
+                 "mean over the band.",)  # fmt: skip
+        return Table("What the sweep will show", columns, tuple(rows), notes)
+
+    def _tables(self) -> tuple[Table, ...]:
+        expected = self.expected()
+        return (self.summary(), expected) if expected.rows else (self.summary(),)
+
+    def file_of(self, axis: AxisSweep) -> str:
+        """Name of the file that sets an axis up; empty where nothing is to be set."""
+        if self.procedure.how == "chirp":
+            return "chirp.txt"
+        if not axis.changes:
+            return ""
+        stem = axis.axis if self.procedure.how == "mode" else "settings"
+        return f"{stem}{self.procedure.suffix}"
+
+    @property
+    def title(self) -> str:
+        """Whose plan."""
+        return f"Flight plan of {self.name}, {self.procedure.title}"
+
+    @property
+    def full_command(self) -> float:
+        """A full command, in the unit of the controllers' outputs."""
+        return 45.0 if self.procedure.loops == "arduplane" else 1.0
+
+    def _notes(self) -> Iterator[str]:
+        yield f"{self.flight_time.words[0].upper()}{self.flight_time.words[1:]}."
+        yield f"Log: {self.logging}."
+        yield from map(str, self.findings)
+
+    def settings(self, axis: str) -> Table:
+        """What the file of an axis sets, beside what flew.
+
+        Raises
+        ------
+        KeyError
+            The plan has no such axis.
+        """
+        found = {each.axis: each for each in self.sweeps}[axis]
+        rows = tuple((c.name, c.value, c.old, c.reason) for c in found.changes)
+        columns = (
+            Column("parameter"),
+            Column("set", digits=7),
+            Column("flown", digits=7),
+            Column("why"),
+        )
+        return Table(f"Settings for {axis}", columns, rows)
+
+    def write(self, path: str | Path, *, overwrite: bool = False) -> tuple[Path, ...]:
+        """Write the settings of each axis, each with the file that takes them back.
+
+        Parameters
+        ----------
+        path : str or Path
+            Folder; is made where it is not there.
+        overwrite : bool
+            Replace files that exist.
+
+        Raises
+        ------
+        OptionError
+            A file is there already: it may be the only record of what the vehicle flew.
+        OSError
+            The folder cannot be written.
+        """
+        place = Path(path)
+        place.mkdir(parents=True, exist_ok=True)
+        if self.procedure.how == "chirp":
+            return (write_atomically(place / "chirp.txt", BETAFLIGHT_CLI),)
+        by_file = {self.file_of(each): each for each in reversed(self.sweeps) if each.changes}
+        written: list[Path] = []
+        for name, each in reversed(by_file.items()):
+            file = place / name
+            notes = [f"flightid plan of {self.name}: {Path(name).stem}"]
+            if self.procedure.suffix == ".params":
+                made = write_px4_parameters(
+                    each.changes, file, notes=notes, integers=INTEGERS, overwrite=overwrite
+                )
+            else:
+                made = write_ardupilot_parameters(
+                    each.changes, file, notes=notes, overwrite=overwrite
+                )
+            written += [each for each in (made.rollback, made.path) if each is not None]
+        return tuple(written)
+
+    @property
+    def stop_if(self) -> tuple[str, ...]:
+        """When to leave the sweep at once."""
+        return STOP
+
+    def _computed(self) -> dict[str, object]:
+        return {"go": self.is_go, "batteries": self.flight_time.batteries}
+
+    def __repr__(self) -> str:
+        """Whose plan, how many axes and the verdict on one line."""
+        verdict = "go" if self.is_go else "no-go"
+        return (
+            f"SweepPlan({self.name!r}, {self.procedure.title}, {len(self.sweeps)} axes, {verdict})"
+        )

@@ -1,0 +1,194 @@
+"""Flight plans: what a card promises is what the simulated vehicle does with its loops closed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.cli.program import run
+from flightid.control.autopilots import read_parameters
+from flightid.errors import OptionError, UnknownNameError
+from flightid.planning.result import AxisSweep
+from flightid.planning.still_rate import still_rate
+from flightid.report.flight_card import card_html
+from flightid.vehicles import (
+    Autopilot,
+    PilotDoublet,
+    SidActivation,
+    Turbulence,
+    fly,
+    write_ardupilot_log,
+)
+from flightid.vehicles.truth import AXES, COMMANDS, RATES, AxisName
+from tests.closeness import assert_close
+
+AIR = Turbulence(rate_rad_s=0.1)
+ANGLES = ("phi", "theta", "psi")
+SID = ("MAGNITUDE", "F_START_HZ", "F_STOP_HZ", "T_FADE_IN", "T_REC", "T_FADE_OUT")
+
+
+def ordinary(path: Path) -> Path:
+    """A log of sticks alone, a minute of doublets."""
+    random, moves, start_s = np.random.default_rng(3), [], 11.0
+    while start_s < 60.0:
+        axis: AxisName = AXES[int(random.integers(3))]
+        size = float(random.uniform(0.05, 0.25)) * (2.0 if axis == "yaw" else 1.0)
+        moves.append(PilotDoublet(axis, start_s, size, float(random.uniform(0.3, 1.0))))
+        start_s = moves[-1].end_s + float(random.uniform(0.0, 2.0))
+    return write_ardupilot_log(fly(doublets=moves, duration_s=65.0, turbulence=AIR, seed=3), path)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return ordinary(tmp_path_factory.mktemp("plan") / "quad.bin")
+
+
+@pytest.fixture(scope="module")
+def plan(log: Path) -> fid.SweepPlan:
+    return fid.plan_flight(log)
+
+
+def flown(sweep: AxisSweep) -> fid.Record:
+    """The sweep as the simulated vehicle flies it with what the file sets."""
+    settings = {each.name: each.value for each in sweep.changes}
+    gains = {n: v for n, v in settings.items() if n.startswith("ATC_RAT_")}
+    chirp = {name.removeprefix("T_").lower(): settings[f"SID_{name}"] for name in SID}
+    names = {"f_start_hz": "start_hz", "f_stop_hz": "stop_hz", "rec": "record_s"}
+    names |= {"fade_in": "fade_in_s", "fade_out": "fade_out_s"}
+    activation = SidActivation(
+        axis=int(settings["SID_AXIS"]),
+        start_s=10.0,
+        **{names.get(name, name): value for name, value in chirp.items()},
+    )
+    flight = fly(
+        runs=[activation], autopilot=Autopilot().with_parameters(gains), turbulence=AIR, seed=9
+    )
+    return flight.record(flight.span(activation))
+
+
+@pytest.mark.parametrize("place", [0, 1, 2])
+def test_the_simulated_vehicle_does_what_the_card_promises(plan: fid.SweepPlan, place: int) -> None:
+    sweep = plan.sweeps[place]
+    assert sweep.plan is not None
+    assert sweep.guess is not None
+    assert sweep.guess.measured
+    promised, record = sweep.plan.axes[0], flown(sweep)
+    peaks = {
+        COMMANDS[place]: promised.peak_control,
+        RATES[place]: promised.peak_rate_rad_s,
+        ANGLES[place]: promised.peak_attitude_rad,
+    }
+    for channel, peak in peaks.items():
+        reached = float(np.ptp(record[channel])) / 2.0
+        assert_close(reached, peak, rtol=0.3, why="asked of the card")
+    pair = fid.Record.from_arrays(
+        record.time_s, inputs={"x": record["excitation"]}, outputs={"y": record[RATES[place]]},
+        units={"y": "rad/s"},
+    )  # fmt: skip
+    response = fid.estimate_response(
+        [pair], inputs="x", outputs="y", band_rad_s=sweep.plan.band_rad_s, n_omega=30,
+        window_s=sweep.plan.windows_s, estimator="composite",
+    )  # fmt: skip
+    assert_close(
+        float(response.coherence[0, 0].mean()), sweep.coherence or 0.0, rtol=0.1,
+        why="mean over the band; asked is 0.3",
+    )  # fmt: skip
+
+
+def test_amplitudes_are_those_of_closed_loops(plan: fid.SweepPlan) -> None:
+    """With loops taken for open, the attitude limit alone made sweeps ten times too small."""
+    sizes = [sweep.amplitude or 0.0 for sweep in plan.sweeps]
+    assert all(0.04 < size < 0.3 for size in sizes)
+
+
+def test_files_set_and_take_back(plan: fid.SweepPlan, log: Path, tmp_path: Path) -> None:
+    written = plan.write(tmp_path)
+    assert len(written) == 6
+    before = fid.read_log(log).parameters
+    pitch = read_parameters(tmp_path / "pitch.param")
+    assert pitch["SID_AXIS"] == 11.0
+    assert pitch["ATC_RAT_PIT_I"] == 0.0
+    assert_close(
+        pitch["ATC_RAT_RLL_I"], before["ATC_RAT_RLL_I"], rtol=1e-6,
+        why="the file of roll had set it to zero; single precision",
+    )  # fmt: skip
+    assert int(pitch["LOG_BITMASK"]) & 1
+    back = read_parameters(tmp_path / "pitch.rollback.param")
+    assert back["SID_AXIS"] == 0.0
+    for name, value in back.items():
+        assert_close(value, before.get(name, 0.0), rtol=1e-6, why="single precision")
+    with pytest.raises(OptionError, match="already there"):
+        plan.write(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "autopilot", "file", "said"),
+    [
+        ("quad", "ardupilot", "roll.param", "SID_AXIS"),
+        ("heli", "ardupilot", "yaw.param", "SID_MAGNITUDE"),
+        ("quadplane", "ardupilot", "pitch.param", "Q_A_RAT_PIT_I"),
+        ("plane", "ardupilot", None, "FBWA"),
+        ("quad", "px4", "settings.params", "SDLOG_PROFILE"),
+        ("plane", "px4", "settings.params", "FW_AT_SYSID_F1"),
+        ("quad", "betaflight", "chirp.txt", "CHIRP"),
+    ],
+)
+def test_every_autopilot_has_a_card(
+    tmp_path: Path, vehicle: str, autopilot: str, file: str | None, said: str
+) -> None:
+    made = fid.plan_flight(vehicle=vehicle, autopilot=autopilot)
+    made.write(tmp_path)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert file is None or file in names
+    assert said in card_html(made) + "".join(p.read_text() for p in tmp_path.iterdir())
+    assert any(each.code == "no-way-back-file" for each in made.findings)
+    assert not any("rollback" in name for name in names)
+
+
+def test_helicopters_keep_their_integrator() -> None:
+    made = fid.plan_flight(vehicle="heli", axes=("roll",))
+    assert not any(each.name.endswith("_I") for each in made.sweeps[0].changes)
+
+
+def test_plans_refuse() -> None:
+    with pytest.raises(UnknownNameError, match="no way to sweep this vehicle"):
+        fid.plan_flight(vehicle="heli", autopilot="px4")
+    with pytest.raises(OptionError, match="sweeps no such axis"):
+        fid.plan_flight(vehicle="plane", axes=("yaw",))
+    with pytest.raises(OptionError, match="FW_AT_SYSID_TIME leaves"):
+        fid.plan_flight(vehicle="plane", autopilot="px4", duration_s=200.0)
+
+
+def test_what_the_stick_moves_is_no_gust() -> None:
+    random = np.random.default_rng(0)
+    time_s = np.arange(12_000) / 100.0
+    stick = np.repeat(random.standard_normal(1200), 10)
+    gusts = 0.1 * random.standard_normal(time_s.size)
+    record = fid.Record.from_arrays(
+        time_s, inputs={"u": 0.0 * time_s}, outputs={"p": stick + gusts, "p_ref": stick}
+    )
+    found = still_rate([record])
+    assert found is not None
+    assert_close(
+        float(np.mean(found[1])), 2.0 * 0.1**2 / 100.0, rtol=0.1,
+        why="white: 2 σ² dt; 24 windows of 500 lines",
+    )  # fmt: skip
+
+
+def test_command_writes_card_and_settings(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["plan", str(log), "--axes", "roll", "--output", str(tmp_path / "out")]) == 0
+    shown = capsys.readouterr()
+    assert "0.0" in shown.out
+    assert "this flight" in shown.out
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {
+        "roll.param", "roll.rollback.param", "card.html",
+    }  # fmt: skip
+    assert run(["plan"]) == 2
+    assert "name a LOG" in capsys.readouterr().err
+    assert run(["plan", str(log), "--autopilot", "px4"]) == 2
+    assert "belongs to --vehicle" in capsys.readouterr().err
