@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.signal import csd, welch
+import scipy
 
 from flightid.record import Record
 
@@ -48,11 +48,11 @@ def still_rate(pieces: list[Record]) -> tuple[tuple[float, ...], tuple[float, ..
     frequencies = np.zeros(0)
     for record, weight in zip(usable, weights, strict=True):
         options: dict[str, Any] = {"fs": rate_hz, "nperseg": size, "detrend": "linear"}
-        frequencies, own = welch(record[named[0]], **options)
+        frequencies, own = scipy.signal.welch(record[named[0]], **options)
         parts = [own]
         if asked is not None:
-            parts.append(welch(record[asked], **options)[1])
-            parts.append(csd(record[asked], record[named[0]], **options)[1])
+            parts.append(scipy.signal.welch(record[asked], **options)[1])
+            parts.append(scipy.signal.csd(record[asked], record[named[0]], **options)[1])
         sums = [weight * part + (sums[k] if sums else 0.0) for k, part in enumerate(parts)]
     total = [each / weights.sum() for each in sums]
     left = total[0]
