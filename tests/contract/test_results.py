@@ -26,6 +26,7 @@ WITHOUT_PICTURE = {
     "ExportFiles": "files",
     "SweepPlan": "a card to print",
     "Flight": "a simulated log, drawn from its records",
+    "FilterChoice": "a table; the spectrum behind it is drawn by the flight review",
     "FlownSession": "its record draws itself",
     "Inspection": "tables and lights",
     "Interpretation": "sentences; `pole_zero` draws the roots",

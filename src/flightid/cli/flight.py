@@ -3,23 +3,42 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from flightid.cli.output import emit_values, json_option, leave_by_verdict, level_option, note
 from flightid.cli.pages import html_option
 
+if TYPE_CHECKING:
+    from flightid.review import FlightReview
+
 
 @click.command("flight", short_help="Say what a flight tells: steps of the loops, motors, noise.")
 @click.argument("log", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option(
+    "--write",
+    "target",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Parameter file for the filters that would serve better, with the way back.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace parameter files that exist.")
 @level_option
 @html_option
 @json_option
-def command(log: Path, level: float | None, html: Path | None, as_json: bool) -> None:
+def command(
+    log: Path,
+    target: Path | None,
+    overwrite: bool,
+    level: float | None,
+    html: Path | None,
+    as_json: bool,
+) -> None:
     """Say what the flight of LOG tells of its vehicle; no sweep is needed.
 
     Steps, delays and bandwidths of the rate and attitude loops from ordinary flying, each with an
-    interval; motors at their limits and out of balance; vibration; battery, modes, gains.
+    interval; motors at their limits and out of balance; vibration; noise of the gyro and what it
+    makes of the outputs; filters, the phase they cost, and better ones; battery, modes, gains.
     What it cannot tell it says, with what to fly or log. Reads ArduPilot DataFlash and PX4 ULog.
     """
     from flightid import review_flight
@@ -38,4 +57,28 @@ def command(log: Path, level: float | None, html: Path | None, as_json: bool) ->
             from flightid.report.html import to_html
 
             note(f"Wrote {write_atomically(html, to_html(flight_document(review)))}")
+        if target is not None:
+            _write(review, target, overwrite)
     leave_by_verdict(review.findings)
+
+
+def _write(review: FlightReview, target: Path, overwrite: bool) -> None:
+    """Write the filters that would serve better; say why there are none."""
+    from flightid import write_ardupilot_parameters, write_px4_parameters
+
+    choice = review.filters.choice
+    if choice is None or not choice.changes:
+        why = "as good as flown" if choice else review.filters.reason or review.noise.reason
+        note(f"Not written: {target}: no better filters ({why})")
+        return
+    notes = ["flightid: filters for the noise of this flight", *review.filters.words()]
+    if review.kind == "px4":
+        whole = [change.name for change in choice.changes if change.name == "IMU_GYRO_DNF_EN"]
+        made = write_px4_parameters(
+            choice.changes, target, notes=notes, integers=whole, overwrite=overwrite
+        )
+    else:
+        made = write_ardupilot_parameters(choice.changes, target, notes=notes, overwrite=overwrite)
+    note(f"Wrote {made.path}")
+    if made.rollback is not None:
+        note(f"Wrote {made.rollback}")

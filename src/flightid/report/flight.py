@@ -6,7 +6,7 @@ from flightid.report.content import Block, Document, Lights, Paragraph, Section,
 from flightid.report.figures import figure_block
 from flightid.review import FlightReview
 
-FOLDED = {"Modes", "Flown gains"}
+FOLDED = {"Modes", "Flown gains", "Filters as flown"}
 CAPTION = (
     "Steps of the closed loops with their bands, from ordinary flying: what follows when a "
     "set-point jumps by 1"

@@ -9,6 +9,7 @@ from flightid.inspection.actuators import find_actuators
 from flightid.inspection.flight_phases import flight_phases
 from flightid.inspection.stamps import log_span
 from flightid.logs import Log, read_log
+from flightid.review.filters import filter_review
 from flightid.review.gyro_noise import gyro_noise
 from flightid.review.identity import flight_identity
 from flightid.review.loops import loop_responses
@@ -57,6 +58,8 @@ def review_flight(log: Log | str | Path) -> FlightReview:
     start_s, stop_s = log_span(opened)
     phases = flight_phases(opened, actuators)
     ways = None if actuators is None else turning(opened, len(actuators.names))
+    loops = loop_responses(opened, phases.airborne)
+    noise = gyro_noise(opened, phases.airborne)
     found = FlightReview(
         name=opened.path.name,
         kind=opened.kind,
@@ -65,10 +68,11 @@ def review_flight(log: Log | str | Path) -> FlightReview:
         duration_s=stop_s - start_s,
         phases=phases,
         identity=flight_identity(opened, phases),
-        loops=loop_responses(opened, phases.airborne),
+        loops=loops,
         motors=motor_use(actuators, phases.airborne),
         yaw_trim=yaw_trim(actuators, phases.airborne, ways),
         vibrations=vibrations(opened, phases.airborne),
-        noise=gyro_noise(opened, phases.airborne),
+        noise=noise,
+        filters=filter_review(opened, phases.airborne, noise, loops),
     )
     return replace(found, findings=judge_flight(found))

@@ -8,6 +8,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid.control.autopilots.axis_loop import Gyro
+from flightid.control.autopilots.output_noise import GyroSpectrum
 from flightid.inspection.signals import Signal, Span, find, inside
 from flightid.logs import Log
 from flightid.result import Result
@@ -29,6 +31,7 @@ FALSE_PEAKS = 0.01
 STANDING_OUT = 2.0
 """A peak is at least so many times its floor: less is a slope of it."""
 MOST_PEAKS = 6
+WHERE = {"raw": "ahead of the autopilot's filters", "filtered": "behind the autopilot's filters"}
 MOVES = "moves up with throttle: motors or propellers"
 FALLS = "moves down as throttle goes up: motors, folded at half of the logging rate"
 STAYS = "stays where throttle moves by a third: frame, mount or a payload"
@@ -81,6 +84,8 @@ class GyroNoise(Result, schema="flightid.gyro_noise/1"):
         Highest first.
     reason : str
         Why there is no spectrum.
+    gyro : {"raw", "filtered"}
+        Whether it was logged ahead of the autopilot's filters or behind them.
 
     Example
     -------
@@ -98,11 +103,16 @@ class GyroNoise(Result, schema="flightid.gyro_noise/1"):
     by_throttle: Array = field(default_factory=lambda: np.zeros((0, 0)))
     peaks: tuple[NoisePeak, ...] = ()
     reason: str = ""
+    gyro: Gyro = "filtered"
 
     @property
     def is_told(self) -> bool:
         """Whether the log holds a spectrum."""
         return self.frequency_hz.size > 0
+
+    def of_axis(self, axis: str) -> GyroSpectrum:
+        """Spectrum about one axis, as controllers take it."""
+        return GyroSpectrum(self.frequency_hz, self.spectrum[AXES.index(axis)], self.gyro)
 
     def band(self, level: float | None = None) -> tuple[Array, Array]:
         """Lower and upper edge of the spectrum's interval, shape (3, n_f) each.
@@ -146,8 +156,9 @@ class GyroNoise(Result, schema="flightid.gyro_noise/1"):
             return (f"No spectrum: {self.reason}.",)
         folded = f" What is faster than {0.5 * self.rate_hz:.3g} Hz shows folded below it."
         what = (
-            f"{self.label}: {self.n_windows} windows of {1.0 / self.resolution_hz:.2g} s at "
-            f"{self.rate_hz:.4g} Hz." + (folded if self.rate_hz < 1000.0 else "")
+            f"{self.label}, {WHERE[self.gyro]}: {self.n_windows} windows of "
+            f"{1.0 / self.resolution_hz:.2g} s at {self.rate_hz:.4g} Hz."
+            + (folded if self.rate_hz < 1000.0 else "")
         )
         none = "" if self.peaks else f"No peak stands out of the floor above {LOWEST_HZ:g} Hz."
         return tuple(filter(None, (what, none)))
@@ -182,7 +193,7 @@ def gyro_noise(log: Log, spans: tuple[Span, ...]) -> GyroNoise:
     resolution = float(frequency[1] - frequency[0])
     return GyroNoise(
         windows.label, windows.rate_hz, resolution, len(powers), freedom,
-        frequency, mean, bins, by_throttle, named,
+        frequency, mean, bins, by_throttle, named, gyro=windows.gyro,
     )  # fmt: skip
 
 
@@ -231,7 +242,7 @@ def _peaks(frequency: Array, mean: Array, freedom: float) -> list[tuple[int, flo
     limit = scipy.stats.chi2.ppf(1.0 - FALSE_PEAKS / (3 * count), freedom) / freedom
     found: list[tuple[int, float, float]] = []
     for axis, power in enumerate(mean):
-        ratio = power / _floor(frequency, power)
+        ratio = power / floor_beneath(frequency, power)
         higher = (ratio[1:-1] >= ratio[:-2]) & (ratio[1:-1] > ratio[2:])
         tops = np.flatnonzero(higher & inside_band[1:-1]) + 1
         found += [
@@ -248,7 +259,7 @@ def _peaks(frequency: Array, mean: Array, freedom: float) -> list[tuple[int, flo
     return kept[:MOST_PEAKS]
 
 
-def _floor(frequency: Array, power: Array) -> Array:
+def floor_beneath(frequency: Array, power: Array) -> Array:
     """Running median on a logarithmic grid: what lies beneath narrow peaks."""
     grid = np.geomspace(frequency[0], frequency[-1], 400)
     level = np.interp(grid, frequency, np.log(np.maximum(power, np.finfo(float).tiny)))

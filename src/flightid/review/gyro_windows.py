@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.control.autopilots.axis_loop import Gyro
 from flightid.inspection.signals import Signal, Span, inside, places
 from flightid.inspection.stamps import believable
 from flightid.logs import Log
@@ -20,6 +21,11 @@ WINDOW_S = 1.0
 GYRO, LONGEST_BATCH = 1, 65536
 POST_FILTER = 3
 """ArduPilot numbers batches behind the filters by so many instances more."""
+BEHIND, BOTH = 1 << 1, 1 << 2
+"""INS_LOG_BAT_OPT: batches from behind the filters, or from both sides of them."""
+RAW = ("GYR", "sensor_combined", "sensor_gyro")
+"""Messages from ahead of the filters."""
+RAW_FIELDS = ("GyrX", "GyrY", "GyrZ")
 JITTER = 0.5
 """Of the median step: a window with a larger one is left out."""
 
@@ -40,6 +46,8 @@ class GyroWindows:
         Rates about x, y and z, rad/s.
     overlap : float
         Of neighbouring windows.
+    gyro : {"raw", "filtered"}
+        Ahead of the autopilot's filters, or behind them.
     """
 
     label: str
@@ -47,6 +55,7 @@ class GyroWindows:
     start_s: Array
     samples: Array
     overlap: float
+    gyro: Gyro
 
     @property
     def window_s(self) -> float:
@@ -60,7 +69,7 @@ def gyro_windows(log: Log, spans: tuple[Span, ...]) -> GyroWindows | str:
     if batches:
         return max(batches, key=lambda each: each.samples.shape[0])
     streams = [_triple(log, place) for place in range(len(places(log, "p")))]
-    whole = [stream for stream in streams if stream is not None]
+    whole = [stream for stream in (_raw_stream(log), *streams) if stream is not None]
     if not whole:
         return "no gyroscope is logged on three axes"
     fastest = max(whole, key=lambda stream: stream[0].rate_hz)
@@ -78,6 +87,22 @@ def _triple(log: Log, place: int) -> tuple[Signal, Signal, Signal] | None:
         return None
     x, y, z = (each[place] for each in found)
     return (x, y, z) if x.time_s.size == y.time_s.size == z.time_s.size else None
+
+
+def _raw_stream(log: Log) -> tuple[Signal, Signal, Signal] | None:
+    """ArduPilot's first gyroscope as its driver gives it, where INS_RAW_LOG_OPT logs it."""
+    if "GYR" not in log or not {"SampleUS", *RAW_FIELDS} <= set(log.messages["GYR"].fields):
+        return None
+    table = log.table("GYR", min(log.messages["GYR"].instances, default=None))
+    time_s = table["SampleUS"] * (1.0 if table.unit("SampleUS") == "s" else 1e-6)
+    good = believable(time_s)
+    if np.count_nonzero(good) < 2:
+        return None
+    x, y, z = (
+        Signal(name, time_s[good], table[field][good], "rad/s", f"GYR.{field}")
+        for name, field in zip(RATES, RAW_FIELDS, strict=True)
+    )
+    return x, y, z
 
 
 def _continuous(
@@ -99,7 +124,8 @@ def _continuous(
     if not windows:
         return None
     label = ", ".join(signal.label for signal in stream)
-    return GyroWindows(label, rate, np.array(starts), np.array(windows), 0.5)
+    gyro: Gyro = "raw" if label.split(".")[0].split("[")[0] in RAW else "filtered"
+    return GyroWindows(label, rate, np.array(starts), np.array(windows), 0.5, gyro)
 
 
 def _batches(log: Log, spans: tuple[Span, ...]) -> Iterator[GyroWindows]:
@@ -124,4 +150,6 @@ def _batches(log: Log, spans: tuple[Span, ...]) -> Iterator[GyroWindows]:
         if windows:
             rate = float(np.median(heads["smp_rate"][mine]))
             label = f"ISBD, gyroscope {int(instance)}"
-            yield GyroWindows(label, rate, np.array(starts), np.array(windows), 0.0)
+            options = round(log.parameters.get("INS_LOG_BAT_OPT", 0.0))
+            gyro: Gyro = "filtered" if options & BEHIND and not options & BOTH else "raw"
+            yield GyroWindows(label, rate, np.array(starts), np.array(windows), 0.0, gyro)

@@ -12,6 +12,7 @@ from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.inspection import WIDTH
 from flightid.result import Result
 from flightid.review import tables
+from flightid.review.filters import FilterReview
 from flightid.review.gyro_noise import GyroNoise
 from flightid.review.identity import FlightIdentity
 from flightid.review.loop_response import LoopResponse
@@ -47,6 +48,8 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
         Levels against published limits.
     noise : GyroNoise
         Spectrum of the gyroscope, its peaks by name.
+    filters : FilterReview
+        Filters with the phase that they cost, the noise in the outputs, and better ones.
     findings : tuple of Finding
         Verdicts with what to do.
 
@@ -70,6 +73,7 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
     yaw_trim: Estimate | None
     vibrations: tuple[Vibration, ...]
     noise: GyroNoise
+    filters: FilterReview
     findings: tuple[Finding, ...] = ()
 
     @property
@@ -121,6 +125,9 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
             tables.motors(self.motors),
             tables.vibrations(self.vibrations),
             self.noise.summary(),
+            self.filters.table(),
+            self.filters.noise_table(),
+            self.filters.choice_table(),
             tables.modes(self.identity.modes),
             tables.gains(self.identity),
         )

@@ -36,3 +36,9 @@ SATURATED = Threshold(
 UNBALANCED = Threshold(
     0.15, "1", "of the mean command between the most and the least loaded motor in still hover"
 )
+OUTPUT_NOISE = Threshold(
+    0.01, "1", "of full command, rms: three deviations move a motor by some 5 % of its range (ours)"
+)
+PHASE_TO_WIN = Threshold(
+    3, "deg", "a fifteenth of the 45 deg of phase margin that a loop is designed for (ours)"
+)

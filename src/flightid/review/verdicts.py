@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from flightid.conventions import Light
 from flightid.findings import Finding
+from flightid.review.filter_findings import filter_findings
 from flightid.review.motors import MotorUse
 from flightid.review.result import FlightReview
 from flightid.review.tables import cell
@@ -35,6 +36,7 @@ def _all(review: FlightReview) -> Iterator[Finding]:
             "vibration-unknown", Light.UNKNOWN, "the log holds no measure of vibration in the air"
         )
     yield from _noise(review)
+    yield from filter_findings(review.filters)
 
 
 def _noise(review: FlightReview) -> Iterator[Finding]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from array import array
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import ClassVar, Literal, Self
 
 import numpy as np
@@ -54,6 +54,9 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     unknown_notches : tuple of str
         Sentences on notches whose place nothing tells, or that moved far. A plant that ends at
         the filtered rate holds them.
+    plant_gyro : tuple of Section, or None
+        Filters of the gyro that a plant identified from the filtered rate holds, where they are
+        not those of the parameters any more; see `with_filters`.
     assumed : tuple of str
         Parameters that the vehicle's firmware did not have.
     unmodelled : tuple of str
@@ -79,6 +82,7 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     unknown_notches: tuple[str, ...] = ()
     assumed: tuple[str, ...] = ()
     unmodelled: tuple[str, ...] = ()
+    plant_gyro: tuple[Section, ...] | None = field(default=None, kw_only=True)
     autopilot: ClassVar[str] = ""
     output_unit: ClassVar[str] = "1"
     set_point_delay_loops: ClassVar[int] = 0
@@ -144,6 +148,17 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
         values = {**self.values, **{roles[n]: float(v) for n, v in changed.items()}}
         return replace(self, values=values)
 
+    def with_filters(self, values: Mapping[str, float]) -> Self:
+        """Copy with other filters around a plant that was identified behind those of this loop.
+
+        Raises
+        ------
+        UnknownNameError
+            The controller has no such parameter.
+        """
+        held = self._gyro_sections() if self.plant_gyro is None else self.plant_gyro
+        return replace(self.with_gains(values), plant_gyro=held)
+
     def with_notes(self, notes: tuple[str, ...]) -> Self:
         """Copy with more sentences in `unmodelled`."""
         return replace(self, unmodelled=self.unmodelled + notes)
@@ -190,7 +205,7 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
     ) -> tuple[Response, tuple[str, ...]]:
         """Feedback per unit of each gain in which it is linear: shape (n_terms, n_f), and names."""
         omega = _frequencies(omega_rad_s)
-        common = self.gyro_response(omega) if gyro == "raw" else np.ones(omega.size, complex)
+        common = self.gyro_response(omega) if gyro == "raw" else self._beyond_plant(omega)
         return self._shared(self._feedback_terms(omega), common, omega, with_hold)
 
     def forward_basis(
@@ -206,6 +221,23 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
         """Filters between the gyro's samples and the rate that the controller takes."""
         omega = _frequencies(omega_rad_s)
         return sections_response(self._gyro_sections(), omega, self.gyro_rate_hz)
+
+    def plant_gyro_response(self, omega_rad_s: ArrayLike) -> Response:
+        """Filters of the gyro that a plant identified from the filtered rate holds."""
+        held = self._gyro_sections() if self.plant_gyro is None else self.plant_gyro
+        return sections_response(held, _frequencies(omega_rad_s), self.gyro_rate_hz)
+
+    def _beyond_plant(self, omega: Omega) -> Response:
+        """What the gyro's filters do more than those that a filtered plant holds."""
+        if self.plant_gyro is None:
+            return np.ones(omega.size, dtype=np.complex128)
+        own, held = list(self._gyro_sections()), list(self.plant_gyro)
+        for section in [each for each in own if each in held]:
+            if section in held:
+                own.remove(section)
+                held.remove(section)
+        parts = (sections_response(each, omega, self.gyro_rate_hz) for each in (own, held))
+        return np.asarray(np.divide(*parts))
 
     @property
     @abstractmethod

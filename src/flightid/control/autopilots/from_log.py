@@ -27,6 +27,8 @@ AUTOPILOT_OF = {
 HELICOPTER_FRAMES = (6.0, 11.0, 13.0)
 """FRAME_CLASS of single, dual and quad helicopters."""
 SCALE_BOUNDS = (0.5, 2.0)
+SLOWEST_LOOP_HZ = 100.0
+"""No rate controller runs slower: such a message was thinned out by the logger."""
 
 
 def autopilot_of(log: Log) -> str:
@@ -144,7 +146,8 @@ def _counted(log: Log, at_s: float | None) -> list[Span]:
 def _loop_rate(log: Log, parameters: Mapping[str, float]) -> float | None:
     """PX4 before 1.11 ran its controllers at the rate of sensor_combined."""
     if log.kind == "px4" and not any(parameters.get(name) for name in LOOP_RATE_PARAMETERS):
-        return _rate(log, "sensor_combined")
+        rate = _rate(log, "sensor_combined")
+        return rate if rate is not None and rate >= SLOWEST_LOOP_HZ else None
     return None
 
 

@@ -164,7 +164,7 @@ def loop_responses(
     if gyro == "raw":
         return rate, angle
     low = np.array([SLOW_RAD_S])
-    delays = [-float(np.angle(loop.gyro_response(low))[0]) / SLOW_RAD_S for loop in loops]
+    delays = [-float(np.angle(loop.plant_gyro_response(low))[0]) / SLOW_RAD_S for loop in loops]
     lead = np.exp(1j * np.outer(delays, omega_rad_s))
     return rate, angle * lead[None, :, None, :]
 

@@ -1,0 +1,61 @@
+"""Verdicts on the filters of a flight, with what to set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from flightid.control.tuning.filter_choice import FilterChoice
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.review.filters import FilterReview
+from flightid.review.thresholds import OUTPUT_NOISE, PHASE_TO_WIN
+
+WRITE = "flightid flight LOG --write filters.param writes them with the way back"
+
+
+def filter_findings(filters: FilterReview) -> Iterator[Finding]:
+    """Noise in the outputs, notches beside the peaks, and what better filters would do."""
+    for text in filters.missed:
+        yield Finding(
+            "notches-miss",
+            Light.AMBER,
+            text,
+            "let the notches follow throttle or the ESCs (INS_HNTCH_MODE 1 or 3), or mend their "
+            "FREQ; they cost phase where they are",
+        )
+    limit = OUTPUT_NOISE.value
+    noisy = [
+        use for use in filters.axes if use.noise is not None and use.noise.total > limit * use.full
+    ]
+    choice = filters.choice
+    told = "" if choice is None else ", ".join(f"{c.name} {c.value:g}" for c in choice.changes)
+    words = "; ".join(filters.words())
+    for use in noisy:
+        assert use.noise is not None
+        share = 100.0 * use.noise.total / use.full
+        yield Finding(
+            f"output-noise-{use.axis}",
+            Light.AMBER,
+            f"noise of the gyroscope moves the {use.axis} output by {share:.2g} % of full command, "
+            f"rms; {100.0 * limit:g} % is fine",
+            _advice(told, words, choice),
+        )
+    if noisy or choice is None or not choice.changes:
+        return
+    most = max(each.phase_gained_deg for each in choice.axes)
+    if most >= PHASE_TO_WIN.value:
+        yield Finding(
+            "filters-slow",
+            Light.GREEN,
+            f"the filters may be faster: {told} ({words})",
+            WRITE,
+        )
+
+
+def _advice(told: str, words: str, choice: FilterChoice | None) -> str:
+    if choice is None or not told:
+        return "balance propellers and damp the mount: no cut-off within its range does better"
+    rest = "" if choice.within_limit else "; it is not enough: balance propellers, damp the mount"
+    if min(each.phase_gained_deg for each in choice.axes) < -PHASE_TO_WIN.value:
+        rest += "; tune the gains with them (flightid tune), or lower D instead"
+    return f"set {told} ({words}){rest}; {WRITE}"

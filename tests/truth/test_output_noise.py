@@ -1,0 +1,111 @@
+"""Noise of the gyro in the outputs against the controllers' recursions; filters chosen by it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.control.autopilots.output_noise import GyroSpectrum, output_noise
+from flightid.control.tuning.filter_choice import choose_filters
+from tests.closeness import assert_close
+
+LOOP_HZ, GYRO_HZ, N = 400.0, 2000.0, 20_000
+
+
+def _noise(seed: int, low_hz: float, high_hz: float) -> tuple[np.ndarray, GyroSpectrum]:
+    """A period of noise made of lines, and its density."""
+    spacing = GYRO_HZ / N
+    frequency = np.arange(1, N // 2) * spacing
+    density = np.where((frequency >= low_hz) & (frequency <= high_hz), 1e-5, 0.0)
+    density *= 1.0 + 20.0 * np.exp(-(((frequency - 120.0) / 8.0) ** 2))
+    phases = np.random.default_rng(seed).uniform(0.0, 2 * np.pi, frequency.size)
+    lines = np.concatenate([[0.0], np.sqrt(density * spacing / 2) * np.exp(1j * phases), [0.0]])
+    return np.fft.irfft(lines, N) * N, GyroSpectrum(frequency, density, "raw")
+
+
+@pytest.mark.parametrize("autopilot", ["arducopter", "arduplane", "px4_multicopter"])
+def test_output_noise_is_what_the_recursion_makes_of_such_a_gyro(autopilot: str) -> None:
+    samples, spectrum = _noise(1, 30.0, 900.0)
+    loop = fid.axis_loop(autopilot, "roll", loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
+    loop = loop.with_gains({loop.names["d"]: 0.02 * loop.values["p"]})
+    found = output_noise(loop, spectrum)
+    twice = np.tile(samples, 2)
+    run = loop.run(np.zeros(2 * N // 5), twice, gyro="raw", single_precision=False)
+    for name, letter in ((loop.names["p"], "P"), (loop.names["d"], "D")):
+        last = run.terms[letter][-N // 5 :]
+        assert_close(found.paths[name], last.std(), rtol=1e-3, why=f"{letter} of a whole period")
+    both = (run.terms["P"] + run.terms["D"])[-N // 5 :]
+    assert_close(found.total, both.std(), rtol=1e-3, why="both paths together")
+
+
+def test_a_filtered_spectrum_tells_the_same_and_what_other_filters_would_do() -> None:
+    _, raw = _noise(2, 30.0, 190.0)
+    loop = fid.axis_loop("arducopter", "pitch", loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
+    loop = loop.with_gains(INS_GYRO_FILTER=40.0)
+    gain = np.abs(loop.gyro_response(2 * np.pi * raw.frequency_hz)) ** 2
+    behind = GyroSpectrum(raw.frequency_hz, raw.density * gain, "filtered")
+    new = loop.with_gains(INS_GYRO_FILTER=80.0)
+    for asked in (loop, new):
+        exact = output_noise(asked, raw).total
+        told = output_noise(asked, behind, flown=loop).total
+        assert_close(told, exact, rtol=1e-9, why="the flown filter is divided out")
+    omega, density = raw.behind(loop)
+    at = np.interp(2 * np.pi * 120.0, omega, density)
+    assert_close(at, np.interp(120.0, raw.frequency_hz, raw.density * gain), rtol=0.02, why="same")
+
+
+def test_noise_above_half_of_the_loop_s_rate_is_folded_below_it() -> None:
+    frequency = np.linspace(1.0, 999.0, 4000)
+    line = GyroSpectrum(frequency, np.exp(-(((frequency - 310.0) / 3.0) ** 2)), "raw")
+    loop = fid.axis_loop("arducopter", "roll", loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
+    omega, density = line.behind(loop)
+    assert_close(omega[np.argmax(density)], 2 * np.pi * 90.0, rtol=0.01, why="400 − 310 Hz")
+    power = np.trapezoid(density, omega) / (2 * np.pi)
+    gain = np.abs(loop.gyro_response(2 * np.pi * frequency)) ** 2
+    assert_close(power, np.trapezoid(line.density * gain, frequency), rtol=0.01, why="none is lost")
+
+
+def test_a_plant_behind_the_flown_filter_sees_the_change_of_it_alone() -> None:
+    flown = fid.axis_loop("arducopter", "roll", loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
+    notch = fid.axis_loop(
+        "arducopter", "roll", {**flown.gains, "INS_HNTCH_ENABLE": 1.0, "INS_HNTCH_MODE": 0.0},
+        loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ,
+    )  # fmt: skip
+    for loop in (flown, notch):
+        new = loop.with_filters({"INS_GYRO_FILTER": 45.0, "ATC_RAT_RLL_FLTD": 31.0})
+        omega = np.geomspace(3.0, 1200.0, 40)
+        plant = loop.gyro_response(omega)
+        whole = plant * new.feedback(omega, gyro="filtered")
+        plain = replace(new, plant_gyro=None)
+        assert_close(whole, plain.feedback(omega, gyro="raw"), rtol=1e-9, why="old · new over old")
+        assert_close(new.plant_gyro_response(omega), plant, rtol=1e-12, why="what the plant holds")
+
+
+def test_quiet_gyros_get_faster_filters_and_noisy_ones_slower_within_ranges_and_steps() -> None:
+    _, spectrum = _noise(3, 30.0, 900.0)
+    axes = ("roll", "pitch")
+    loops = {
+        axis: fid.axis_loop("arducopter", axis, loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
+        for axis in axes
+    }
+    spectra, at = dict.fromkeys(axes, spectrum), dict.fromkeys(axes, 30.0)
+    flown = output_noise(loops["roll"], spectrum).total
+    quiet = choose_filters(loops, spectra, at, dict.fromkeys(axes, 50.0 * flown))
+    assert quiet.values == {
+        "INS_GYRO_FILTER": 40.0, "ATC_RAT_RLL_FLTD": 40.0, "ATC_RAT_PIT_FLTD": 40.0
+    }  # fmt: skip
+    assert all(each.phase_gained_deg > 5.0 for each in quiet.axes)
+    noisy = choose_filters(loops, spectra, at, dict.fromkeys(axes, 0.6 * flown))
+    assert noisy.within_limit
+    assert all(each.noise_new <= 0.6 * flown < each.noise_flown for each in noisy.axes)
+    own = {name: value for name, value in noisy.values.items() if name in loops["pitch"].gains}
+    new = output_noise(loops["pitch"].with_gains(own), spectrum).total
+    assert_close(noisy.axes[1].noise_new, new, rtol=1e-9, why="told of the filters that are set")
+    hopeless = choose_filters(loops, spectra, at, dict.fromkeys(axes, 1e-3 * flown))
+    assert not hopeless.within_limit
+    assert hopeless.values["INS_GYRO_FILTER"] == 10.0
+    fixed = choose_filters(loops, spectra, at, dict.fromkeys(axes, flown), step_limit=1.0)
+    assert fixed.changes == (), "no step is allowed"

@@ -1,0 +1,112 @@
+"""Filters in the review of a flight: noise in the outputs, notches proposed, files written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import flightid as fid
+from flightid.cli.flight import command
+from flightid.logs.dataflash.layout import MessageLayout
+from flightid.logs.dataflash.writer import DataflashWriter
+from tests.closeness import assert_close
+
+PARAMETERS = {
+    "SCHED_LOOP_RATE": 400.0, "INS_GYRO_RATE": 0.0, "FRAME_CLASS": 1.0, "INS_GYRO_FILTER": 40.0,
+    "MOT_PWM_MIN": 1000.0, "MOT_PWM_MAX": 2000.0, "INS_HNTCH_ENABLE": 0.0,
+    **{f"ATC_RAT_{axis}_{k}": v for axis in ("RLL", "PIT", "YAW")
+       for k, v in (("P", 0.12), ("I", 0.12), ("D", 0.004), ("FLTD", 20.0), ("IMAX", 0.5))},
+    **{f"ATC_ANG_{axis}_P": 4.5 for axis in ("RLL", "PIT", "YAW")},
+    **{f"SERVO{i}_FUNCTION": 32.0 + i for i in (1, 2, 3, 4)},
+}  # fmt: skip
+
+
+def _write(path: Path, *, tone: float, white: float, esc: bool) -> None:
+    """A hover whose throttle wanders, with motors that turn 100 Hz at a throttle of 0.4."""
+    random, rate_hz = np.random.default_rng(4), 1000.0
+    time_s = 10.0 + np.arange(0.0, 60.0, 1 / rate_hz)
+    throttle = 0.4 + 0.08 * np.sin(2 * np.pi * time_s / 17.0)
+    turns = 100.0 * np.sqrt(throttle / 0.4)
+    angle = 2 * np.pi * np.cumsum(turns) / rate_hz
+    stamps = (1e6 * time_s).astype(np.int64)
+    writer = DataflashWriter()
+    writer.message(int(stamps[0]), "ArduCopter V4.6.0 (test)")
+    for name, value in PARAMETERS.items():
+        writer.parameter(name, value)
+    shake = tone * np.sqrt(2) * (np.sin(angle) + 0.5 * np.sin(2 * angle))
+    gyro = {f"Gyr{axis}": shake + white * random.standard_normal(time_s.size) for axis in "XYZ"}
+    labels = "TimeUS,I,SampleUS,GyrX,GyrY,GyrZ"
+    writer.define(MessageLayout("GYR", 220, "QBQfff", labels, "s#sEEE", "F-F000"))
+    writer.add("GYR", stamps, {"SampleUS": 1e-6 * stamps, **gyro})
+    slow = slice(None, None, 100)
+    writer.add("CTUN", stamps[slow], {"ThO": throttle[slow]})
+    writer.add("RCOU", stamps[slow], {f"C{i}": 1500.0 for i in (1, 2, 3, 4)})
+    if esc:
+        writer.add("ESC", stamps[slow], {"RPM": 60.0 * turns[slow]})
+    writer.write(path)
+
+
+def test_a_notch_by_throttle_is_proposed_where_motors_shake_the_gyro(tmp_path: Path) -> None:
+    path, file = tmp_path / "shaken.bin", tmp_path / "filters.param"
+    _write(path, tone=0.6, white=0.002, esc=False)
+    review = fid.review_flight(path)
+    assert review.noise.gyro == "raw"
+    assert review.noise.label.startswith("GYR.GyrX")
+    roll = review.filters.axes[0].noise
+    assert roll is not None
+    # 0.6 rad/s at about 100 Hz and half at twice that, by P and D alone.
+    loop = fid.axis_loop("arducopter", "roll", PARAMETERS, gyro_rate_hz=1000.0)
+    turns = 2 * np.pi * 100.0 * np.sqrt(1.0 + 0.2 * np.sin(np.linspace(0.0, 2 * np.pi, 200)))
+    gains = [np.abs(loop.feedback(k * turns, with_hold=False)) ** 2 for k in (1.0, 2.0)]
+    exact = 0.6 * np.sqrt(np.mean(gains[0] + 0.25 * gains[1]))
+    assert_close(roll.total, exact, rtol=0.05, why="two tones that wander, and little noise")
+    choice = review.filters.choice
+    assert choice is not None
+    assert choice.values["INS_HNTCH_MODE"] == 1.0
+    assert abs(choice.values["INS_HNTCH_REF"] - 0.4) < 0.02
+    assert abs(choice.values["INS_HNTCH_FREQ"] - 100.0) < 8.0
+    assert choice.values["INS_HNTCH_HMNCS"] == 3.0
+    assert any(f.code == "output-noise-roll" for f in review.findings)
+    made = CliRunner().invoke(command, [str(path), "--write", str(file)])
+    assert made.exit_code == 0, made.output
+    assert "set INS_HNTCH_ENABLE 1" in " ".join(made.output.split())
+    assert fid.read_parameters(file) == pytest.approx(choice.values)
+    back = fid.read_parameters(tmp_path / "filters.rollback.param")
+    assert back["INS_HNTCH_ENABLE"] == 0.0
+
+
+def test_telemetry_of_the_motors_leads_the_notch_where_it_is_logged(tmp_path: Path) -> None:
+    path = tmp_path / "shaken.bin"
+    _write(path, tone=0.6, white=0.002, esc=True)
+    choice = fid.review_flight(path).filters.choice
+    assert choice is not None
+    assert (choice.values["INS_HNTCH_MODE"], choice.values["INS_HNTCH_REF"]) == (3.0, 1.0)
+
+
+def test_a_quiet_gyro_may_have_faster_filters_and_says_what_they_save(tmp_path: Path) -> None:
+    path = tmp_path / "quiet.bin"
+    _write(path, tone=0.0, white=0.001, esc=False)
+    review = fid.review_flight(path)
+    assert review.filters.choice is not None
+    assert review.filters.choice.values["INS_GYRO_FILTER"] == 80.0
+    (found,) = (f for f in review.findings if f.code == "filters-slow")
+    assert "roll: saves" in found.message
+    assert review.filters.table().rows[0][:2] == ("all", "INS_GYRO_FILTER")
+
+
+def test_filters_that_cannot_be_told_say_why_and_nothing_is_written(tmp_path: Path) -> None:
+    writer = DataflashWriter()
+    writer.message(10_000_000, "ArduCopter V4.6.0 (test)")
+    writer.parameter("SCHED_LOOP_RATE", 400.0)
+    writer.add("CTUN", np.arange(10_000_000, 30_000_000, 100_000), {"ThO": 0.0})
+    writer.write(tmp_path / "bare.bin")
+    review = fid.review_flight(tmp_path / "bare.bin")
+    assert "no ATC_RAT_RLL_P" in review.filters.reason
+    made = CliRunner().invoke(
+        command, [str(tmp_path / "bare.bin"), "--write", str(tmp_path / "none.param")]
+    )
+    assert "Not written" in made.output
+    assert not (tmp_path / "none.param").exists()
