@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from flightid.control.loops.block import Block
 from flightid.control.loops.elements import system
 from flightid.control.loops.interconnection import Interconnection
-from flightid.control.loops.linear_core import assemble
-from flightid.control.loops.views import linear_view
 
 
 def connect(
@@ -64,7 +62,7 @@ def connect(
     made = Interconnection(
         tuple(wanted), tuple(inputs), tuple(given if outputs is None else outputs), name
     )
-    _require_solution(made)
+    _ = made.wiring.core  # refuses algebraic loops without a solution, in either kind of time
     return made
 
 
@@ -77,9 +75,3 @@ def blocks_of(each: object, place: int) -> list[Block]:
         names = {signal: f"{each.name}{place + 1}.{signal}" for signal in inner}
         return [block.renamed(names) for block in each.blocks]
     return [system(each)]
-
-
-def _require_solution(made: Interconnection) -> None:
-    """Refuse algebraic loops without a solution, in either kind of time."""
-    direct = [linear_view(block) for block in made.blocks]
-    assemble(direct, made.inputs)

@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.control.loops.block import Block
+from flightid.control.loops.block import Block, Equations, Hold
+from flightid.control.loops.elements import static
 from flightid.errors import ModelError
 from flightid.models.linear.linear_system import LinearSystem
 
@@ -77,6 +78,18 @@ class Core:
             tuple(f"y{k}" for k in range(len(places))),
             [row.delay_s for row in self.rows], self.states, sample_time_s,
         )  # fmt: skip
+
+
+def linear_view(block: Block) -> Block:
+    """A block as the linear system that it is near its trim; a hold as its delay."""
+    part = block.part
+    if isinstance(part, LinearSystem):
+        return block
+    if isinstance(part, Equations):
+        return replace(block, part=part.linear)
+    late = (part.sample_time_s / 2.0 + part.delay_s,) if isinstance(part, Hold) else ()
+    found = static(block.name, block.inputs, block.outputs, np.eye(1), late)
+    return replace(found, units=block.units)
 
 
 def assemble(
@@ -149,10 +162,12 @@ def _part(block: Block) -> LinearSystem:
 
 def _diagonal(parts: Sequence[Array]) -> Array:
     # SciPy's block_diag costs more than all else that an interconnection computes.
-    rows, columns = (np.cumsum([0, *(part.shape[axis] for part in parts)]) for axis in (0, 1))
-    found = np.zeros((rows[-1], columns[-1]))
-    for place, part in enumerate(parts):
-        found[rows[place] : rows[place + 1], columns[place] : columns[place + 1]] = part
+    found = np.zeros((sum(len(part) for part in parts), sum(part.shape[1] for part in parts)))
+    row = column = 0
+    for part in parts:
+        height, width = part.shape
+        found[row : row + height, column : column + width] = part
+        row, column = row + height, column + width
     return found
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid.control.loops.block import Block, Hold
-from flightid.control.loops.linear_core import Core, assemble
-from flightid.control.loops.views import linear_view
+from flightid.control.loops.linear_core import Core, assemble, linear_view
 from flightid.control.loops.wiring import Wiring
 from flightid.errors import DataError
 from flightid.models.linear.linear_system import LinearSystem

@@ -8,8 +8,7 @@ import numpy as np
 
 from flightid.control.loops.block import Block, Hold
 from flightid.control.loops.elements import static
-from flightid.control.loops.linear_core import Core, assemble
-from flightid.control.loops.views import linear_view
+from flightid.control.loops.linear_core import Core, assemble, linear_view
 from flightid.control.loops.wiring import Wiring
 from flightid.errors import ModelError, OptionError
 from flightid.models.linear.linear_system import LinearSystem

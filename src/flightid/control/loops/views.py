@@ -6,24 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from flightid.control.loops.block import Block, Equations, Hold
+from flightid.control.loops.block import Block
 from flightid.control.loops.elements import static
 from flightid.control.loops.linear_core import Core, Row, assemble
 from flightid.control.loops.wiring import Wiring
 from flightid.errors import ModelError, OptionError
 from flightid.models.linear.linear_system import LinearSystem
-
-
-def linear_view(block: Block) -> Block:
-    """A block as the linear system that it is near its trim; a hold as its delay."""
-    part = block.part
-    if isinstance(part, LinearSystem):
-        return block
-    if isinstance(part, Equations):
-        return replace(block, part=part.linear)
-    late = (part.sample_time_s / 2.0 + part.delay_s,) if isinstance(part, Hold) else ()
-    found = static(block.name, block.inputs, block.outputs, np.eye(1), late)
-    return replace(found, units=block.units)
 
 
 def continuous_core(wiring: Wiring) -> Core:
@@ -42,7 +30,7 @@ def continuous_core(wiring: Wiring) -> Core:
                 needed="continuous blocks",
                 action="use sampled(), or frequency_response()",
             )
-    return assemble([linear_view(block) for block in wiring.blocks], wiring.inputs)
+    return wiring.core
 
 
 def continuous_system(

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from functools import cached_property
 
 from flightid.control.loops.block import Block, Hold
+from flightid.control.loops.linear_core import Core, assemble, linear_view
 from flightid.errors import ModelError, UnitError, UnknownNameError
 from flightid.units import canonical
 
@@ -55,6 +57,17 @@ class Wiring:
     def signals(self) -> tuple[str, ...]:
         """All signals: those from outside, then those of the blocks."""
         return (*self.inputs, *self.sources)
+
+    @cached_property
+    def core(self) -> Core:
+        """All blocks as linear ones of continuous time, delays kept.
+
+        Raises
+        ------
+        ModelError
+            An algebraic loop without a solution.
+        """
+        return assemble([linear_view(block) for block in self.blocks], self.inputs)
 
     def require(self, names: Sequence[str], what: str) -> None:
         """Refuse names that are no signal.
