@@ -21,7 +21,7 @@ from flightid.control.tuning.loop_problem import LoopAssessment, LoopProblem
 Array = NDArray[np.float64]
 Linear = tuple[Array, Array, Array, Array]
 """Limits, levels and their slopes."""
-GRID_P, GRID_I, GRID_D, GRID_A = 20, 6, 5, 4
+GRID_P, GRID_I, GRID_D, GRID_A = 14, 5, 4, 3
 CHUNK = 96
 STARTS, MORE_STARTS = 2, 4
 ROUNDS = 8
@@ -29,7 +29,7 @@ HEADROOM = 2e-3
 """Slack kept in the search, for rounding of gains and frequencies between grid points."""
 STEP = 1e-4
 FIRST_REACH, SMALLEST_REACH = 0.25, 1e-4
-SMALLEST_GAIN, SHRINK = 1e-6, 0.4
+SMALLEST_GAIN, SHRINK = 1e-6, 0.25
 ITERATIONS = 60
 FAR = 1.0
 """Slack beyond the least one at which a limit takes no part in a step."""
