@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import gc
+import linecache
 import os
 from collections.abc import Generator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from _pytest.doctest import DoctestModule
 from hypothesis import settings
 
-from flightid import Study
-from flightid.study.output import SCHEMA
 from tests.examples import PROFILE
+
+if TYPE_CHECKING:
+    from flightid import Study
 
 REPOSITORY = Path(__file__).parent.parent
 
@@ -31,8 +34,9 @@ def pytest_configure() -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Take what was imported and collected out of every later look for garbage."""
+    """Take what was collected out of every later look for garbage, or for changed sources."""
     gc.freeze()
+    linecache.clearcache()
 
 
 @pytest.hookimpl(wrapper=True)
@@ -58,6 +62,8 @@ def shared_data() -> Path:
 @pytest.fixture
 def no_report(monkeypatch: pytest.MonkeyPatch) -> None:
     """Studies of this test write no report: it takes longer than most of their stages."""
+
+    from flightid.study.output import SCHEMA  # noqa: PLC0415 - the process that hands out tests needs none
 
     def results_alone(_: Study, folder: Path) -> None:
         (folder / "results.json").write_text(f'{{"schema": "{SCHEMA}"}}', encoding="utf-8")
