@@ -83,7 +83,9 @@ def _zeros(rng: np.random.Generator, size: int) -> bytes:
 
 
 @pytest.mark.parametrize("fill", [_random, _zeros])
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(k, marks=pytest.mark.nightly) for k in range(1, 5))]
+)
 def test_real_log_damaged_keeps_more_than_pyulog_and_nothing_false(
     real_log: bytes, seed: int, fill: Callable[[np.random.Generator, int], bytes]
 ) -> None:

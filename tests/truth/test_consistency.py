@@ -136,7 +136,7 @@ def test_errors_of_accelerometers_are_recovered(velocities: tuple[str, ...]) -> 
 
 
 def test_derivatives_of_every_output_are_exact() -> None:
-    record = flight(OUTPUTS, n=100)
+    record = flight(OUTPUTS, n=50)
     inputs = {name: record[name] for name in ("p", "q", "r", "ax", "ay", "az")}
     states = tuple(f"{name}_0" for name in ("phi", "theta", "psi", "u", "v", "w"))
     errors = tuple(

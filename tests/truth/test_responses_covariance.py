@@ -170,7 +170,7 @@ def test_closed_form_of_the_basis(detrend: str) -> None:
 
 
 def test_the_noise_spectrum_is_unbiased_and_free_of_leakage() -> None:
-    n, flights = 3000, 30
+    n, flights = 3000, 15
     sweep = signal.chirp(np.arange(n) * DT, 0.2, n * DT, 8.0)
     omega = np.geomspace(2.0, 30.0, 12)
     ratios = []
@@ -180,8 +180,8 @@ def test_the_noise_spectrum_is_unbiased_and_free_of_leakage() -> None:
         record = Record.from_arrays(np.arange(n) * DT, inputs={"u": sweep}, outputs={"y": y})
         response = estimate_response(record, omega_rad_s=omega, window_s=8.0)
         ratios.append(response.errors.noise.at(omega)[0] / (2 * DT))
-    # 30 flights x about 7 groups x 9 degrees of freedom: 2.3 % standard error.
-    assert_close(np.mean(ratios), 1.0, atol=0.07, why="three standard errors")
+    # 15 flights x about 7 groups x 9 degrees of freedom: 3.3 % standard error.
+    assert_close(np.mean(ratios), 1.0, atol=0.07, why="two standard errors")
 
 
 def test_covariance_follows_selection_and_is_refused_when_huge() -> None:

@@ -22,13 +22,10 @@ def _loop(n: int, *, late: int = 1, direct: float = 0.0) -> tuple[np.ndarray, np
     The controller answers `late` samples later.
     """
     fresh, e = np.random.default_rng(3).standard_normal((2, n))
-    x, u, y = np.zeros((3, n))
-    for k in range(1, n):
-        x[k] = POLE * x[k - 1] + GAIN * u[k - 1] + e[k]
-        fed = FED * (y[k - 1] if late else x[k])
-        u[k] = (fresh[k] + fed) / (1.0 if late else 1.0 - FED * direct)
-        y[k] = x[k] + direct * u[k]
-    return u, y
+    way, back = np.array([direct, GAIN - direct * POLE, 0.0]), np.eye(2)[late] * FED
+    around = np.array([1.0, -POLE, 0.0]) - np.convolve(back, way[:2])
+    y = lfilter(way, around, fresh) + lfilter([1.0], around, e)
+    return fresh + lfilter(back, [1.0], y), y
 
 
 @pytest.mark.parametrize(("late", "direct"), [(1, 0.0), (0, 0.0), (0, 0.8), (1, 0.8)])
@@ -57,8 +54,8 @@ def test_an_open_loop_feeds_nothing() -> None:
 
 def test_a_fit_claims_the_shift_that_is_there() -> None:
     """One of the counts of `tests/strangers/loop_shifts.py`, at its plainest parameter."""
-    claimed, shift = loop_shifts.claimed_and_true(loop_shifts.heave, range(4))
-    assert_close(claimed["Zw"], shift["Zw"], rtol=0.5, why="four flights' scatter")
+    claimed, shift = loop_shifts.claimed_and_true(loop_shifts.heave, range(2))
+    assert_close(claimed["Zw"], shift["Zw"], rtol=0.5, why="two flights' scatter")
 
 
 @pytest.mark.parametrize("feedback", [0.0, closed_loops.PILOT])

@@ -72,7 +72,7 @@ def newton_euler(state, command):
 
 def test_quadrotor_agrees_with_an_independent_integration():
     model = fid.load_model("quadrotor_6dof")
-    record = flown(seconds=0.3)
+    record = flown(seconds=0.15)
     found = fid.simulate(model, record, initial_state={"phi": 0.2, "u": 1.0}, substeps=8)
     stamps = record.time_s
 

@@ -83,7 +83,7 @@ def test_a_controller_of_a_study_is_written_as_code(tmp_path: Path) -> None:
 
 
 def test_a_study_that_was_changed_by_hand_stays(tmp_path: Path) -> None:
-    made = propose_study([_rig(tmp_path)], folder=tmp_path)
+    made = propose_study([_rig(tmp_path)], folder=tmp_path, model="rate_first_order")
     target = made.write(tmp_path / "rig-study.toml")
     made.write(target)
     target.write_text(target.read_text().replace("Models of rig", "Mine"))
@@ -118,11 +118,12 @@ def test_records_without_times_take_a_sample_time_into_the_study(tmp_path: Path)
     rows = [line.split(",")[1:] for line in rig.read_text().splitlines()]
     bare = tmp_path / "bare.csv"
     bare.write_text("\n".join(",".join(row) for row in rows))
-    made = propose_study([bare], folder=tmp_path, sample_time_s=0.1)
+    asked = {"folder": tmp_path, "model": "rate_first_order"}
+    made = propose_study([bare], **asked, sample_time_s=0.1)
     told = [line for line in made.lines if line.startswith("sample_time_s")]
     assert told == ["sample_time_s = 0.1"] * 3
     with pytest.raises(OptionError, match="no time column"):
-        propose_study([bare], folder=tmp_path)
+        propose_study([bare], **asked)
 
 
 def test_uneven_stamps_take_a_new_grid_into_the_study(tmp_path: Path) -> None:

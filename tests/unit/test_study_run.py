@@ -145,9 +145,13 @@ def test_a_run_that_breaks_off_leaves_nothing(
         raise failure
 
     monkeypatch.setattr(running, "to_html", broken)
+    text = STUDY.replace('compare = ["composite"]\n[reduce]\n', "")
+    (study.output.parent / "short.toml").write_text(
+        text.replace('verify = "doublet"\nrivals = "rate_integrator"\n', "")
+    )
     with pytest.raises(failure):
         fid.run_study(
-            study.output.parent / "study.toml",
+            study.output.parent / "short.toml",
             output=tmp_path / "out",
             log=study.output / "flight.bin",
         )
