@@ -348,7 +348,7 @@ def _rows(
         for lag in lags
     ]
     own = np.ones((output.size, order + int(data.levels)))
-    own[:, :order] = lfilter([1.0], below, np.eye(output.size, order), axis=0)
+    own[:, :order] = scipy.signal.lfilter([1.0], below, np.eye(output.size, order), axis=0)
     # Directions that rounding leaves of responses that are over cost a sample each, no more.
     basis = np.linalg.qr(own[skip:])[0]
     rows = np.array([*columns, output]).T[skip:]
