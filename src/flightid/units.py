@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flightid.common_units import common_unit
 from flightid.errors import UnitError
 
 if TYPE_CHECKING:
@@ -120,6 +121,8 @@ def canonical(unit: str) -> str:
     >>> canonical("radian / second"), canonical("ft/s**2"), canonical("")
     ('rad/s', 'ft/s^2', '1')
     """
+    if (known := common_unit(unit)) is not None:
+        return known.text
     parsed = _parse(unit)
     if parsed == _registry().dimensionless:
         return DIMENSIONLESS
@@ -179,6 +182,10 @@ def convert(values: ArrayLike, source: str, target: str) -> NDArray[np.float64]:
     >>> convert([1.0], "g", "m/s^2"), convert([1.0], "g", "1")
     (array([9.80665]), array([1.]))
     """
+    one, two = common_unit(source), common_unit(target)
+    if one is not None and two is not None and one.powers == two.powers:
+        factor = 1.0 if source == target else one.factor / two.factor
+        return np.asarray(values, dtype=np.float64) * factor
     registry = _registry()
     first, second = _pair(source, target)
     quantity = registry.Quantity(np.asarray(values, dtype=np.float64), first)
@@ -198,6 +205,9 @@ def same_dimension(first: str, second: str) -> bool:
     >>> same_dimension("deg", "rad"), same_dimension("ft", "s")
     (True, False)
     """
+    known, other = common_unit(first), common_unit(second)
+    if known is not None and other is not None:
+        return known.without_angle() == other.without_angle()
     one, two = _pair(first, second)
     return bool(one.dimensionality == two.dimensionality)
 
@@ -213,6 +223,9 @@ def is_convertible(source: str, target: str) -> bool:
     >>> is_convertible("deg/s", "rad/s"), is_convertible("1", "rad"), is_convertible("Hz", "rad/s")
     (True, False, False)
     """
+    known, other = common_unit(source), common_unit(target)
+    if known is not None and other is not None:
+        return DIMENSIONLESS not in (source, target) and known.powers == other.powers
     one, two = (f"{each:~C}" for each in _pair(source, target))
     if DIMENSIONLESS in (canonical(one), canonical(two)):
         return False
@@ -282,6 +295,8 @@ def match(found: str, needed: str) -> bool:
     >>> match("g", "1"), match("g", "m/s^2"), match("deg/s", "rad/s")
     (True, False, False)
     """
+    if found == needed and common_unit(found) is not None:
+        return True
     one, two = _pair(found, needed)
     return bool(one == two)
 
@@ -306,6 +321,9 @@ def exponents(unit: str) -> dict[str, float]:
     >>> exponents("ft/s^2"), exponents("rad/s"), exponents("N*m/W")
     ({'foot': 1.0, 'second': -2.0}, {'second': -1.0}, {'second': 1.0})
     """
+    known = common_unit(unit)
+    if known is not None and known.factor == 1.0:
+        return {name: float(n) for name, n in known.powers.items() if name != "radian"}
     registry = _registry()
     result: dict[str, float] = {}
     for name, power in registry.Quantity(1.0, _parse(unit)).unit_items():
@@ -337,6 +355,8 @@ def si_base(unit: str) -> tuple[float, dict[str, float]]:
     >>> si_base("N*m/W"), si_base("ft")
     ((1.0, {'second': 1.0}), (0.3048, {'meter': 1.0}))
     """
+    if (known := common_unit(unit)) is not None:
+        return round_off(known.factor), {name: float(n) for name, n in known.powers.items()}
     found = _registry().Quantity(1.0, _parse(unit)).to_base_units()
     powers = {str(name): float(str(power)) for name, power in found.unit_items()}
     return round_off(float(found.magnitude)), powers

@@ -8,6 +8,7 @@ from tests.contract.source import PACKAGE, imported_modules, imports, python_fil
 
 BASE = {
     "_native",
+    "common_units",
     "conventions",
     "errors",
     "files",

@@ -22,6 +22,7 @@ from flightid.logs import Log
 from flightid.record import Record
 from flightid.responses import FrequencyResponse, estimate_response
 from flightid.responses.bands import usable_band
+from flightid.surface import speaking
 
 
 @dataclass(frozen=True)
@@ -130,15 +131,17 @@ def _response(
             f"{high / (2 * math.pi):.2g} Hz: no band is left{_cut(made, kept, spans)}"
         )
     try:
-        return estimate_response(
-            kept,
-            inputs=inputs,
-            outputs=[axis.rate for axis in axes],
-            band_rad_s=(low, high),
-            n_omega=60,
-            window_s=[window, window / 2] if high > 4 * low else [window],
-            covariance=False,
-        ), _cut(made, kept, spans)
+        # Nobody reads the findings of this response: no command's options are looked up for them.
+        with speaking(str):
+            return estimate_response(
+                kept,
+                inputs=inputs,
+                outputs=[axis.rate for axis in axes],
+                band_rad_s=(low, high),
+                n_omega=60,
+                window_s=[window, window / 2] if high > 4 * low else [window],
+                covariance=False,
+            ), _cut(made, kept, spans)
     except FlightidError as error:
         return None, error.problem
 

@@ -9,12 +9,15 @@ sign and the delay are proven rather than assumed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid._native import cubic_spline
 from flightid.conventions import Axis, Light
 from flightid.findings import Finding
 from flightid.logs.contents import LogContents
@@ -185,7 +188,7 @@ def _check_axis(log: LogContents, run: SidRun, axis: Axis, loop_time_s: float) -
     rms = float(np.sqrt(np.mean(left**2)))
     if rms <= QUIET * float(np.std(signal)):
         return AxisCheck(axis, rms, 0.0, 0.0, 0.0, 0.0)
-    spline = scipy.interpolate.CubicSpline(clock_s, signal)
+    spline = partial(cubic_spline, clock_s, signal)
     lag_s = _best_lag(left, at_s, spline, loop_time_s)
     correlation, gain = _projection(left, spline(at_s - lag_s))
     return AxisCheck(axis, rms, correlation, gain, lag_s, lag_s / loop_time_s)
@@ -210,7 +213,7 @@ def mixer_residual(
 def _best_lag(
     left: NDArray[np.float64],
     at_s: NDArray[np.float64],
-    spline: scipy.interpolate.CubicSpline,
+    spline: Callable[[NDArray[np.float64]], NDArray[np.float64]],
     loop_time_s: float,
 ) -> float:
     """Delay with the largest correlation: a search over half loops, then a refinement."""

@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
+from flightid._native import cubic_spline
 from flightid.conventions import Role
 from flightid.errors import DataError, MissingColumnError
 from flightid.logs.channels.channel_map import (
@@ -225,7 +225,7 @@ def _excitation(log: LogContents, run: SidRun, check: InjectionCheck) -> Channel
         at_s = clock_s[of_chirp] - check.injected.lag_s
         inside = at_s >= clock_s[0]
         stamp_s = rates[rows][inside]
-        signal = check.sign * scipy.interpolate.CubicSpline(clock_s, signal)(at_s[inside])
+        signal = check.sign * cubic_spline(clock_s, signal, at_s[inside])
         note = f"shifted by {check.injected.lag_loops:.2g} loops to when the mixer got it (proven)"
     unit = SI.get(run.unit, run.unit)
     channel = MappedChannel(EXCITATION, unit, Role.EXCITATION, False, False, ())

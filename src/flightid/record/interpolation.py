@@ -11,6 +11,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid._native import cubic_spline
 from flightid.record.stamps import StampedSamples
 
 ATTENUATION_DB = 100.0
@@ -152,10 +153,7 @@ def spline(source: StampedSamples, time_s: NDArray[np.float64]) -> NDArray[np.fl
     """Cubic spline through the samples at their true stamps; a line where there are only two."""
     if source.time_s.size < 3:
         return np.interp(time_s, source.time_s, source.values)
-    # Half a second of imports that no record of uniform stamps needs.
-    from scipy.interpolate import CubicSpline  # noqa: PLC0415
-
-    return np.asarray(CubicSpline(source.time_s, source.values)(time_s), dtype=np.float64)
+    return cubic_spline(source.time_s, source.values, time_s)
 
 
 def uniform_samples(source: StampedSamples) -> tuple[float, float, NDArray[np.float64]]:

@@ -178,24 +178,29 @@ fn check(axes: &[Vec<f64>], values: &[f64]) -> Result<(), CoreError> {
     if !(1..=2).contains(&axes.len()) {
         return Err(CoreError::Shape { what: "axes of a table", found: axes.len(), needed: 2 });
     }
-    for points in axes {
-        if points.len() < 2 {
-            let found = points.len();
-            return Err(CoreError::Shape { what: "breakpoints of a table", found, needed: 2 });
-        }
-        if let Some(index) = points.iter().position(|point| !point.is_finite()) {
-            return Err(CoreError::NotFinite { what: "breakpoints of a table", index });
-        }
-        let steps = points.windows(2).map(|pair| pair[1] - pair[0]);
-        if let Some(found) =
-            steps.into_iter().find(|&step| !(step > 0.0 && (1.0 / step).is_finite()))
-        {
-            let needed = "breakpoints that rise";
-            return Err(CoreError::Range { what: "step of a table's axis", found, needed });
-        }
-    }
+    axes.iter().try_for_each(|points| check_axis(points))?;
     let needed = axes.iter().try_fold(1_usize, |product, axis| product.checked_mul(axis.len()));
     let needed = needed.filter(|&count| count <= MAXIMUM_POINTS).unwrap_or(MAXIMUM_POINTS);
+    check_values(values, needed)
+}
+
+fn check_axis(points: &[f64]) -> Result<(), CoreError> {
+    if points.len() < 2 {
+        let found = points.len();
+        return Err(CoreError::Shape { what: "breakpoints of a table", found, needed: 2 });
+    }
+    if let Some(index) = points.iter().position(|point| !point.is_finite()) {
+        return Err(CoreError::NotFinite { what: "breakpoints of a table", index });
+    }
+    let steps = points.windows(2).map(|pair| pair[1] - pair[0]);
+    if let Some(found) = steps.into_iter().find(|&step| !(step > 0.0 && (1.0 / step).is_finite())) {
+        let needed = "breakpoints that rise";
+        return Err(CoreError::Range { what: "step of a table's axis", found, needed });
+    }
+    Ok(())
+}
+
+fn check_values(values: &[f64], needed: usize) -> Result<(), CoreError> {
     if values.len() != needed {
         return Err(CoreError::Shape { what: "values of a table", found: values.len(), needed });
     }
@@ -229,6 +234,25 @@ fn slopes_of_lines(
         }
     }
     result
+}
+
+/// The cubic spline through points, at some places; its end pieces go on beyond them.
+///
+/// # Errors
+/// As `LookupTable::new`, but for any number of points.
+pub fn cubic_spline(points: &[f64], values: &[f64], at: &[f64]) -> Result<Vec<f64>, CoreError> {
+    check_axis(points)?;
+    check_values(values, points.len())?;
+    let slopes = smooth(points, values);
+    let piece = |&place: &f64| {
+        let cell = points.partition_point(|&point| point <= place).clamp(1, points.len() - 1) - 1;
+        let width = points[cell + 1] - points[cell];
+        let (along, chord) = (place - points[cell], (values[cell + 1] - values[cell]) / width);
+        let bend = (slopes[cell] + slopes[cell + 1] - 2.0 * chord) / width;
+        let (cubic, square) = (bend / width, (chord - slopes[cell]) / width - bend);
+        values[cell] + along * (slopes[cell] + along * (square + along * cubic))
+    };
+    Ok(at.iter().map(piece).collect())
 }
 
 fn steps(points: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {

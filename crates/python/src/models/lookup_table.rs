@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use flightid_core::CoreError;
-use flightid_core::language::lookup_table::{Interpolation, LookupTable as CoreTable, Outside};
+use flightid_core::language::lookup_table::{
+    Interpolation, LookupTable as CoreTable, Outside, cubic_spline as spline,
+};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -75,10 +77,26 @@ impl LookupTable {
     }
 }
 
+/// cubic_spline(points: NDArray[np.float64], values: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]
+///
+/// The cubic spline through points, without a knot at the second and last but one, at some places.
+#[pyfunction]
+fn cubic_spline<'py>(
+    py: Python<'py>,
+    points: PyReadonlyArray1<'_, f64>,
+    values: PyReadonlyArray1<'_, f64>,
+    at: PyReadonlyArray1<'_, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (points, values, at) = (points.as_slice()?, values.as_slice()?, at.as_slice()?);
+    let made = py.detach(|| spline(points, values, at)).map_err(from_core)?;
+    Ok(made.into_pyarray(py))
+}
+
 /// Add this file's names to the module.
 ///
 /// # Errors
 /// Never in practice; PyO3's own.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(cubic_spline, module)?)?;
     module.add_class::<LookupTable>()
 }

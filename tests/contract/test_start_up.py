@@ -1,0 +1,42 @@
+"""Commands that answer at once load nothing that only long work needs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.sweep_log import SweepFlight
+
+LOADED = (
+    "import sys\nfrom flightid.cli.program import run\n"
+    "run(sys.argv[1:])\nsys.stderr.write('\\n'.join(sys.modules))"
+)
+HEAVY = frozenset({"plotly", "pint", "pyarrow", "h5py", "jinja2"})
+HEAVY |= {f"scipy.{part}" for part in ("signal", "stats", "optimize", "interpolate", "sparse")}
+HEAVY |= {f"flightid.{room}" for room in ("study", "identification", "control", "export")}
+
+
+def loaded(*arguments: str) -> set[str]:
+    """Modules that a command loaded."""
+    command = [sys.executable, "-c", LOADED, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return set(done.stderr.splitlines())
+
+
+@pytest.mark.parametrize("flag", ["--help", "--version"])
+def test_help_and_version_load_no_numbers(flag: str) -> None:
+    assert not loaded(flag) & (HEAVY | {"numpy", "scipy"})
+
+
+def test_inspect_loads_what_it_uses(tmp_path: Path) -> None:
+    path = SweepFlight(sweep_s=20.0).write(tmp_path)
+    found = loaded("--quiet", "inspect", str(path))
+    assert "flightid.inspection.usable_band" in found
+    assert not found & HEAVY
+
+
+def test_a_loaded_module_is_seen() -> None:
+    assert "flightid.study" in loaded("run", "--help")
