@@ -158,7 +158,7 @@ def _errors(
     columns = linear.places[1]
     residuals = _residuals(linear, pilots)
     highest = BEYOND_BAND * linear.pilots.highest_rad_s
-    spent = np.array([len(each.covariance) for each in pilots])
+    spent = _stacked([each.spent for each in pilots])
     source = linear.errors_with(mean_spectrum(residuals, linear.sample_time_s, highest, spent))
     places = [np.arange(size) for size in response.response.shape]
     total = source.covariance(*places)

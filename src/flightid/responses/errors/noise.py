@@ -153,7 +153,10 @@ def noise_of_residuals(
 
 
 def mean_spectrum(
-    residuals: Sequence[Real], sample_time_s: float, highest_rad_s: float, spent: Real
+    residuals: Sequence[Real],
+    sample_time_s: float,
+    highest_rad_s: float,
+    spent: Sequence[Real],
 ) -> NoiseSpectrum:
     """Noise spectra of residuals that hold nothing but noise, averaged over neighbouring bins.
 
@@ -164,8 +167,8 @@ def mean_spectrum(
     sample_time_s : float
     highest_rad_s : float
         Highest frequency that a model was fitted to.
-    spent : ndarray, shape (n_out,)
-        Coefficients of the model of each output, whose freedom the residuals lack.
+    spent : sequence of ndarray, each shape (n_out, n_bins)
+        Of each record, share of a bin's noise that the model of each output took.
     """
     records = [Bins.of(each, sample_time_s) for each in residuals]
     longest = max(records, key=lambda bins: len(bins.omega)).omega
@@ -175,12 +178,14 @@ def mean_spectrum(
     found = []
     for group in np.array_split(inside, min(n_groups, len(inside))):
         low, high = group[0] * (1 - 1e-9), group[-1] * (1 + 1e-9)
-        values = np.concatenate(
-            [b.values[:, (b.omega >= low) & (b.omega <= high)] for b in records], axis=1
+        parts = [(b.omega >= low) & (b.omega <= high) for b in records]
+        values = np.concatenate([b.values[:, p] for b, p in zip(records, parts, strict=True)], 1)
+        taken = np.concatenate(
+            [each[:, p[: each.shape[1]]] for each, p in zip(spent, parts, strict=True)], axis=1
         )
-        found.append((0.5 * (low + high), values.conj() @ values.T / values.shape[1]))
-    grown = np.sqrt(2.0 * size / np.maximum(2.0 * size - spent, 1.0))
-    return _gather([(centre, matrix * np.outer(grown, grown)) for centre, matrix in found])
+        left = np.sqrt(values.shape[1] - taken.sum(axis=1))
+        found.append((0.5 * (low + high), values.conj() @ values.T / np.outer(left, left)))
+    return _gather(found)
 
 
 def _gather(found: Sequence[tuple[float, Complex]]) -> NoiseSpectrum:

@@ -32,6 +32,8 @@ SMOOTHED = 15
 """Bins over which squared residuals are averaged to a noise spectrum."""
 LEAST = 1e-10
 """Share of an output's power below which noise is rounding."""
+MOST_SPENT = 0.95
+"""Largest share of a bin's noise that a fit is held to have taken."""
 SPENT = 3.0
 """Equations for each unknown that a fit needs."""
 PATIENCE = 2
@@ -57,6 +59,8 @@ class Pilot:
         Of the coefficients.
     n_bins : int
         Bins of all records that it was fitted to.
+    spent : tuple of ndarray, each shape (n_bins of the record,)
+        Share of each bin's noise that the coefficients took: slow bins are few, and bend the most.
     """
 
     scale_rad_s: float
@@ -66,6 +70,7 @@ class Pilot:
     slopes: tuple[Real, ...]
     covariance: Real
     n_bins: int
+    spent: tuple[Real, ...]
 
     @property
     def order(self) -> int:
@@ -244,7 +249,7 @@ def _fit_output(data: _Spectra) -> Pilot | None:
         if found is None:
             return best
         best = _pilot(data, found, scale, weights)
-        weights = _weights(target - found.modelled, target)
+        weights = _weights(target - found.modelled, target, np.concatenate(best.spent))
     return best
 
 
@@ -257,7 +262,10 @@ def _pilot(data: _Spectra, state: _PilotState, scale: float, weights: Real) -> P
     weighed = slopes * weights
     left = np.concatenate([weighed.real, weighed.imag], axis=1)
     norms = np.maximum(np.linalg.norm(left, axis=1), np.finfo(float).tiny)
-    inverse = np.linalg.pinv((left / norms[:, None]) @ (left / norms[:, None]).T, hermitian=True)
+    scaled = left / norms[:, None]
+    inverse = np.linalg.pinv(scaled @ scaled.T, hermitian=True)
+    taken = 0.5 * np.einsum("ib,ij,jb->b", scaled, inverse, scaled, optimize=True)
+    spent = np.clip(taken[: data.size] + taken[data.size :], 0.0, MOST_SPENT)
     variance = state.cost * data.size / max(2.0 * data.size - len(slopes), 1.0)
     samples = [data.samples(row) for row in slopes]
     return Pilot(
@@ -268,14 +276,15 @@ def _pilot(data: _Spectra, state: _PilotState, scale: float, weights: Real) -> P
         tuple(np.stack(each) for each in zip(*samples, strict=True)),
         variance * inverse / np.outer(norms, norms),
         data.size,
+        tuple(np.split(spent, np.cumsum([len(each) for each in data.omega])[:-1])),
     )
 
 
-def _weights(residual: Complex, target: Complex) -> Real:
-    """One over the root of the residuals' spectrum."""
+def _weights(residual: Complex, target: Complex, spent: Real) -> Real:
+    """One over the root of the noise's spectrum: that of the residuals with what a fit spent."""
     window = np.ones(min(SMOOTHED, len(residual)))
     power = np.convolve(np.abs(residual) ** 2, window, "same")
-    power /= np.convolve(np.ones(len(residual)), window, "same")
+    power /= np.convolve(1.0 - spent, window, "same")
     least = LEAST * float(np.mean(np.abs(target) ** 2))
     return np.asarray(1.0 / np.sqrt(np.maximum(power, least)))
 
