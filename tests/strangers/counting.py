@@ -11,7 +11,8 @@ import numpy as np
 
 import flightid as fid
 
-NOMINAL = 0.95
+NOMINAL, Z = 0.95, 3.3
+"""Of intervals, and standard deviations of chance that a count may lie off."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,12 @@ class Trial:
     def green_and_missed(self) -> bool:
         """Green beside at least one interval that misses."""
         return self.light == "green" and any(r.holds is False for r in self.readings)
+
+    @property
+    def shown(self) -> int:
+        """Intervals beside a green light."""
+        held = [r.holds for r in self.readings if r.holds is not None]
+        return len(held) if self.light == "green" else 0
 
 
 @dataclass(frozen=True)
@@ -91,6 +98,16 @@ class Tally:
         """Share of flights with a green light beside a miss."""
         return float(np.mean([t.green_and_missed for t in self.trials]))
 
+    def ceiling(self) -> float:
+        """Share of flights with green beside a miss that chance allows sound intervals.
+
+        Each of k intervals beside a green light misses in 5 %: independent ones, the worst there
+        are, make 1 - 0.95^k of a flight, and chance over the flights adds 3.3 deviations.
+        """
+        missing = np.array([1.0 - NOMINAL**trial.shown for trial in self.trials])
+        chance = np.sqrt(np.sum(missing * (1.0 - missing))) / max(len(missing), 1)
+        return float(np.mean(missing) + Z * chance) if missing.size else float("nan")
+
     def refusals(self) -> float:
         """Share of flights that ended in a typed refusal."""
         return float(np.mean([bool(t.refusal) for t in self.trials]))
@@ -110,16 +127,19 @@ class Tally:
         seconds = float(np.median([t.seconds for t in self.trials]))
         lights = " ".join(f"{100 * self.share(c):4.0f}" for c in ("green", "amber", "red"))
         missed, refused = 100 * self.green_and_missed(), 100 * self.refusals()
+        most = 100 * self.ceiling()
+        above = "!" if missed > most else " "
         return (
             f"{self.name:44s} {100 * share:6.1f} {count:7d} {self.rms_z():7.2f}  {lights} "
-            f"{missed:6.1f} {refused:6.1f} {1e3 * seconds:8.0f} "
+            f"{missed:6.1f}{above}{most:6.1f} {refused:6.1f} {1e3 * seconds:8.0f} "
             f"{len(self.trials):5d}"
         )
 
 
 HEADING = (
     f"{'case':44s} {'held %':>6s} {'of':>7s} {'rms z':>7s}  "
-    f"{'grn':>4s} {'amb':>4s} {'red':>4s} {'g&miss':>6s} {'refuse':>6s} {'ms':>8s} {'runs':>5s}"
+    f"{'grn':>4s} {'amb':>4s} {'red':>4s} {'g&miss':>6s} {'most':>6s} {'refuse':>6s} "
+    f"{'ms':>8s} {'runs':>5s}"
 )
 
 
@@ -148,7 +168,7 @@ def count(case: Case, runs: int, *, first_seed: int = 0, jobs: int = 1) -> Tally
         return Tally(case.name, tuple(pool.map(case.fly, seeds, chunksize=max(runs // 40, 1))))
 
 
-def limits(n: int, *, nominal: float = NOMINAL, z: float = 3.3) -> tuple[float, float]:
+def limits(n: int, *, nominal: float = NOMINAL, z: float = Z) -> tuple[float, float]:
     """Shares that chance allows a nominal interval over `n` independent readings."""
     slack = z * np.sqrt(nominal * (1.0 - nominal) / max(n, 1))
     return nominal - slack, nominal + slack

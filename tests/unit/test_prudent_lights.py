@@ -61,6 +61,10 @@ def test_colour_that_bars_hold_is_a_note() -> None:
         (found,) = colour_findings(1.0, ratio)
         assert found.light is light
         assert bool(found.action) is (light is Light.AMBER)
+        assert "intervals allow for it" in found.message
+        (bare,) = colour_findings(1.0, ratio, has_bars=False)
+        assert bare.light is light
+        assert "interval" not in bare.message
 
 
 @pytest.mark.parametrize(

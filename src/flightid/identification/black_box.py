@@ -72,7 +72,9 @@ def black_box_fit(
     details: Details,
 ) -> Fit:
     """The fit of a black box."""
-    covariance = estimates.covariance
+    covariance, agreement = estimates.covariance, estimates.agreement
+    if covariance is None:
+        agreement = agreement and agreement.without_bars()
     costs = _costs(runs, model.outputs)
     return Fit(
         model=model,
@@ -103,7 +105,7 @@ def black_box_fit(
         ),
         residual_horizon=1 if runs.white else "free_run",
         details=details,
-        agreement=estimates.agreement,
+        agreement=agreement,
         input_correlations=estimates.correlations,
     )
 

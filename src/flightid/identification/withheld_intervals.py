@@ -40,8 +40,6 @@ def without_intervals(fit: Fit, reason: str) -> Fit:
         name: replace(each, stderr=None, reason=each.reason or reason)
         for name, each in fit.parameters.items()
     }
-    # What parts say of each other stays, what their scatter does to bars goes with the bars.
-    agreement = fit.agreement and replace(fit.agreement, by_scatter=None, freedom=None)
     findings = (
         *(each for each in fit.findings if each.code not in _OF_INTERVALS),
         *judge_parameters(bare),
@@ -53,5 +51,5 @@ def without_intervals(fit: Fit, reason: str) -> Fit:
         covariance=None,
         intervals_from=UNKNOWN,
         findings=findings,
-        agreement=agreement,
+        agreement=fit.agreement and fit.agreement.without_bars(),
     )

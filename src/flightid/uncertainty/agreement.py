@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,6 +92,10 @@ class Agreement:
         doubled = self.by_scatter > 2.0 * self.by_noise
         shares = 100.0 * half_width() * self.by_scatter / size
         return float(np.max(shares, where=told & doubled, initial=0.0))
+
+    def without_bars(self) -> Agreement:
+        """What parts say of each other; what their scatter does to bars goes with the bars."""
+        return replace(self, by_scatter=None, freedom=None)
 
     def of(self, count: int) -> Agreement:
         """The same of the first parameters alone."""

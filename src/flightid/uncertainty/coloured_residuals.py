@@ -106,7 +106,7 @@ class ResidualCovariance:
         return f"autoregressive noise of each whitened output, order {orders}"
 
 
-def colour_findings(smallest: float, largest: float) -> list[Finding]:
+def colour_findings(smallest: float, largest: float, *, has_bars: bool = True) -> list[Finding]:
     """Verdict on the colour of residuals: red where it changes standard errors beyond belief.
 
     A note where it widens them and the intervals allow for it, amber from `WELL_TOLD` times on.
@@ -115,6 +115,8 @@ def colour_findings(smallest: float, largest: float) -> list[Finding]:
     ----------
     smallest, largest : float
         Ratio of standard errors to those for white residuals, over all parameters.
+    has_bars : bool
+        Whether any estimate has an interval that allows for it.
 
     Example
     -------
@@ -125,9 +127,11 @@ def colour_findings(smallest: float, largest: float) -> list[Finding]:
     if believed and largest <= COLOURED:
         return []
     if believed:
+        allowed = "are", ", and the intervals allow for it"
+        are, bars = allowed if has_bars else ("would be", "")
         said = (
-            f"residuals are coloured: standard errors are up to {largest:.2g} times those of "
-            "white residuals, and the intervals allow for it"
+            f"residuals are coloured: standard errors {are} up to {largest:.2g} times those of "
+            f"white residuals{bars}"
         )
         if largest <= WELL_TOLD:
             return [Finding("residuals-coloured", Light.GREEN, said)]

@@ -286,7 +286,7 @@ def _assemble(
         findings=(
             *choice,
             *judge_polynomial(structure, model, parameters, roots, minima, n_counted, found.reason),
-            *colour_findings(*found.colour),
+            *colour_findings(*found.colour, has_bars=found.covariance is not None),
             *tests.findings(
                 biased=shares_poles(structure),
                 times=tests.widening(biased=shares_poles(structure)),
