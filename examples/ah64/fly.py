@@ -15,8 +15,8 @@ def write(folder: Path, seed: int, *, full: bool) -> None:
     """Write the sweeps, and the manoeuvres that no fit sees."""
     folder.mkdir(parents=True, exist_ok=True)
     flown = fly_sweeps(seed) if full else fly_sweeps(seed, repeats=1, duration_s=120.0)
-    fid.write_records(flown, folder / "sweeps.parquet")
-    fid.write_records(fly_manoeuvres(seed), folder / "manoeuvres.parquet")
+    fid.write_records(flown, folder / "sweeps.nc")
+    fid.write_records(fly_manoeuvres(seed), folder / "manoeuvres.nc")
 
 
 if __name__ == "__main__":

@@ -20,8 +20,8 @@ def write(folder: Path, seed: int, *, full: bool) -> None:
     for condition in flights.LIBRARY:
         plan = flights.plan(condition, full=full)
         doublets = [record.segment(0.0, UNSEEN_S) for record in plan.fly_doublets(seed)]
-        fid.write_records(plan.fly_sweeps(seed), folder / f"{condition}_sweeps.parquet")
-        fid.write_records(doublets, folder / f"{condition}_doublets.parquet")
+        fid.write_records(plan.fly_sweeps(seed), folder / f"{condition}_sweeps.nc")
+        fid.write_records(doublets, folder / f"{condition}_doublets.nc")
 
 
 if __name__ == "__main__":

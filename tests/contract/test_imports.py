@@ -11,6 +11,7 @@ BASE = {
     "common_units",
     "conventions",
     "errors",
+    "extras",
     "files",
     "findings",
     "option_forms",

@@ -4,14 +4,14 @@ import json
 import shutil
 import subprocess
 import sys
+import time
 from io import StringIO
 from pathlib import Path
 
 import click
 import pytest
-from rich.console import Console
 
-from flightid.cli import output, program
+from flightid.cli import bar, output, program
 from flightid.cli.bar import Bar
 from flightid.conventions import Light
 from flightid.errors import DataError
@@ -139,12 +139,25 @@ def test_numbers_that_are_not_finite_are_refused() -> None:
         output.emit_values({"x": float("nan")})
 
 
-def test_bar_is_quiet_for_short_work_and_vanishes() -> None:
-    stream = StringIO()
-    bar = Bar("short", 2, Console(file=stream, force_terminal=True))
-    bar.advance()
-    bar.close()
-    assert "short" not in stream.getvalue()
+class _Terminal(StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_bar_is_quiet_for_short_work_and_vanishes(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = _Terminal()
+    short = Bar("short", 2, stream)
+    short.advance()
+    short.close()
+    assert not stream.getvalue()
+    monkeypatch.setattr(bar, "PATIENCE_S", 0.01)
+    shown = Bar("long\x1b[2J", 2, stream)
+    shown.advance()
+    while "1/2" not in stream.getvalue():
+        time.sleep(0.01)
+    shown.close()
+    assert f"long[2J {'━' * 15:<30} 1/2" in stream.getvalue()
+    assert stream.getvalue().endswith(bar.CLEAR)
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")

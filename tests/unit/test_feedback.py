@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -10,7 +12,7 @@ import flightid as fid
 from flightid.conventions import Light
 from flightid.errors import OptionError
 from flightid.evidence.data_checks import loop_check
-from flightid.responses.store import from_xarray, to_xarray
+from flightid.responses.store import read_response, write_response
 from flightid.uncertainty.feedback import LEVEL, FeedbackTest, find_feedback
 from tests.feedback_flights import DT, flight
 
@@ -72,12 +74,12 @@ def test_several_records_count_as_one_sample() -> None:
     assert all_of_them.p_value < 0.01 * one.p_value
 
 
-def test_a_response_carries_the_answer_and_a_file_keeps_it() -> None:
+def test_a_response_carries_the_answer_and_a_file_keeps_it(tmp_path: Path) -> None:
     response = fid.estimate_response(_record("white", size=0.5, gain=1.0, pole=0.9), window_s=10.0)
     assert response.loop is not None
     assert response.loop.is_closed
     assert "loop-closed" in {finding.code for finding in response.findings}
-    again = from_xarray(to_xarray(response))
+    again = read_response(write_response(response, tmp_path / "a.nc"))
     assert (again.loop, again.input_shape) == (response.loop, response.input_shape)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 
 import h5py
@@ -118,6 +119,21 @@ def test_history_of_numpy_numbers_is_stored_as_numbers(tmp_path: Path) -> None:
     record = _record(history=[Step("x", {"order": np.int64(3)})])
     (found,) = read_records(write_records(record, tmp_path / "a.nc"))
     assert found.history[0].options == {"order": 3}
+
+
+def test_what_an_extra_installs_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    record = Record.from_arrays([0.0, 0.5], outputs={"p": [0.1, 0.3]})
+    path = write_records(record, tmp_path / "a.parquet")
+    for name in ("pyarrow.parquet", "xarray"):
+        monkeypatch.setitem(sys.modules, name, None)
+    for call in (
+        lambda: write_records(record, tmp_path / "b.parquet"),
+        lambda: read_records(path),
+        lambda: record.dataset,
+    ):
+        with pytest.raises(OptionError, match=r"is not installed.*pip install 'flightid\["):
+            call()
+    assert [each.name for each in tmp_path.iterdir()] == ["a.parquet"]
 
 
 def test_refusals_to_write(tmp_path: Path) -> None:

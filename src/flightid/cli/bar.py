@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from threading import Timer
-
-from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+import sys
+import time
+from threading import Event, Thread
+from typing import TextIO
 
 PATIENCE_S = 1.0
 """Work shorter than this shows nothing."""
+REDRAWN_S = 0.1
+WIDTH = 30
+LABEL_WIDTH = 40
+CLEAR = "\r\x1b[K"
 
 
 class Bar:
@@ -20,37 +24,49 @@ class Bar:
         What is being done.
     total : int or None
         Number of steps.
-    console : rich.console.Console
-        Where to draw; a console that is no terminal shows nothing.
+    stream : text stream
+        Where to draw; one that is no terminal shows nothing.
     """
 
-    def __init__(self, label: str, total: int | None, console: Console) -> None:
-        self._live = Progress(
-            SpinnerColumn(),
-            TextColumn("{task.description}", markup=False),
-            BarColumn(),
-            TextColumn("{task.completed}/{task.total}" if total else ""),
-            TimeElapsedColumn(),
-            console=console,
-            transient=True,
-            disable=not console.is_terminal,
-        )
-        self._task = self._live.add_task(label, total=total)
-        self._timer = Timer(PATIENCE_S, self._live.start)
-        self._timer.daemon = True
-        self._timer.start()
+    def __init__(self, label: str, total: int | None, stream: TextIO) -> None:
+        self._label = "".join(letter for letter in label if letter.isprintable())[:LABEL_WIDTH]
+        self._total, self._done = total, 0
+        self._stream, self._begun = stream, time.monotonic()
+        self._ended = Event()
+        self._thread = Thread(target=self._draw, daemon=True)
+        if stream.isatty():
+            self._thread.start()
 
     def advance(self, steps: int = 1) -> None:
         """Count steps that are done."""
-        self._live.advance(self._task, steps)
+        self._done += steps
 
     def close(self) -> None:
         """Take the bar away."""
-        self._timer.cancel()
-        self._timer.join()
-        self._live.stop()
+        self._ended.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _draw(self) -> None:
+        if self._ended.wait(PATIENCE_S):
+            return
+        while True:
+            self._stream.write(CLEAR + self._line())
+            self._stream.flush()
+            if self._ended.wait(REDRAWN_S):
+                break
+        self._stream.write(CLEAR)
+        self._stream.flush()
+
+    def _line(self) -> str:
+        minutes, seconds = divmod(int(time.monotonic() - self._begun), 60)
+        clock = f"{minutes}:{seconds:02d}"
+        if not self._total:
+            return f"{self._label} {clock}"
+        full = WIDTH * min(self._done, self._total) // self._total
+        return f"{self._label} {'━' * full:<{WIDTH}} {self._done}/{self._total} {clock}"
 
 
 def bar_display(label: str, total: int | None) -> Bar:
     """Make a bar on standard error; a display for `flightid.progress.shown_by`."""
-    return Bar(label, total, Console(stderr=True))
+    return Bar(label, total, sys.stderr)

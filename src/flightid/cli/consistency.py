@@ -25,7 +25,9 @@ def _fields() -> dict[str, type[Options]]:
 @click.command(cls=OptionsCommand, fields_of=_fields, short_help="Check data compatibility.")
 @click.argument("files", type=FILES, nargs=-1, required=True)
 @click.option("--estimate", help="Instrument errors, with commas: bias_p,scale_q,delay_phi.")
-@click.option("--write", type=FILE, help="Write the corrected records to this file (*.parquet).")
+@click.option(
+    "--write", type=FILE, help="Write the corrected records to this file (*.parquet, *.nc)."
+)
 @level_option
 @html_option
 @all_option

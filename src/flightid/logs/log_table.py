@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.errors import MissingColumnError
+from flightid.extras import extra_module
 from flightid.logs.source import LogSource
 from flightid.result import Result
 from flightid.table import Column, Table
@@ -176,10 +177,14 @@ class LogTable(Result, schema="flightid.log_table/1"):
         return self._time_s
 
     def to_pandas(self) -> pd.DataFrame:
-        """All columns as a `pandas.DataFrame`; array fields become ``name[i]``."""
-        # pandas takes half a second to load: only those who ask for a frame pay for it.
-        import pandas as pd  # noqa: PLC0415
+        """All columns as a `pandas.DataFrame`; array fields become ``name[i]``.
 
+        Raises
+        ------
+        OptionError
+            pandas is not installed (extra ``tables``).
+        """
+        module = extra_module("pandas", "a pandas.DataFrame")
         frame: dict[str, object] = {}
         arrays = self.arrays()
         for column in self.columns:
@@ -190,7 +195,7 @@ class LogTable(Result, schema="flightid.log_table/1"):
             else:
                 for index, values in enumerate(arrays[column].T):
                     frame[f"{column}[{index}]"] = values
-        return pd.DataFrame(frame)
+        return cast("pd.DataFrame", module.DataFrame(frame))
 
     def summary(self) -> Table:
         """Table of the fields with unit and range."""

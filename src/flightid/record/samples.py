@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Iterable, Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Role
+from flightid.extras import extra_module
 from flightid.record.channel import Channel
 from flightid.record.history import Step
 from flightid.record.hold import InputHold, InputShape
@@ -92,14 +93,19 @@ class LabelledSamples:
 
     @property
     def dataset(self) -> xr.Dataset:
-        """The data as an `xarray.Dataset`, with unit, role and note as attributes; read-only."""
-        import xarray as xr  # noqa: PLC0415  # half a second that few commands need
+        """The data as an `xarray.Dataset`, with unit, role and note as attributes; read-only.
 
+        Raises
+        ------
+        OptionError
+            xarray is not installed (extra ``tables``).
+        """
+        module = extra_module("xarray", "an xarray.Dataset")
         variables = {
             key: (TIME, self._samples[key], {"unit": c.unit, "role": str(c.role), "note": c.note})
             for key, c in self._channels.items()
         }
-        return xr.Dataset(variables, coords={TIME: self._time_s})
+        return cast("xr.Dataset", module.Dataset(variables, coords={TIME: self._time_s}))
 
     @property
     def time_s(self) -> NDArray[np.float64]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
+from typing import TYPE_CHECKING, cast
 
 import h5netcdf
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 
 from flightid.errors import DataError, FileFormatError, OptionError
 from flightid.files import as_path, write_atomically
@@ -17,6 +17,9 @@ from flightid.record.labels import RecordLabels, from_text, labels_of, to_text
 from flightid.record.record import Record
 from flightid.record.several import as_records
 from flightid.record.validation import TIME
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 RECORD_COLUMN = "record"
 
@@ -44,7 +47,7 @@ def write_records(records: Record | Sequence[Record], path: str | Path) -> Path:
     Raises
     ------
     OptionError
-        Another suffix.
+        Another suffix; Parquet without pyarrow (extra ``parquet``).
     DataError
         No record, or a history that holds values that are not plain.
     OSError
@@ -65,6 +68,7 @@ def write_records(records: Record | Sequence[Record], path: str | Path) -> Path:
     if not items:
         raise DataError("there is no record to write", needed="at least one")
     if target.suffix.lower() == ".parquet":
+        pq = parquet.parquet_library()
         table = _parquet_table(items)
         return write_atomically(
             target, lambda temporary: pq.write_table(table, temporary, compression="zstd")
@@ -104,26 +108,29 @@ def stored_records(path: Path, text: str, *, is_parquet: bool) -> list[Record]:
 
 
 def _parquet_table(records: list[Record]) -> pa.Table:
+    arrow = import_module("pyarrow")
     labels = [labels_of(record, plain_names=False) for record in records]
     names = list(dict.fromkeys(name for record in records for name in record.channels))
-    columns = {TIME: pa.array(np.concatenate([record.time_s for record in records]))}
-    fields = [pa.field(TIME, pa.float64(), metadata={"unit": "s"})]
+    columns = {TIME: arrow.array(np.concatenate([record.time_s for record in records]))}
+    fields = [arrow.field(TIME, arrow.float64(), metadata={"unit": "s"})]
     if len(records) > 1 and RECORD_COLUMN not in names:
         counts = [record.n_samples for record in records]
         numbers = np.repeat(np.arange(len(records), dtype=np.int32), counts)
-        columns[RECORD_COLUMN] = pa.array(numbers)
-        fields.append(pa.field(RECORD_COLUMN, pa.int32()))
+        columns[RECORD_COLUMN] = arrow.array(numbers)
+        fields.append(arrow.field(RECORD_COLUMN, arrow.int32()))
     for name in names:
         parts = [
-            pa.array(record[name]) if name in record else pa.nulls(record.n_samples, pa.float64())
+            arrow.array(record[name])
+            if name in record
+            else arrow.nulls(record.n_samples, arrow.float64())
             for record in records
         ]
-        columns[name] = pa.concat_arrays(parts)
+        columns[name] = arrow.concat_arrays(parts)
         units = {record.unit(name) for record in records if name in record}
         metadata = {"unit": units.pop()} if len(units) == 1 else None
-        fields.append(pa.field(name, pa.float64(), metadata=metadata))
-    schema = pa.schema(fields, metadata={parquet.LABELS_KEY: to_text(labels).encode()})
-    return pa.table(list(columns.values()), schema=schema)
+        fields.append(arrow.field(name, arrow.float64(), metadata=metadata))
+    schema = arrow.schema(fields, metadata={parquet.LABELS_KEY: to_text(labels).encode()})
+    return cast("pa.Table", arrow.table(list(columns.values()), schema=schema))
 
 
 def _from_parquet(path: Path, labels: list[RecordLabels]) -> list[Record]:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from flightid.errors import DataError, FileFormatError
+from flightid.extras import extra_module
 from flightid.reading import decoding
 from flightid.record.formats.columns import (
     ColumnTable,
@@ -22,13 +22,11 @@ from flightid.record.formats.columns import (
 LABELS_KEY = b"flightid"
 UNIT_KEYS = (b"unit", b"units")
 WHOLE = "a whole Parquet file"
-PLAIN_TYPES = (
-    pa.types.is_integer,
-    pa.types.is_floating,
-    pa.types.is_boolean,
-    pa.types.is_timestamp,
-    pa.types.is_dictionary,
-)
+PLAIN_TYPES = ("is_integer", "is_floating", "is_boolean", "is_timestamp", "is_dictionary")
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
 
 
 def read_columns(path: Path, *, has_labels: bool = False) -> ColumnTable:
@@ -45,6 +43,8 @@ def read_columns(path: Path, *, has_labels: bool = False) -> ColumnTable:
     ------
     FileFormatError
         The file is damaged, absurdly large or repeats a name.
+    OptionError
+        pyarrow is not installed (extra ``parquet``).
     """
     file = _open(path)
     headings = list(file.schema_arrow.names)
@@ -70,7 +70,13 @@ def read_labels(path: Path) -> str | None:
     return metadata[LABELS_KEY].decode("utf-8", "replace") if LABELS_KEY in metadata else None
 
 
+def parquet_library() -> Any:  # noqa: ANN401 - a module
+    """`pyarrow.parquet`, for those who read or write such files."""
+    return extra_module("pyarrow.parquet", "a Parquet file")
+
+
 def _open(path: Path) -> pq.ParquetFile:
+    pq, pa = parquet_library(), import_module("pyarrow")
     with decoding(path.name, WHOLE):
         schema = pq.read_schema(path)
         # One text of a megabyte may stand in a million rows: kept once, numbered.
@@ -83,9 +89,10 @@ def _open(path: Path) -> pq.ParquetFile:
 
 
 def _column(path: Path, file: pq.ParquetFile, name: str) -> NDArray[Any]:
+    types = import_module("pyarrow").types
     kind = file.schema_arrow.field(name).type
     # A list or a text of any length may stand in each row: one value of bounded width is a cell.
-    if not any(is_plain(kind) for is_plain in PLAIN_TYPES):
+    if not any(getattr(types, is_plain)(kind) for is_plain in PLAIN_TYPES):
         raise DataError(
             f"column {name!r} of {path.name} does not hold real numbers",
             found=f"type {kind}",
@@ -94,15 +101,16 @@ def _column(path: Path, file: pq.ParquetFile, name: str) -> NDArray[Any]:
         )
     with decoding(path.name, WHOLE):
         column = file.read(columns=[name]).column(name)
-        if pa.types.is_dictionary(column.type):
+        if types.is_dictionary(column.type):
             texts = column.unify_dictionaries().combine_chunks()
             known = texts.dictionary.to_numpy(zero_copy_only=False)
             return np.asarray(known[texts.indices.fill_null(0).to_numpy(zero_copy_only=False)])
-        return plain_values(column)
+        return _plain_values(column)
 
 
-def plain_values(column: pa.ChunkedArray) -> NDArray[Any]:
+def _plain_values(column: pa.ChunkedArray) -> NDArray[Any]:
     """Values of a column; times become s from the first of them."""
+    pa = import_module("pyarrow")
     if not pa.types.is_timestamp(column.type):
         return np.asarray(column.to_numpy())
     # Exact in integers; a double of seconds since 1970 would round to 0.2 µs.
