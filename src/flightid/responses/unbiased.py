@@ -177,8 +177,9 @@ def _errors(
 
 def _widened(pilot: Pilot) -> float:
     """Student's distribution over the normal one at 95 %, squared: noise is known from few bins."""
-    groups = max(1, pilot.n_bins // AVERAGED)
-    freedom = (2.0 * pilot.n_bins - len(pilot.covariance)) / groups
+    n_bins = sum(map(len, pilot.spent))
+    groups = max(1, n_bins // AVERAGED)
+    freedom = (2.0 * n_bins - len(pilot.covariance)) / groups
     return (half_width(LEVEL, max(freedom, 1.0)) / half_width(LEVEL)) ** 2
 
 

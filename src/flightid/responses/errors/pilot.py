@@ -32,8 +32,7 @@ SMOOTHED = 15
 """Bins over which squared residuals are averaged to a noise spectrum."""
 LEAST = 1e-10
 """Share of an output's power below which noise is rounding."""
-MOST_SPENT = 0.95
-"""Largest share of a bin's noise that a fit is held to have taken."""
+MOST_SPENT = 0.95  # of a bin's noise, that a fit is held to have taken
 SPENT = 3.0
 """Equations for each unknown that a fit needs."""
 PATIENCE = 2
@@ -57,8 +56,6 @@ class Pilot:
         Their derivatives by the coefficients: numerators, transients, denominator but its first.
     covariance : ndarray, shape (n_coefficients, n_coefficients)
         Of the coefficients.
-    n_bins : int
-        Bins of all records that it was fitted to.
     spent : tuple of ndarray, each shape (n_bins of the record,)
         Share of each bin's noise that the coefficients took: slow bins are few, and bend the most.
     """
@@ -69,7 +66,6 @@ class Pilot:
     outputs: tuple[Real, ...]
     slopes: tuple[Real, ...]
     covariance: Real
-    n_bins: int
     spent: tuple[Real, ...]
 
     @property
@@ -206,9 +202,7 @@ def fit_pilots(
 def _spectra(
     inputs: Sequence[Real], output: Sequence[Real], sample_time_s: float, highest: float
 ) -> _Spectra:
-    omegas: list[Real] = []
-    ins: list[Complex] = []
-    outs: list[Complex] = []
+    omegas, ins, outs = [], [], []
     for u, y in zip(inputs, output, strict=True):
         n = len(y)
         last = min((n - 1) // 2, int(BEYOND_BAND * highest * n * sample_time_s / (2.0 * np.pi)))
@@ -262,10 +256,10 @@ def _pilot(data: _Spectra, state: _PilotState, scale: float, weights: Real) -> P
     weighed = slopes * weights
     left = np.concatenate([weighed.real, weighed.imag], axis=1)
     norms = np.maximum(np.linalg.norm(left, axis=1), np.finfo(float).tiny)
-    scaled = left / norms[:, None]
-    inverse = np.linalg.pinv(scaled @ scaled.T, hermitian=True)
-    taken = 0.5 * np.einsum("ib,ij,jb->b", scaled, inverse, scaled, optimize=True)
-    spent = np.clip(taken[: data.size] + taken[data.size :], 0.0, MOST_SPENT)
+    left /= norms[:, None]
+    inverse = np.linalg.pinv(left @ left.T, hermitian=True)
+    taken = 0.5 * np.einsum("ib,ij,jb->b", left, inverse, left, optimize=True)
+    spent = np.minimum(taken.reshape(2, -1).sum(axis=0), MOST_SPENT)
     variance = state.cost * data.size / max(2.0 * data.size - len(slopes), 1.0)
     samples = [data.samples(row) for row in slopes]
     return Pilot(
@@ -275,7 +269,6 @@ def _pilot(data: _Spectra, state: _PilotState, scale: float, weights: Real) -> P
         data.samples(state.modelled),
         tuple(np.stack(each) for each in zip(*samples, strict=True)),
         variance * inverse / np.outer(norms, norms),
-        data.size,
         tuple(np.split(spent, np.cumsum([len(each) for each in data.omega])[:-1])),
     )
 
