@@ -50,7 +50,16 @@ GROUPS = {
     "flight": Group(
         "Flight review",
         "flight.md",
-        ("review_flight", "FlightReview", "LoopResponse", "plan_flight", "SweepPlan"),
+        (
+            "review_flight",
+            "FlightReview",
+            "LoopResponse",
+            "compare_flights",
+            "compare_with_promise",
+            "FlightComparison",
+            "plan_flight",
+            "SweepPlan",
+        ),
     ),
     "responses": Group(
         "Responses",

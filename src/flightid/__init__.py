@@ -115,7 +115,14 @@ if TYPE_CHECKING:
     )
     from flightid.responses.coherent_pairs import coherent_pairs
     from flightid.responses.response_band import response_band
-    from flightid.review import FlightReview, LoopResponse, review_flight
+    from flightid.review import (
+        FlightComparison,
+        FlightReview,
+        LoopResponse,
+        compare_flights,
+        compare_with_promise,
+        review_flight,
+    )
     from flightid.simulation.noise import Noise
     from flightid.simulation.simulate import simulate
     from flightid.study import Study, run_study
@@ -239,9 +246,12 @@ _HOMES = {
     "reduce": "flightid.identification.reduction.reduce",
     "residual_tests": "flightid.validation.residuals.residual_tests",
     "SweepPlan": "flightid.planning",
+    "FlightComparison": "flightid.review",
     "FlightReview": "flightid.review",
     "LoopResponse": "flightid.review",
     "plan_flight": "flightid.planning",
+    "compare_flights": "flightid.review",
+    "compare_with_promise": "flightid.review",
     "review_flight": "flightid.review",
     "run_study": "flightid.study",
     "simulate": "flightid.simulation.simulate",
@@ -253,7 +263,7 @@ __all__ = [
     "Advice", "AxisLoop", "Channel", "Check", "ClosedLoop", "CoherentPairs", "Comparison",
     "ConditionComparison", "ControllerOptions", "DerivativeTable", "DiskMargin",
     "DisturbanceRejection", "Estimate", "Evidence", "ExportFiles", "FeedbackTest", "Finding",
-    "Fit", "FittedRecord", "FittedResponse", "FlightReview", "FlightidError",
+    "Fit", "FittedRecord", "FittedResponse", "FlightComparison", "FlightReview", "FlightidError",
     "FrequencyResponse", "ImpulseResponse", "InnovationsModel", "Inspection", "Interconnection",
     "Interpretation", "LinearSystem", "LocalMinimum", "Log", "LogTable", "LoopResponse",
     "Margins", "ModelBuilder", "Modes", "NarxModel", "NarxStructure", "Noise", "OrderScan",
@@ -262,17 +272,18 @@ __all__ = [
     "StateSpaceModel", "StructureComparison", "Study", "SweepPlan", "Table", "TransferFunction",
     "TransferFunctionModel", "Tuning", "TuningRequirements", "Uncertain", "Verification",
     "__version__", "advise", "approximate_modes", "attitude_bandwidth", "axis_loop",
-    "axis_loop_of", "close_loop", "coherent_pairs", "compare_conditions", "compare_structures",
-    "conditioning", "connect", "derivatives", "disk_margin", "disturbance_rejection",
-    "estimate_response", "excitation", "export", "feedback_test", "from_control", "from_scipy",
-    "handling_qualities", "identify", "impulse_response", "inspect_log", "interpret",
-    "library_names", "load_model", "loops", "lower_order", "margins", "modes", "open_loop",
-    "pilot_cutoff", "plan_flight", "plot", "predict", "px4_autotune_gains", "read_log",
-    "read_parameters", "read_records", "read_system", "reduce", "replay", "residual_tests",
-    "response_band", "review_flight", "rotor_physics", "run_study", "scan_orders", "simulate",
-    "to_continuous", "to_control", "to_discrete", "to_scipy", "tune", "tune_controller",
-    "tune_pid", "validation", "verify", "without_bias", "write_ardupilot_parameters",
-    "write_model", "write_px4_parameters", "write_records", "write_system",
+    "axis_loop_of", "close_loop", "coherent_pairs", "compare_conditions", "compare_flights",
+    "compare_structures", "compare_with_promise", "conditioning", "connect", "derivatives",
+    "disk_margin", "disturbance_rejection", "estimate_response", "excitation", "export",
+    "feedback_test", "from_control", "from_scipy", "handling_qualities", "identify",
+    "impulse_response", "inspect_log", "interpret", "library_names", "load_model", "loops",
+    "lower_order", "margins", "modes", "open_loop", "pilot_cutoff", "plan_flight", "plot",
+    "predict", "px4_autotune_gains", "read_log", "read_parameters", "read_records",
+    "read_system", "reduce", "replay", "residual_tests", "response_band", "review_flight",
+    "rotor_physics", "run_study", "scan_orders", "simulate", "to_continuous", "to_control",
+    "to_discrete", "to_scipy", "tune", "tune_controller", "tune_pid", "validation", "verify",
+    "without_bias", "write_ardupilot_parameters", "write_model", "write_px4_parameters",
+    "write_records", "write_system",
 ]  # fmt: skip
 
 

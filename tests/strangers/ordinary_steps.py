@@ -53,19 +53,25 @@ def instants(axis: Axis, every: int) -> np.ndarray:
     return np.asarray(middles - 0.5 / axis.loop_hz)
 
 
-def fly_step(
-    seed: int, *, axis: Axis, acro: bool, duration_s: float = 60.0, every: int = 4
-) -> Trial:
-    """Step at eight instants and every reading of one flight's rate loop."""
+def fly_samples(
+    seed: int, axis: Axis, *, acro: bool, duration_s: float = 60.0, every: int = 4
+) -> LoopSamples:
+    """What a log of one flight would hold of the rate loop."""
     flown = ordinary(axis, seed, duration_s, acro=acro, size=1.0 if acro else 0.25)
     sample_s = every / axis.loop_hz
     r, y, angle = flown.rate_wanted[::every], flown.rate[::every], flown.angle[::every]
     ahead = np.concatenate([[0.0], np.diff(angle) / sample_s])
+    return LoopSamples(r - r.mean(), y - y.mean(), ahead - ahead.mean(), (r.size,), sample_s)
+
+
+def fly_step(
+    seed: int, *, axis: Axis, acro: bool, duration_s: float = 60.0, every: int = 4
+) -> Trial:
+    """Step at eight instants and every reading of one flight's rate loop."""
+    samples = fly_samples(seed, axis, acro=acro, duration_s=duration_s, every=every)
     begun = time.perf_counter()
     try:
-        loop = closed_loop(
-            LoopSamples(r - r.mean(), y - y.mean(), ahead - ahead.mean(), (r.size,), sample_s)
-        )
+        loop = closed_loop(samples)
     except FlightidError as error:
         return Trial(refusal=str(error), seconds=time.perf_counter() - begun)
     time_s = instants(axis, every)

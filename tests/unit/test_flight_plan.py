@@ -30,7 +30,7 @@ ANGLES = ("phi", "theta", "psi")
 SID = ("MAGNITUDE", "F_START_HZ", "F_STOP_HZ", "T_FADE_IN", "T_REC", "T_FADE_OUT")
 
 
-def ordinary(path: Path) -> Path:
+def ordinary(path: Path, autopilot: Autopilot | None = None) -> Path:
     """A log of sticks alone, a minute of doublets."""
     random, moves, start_s = np.random.default_rng(3), [], 11.0
     while start_s < 60.0:
@@ -38,7 +38,8 @@ def ordinary(path: Path) -> Path:
         size = float(random.uniform(0.05, 0.25)) * (2.0 if axis == "yaw" else 1.0)
         moves.append(PilotDoublet(axis, start_s, size, float(random.uniform(0.3, 1.0))))
         start_s = moves[-1].end_s + float(random.uniform(0.0, 2.0))
-    return write_ardupilot_log(fly(doublets=moves, duration_s=65.0, turbulence=AIR, seed=3), path)
+    flight = fly(doublets=moves, duration_s=65.0, turbulence=AIR, autopilot=autopilot, seed=3)
+    return write_ardupilot_log(flight, path)
 
 
 @pytest.fixture(scope="module")

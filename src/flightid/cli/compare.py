@@ -1,41 +1,125 @@
-"""``flightid compare``: models of several flights side by side, and what really changed."""
+"""``flightid compare``: before and after, of models, flights, or a promise and its flight."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from itertools import takewhile
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from flightid.cli.output import all_option, json_option, level_option
-from flightid.cli.pages import show
+from flightid.cli.pages import html_option, show
 from flightid.cli.sources import AXES, known_models, load_source
 
+if TYPE_CHECKING:
+    from flightid.models import Model
+    from flightid.review import FlightComparison, FlightReview
 
-@click.command(short_help="Put models of several flights or conditions side by side.")
-@click.argument(
-    "models", nargs=-1, required=True, metavar="MODEL MODEL...", shell_complete=known_models
-)
+PART = re.compile(r"(.+)@([\d.]*):([\d.]*)")
+"""A log and a part of it, s: ``flight.BIN@20:80``."""
+
+
+@click.command(short_help="Put flights, models, or a promise and its flight side by side.")
+@click.argument("files", nargs=-1, required=True, metavar="A B...", shell_complete=known_models)
 @click.option("--axis", type=AXES, help="Of a library model.")
 @level_option
+@html_option
 @all_option
 @json_option
-def command(models: tuple[str, ...], axis: str | None, level: float | None, as_json: bool) -> None:
-    """Parameters and modes of MODELs with their ratios, and what is more than chance.
+def command(
+    files: tuple[str, ...],
+    axis: str | None,
+    level: float | None,
+    html: Path | None,
+    as_json: bool,
+) -> None:
+    """What changed from A to B, and what is more than chance.
 
-    The first is the base. Each is a .toml file, the folder of a study with one model, the JSON of a
-    fit, or the name of a library model. To see which predicts better: `flightid verify MODEL
-    RECORDS --against MODEL`.
+    Two logs, or parts of logs (flight.BIN@20:80, s on its clock): steps, bandwidths and tracking of
+    the loops, and gains that differ. Models, then a log: what they promise of the gains that it
+    flew beside what it shows; where `flightid tune --write` left its files beside either, the next
+    step to fly or the file that takes this one back. Models alone: parameters and modes with their
+    ratios, the first as base. A model is a .toml file, the folder of a study, the JSON of a fit, or
+    a library name. To see which predicts better: `flightid verify MODEL RECORDS --against MODEL`.
     """
     from flightid import compare_conditions
+    from flightid.uncertainty.quantiles import showing
 
-    if len(set(models)) < len(models):
-        raise click.UsageError("a model is named twice")
-    sources = {
-        n: load_source(model, axis) for n, model in zip(short_names(models), models, strict=True)
-    }
-    show(compare_conditions(sources), "Comparison", as_json=as_json, level=level)
+    if len(set(files)) < len(files):
+        raise click.UsageError("a file is named twice: parts of a log are flight.BIN@20:80")
+    flights = [file for file in files if _is_flight(file)]
+    if not flights:
+        named = zip(short_names(files), files, strict=True)
+        sources = {name: load_source(model, axis) for name, model in named}
+        show(compare_conditions(sources), "Comparison", as_json=as_json, level=level)
+        return
+    if (len(flights) > 1 and len(files) != len(flights)) or files[-1] not in flights:
+        raise click.UsageError("name two logs, or models and then the log that flew their gains")
+    if len(flights) > 2:
+        raise click.UsageError("two logs are compared at a time")
+    with showing(level):
+        made = _flights(*files) if len(flights) == 2 else _promise(files[:-1], files[-1])
+        show(made, "Comparison", as_json=as_json, html=html, level=level)
+
+
+def _is_flight(name: str) -> bool:
+    from flightid.logs import is_log
+
+    path = Path(PART.sub(r"\1", name))
+    return path.is_file() and path.suffix not in (".toml", ".json") and is_log(path)
+
+
+def _reviewed(name: str) -> FlightReview:
+    from dataclasses import replace
+
+    from flightid import review_flight
+
+    part = PART.fullmatch(name)
+    if part is None:
+        return review_flight(name)
+    span_s = float(part[2] or 0.0), float(part[3] or "inf")
+    review = review_flight(part[1], span_s=span_s)
+    return replace(review, name=f"{review.name}@{part[2]}:{part[3]}")
+
+
+def _flights(before: str, after: str) -> FlightComparison:
+    from flightid import compare_flights
+    from flightid.progress import progress
+
+    with progress(None, "reviewing both flights"):
+        return compare_flights(_reviewed(before), _reviewed(after))
+
+
+def _promise(models: Sequence[str], after: str) -> FlightComparison:
+    """What models promised of a flight, and which step of the gains comes next."""
+    from dataclasses import replace
+
+    from flightid import compare_with_promise, read_log
+    from flightid.progress import progress
+    from flightid.review.next_step import flown_step
+
+    if PART.fullmatch(after):
+        raise click.UsageError("a promise is compared with a whole log")
+    log = read_log(after)
+    with progress(None, "working out what was promised"):
+        made = compare_with_promise([each for name in models for each in _models(name)], log)
+    places = [Path(name).resolve().parent for name in (*models, after)]
+    step = flown_step([each for each in places if each.is_dir()], log.parameters)
+    if step is None:
+        return made
+    return replace(made, findings=(*made.findings, step.finding(kept=made.kept)))
+
+
+def _models(name: str) -> list[Model]:
+    """All models of a folder, or the one that was named."""
+    from flightid.models.saved_files import models_of
+
+    if Path(name).is_dir():
+        return [load_source(str(path)) for path in models_of(Path(name))]
+    return [load_source(name)]
 
 
 def short_names(paths: Sequence[str]) -> list[str]:

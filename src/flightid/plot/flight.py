@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from flightid.errors import DataError
 from flightid.plot import look
-from flightid.review import FlightReview, GyroNoise, LoopResponse
+from flightid.review import FlightComparison, FlightReview, GyroNoise, LoopResponse
 
 COLOURS = {"roll": look.BLUE, "pitch": look.ORANGE, "yaw": look.GREEN}
 DASHES = {"roll": "solid", "pitch": "dash", "yaw": "dashdot"}
@@ -90,6 +90,44 @@ def loop_steps(*loops: LoopResponse) -> go.Figure:
     )
     for row in range(1, len(kinds) + 1):
         made.add_hline(1.0, line={"color": look.LINE, "dash": "dot", "width": 1}, row=row, col=1)
+    return made
+
+
+def compared_steps(result: FlightComparison) -> go.Figure:
+    """Draw the steps of two flights, or of a promise and a flight, one panel a loop.
+
+    Parameters
+    ----------
+    result : FlightComparison
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+
+    Example
+    -------
+    >>> compared_steps(fid.compare_flights("a.BIN", "b.BIN")).show()   # doctest: +SKIP
+    """
+    later = {loop.name: loop for loop in result.after}
+    pairs = [(loop, later[loop.name]) for loop in result.before if loop.name in later]
+    pairs = [pair for pair in pairs if pair[0].is_told and pair[1].is_told]
+    made = look.figure(len(pairs), shared_x=False, height_px=110 + 190 * len(pairs))
+    names = ("promised", "flown") if result.promised else result.names
+    for row, pair in enumerate(pairs, start=1):
+        end_s = min(loop.time_s[-1] for loop in pair)
+        for name, loop, colour, dash in zip(
+            names, pair, (look.ORANGE, look.BLUE), ("dash", "solid"), strict=True
+        ):
+            kept = loop.time_s <= end_s
+            low, high = (edge[kept] for edge in loop.band())
+            band = look.band(name, loop.time_s[kept], low, high, colour=colour)
+            made.add_traces(band, rows=row, cols=1)
+            line = look.line(
+                name, loop.time_s[kept], loop.step[kept], colour=colour, dash=dash, legend=row == 1
+            )
+            made.add_trace(line, row=row, col=1)
+    titles = [pair[0].name for pair in pairs]
+    look.label_axes(made, x="time after a step of the set-point [s]", y=titles)
     return made
 
 

@@ -18,7 +18,7 @@ from flightid.plot.consistency import consistency
 from flightid.plot.excitation import excitation_history, plan_spectrum
 from flightid.plot.fit import fit_figure
 from flightid.plot.fitted_record import record_figure
-from flightid.plot.flight import flight_steps, gyro_spectrum, loop_steps
+from flightid.plot.flight import compared_steps, flight_steps, gyro_spectrum, loop_steps
 from flightid.plot.handling_qualities import (
     bandwidth_curves,
     cutoff_spectrum,
@@ -154,6 +154,7 @@ PICTURES: Mapping[str, Callable[..., Any]] = {
     "AttitudeBandwidth": bandwidth_curves,
     "AxisLoop": controller,
     "ClosedLoop": _closed_loop,
+    "FlightComparison": compared_steps,
     "FlightReview": flight_steps,
     "GyroNoise": gyro_spectrum,
     "LoopResponse": loop_steps,

@@ -1,8 +1,19 @@
-"""Review: what one flight tells of its vehicle, sweeps or none."""
+"""Review of a flight: what it tells of the vehicle, sweeps or none, and what changed since."""
 
+from flightid.review.before_after import compare_flights, compare_with_promise
+from flightid.review.comparison import FlightComparison
 from flightid.review.flight import review_flight
 from flightid.review.gyro_noise import GyroNoise, NoisePeak
 from flightid.review.loop_response import LoopResponse
 from flightid.review.result import FlightReview
 
-__all__ = ["FlightReview", "GyroNoise", "LoopResponse", "NoisePeak", "review_flight"]
+__all__ = [
+    "FlightComparison",
+    "FlightReview",
+    "GyroNoise",
+    "LoopResponse",
+    "NoisePeak",
+    "compare_flights",
+    "compare_with_promise",
+    "review_flight",
+]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,14 +13,16 @@ from flightid.logs import Log, read_log
 from flightid.review.filters import filter_review
 from flightid.review.gyro_noise import gyro_noise
 from flightid.review.identity import flight_identity
-from flightid.review.loops import loop_responses
+from flightid.review.loops import loop_responses, without
 from flightid.review.motors import motor_use, turning, yaw_trim
 from flightid.review.result import FlightReview
 from flightid.review.verdicts import judge_flight
 from flightid.review.vibration import vibrations
 
 
-def review_flight(log: Log | str | Path) -> FlightReview:
+def review_flight(
+    log: Log | str | Path, *, span_s: tuple[float, float] | None = None
+) -> FlightReview:
     """Say what one flight tells of its vehicle; no sweep is needed.
 
     Steps and bandwidths of the closed loops from ordinary flying, tracking errors, motors at their
@@ -30,6 +33,8 @@ def review_flight(log: Log | str | Path) -> FlightReview:
     ----------
     log : Log or path-like
         An opened log or its file.
+    span_s : tuple of float, optional
+        Part of the flight to look at, s on the autopilot's clock; default: all of it.
 
     Raises
     ------
@@ -57,6 +62,9 @@ def review_flight(log: Log | str | Path) -> FlightReview:
     actuators = find_actuators(opened)
     start_s, stop_s = log_span(opened)
     phases = flight_phases(opened, actuators)
+    if span_s is not None:
+        cuts = [(-math.inf, span_s[0]), (span_s[1], math.inf)]
+        phases = replace(phases, airborne=without(phases.airborne, cuts))
     ways = None if actuators is None else turning(opened, len(actuators.names))
     loops = loop_responses(opened, phases.airborne)
     noise = gyro_noise(opened, phases.airborne)

@@ -111,6 +111,66 @@ def ratio_of(above: Reading, below: Reading, name: str = "ratio") -> Reading:
     return Estimate(name, b / a, "1", ends=ends)
 
 
+@dataclass(frozen=True)
+class DifferenceEnds:
+    """Ends of a difference of two independent estimates, by the ends of both.
+
+    Of even intervals of normal errors it is the usual root of the sum of squares.
+
+    Reference
+    ---------
+    Zou & Donner, "Construction of confidence limits about effect measures", *Statistics in
+    Medicine* 27 (2008).
+
+    Example
+    -------
+    >>> one, other = Estimate("a", 1.0, "1", 0.3), Estimate("b", 2.0, "1", 0.4)
+    >>> low, high = DifferenceEnds(other, one)(0.95)
+    >>> round(low, 3), round(high, 3)
+    (0.02, 1.98)
+    """
+
+    above: Reading
+    below: Reading
+
+    def __call__(self, level: float) -> Interval | None:
+        """Lower and upper end at a level."""
+        a, b = self.above.value, self.below.value
+        if a is None or b is None:
+            return None
+        least, most = self.above.interval(level) or (a, a)
+        lower, upper = self.below.interval(level) or (b, b)
+        return a - b - math.hypot(a - least, upper - b), a - b + math.hypot(most - a, b - lower)
+
+
+def difference_of(above: Reading, below: Reading, name: str = "difference") -> Reading:
+    """Difference of two independent estimates with its interval.
+
+    Parameters
+    ----------
+    above, below : Estimate
+        In the same unit; one that was declared counts as exact where the other has an interval.
+    name : str
+
+    Returns
+    -------
+    Estimate
+        Without an interval where that of either was withheld.
+
+    Example
+    -------
+    >>> difference_of(Estimate("b", 3.0, "s", 0.3), Estimate("a", 2.0, "s", 0.4))
+    Estimate(difference = 1 (0.02002 to 1.98) s)
+    """
+    a, b = below.value, above.value
+    if a is None or b is None:
+        return Estimate(name, None, above.unit, None, below.reason if a is None else above.reason)
+    reason = withheld(above, below)
+    if reason or (above.interval95 is None and below.interval95 is None):
+        return Estimate(name, b - a, above.unit, None, reason or above.reason or below.reason)
+    return Estimate(name, b - a, above.unit, ends=DifferenceEnds(above, below))
+
+
 def chance_of(first: Reading, second: Reading) -> float | None:
     """Two-sided probability of a difference as large as this between equal independent truths.
 

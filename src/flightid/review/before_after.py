@@ -1,0 +1,83 @@
+"""The verb: what changed between two flights, or whether one keeps what models promised of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from flightid.logs import Log, read_log
+from flightid.review.comparison import FlightComparison, compare_loops, gains_between
+from flightid.review.flight import review_flight
+from flightid.review.promised import promised_loops
+from flightid.review.result import FlightReview
+
+Flown = FlightReview | Log | str | Path
+
+
+def compare_flights(before: Flown, after: Flown) -> FlightComparison:
+    """Say what changed between two flights, or parts of one: steps, bandwidths, tracking, gains.
+
+    Parameters
+    ----------
+    before, after : FlightReview, Log or path-like
+        Reviews may be of parts: ``review_flight(log, span_s=(20.0, 80.0))``.
+
+    Raises
+    ------
+    DataError
+        There is no loop whose step both tell.
+
+    Assumes
+    -------
+    Flights of the same vehicle in like air, whose errors are independent. A change is called one by
+    Holm's rule: one false verdict in 5 % of comparisons.
+
+    Reference
+    ---------
+    Zou & Donner, *Statistics in Medicine* 27 (2008), for intervals of differences; see
+    `review_flight`.
+
+    Example
+    -------
+    >>> print(fid.compare_flights("before.BIN", "after.BIN").summary())   # doctest: +SKIP
+    """
+    first, second = _review(before), _review(after)
+    names = first.name, second.name
+    if names[0] == names[1]:
+        names = f"{names[0]}, before", f"{names[1]}, after"
+    gains = gains_between(first, second)
+    return compare_loops(first.loops, second.loops, names, gains=gains, promised=False)
+
+
+def compare_with_promise(sources: Iterable[object], after: Log | str | Path) -> FlightComparison:
+    """Say whether a flight keeps what identified models promise of the gains that it flew.
+
+    Parameters
+    ----------
+    sources : iterable of Fit or model
+        Identified from an earlier flight of this vehicle.
+    after : Log or path-like
+        The flight with new gains.
+
+    Raises
+    ------
+    DataError
+        The models promise nothing of loops that the flight tells.
+
+    Reference
+    ---------
+    As `compare_flights`; steps of sampled loops as `flightid.tune` shows them.
+
+    Example
+    -------
+    >>> models = [fid.load_model("flight-output/models/roll.toml")]      # doctest: +SKIP
+    >>> print(fid.compare_with_promise(models, "after.BIN").summary())   # doctest: +SKIP
+    """
+    log = after if isinstance(after, Log) else read_log(after)
+    names = "the models", log.path.name
+    promise = promised_loops(sources, log)
+    return compare_loops(promise, review_flight(log).loops, names, gains={}, promised=True)
+
+
+def _review(flown: Flown) -> FlightReview:
+    return flown if isinstance(flown, FlightReview) else review_flight(flown)
