@@ -40,7 +40,9 @@ from flightid.simulation.fly_options import FlyOptions
 from flightid.simulation.options import SimulationOptions
 from flightid.study.fit_settings import VerifySettings
 from flightid.study.proposal.options import ProposalOptions
+from flightid.study.record_files import RecordFile
 from flightid.study.response_settings import ResponseSettings
+from flightid.study.settings import LogChannels, Segment, StudyWords
 from flightid.validation.residuals.options import ResidualTestOptions
 from flightid.validation.verification.options import VerifyOptions
 from flightid.vehicles.gain_flight import GainFlightOptions
@@ -96,6 +98,10 @@ def sections() -> dict[str, type[Options]]:
         "Part of a log or record": PartOptions,
         "Channels": ChannelOptions,
         "Studies of a log or records (run, new, tune)": ProposalOptions,
+        "[study] of a study": StudyWords,
+        "[channels] of a study": LogChannels,
+        "[[segment]] of a study": Segment,
+        "[[record]] of a study": RecordFile,
         "[response] of a study": ResponseSettings,
         "[verify] of a study": VerifySettings,
     }

@@ -61,6 +61,11 @@ NUMBERS = Form(
     "a list of numbers", lambda value: _is_list(value, _is_number) and len(value) > 0, tuple
 )
 BAND = Form("two numbers, low and high", lambda value: _is_list(value, _is_number, 2), tuple)
+SPAN = Form(
+    "two numbers, the first below the second",
+    lambda value: _is_list(value, _is_number, 2) and value[0] < value[1],
+    lambda value: (float(value[0]), float(value[1])),
+)
 NOTHING = Form("none", lambda value: value is None)
 TABLE = Form("a table", lambda value: isinstance(value, Mapping))
 WORDS = Form(

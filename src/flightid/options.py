@@ -25,6 +25,7 @@ from flightid.option_forms import (
     NUMBERS,
     WHOLE,
     WORD,
+    WORDS,
     Form,
     forms_of,
 )
@@ -120,8 +121,10 @@ class Option:
         form = forms[0]
         if form is WORD and self.choices and value not in self.choices:
             return f"{self.name} is not known"
-        if form is NAMES and self.choices and not set(typing.cast("Any", value)) <= {*self.choices}:
-            return f"{self.name} holds a word that is not known"
+        if form in (NAMES, WORDS) and self.choices:
+            given = value.values() if isinstance(value, Mapping) else typing.cast("Any", value)
+            if not set(given) <= {*self.choices}:
+                return f"{self.name} holds a word that is not known"
         if form in (WHOLE, NUMBER):
             return self._outside(float(typing.cast(float, value)))
         if form in (NUMBERS, BAND):

@@ -208,7 +208,10 @@ def test_commands_with_options_of_fields_read_them_all() -> None:
     for name, found in _commands():
         if isinstance(found, OptionsCommand):
             by_hand = {param.name for param in found.params} & FIELDS
-            assert by_hand <= {"axis", "feedback", "kind", "method", "model"}, (name, by_hand)
+            assert by_hand <= {"axis", "feedback", "kind", "level", "method", "model", "name"}, (
+                name,
+                by_hand,
+            )
 
 
 def test_a_word_of_the_dictionary_has_one_name_in_all_places() -> None:

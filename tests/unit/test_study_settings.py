@@ -84,7 +84,7 @@ def test_rivals_are_library_models_or_files_beside_the_study(tmp_path: Path) -> 
     ("old", "new", "said"),
     [
         ('title = "Roll"', "", "[study]: title is missing"),
-        ('title = "Roll"', "title = 3", "[study]: title does not fit: found 3; needed a text"),
+        ('title = "Roll"', "title = 3", "[study]: title has no meaning: found 3; needed a word"),
         ("sample_rate_hz = 100", "sample_rate = 100", "Next: write 'sample_rate_hz'"),
         ("sample_rate_hz = 100", "sample_rate_hz = -1", "needed a number above 0"),
         ("sample_rate_hz = 100", "sample_rate_hz = nan", "needed a number above 0"),

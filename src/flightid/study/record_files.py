@@ -3,72 +3,77 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
 from flightid.conventions import Role
 from flightid.errors import StudyError
+from flightid.option_forms import NOTHING, SPAN
+from flightid.options import Options, option
 from flightid.record import InputShape, Interpolation, Record, read_records
 from flightid.record.hold import HOLDS, LOOPS
 from flightid.record.store import RECORD_COLUMN
 from flightid.study.error_list import ErrorList
-from flightid.study.reading import TableReader
+from flightid.study.reading import TableReader, read_each
 
 UNKNOWN = InputShape()
 ALL = "*"
 """Manoeuvre that stands for all of a file."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class ShapeOptions(Options):
+    """What a table says of the inputs between samples, their repetition and the loop."""
+
+    hold: str | None = option(None, choices=HOLDS, doc="Inputs between samples.")
+    period_s: float | None = option(
+        None, unit="s", above=0.0, doc="Time after which the inputs repeat exactly."
+    )
+    loop: str | None = option(
+        None, choices=LOOPS, doc="Whether anything moved the inputs after what the outputs did."
+    )
+
+    @property
+    def shape(self) -> InputShape:
+        """The same as a record knows it."""
+        return InputShape(**{each.name: getattr(self, each.name) for each in fields(InputShape)})
+
+
 @dataclass(frozen=True)
-class RecordFile:
-    """One manoeuvre in a file.
+class RecordFile(ShapeOptions):
+    """One manoeuvre in files: a table ``[[record]]``, and the paths that it stands for."""
 
-    Attributes
-    ----------
-    name : str
-        Name by which models refer to it.
-    paths : tuple of Path
-        CSV, Parquet, MATLAB or netCDF; the name stands for the pieces of all, where they are
-        several.
-    manoeuvre : str or None
-        Name of the manoeuvre, where the file holds several; ``"*"`` takes all of them, and the
-        name then stands for the whole group.
-    span_s : tuple of float or None
-        Start and stop on the file's clock, s; None: all of it.
-    time : str
-        Column of the time stamps.
-    sample_time_s : float or None
-        Sample time of a file without time column, s.
-    resample_to_s : float or None
-        Sample time of a new uniform grid, s.
-    time_unit : str or None
-        Unit of the time stamps, where the file does not say.
-    experiment : str
-        Column that tells manoeuvres of one file apart.
-    interpolation : str, mapping of str to str, or None
-        How samples of the new grid arise, for all channels or by name.
-    columns : mapping of str to str
-        Column of a channel, where it has another name.
-    units : mapping of str to str
-        Unit of a channel or of the time column, where the file does not say.
-    shape : InputShape
-        What is known of the inputs beyond their samples.
-    """
-
-    name: str
-    paths: tuple[Path, ...]
-    manoeuvre: str | None = None
-    span_s: tuple[float, float] | None = None
-    time: str = "time"
-    sample_time_s: float | None = None
-    resample_to_s: float | None = None
-    time_unit: str | None = None
-    experiment: str = RECORD_COLUMN
-    interpolation: str | Mapping[str, str] | None = None
-    columns: Mapping[str, str] = field(default_factory=dict)
-    units: Mapping[str, str] = field(default_factory=dict)
-    shape: InputShape = UNKNOWN
+    name: str = option(doc="Name by which models refer to it.")
+    path: tuple[str, ...] = option(
+        doc="CSV, Parquet, MATLAB or netCDF, by name or pattern; the name stands for all pieces."
+    )
+    manoeuvre: str | None = option(
+        None, doc="Name of the manoeuvre where the file holds several; '*': all, as one group."
+    )
+    span_s: tuple[float, float] | None = option(
+        None, unit="s", forms=(SPAN, NOTHING), doc="Start and stop on the file's clock."
+    )
+    time_column: str = option("time", doc="Column of the time stamps.")
+    sample_time_s: float | None = option(
+        None, unit="s", above=0.0, doc="Sample time of a file without time column."
+    )
+    resample_to_s: float | None = option(
+        None, unit="s", above=0.0, doc="Sample time of a new uniform grid."
+    )
+    time_unit: str | None = option(None, doc="Unit of the stamps, where the file does not say.")
+    experiment: str = option(RECORD_COLUMN, doc="Column that tells manoeuvres of one file apart.")
+    interpolation: str | Mapping[str, str] | None = option(
+        None, choices=tuple(map(str, Interpolation)),
+        doc="Between samples of a new grid, for all channels or by channel.",
+    )  # fmt: skip
+    columns: Mapping[str, str] = option(
+        default_factory=dict, doc="Column of a channel, where it has another name."
+    )
+    units: Mapping[str, str] = option(
+        default_factory=dict, doc="Unit of a channel or the time, where the file does not say."
+    )
+    paths: tuple[Path, ...] = ()
 
 
 def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
@@ -79,29 +84,15 @@ def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
     StudyError
         A key is unknown or a value does not fit.
     """
-    made = RecordFile(
-        reader.text("name"),
-        _paths(reader, folder),
-        reader.maybe(reader.text, "manoeuvre"),
-        reader.maybe(reader.interval, "span_s"),
-        reader.text("time_column", "time"),
-        reader.maybe(reader.positive, "sample_time_s"),
-        reader.maybe(reader.positive, "resample_to_s"),
-        reader.maybe(reader.text, "time_unit"),
-        reader.text("experiment", RECORD_COLUMN),
-        reader.maybe(lambda key: _interpolation(reader, key), "interpolation"),
-        _texts(reader.table("columns"), reader.values("columns")),
-        _texts(reader.table("units"), reader.values("units")),
-        read_shape(reader),
-    )
-    reader.finish()
-    return made
+    made: RecordFile
+    (made,) = read_each((RecordFile,), reader)
+    return replace(made, paths=_paths(reader, folder, made.path))
 
 
-def _paths(reader: TableReader, folder: Path) -> tuple[Path, ...]:
+def _paths(reader: TableReader, folder: Path, names: Iterable[str]) -> tuple[Path, ...]:
     """Files by name, or by a pattern with ``*``, in the order of their names."""
     found: list[Path] = []
-    for text in reader.names("path"):
+    for text in names:
         place = folder / text
         matches = sorted(place.parent.glob(place.name)) if "*" in place.name else [place]
         if not matches:
@@ -135,35 +126,11 @@ def _require_file(name: str, path: Path) -> None:
         )
 
 
-def _interpolation(reader: TableReader, key: str) -> str | dict[str, str]:
-    """One word for all channels, or one for each that is named."""
-    words = tuple(map(str, Interpolation))
-    given = reader.peek(key)
-    if not isinstance(given, Mapping):
-        return reader.choice(key, words)
-    inner = reader.table(key)
-    return {str(name): inner.choice(str(name), words) for name in given}
-
-
-def read_shape(reader: TableReader) -> InputShape:
-    """Take what a table says of the inputs between samples, their repetition and the loop."""
-    given: dict[str, Any] = {
-        "hold": reader.maybe(lambda key: reader.choice(key, HOLDS), "hold"),
-        "period_s": reader.maybe(reader.positive, "period_s"),
-        "loop": reader.maybe(lambda key: reader.choice(key, LOOPS), "loop"),
-    }
-    return InputShape(**given)
-
-
 def declared(record: Record, shape: InputShape) -> Record:
     """The record with what the study knows of its inputs; what is left out stays."""
     if shape == UNKNOWN:
         return record
     return record.declare(hold=shape.hold, period_s=shape.period_s, loop=shape.loop)
-
-
-def _texts(reader: TableReader, values: Mapping[str, object]) -> dict[str, str]:
-    return {key: reader.text(key) for key in values}
 
 
 def load_records(
@@ -217,7 +184,7 @@ def _load(
         outputs=named(Role.OUTPUT),
         excitations=named(Role.EXCITATION),
         others=named(Role.OTHER),
-        time_column=file.time,
+        time_column=file.time_column,
         units=_declared_units(file, roles),
         sample_time_s=file.sample_time_s,
         resample_to_s=file.resample_to_s,
@@ -256,11 +223,12 @@ def _declared_units(file: RecordFile, roles: Mapping[str, Role]) -> dict[str, st
     StudyError
         The unit of the time is declared twice, and differently.
     """
-    units = {key: unit for key, unit in file.units.items() if key in roles or key == file.time}
-    if file.time_unit is not None and units.setdefault(file.time, file.time_unit) != file.time_unit:
+    time, told = file.time_column, file.time_unit
+    units = {key: unit for key, unit in file.units.items() if key in roles or key == time}
+    if told is not None and units.setdefault(time, told) != told:
         raise StudyError(
             f"study file, record {file.name!r}: the unit of the time is declared twice",
-            found=f"time_unit = {file.time_unit!r}, units {file.time} = {units[file.time]!r}",
+            found=f"time_unit = {told!r}, units {time} = {units[time]!r}",
             needed="one of them",
         )
     return units

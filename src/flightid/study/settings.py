@@ -13,16 +13,17 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from flightid.errors import StudyError
+from flightid.option_forms import NOTHING, SPAN
+from flightid.options import Options, option
 from flightid.reading import read_toml
-from flightid.record import InputShape
 from flightid.study.conditioning import Conditioning, read_conditioning, require_records
 from flightid.study.error_list import ErrorList
 from flightid.study.fit_settings import FitSettings, VerifySettings, read_fit, read_verify
 from flightid.study.flight import FlightPlan, read_flight, read_fly
 from flightid.study.model_settings import ModelSettings, read_model
 from flightid.study.qualities_settings import QualitiesSettings, read_qualities
-from flightid.study.reading import TOP, TableReader
-from flightid.study.record_files import UNKNOWN, RecordFile, read_record_file, read_shape
+from flightid.study.reading import TOP, TableReader, read_each
+from flightid.study.record_files import RecordFile, ShapeOptions, read_record_file
 from flightid.study.reducing import ReduceSettings, read_reduce
 from flightid.study.references import require_conditions, require_references
 from flightid.study.response_settings import EXCITATION, ResponseSettings, read_response
@@ -35,31 +36,50 @@ Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
-class Segment:
-    """A named stretch of the log.
+class StudyWords(Options):
+    """What ``[study]`` says of the whole study."""
 
-    Attributes
-    ----------
-    name : str
-        Name by which models refer to it.
-    span_s : tuple of float or None
-        Start and stop, s of the log's clock.
-    sid_axis : int or None
-        Or: the system-identification run of this ``SID_AXIS``.
-    run : int
-        Which of the runs of that axis, from 0.
-    shape : InputShape
-        What is known of the inputs beyond their samples.
-    excitation : str
-        Name of the injected signal in this segment; in the others it is zero.
-    """
+    title: str = option(doc="Of the report.")
+    aircraft: str = option("", doc="Vehicle and weight, rig and rate.")
+    notes: str = option("", doc="Words for the report.")
+    level: float = option(
+        LEVEL, above=0.0, below=1.0, doc="Of every interval that the report shows."
+    )
 
-    name: str
-    span_s: tuple[float, float] | None = None
-    sid_axis: int | None = None
-    run: int = 0
-    shape: InputShape = UNKNOWN
-    excitation: str = EXCITATION
+
+@dataclass(frozen=True)
+class LogChannels(Options):
+    """What ``[channels]`` says of reading a log."""
+
+    map: str | None = option(
+        None, doc="Shipped channel map, or a file (*.toml); default: by autopilot and vehicle."
+    )
+    gaps: str = option(
+        "error", choices=("error", "interpolate"), doc="Where a channel has no samples for long."
+    )
+    max_gap_s: float | None = option(
+        None, unit="s", above=0.0, doc="Longest gap that is bridged; default: the reader's."
+    )
+    sample_rate_hz: float | None = option(
+        None, unit="Hz", above=0.0, doc="Of the records; default: the slowest needed channel's."
+    )
+
+
+@dataclass(frozen=True)
+class Segment(ShapeOptions):
+    """A named stretch of the log: a table ``[[segment]]``."""
+
+    name: str = option(doc="Name by which models refer to it.")
+    span_s: tuple[float, float] | None = option(
+        None, unit="s", forms=(SPAN, NOTHING), doc="Start and stop on the log's clock."
+    )
+    sid_axis: int | None = option(
+        None, minimum=0, doc="Or: the system-identification run of this SID_AXIS."
+    )
+    run: int = option(0, minimum=0, doc="Which of the runs of that axis.")
+    excitation: str = option(
+        EXCITATION, doc="Name of the signal injected here; in other segments it is zero."
+    )
 
 
 @dataclass(frozen=True)
@@ -240,32 +260,22 @@ def _maybe(
 
 
 def _words(root: TableReader) -> tuple[str, str, str, float]:
-    title = root.table("study")
-    words = (
-        *(title.text("title"), title.text("aircraft", ""), title.text("notes", "")),
-        title.number("level", LEVEL),
-    )
-    if not 0.0 < words[-1] < 1.0:
-        raise title.error(
-            "level", "is no probability", found=words[-1], needed="a number above 0 and below 1"
-        )
-    title.finish()
-    return words
+    (made,) = read_each((StudyWords,), root.table("study"))
+    return made.title, made.aircraft, made.notes, made.level
 
 
 def _channels(
     root: TableReader, folder: Path
 ) -> tuple[str | None, str, float | None, float | None]:
     """Map of channels, what to do about gaps, their longest, and the rate."""
-    channels = root.table("channels")
-    mapped = channels.maybe(channels.text, "map")
-    if mapped is not None and mapped.endswith(".toml"):
-        mapped = str(folder / mapped)
-    gaps = channels.choice("gaps", ("error", "interpolate"), "error")
-    max_gap_s = channels.maybe(channels.positive, "max_gap_s")
-    rate = channels.maybe(channels.positive, "sample_rate_hz")
-    channels.finish()
-    return mapped, gaps, max_gap_s, rate
+    (made,) = read_each((LogChannels,), root.table("channels"))
+    is_file = made.map is not None and made.map.endswith(".toml")
+    return (
+        str(folder / made.map) if is_file else made.map,
+        made.gaps,
+        made.max_gap_s,
+        made.sample_rate_hz,
+    )
 
 
 def _record_tables(root: TableReader) -> list[TableReader]:
@@ -308,15 +318,10 @@ def _source(root: TableReader, folder: Path) -> tuple[Path | None, FlightPlan | 
 
 
 def _segment(reader: TableReader) -> Segment:
-    name = reader.text("name")
-    span = reader.maybe(reader.interval, "span_s")
-    axis = reader.maybe(reader.integer, "sid_axis")
-    run = reader.integer("run", 0)
-    shape = read_shape(reader)
-    excitation = reader.text("excitation", EXCITATION)
-    reader.finish()
-    if (span is None) == (axis is None):
+    made: Segment
+    (made,) = read_each((Segment,), reader)
+    if (made.span_s is None) == (made.sid_axis is None):
         raise reader.error(
-            "span_s or sid_axis", "must be given, not both", found=name, needed="one of them"
+            "span_s or sid_axis", "must be given, not both", found=made.name, needed="one of them"
         )
-    return Segment(name, span, axis, run, shape, excitation)
+    return made
