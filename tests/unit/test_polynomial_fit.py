@@ -155,6 +155,11 @@ def test_instruments_are_consistent_where_least_squares_is_not():
 def test_a_pole_that_a_zero_cancels_is_named():
     fit = fid.identify(P.armax("u", "y", na=3, nb=3, nc=2), flown(ARMAX, 12, n=800, noise=0.3))
     assert "pole-zero-cancellation" in _codes(fit)
+    barred = {name for name, each in fit.parameters.items() if each.stderr is not None}
+    assert barred == {"c1", "c2"}, "bars of what cancels are not Gaussian"
+    bare = [root for root in fit.details.roots if root.covariance is None]
+    assert {root.kind for root in bare} == {"pole", "zero"}
+    assert all(root.natural_frequency.stderr is None for root in bare if root.natural_frequency)
     good = fid.identify(P.armax("u", "y", na=2, nb=2, nc=2), flown(ARMAX, 12, n=800, noise=0.3))
     assert not _codes(good) & {"pole-zero-cancellation", "overfit", "not-converged"}
     truth = P(("u",), "y", 0.1, a=[1, -0.4733], b=[[0.02, 0.09]])

@@ -30,13 +30,14 @@ cancel; a pair that may change it by more was not shown to."""
 NOISE_AT_CIRCLE = "a root of C may lie on the unit circle, where errors to first order do not hold"
 ELSEWHERE = "another minimum far away fits as well within chance: bars about either hold nothing"
 CANCELLATION = "pole-zero-cancellation"
+CANCELS = "a pole and a zero cancel within their errors, which are not Gaussian then"
 
 
 def judge_polynomial(
     structure: PolynomialStructure,
     model: PolynomialModel,
     parameters: Mapping[str, Estimate],
-    roots: Sequence[FittedRoot],
+    pairs: Sequence[tuple[FittedRoot, FittedRoot, float]],
     minima: Sequence[LocalMinimum],
     n_samples: int,
     reason: str = "",
@@ -46,7 +47,7 @@ def judge_polynomial(
         *_ending(minima, reason),
         *_circle(model, reason),
         *_stability(structure, model),
-        *(() if structure.kernel else _cancellation(model, roots)),
+        *(_cancels(*pair) for pair in pairs),
         *_overfit(structure, parameters, n_samples),
     )
 
@@ -122,20 +123,23 @@ def _stability(structure: PolynomialStructure, model: PolynomialModel) -> list[F
     return []
 
 
-def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[Finding]:
+def cancelling(
+    model: PolynomialModel, roots: Sequence[FittedRoot]
+) -> list[tuple[FittedRoot, FittedRoot, float]]:
     """Pairs whose difference their joint error explains and that hardly change the response.
 
     On the unit circle a pole p and a zero q multiply the response by (z - q)/(z - p) =
-    1 + (p - q)/(z - p), which is at most |p - q|/|1 - |p|| from one. That share has to be small up
-    to the end of the gap's interval: a zero that may lie anywhere cancels nothing.
+    1 + (p - q)/(z - p), which is at most |p - q|/|1 - |p|| from one. That share, which comes with
+    each pair, has to be small up to the end of the gap's interval: a zero that may lie anywhere
+    cancels nothing.
     """
-    found = []
+    found: list[tuple[FittedRoot, FittedRoot, float]] = []
     covariance = model.covariance
+    if covariance is None:
+        return found
     for pole in (root for root in roots if root.kind == POLE):
         for zero in (root for root in roots if root.kind == ZERO):
-            if covariance is None or pole.response != zero.response:
-                continue
-            if pole.gradient is None or zero.gradient is None:
+            if pole.response != zero.response or pole.gradient is None or zero.gradient is None:
                 continue
             if (pole.z.imag == 0.0) != (zero.z.imag == 0.0):
                 continue
@@ -150,18 +154,19 @@ def _cancellation(model: PolynomialModel, roots: Sequence[FittedRoot]) -> list[F
             widest = max(float(np.max(np.linalg.eigvalsh(errors))), 0.0)
             spread = QUANTILE * float(np.sqrt(widest))
             seen = (abs(gap) + spread) / abs(1.0 - abs(pole.z))
-            together = statistic < scipy.special.chdtri(n, 0.05)
-            if together and seen < HARDLY_SEEN:
-                found.append(
-                    Finding(
-                        CANCELLATION,
-                        Light.AMBER,
-                        f"{pole.response}: pole {pole.z:.4g} and zero {zero.z:.4g} cancel within "
-                        f"their errors and change the response by {100 * seen:.2g} % at most",
-                        f"lower na or nf and nb by {n}: the data do not show this mode",
-                    )
-                )
+            if statistic < scipy.special.chdtri(n, 0.05) and seen < HARDLY_SEEN:
+                found.append((pole, zero, seen))
     return found
+
+
+def _cancels(pole: FittedRoot, zero: FittedRoot, seen: float) -> Finding:
+    return Finding(
+        CANCELLATION,
+        Light.AMBER,
+        f"{pole.response}: pole {pole.z:.4g} and zero {zero.z:.4g} cancel within their errors and "
+        f"change the response by {100 * seen:.2g} % at most: they have no intervals",
+        f"lower na or nf and nb by {2 if pole.z.imag else 1}: the data do not show this mode",
+    )
 
 
 def _overfit(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +34,11 @@ from flightid.identification.prediction_error.coefficient_covariance import (
 )
 from flightid.identification.prediction_error.denominators import preferred
 from flightid.identification.prediction_error.details import FitScore, PolynomialDetails
-from flightid.identification.prediction_error.findings import judge_polynomial
+from flightid.identification.prediction_error.findings import (
+    CANCELS,
+    cancelling,
+    judge_polynomial,
+)
 from flightid.identification.prediction_error.information_criteria import criteria
 from flightid.identification.prediction_error.instrumental_variables import four_stage
 from flightid.identification.prediction_error.kernel_regression import kernel_estimate
@@ -48,7 +52,12 @@ from flightid.identification.prediction_error.part_blocks import (
     about_levels,
     errors_at,
 )
-from flightid.identification.prediction_error.roots import fitted_gains, fitted_roots
+from flightid.identification.prediction_error.roots import (
+    coefficients_of,
+    fitted_gains,
+    fitted_roots,
+    without_errors,
+)
 from flightid.identification.prediction_error.sampling_rate import sampling_findings
 from flightid.identification.prediction_error.starts import polynomial_starts
 from flightid.identification.residual_evidence import nothing_told
@@ -256,9 +265,10 @@ def _assemble(
         replace(m, objective=squares) if m.objective == 0.0 and found.iterations == 0 else m
         for m in found.minima
     )
-    parameters = _parameters(model, found)
     degrees = found.degrees if found.freedom is None else float(np.min(found.freedom))
     roots = fitted_roots(model, degrees)
+    pairs = () if structure.kernel else cancelling(model, roots)
+    parameters = _parameters(structure, model, found, {pole.response for pole, *_ in pairs})
     runs = _free_runs(model, data)
     return black_box_fit(
         model,
@@ -285,7 +295,7 @@ def _assemble(
         noise_covariance=np.array([[squares / found.degrees]]),
         findings=(
             *choice,
-            *judge_polynomial(structure, model, parameters, roots, minima, n_counted, found.reason),
+            *judge_polynomial(structure, model, parameters, pairs, minima, n_counted, found.reason),
             *colour_findings(*found.colour, has_bars=found.covariance is not None),
             *tests.findings(
                 biased=shares_poles(structure),
@@ -298,7 +308,7 @@ def _assemble(
             structure.method.replace("_", " "), records, data.offsets, structure.to_dict()
         ),
         details=PolynomialDetails(
-            roots,
+            without_errors(roots, [root for pair in pairs for root in pair[:2]], CANCELS),
             fitted_gains(model, degrees),
             criteria(squares, n_counted, structure.n_parameters),
             {structure.output: _scores(structure, runs, data, counted)},
@@ -309,12 +319,20 @@ def _assemble(
     )
 
 
-def _parameters(model: PolynomialModel, found: SearchResult) -> dict[str, Estimate]:
+def _parameters(
+    structure: PolynomialStructure,
+    model: PolynomialModel,
+    found: SearchResult,
+    cancelling: Collection[str],
+) -> dict[str, Estimate]:
+    """Estimates; of responses whose roots cancel, a linear regression alone has Gaussian ones."""
+    doubtful = set() if structure.is_regression else coefficients_of(model, cancelling)
     made = {}
     for place, (name, coefficient) in enumerate(model.parameters.items()):
         unit, value = coefficient.unit, float(found.theta[place])
         reason = found.reason if found.covariance is None else ""
         reason = found.noise_reason if not reason and name[0] in "cd" else reason
+        reason = reason or (CANCELS if place in doubtful else "")
         if found.covariance is None or reason:
             made[name] = Estimate(name, value, unit, None, reason, status="free")
             continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -210,6 +210,40 @@ def _covariance_of(
         return None
     rows = np.array([(gradient * factor).real, (gradient * factor).imag])
     return np.asarray(rows @ errors.covariance @ rows.T)
+
+
+def coefficients_of(model: PolynomialModel, responses: Collection[str]) -> set[int]:
+    """Places of the coefficients of A, B and F behind responses ``"output/input"``."""
+    places = _places(model)
+    keys = [
+        key
+        for i, name in enumerate(model.inputs)
+        if f"{model.output}/{name}" in responses
+        for key in (("a", 0), ("b", i), ("f", i))
+    ]
+    return {place for key in keys for place in range(model.theta.size)[places[key]]}
+
+
+def without_errors(
+    roots: Sequence[FittedRoot], which: Sequence[FittedRoot], reason: str
+) -> tuple[FittedRoot, ...]:
+    """The roots, some without error bars and with the reason."""
+
+    def bare(estimate: Estimate | None) -> Estimate | None:
+        return estimate and replace(estimate, stderr=None, ends=None, reason=reason)
+
+    return tuple(
+        replace(
+            root,
+            covariance=None,
+            natural_frequency=bare(root.natural_frequency),
+            damping=bare(root.damping),
+            note="; ".join(filter(None, (root.note, reason))),
+        )
+        if any(root is each for each in which)
+        else root
+        for root in roots
+    )
 
 
 def derived(reading: Reading) -> Estimate:
