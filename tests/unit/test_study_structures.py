@@ -6,8 +6,12 @@ import numpy as np
 from scipy import signal
 
 import flightid as fid
+from flightid.conventions import Light
+from flightid.evidence.evidence import GUIDELINES
+from flightid.study import widened_scan
 from flightid.study.structure_settings import StructureSettings
 from flightid.study.structures import fit_structure, ranked
+from flightid.study.widened_scan import EDGE, ROUNDS
 
 T_S = 0.02
 
@@ -32,3 +36,38 @@ def test_an_offset_of_the_means_asks_for_no_pole() -> None:
     first = ranked(scan, "balanced")[0]
     assert (first.structure.nb, first.structure.nf) == ((2,), (2,))
     assert (fit.structure.nb, fit.structure.nf) == ((2,), (2,))
+
+
+def third_order(n: int = 1200) -> fid.Record:
+    """A lightly damped mode behind a lag and four samples of delay, white noise."""
+    rng = np.random.default_rng(3)
+    u = np.repeat(np.sign(rng.standard_normal(n // 4)), 4)
+    (b, a, _) = signal.cont2discrete(([90.0], np.polymul([1.0, 1.0, 9.0], [1.0, 10.0])), 0.05)
+    y = signal.lfilter([*np.zeros(4), *b.ravel()], a, u) + 0.02 * rng.standard_normal(n)
+    return fid.Record.from_arrays(0.05 * np.arange(n), inputs={"u": u}, outputs={"y": y})
+
+
+def narrow_scan():
+    """Orders of 1 and 2 and delays of 3 and 4 of three poles after five samples."""
+    whole = third_order()
+    orders = {"nb": (1, 2), "nf": (1, 2), "nk": (3, 4)}
+    settings = StructureSettings("oe", ("u",), ("y",), (), (), orders)
+    return fit_structure(settings, ("u",), [whole.segment(0.0, 39.9)], [whole.segment(39.9, 60.0)])
+
+
+def test_a_scan_goes_on_past_its_edges() -> None:
+    fit, scan = narrow_scan()
+    assert fit.structure.nf[0] >= 3
+    assert fit.structure.nb[0] + fit.structure.nk[0] >= 7, "what acts after five samples and later"
+    assert EDGE not in {each.code for each in fit.findings}
+    assert fit.covariance is not None
+    assert len(scan.trials) <= 8 + ROUNDS * 8
+
+
+def test_an_edge_that_stays_is_amber_without_intervals(monkeypatch) -> None:
+    monkeypatch.setattr(widened_scan, "ROUNDS", 1)
+    fit, _ = narrow_scan()
+    (found,) = (each for each in fit.findings if each.code == EDGE)
+    assert fit.covariance is None
+    assert fit.evidence.check(GUIDELINES).light is Light.AMBER
+    assert fit.evidence.check(GUIDELINES).what == found.message

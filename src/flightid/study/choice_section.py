@@ -41,13 +41,14 @@ def choice_blocks(item: ModelResults) -> tuple[Block, ...]:
     if structure.choose == "balanced":
         words += (
             ". Free runs do not see the noise model; so of all structures whose free-run error "
-            "lies within 10 % of the smallest the one with the smallest BIC is taken, before those "
-            "with fewer coefficients of B than of F, which no sampled system has"
+            "lies within 10 % of the smallest the one with the smallest AICc is taken, before "
+            "those with fewer coefficients of B than of F: what such a structure forbids has no "
+            "share in its intervals"
         )
     if taken is not None and taken is not ranked(choice, structure.choose)[0]:
         words += (
-            ". Those before it have a pole and a zero that cancel within their errors, or that fit "
-            "an offset of the record"
+            ". Those before it have a pole and a zero that cancel within their errors, or their "
+            "search ended at no minimum or at one of several that fit as well"
         )
     lights = (Lights(item.choice_findings),) if item.choice_findings else ()
     table = choice.summary()

@@ -54,8 +54,8 @@ class StructureSettings:
     choose : str
         How a structure is chosen: ``"free_run"`` smallest error on the selection records,
         ``"simplest"`` fewest coefficients within 2 % of it, ``"bic"``, or ``"balanced"``: the
-        smallest BIC among those within 10 % of it, of OE and BJ first those with as many
-        coefficients of B as of F.
+        smallest AICc among those within 10 % of it, of OE and BJ first those with no fewer
+        coefficients of B than of F.
     options : mapping
         Further options of the structure.
     """

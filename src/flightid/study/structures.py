@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,9 +11,11 @@ from flightid.findings import Finding
 from flightid.identification import Fit, identify
 from flightid.identification.prediction_error.findings import CANCELLATION
 from flightid.models import InnovationsModel, NarxStructure, PolynomialModel
+from flightid.models.polynomial.orders import ANY
 from flightid.models.polynomial.structure import PolynomialStructure
 from flightid.record import Record
 from flightid.study.structure_settings import NARX, SUBSPACE, StructureSettings
+from flightid.study.widened_scan import doubted, widened
 from flightid.validation import NarxSearch, OrderScan, scan_orders, search_narx
 from flightid.validation.order_scan.result import OrderTrial, Structure, is_settled
 from flightid.validation.order_scan.scan_orders import fit_of
@@ -23,7 +25,7 @@ Choice = OrderScan | NarxSearch
 AS_GOOD = 0.10
 """Free-run errors that differ by less are alike: a minute of a slow mode tells them no better."""
 TRIED = 4
-"""Structures that are fitted whole, at most, for one that ended well and cancels no pole."""
+"""Structures that are fitted whole, at most, for one that `_is_clean`."""
 
 
 def fit_structure(
@@ -63,21 +65,38 @@ def _polynomial(
         orders: dict[str, Any] = {name: values[0] for name, values in settings.orders.items()}
         asked = PolynomialModel.general(inputs, output, **orders, **settings.options)
         return identify(asked, flown), None
-    tried: dict[str, Any] = {"kind": settings.kind, **settings.orders, **settings.options}
-    scan = scan_orders(flown, unseen, outputs=output, inputs=inputs, **tried)
+    usual: dict[str, Any] = {"kind": settings.kind, "inputs": inputs, "outputs": output}
+
+    def scanned(orders: Mapping[str, tuple[int, ...]]) -> OrderScan:
+        tried: dict[str, Any] = {**usual, **orders, **settings.options}
+        return scan_orders(flown, unseen, **tried)
+
+    scan = scanned(settings.orders)
+    findings: tuple[Finding, ...] = ()
+    if settings.kind != ANY:
+        scan, findings = widened(
+            scan, settings.orders, lambda each: ranked(each, settings.choose)[0], scanned
+        )
+    return doubted(_cleanest(scan, settings.choose, flown), findings), scan
+
+
+def _cleanest(scan: OrderScan, choose: str, flown: list[Record]) -> Fit:
+    """The first of a rule's trials whose search ended well and that cancels no pole, or the first.
+
+    A search that ended at no minimum or at one of several as good, or a pole and its zero that
+    cancel, say little of a mode.
+    """
     fits = (
         scan.best if trial is scan.trials[0] else fit_of(trial, flown)
-        for trial in ranked(scan, settings.choose)[:TRIED]
+        for trial in ranked(scan, choose)[:TRIED]
     )
     first = next(fits)
-    if _is_clean(first):
-        return first, scan
-    # A search that ended at no minimum, or a pole and its zero that cancel, say little of a mode.
-    return next((fit for fit in fits if _is_clean(fit)), first), scan
+    return first if _is_clean(first) else next((fit for fit in fits if _is_clean(fit)), first)
 
 
 def _is_clean(fit: Fit) -> bool:
-    return is_settled(fit) and not any(finding.code == CANCELLATION for finding in fit.findings)
+    doubts = {each.code for each in fit.findings if each.light is not Light.GREEN}
+    return is_settled(fit) and not doubts & {CANCELLATION, "local-minima"}
 
 
 def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
@@ -98,9 +117,10 @@ def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
         return [first]
     limit = (1 + AS_GOOD) * first.free_run_rms
     alike = [
-        (not _has_zeros_of_sampling(trial.structure), trial.criteria.bic, place)
+        (not _has_zeros_of_sampling(trial.structure), trial.criteria.aicc, place)
         for place, trial in enumerate(scan.trials)
         if trial.criteria is not None
+        and trial.criteria.aicc is not None
         and trial.settled
         and trial.free_run_rms is not None
         and trial.free_run_rms <= limit
@@ -110,7 +130,7 @@ def ranked(scan: OrderScan, how: str) -> list[OrderTrial]:
 
 
 def _has_zeros_of_sampling(structure: Structure) -> bool:
-    """Whether B has as many coefficients as F: a held input sampled leaves no fewer.
+    """Whether B has as many coefficients as F, as a strictly proper system that is sampled has.
 
     Where slow inputs hardly tell them, fewer make every bar at high frequencies too short: what
     the structure forbids has no share in them (Åström, Hagander & Sternby (1984), Automatica 20).

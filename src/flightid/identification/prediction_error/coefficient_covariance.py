@@ -233,4 +233,4 @@ def printed(covariance: Array | None, parameters: Mapping[str, Estimate]) -> Arr
     if covariance is None:
         return None
     shown = [each.stderr is not None for each in parameters.values()]
-    return covariance[np.ix_(shown, shown)]
+    return covariance[np.ix_(shown, shown)] if any(shown) else None

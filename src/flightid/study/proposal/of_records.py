@@ -21,12 +21,15 @@ from flightid.models.save import toml_value
 from flightid.record import Record, read_records
 from flightid.study.proposal.columns import Columns, columns_of
 from flightid.study.proposal.proposal import Proposal
+from flightid.study.structures import ranked
 from flightid.validation import scan_orders
 
 TIME_COLUMN = "time"
-KINDS = ("arx", "armax", "oe")
-ORDERS = {"na": (1, 2, 3, 4), "nb": (1, 2, 3), "nc": (1, 2), "nf": (1, 2, 3, 4)}
+KINDS = ("arx", "armax", "bj", "oe")
+ORDERS = {"na": (1, 2, 3, 4), "nb": (1, 2, 3), "nc": (1, 2), "nd": (1, 2), "nf": (1, 2, 3, 4)}
 """Orders that are tried: two modes; delays are those that the record tells."""
+OF_VEHICLE = ("nb", "nf", "nk")
+"""Orders of Box-Jenkins that are those of the best output error, whose noise models are tried."""
 FITTED, CHOSEN, ALONE = 0.6, 1.0, (0.5, 0.75)
 """Part of a record that is fitted, the rest ranks structures; and where it also has to verify."""
 AS_GOOD = 1.02
@@ -249,20 +252,24 @@ def _structure(
         for span in segments.spans
     )  # fmt: skip
     orders = ORDERS | {"nk": delays_to_scan([seen], inputs, output)}
+    of_kind = dict.fromkeys(KINDS, orders)
     reached: dict[str, float] = {}
-    for kind in KINDS:
-        tried: dict[str, Any] = {order: orders[order] for order in USED[kind]}
+    for kind in sorted(KINDS, key=("arx", "armax", "oe", "bj").index):
+        tried: dict[str, Any] = {order: of_kind[kind][order] for order in USED[kind]}
         scan = scan_orders(seen, unseen, inputs=inputs, outputs=output, kind=kind, **tried)
         best = scan.trials[0].free_run_rms
         if best is not None:
             reached[kind] = best
+        if kind == "oe":
+            taken = ranked(scan, "balanced")[0].structure
+            of_kind["bj"] = orders | {name: getattr(taken, name)[:1] for name in OF_VEHICLE}
     if not reached:
         raise StudyError("no structure runs freely", needed="a record that moves the output")
-    said = ", ".join(f"{kind} {value:.3g}" for kind, value in reached.items())
+    said = ", ".join(f"{kind} {reached[kind]:.3g}" for kind in KINDS if kind in reached)
     least = min(reached.values())
     # What comes last assumes least of the noise, so that its intervals hold for more of it.
-    good = [kind for kind, value in reached.items() if value <= AS_GOOD * least]
-    return good[-1], f"{said} {record.unit(output)}".rstrip(), orders
+    good = [kind for kind in KINDS if reached.get(kind, math.inf) <= AS_GOOD * least]
+    return good[-1], f"{said} {record.unit(output)}".rstrip(), of_kind[good[-1]]
 
 
 def _head(paths: Sequence[Path], columns: Columns, missed: Sequence[Finding]) -> list[str]:
