@@ -248,7 +248,7 @@ def _assemble(
     counted = tuple(errors[span][found.skip :] for span in data.spans)
     tests = tests_of(structure, data, counted, found.skip)
     found = compared(structure, data, found, errors, tests)
-    tests = judged_tests(tests, data, found, errors)
+    tests, biased = judged_tests(tests, data, found, errors), shares_poles(structure)
     squares = float(sum(row @ row for row in counted))
     n_counted = sum(row.size for row in counted)
     model = PolynomialModel.from_theta(
@@ -297,10 +297,7 @@ def _assemble(
             *choice,
             *judge_polynomial(structure, model, parameters, pairs, minima, n_counted, found.reason),
             *colour_findings(*found.colour, has_bars=found.covariance is not None),
-            *tests.findings(
-                biased=shares_poles(structure),
-                times=tests.widening(biased=shares_poles(structure)),
-            ),
+            *tests.findings(biased=biased, times=tests.widening(biased=biased)),
             *nothing_told(found.reason),
             *sampling_findings(model, roots, max(each.duration_s for each in records)),
         ),
