@@ -52,6 +52,8 @@ GROUPS = {
         "flight.md",
         (
             "review_flight",
+            "review_autotune",
+            "AutotuneReview",
             "FlightReview",
             "LoopResponse",
             "compare_flights",

@@ -116,11 +116,13 @@ if TYPE_CHECKING:
     from flightid.responses.coherent_pairs import coherent_pairs
     from flightid.responses.response_band import response_band
     from flightid.review import (
+        AutotuneReview,
         FlightComparison,
         FlightReview,
         LoopResponse,
         compare_flights,
         compare_with_promise,
+        review_autotune,
         review_flight,
     )
     from flightid.simulation.noise import Noise
@@ -246,12 +248,14 @@ _HOMES = {
     "reduce": "flightid.identification.reduction.reduce",
     "residual_tests": "flightid.validation.residuals.residual_tests",
     "SweepPlan": "flightid.planning",
+    "AutotuneReview": "flightid.review",
     "FlightComparison": "flightid.review",
     "FlightReview": "flightid.review",
     "LoopResponse": "flightid.review",
     "plan_flight": "flightid.planning",
     "compare_flights": "flightid.review",
     "compare_with_promise": "flightid.review",
+    "review_autotune": "flightid.review",
     "review_flight": "flightid.review",
     "run_study": "flightid.study",
     "simulate": "flightid.simulation.simulate",
@@ -260,8 +264,8 @@ _HOMES = {
 # fmt: on
 
 __all__ = [
-    "Advice", "AxisLoop", "Channel", "Check", "ClosedLoop", "CoherentPairs", "Comparison",
-    "ConditionComparison", "ControllerOptions", "DerivativeTable", "DiskMargin",
+    "Advice", "AutotuneReview", "AxisLoop", "Channel", "Check", "ClosedLoop", "CoherentPairs",
+    "Comparison", "ConditionComparison", "ControllerOptions", "DerivativeTable", "DiskMargin",
     "DisturbanceRejection", "Estimate", "Evidence", "ExportFiles", "FeedbackTest", "Finding",
     "Fit", "FittedRecord", "FittedResponse", "FlightComparison", "FlightReview", "FlightidError",
     "FrequencyResponse", "ImpulseResponse", "InnovationsModel", "Inspection", "Interconnection",
@@ -279,8 +283,9 @@ __all__ = [
     "impulse_response", "inspect_log", "interpret", "library_names", "load_model", "loops",
     "lower_order", "margins", "modes", "open_loop", "pilot_cutoff", "plan_flight", "plot",
     "predict", "px4_autotune_gains", "read_log", "read_parameters", "read_records",
-    "read_system", "reduce", "replay", "residual_tests", "response_band", "review_flight",
-    "rotor_physics", "run_study", "scan_orders", "simulate", "to_continuous", "to_control",
+    "read_system", "reduce", "replay", "residual_tests", "response_band", "review_autotune",
+    "review_flight", "rotor_physics", "run_study", "scan_orders", "simulate",
+    "to_continuous", "to_control",
     "to_discrete", "to_scipy", "tune", "tune_controller", "tune_pid", "validation", "verify",
     "without_bias", "write_ardupilot_parameters", "write_model", "write_px4_parameters",
     "write_records", "write_system",

@@ -19,6 +19,7 @@ from tests.contract.source import PACKAGE, python_files, tree
 # Kind of result -> why there is nothing to draw.
 WITHOUT_PICTURE = {
     "ApproximateModes": "a table beside `modes`, which draws them",
+    "AutotuneReview": "tables; the margins of each axis draw themselves",
     "CoherentPairs": "a table of names; the response draws them",
     "ConditionComparison": "ratios in a table; `pole_map` draws several conditions",
     "DerivativeTable": "a table",

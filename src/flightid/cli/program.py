@@ -24,6 +24,7 @@ ORDER = (
     "tune",
     "inspect",
     "flight",
+    "autotune",
     "new",
     "plan",
     "design",

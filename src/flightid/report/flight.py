@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
-from flightid.review import FlightReview
+from flightid.review import AutotuneReview, FlightReview
 
 FOLDED = {"Modes", "Flown gains", "Filters as flown"}
 CAPTION = (
@@ -42,3 +42,18 @@ def flight_document(review: FlightReview) -> Document:
         review.in_short,
         (Section("What this flight tells", (*opening, *flight_blocks(review))),),
     )
+
+
+def autotune_document(review: AutotuneReview) -> Document:
+    """A page for an autotune: verdicts, the loops in pictures, tables."""
+    blocks: list[Block] = [Lights(tuple(reversed(review.findings)))] if review.findings else []
+    for opinion in review.opinions:
+        if opinion.tuned is not None:
+            caption = (
+                f"Rate loop of {opinion.axis} with autotune's gains, by the model of its tests"
+            )
+            blocks.append(figure_block(opinion.tuned.plot(), caption))
+    blocks += [TableBlock(table) for table in review.tables()]
+    end = "finished" if review.run.finished else "did not finish"
+    short = f"{review.firmware}, autotune {end}"
+    return Document(f"Autotune {review.name}", short, (Section("Second opinion", tuple(blocks)),))

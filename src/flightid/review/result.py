@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from textwrap import fill
 
 from flightid.conventions import Light
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding, worst
 from flightid.inspection.flight_phases import FlightPhases
-from flightid.inspection.inspection import WIDTH
 from flightid.result import Result
 from flightid.review import tables
 from flightid.review.filters import FilterReview
@@ -17,6 +15,7 @@ from flightid.review.gyro_noise import GyroNoise
 from flightid.review.identity import FlightIdentity
 from flightid.review.loop_response import LoopResponse
 from flightid.review.motors import MotorUse
+from flightid.review.verdict_lines import verdict_lines
 from flightid.review.vibration import Vibration
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.estimate import Estimate
@@ -135,24 +134,8 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
 
     def to_text(self) -> str:
         """Tables, then the verdicts, the worst last, where eyes are."""
-        said = [table.to_text() for table in self.tables()]
-        given: set[str] = set()
-        lines = []
-        for finding in self.findings:
-            lines.append(
-                fill(f"{finding.light}: {finding.message}", WIDTH, subsequent_indent="    ")
-            )
-            if finding.action and finding.action not in given:
-                given.add(finding.action)
-                lines.append(
-                    fill(
-                        f"do: {finding.action}",
-                        WIDTH,
-                        initial_indent="    ",
-                        subsequent_indent="        ",
-                    )
-                )
-        return "\n\n".join([*said, "\n".join(lines)])
+        said = (table.to_text() for table in self.tables())
+        return "\n\n".join([*said, verdict_lines(self.findings)])
 
     def _tables(self) -> tuple[Table, ...]:
         return self.tables()
