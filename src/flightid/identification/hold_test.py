@@ -30,7 +30,7 @@ from flightid.record import Record
 from flightid.record.chosen_hold import ASSUMED, DECLARED, RECORDED, ChosenHold
 from flightid.record.history import is_of_log
 from flightid.record.hold import BETWEEN, HOLDS, InputHold
-from flightid.record.repeats import found_staircase
+from flightid.record.repeats import found_staircase, is_rough
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.foretold import likelihood_gain
 
@@ -39,8 +39,8 @@ NEGLIGIBLE = 0.3
 """Standard errors by which an estimate may move: a 95 % interval then holds 94 in 100."""
 DECISIVE = 6.0
 """Difference of log-likelihoods, odds of 400 to 1, that counts as told by the data."""
-DOUBTFUL = 3.0
-"""The same for a hold that was told: chance alone gives it in less than 1 of 100 fits."""
+DOUBTFUL = 1.5
+"""The same for a hold that was told: chance alone gives it in less than 1 of 25 fits."""
 STEPS = 25
 """Most steps of a fit under another hold: it starts half a sample from its end."""
 OF_A_LOG = (
@@ -231,12 +231,14 @@ def _told(fit: Fit, held: ChosenHold, rivals: _Rivals) -> tuple[Fit, ChosenHold]
 
 
 def _steps_told_otherwise(steps: OtherHold, rivals: _Rivals, whose: str) -> Finding | None:
-    """A staircase in samples that were told as anything else; none where a simulator made them."""
+    """Steps in samples that were told as anything else; none where a simulator made them."""
     if rivals.logged or rivals.made_by("simulate"):
         return None
     for record in rivals.records:
         for name in rivals.fit.model.inputs:
-            stairs = found_staircase(record[name])
+            stairs: object = found_staircase(record[name])
+            if stairs is None and is_rough(record[name]) and (steps.gain or 0.0) > -DOUBTFUL:
+                stairs = "moves from sample to sample as a device's steps do, and steps fit alike"
             if stairs is not None:
                 return Finding(
                     "hold-contradicted",

@@ -15,6 +15,9 @@ LARGE_JUMP = 0.2
 quantisation of a smooth signal also stands still, but then moves by its smallest step."""
 STANDING = 0.5
 """Least share of samples that repeat the one before, for irregular jumps."""
+ROUGH, MATERIAL = 1.7, 0.05
+"""Power of second over first differences, 2 of a random walk and next to none of a smooth signal;
+and of first differences over the signal's, below which its noise alone may be rough."""
 FEWEST_PERIODS = 2
 ROUNDING = 1e-9
 """Largest difference of two periods, over the range, that still counts as the same."""
@@ -82,6 +85,25 @@ def found_staircase(samples: Array) -> Staircase | None:
     large = np.median(sizes) >= LARGE_JUMP * np.ptp(samples)
     still = jumps.size <= (1.0 - STANDING) * samples.size
     return Staircase(1, int(jumps.size)) if large and still else None
+
+
+def is_rough(samples: Array) -> bool:
+    """Whether samples move at random from one to the next, so that none tells what lies between.
+
+    Parameters
+    ----------
+    samples : ndarray, shape (n_samples,)
+
+    Example
+    -------
+    >>> random = np.random.default_rng(0)
+    >>> is_rough(random.standard_normal(400)), is_rough(np.sin(0.3 * np.arange(400)))
+    (True, False)
+    """
+    if samples.size < FEWEST_JUMPS:
+        return False
+    first, second = (float(np.var(np.diff(samples, order))) for order in (1, 2))
+    return first > MATERIAL * float(np.var(samples)) and second > ROUGH * first
 
 
 def is_switched(samples: Array) -> bool:
