@@ -35,6 +35,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     simulation::drift_errors::register(module)?;
     simulation::extended_kalman::register(module)?;
     simulation::linear_recursion::register(module)?;
+    simulation::slope_recursion::register(module)?;
     simulation::linear_simulation::register(module)?;
     simulation::vehicle_loop::register(module)?;
     models::lookup_table::register(module)?;

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -65,17 +65,22 @@ class DenseEnd(End):
         upper: Array,
         n_residuals: int,
         maximum_iterations: int,
+        stop: Callable[[float], bool] | None = None,
     ) -> DenseEnd:
-        """Of bounded Levenberg–Marquardt on callables, their Jacobian in any order of memory."""
+        """Of bounded Levenberg–Marquardt on callables, their Jacobian in any order of memory.
+
+        `stop` is asked after each step, with the least cost so far, whether that is near enough.
+        """
 
         def by_rows(x: Array) -> Array:
             # The native half reads rows of C order.
             return np.ascontiguousarray(jacobian(x))
 
         found = _native.least_squares(
-            residuals, by_rows, start, lower, upper, n_residuals, maximum_iterations
+            residuals, by_rows, start, lower, upper, n_residuals, maximum_iterations, stop
         )
-        return cls.of_native(found)
+        end = cls.of_native(found)
+        return replace(end, termination="cost") if end.termination == "interrupted" else end
 
 
 E = TypeVar("E", bound=End)

@@ -7,4 +7,5 @@ pub mod hold_integrals;
 pub mod linear_recursion;
 pub mod linear_response;
 pub mod linear_simulation;
+pub mod slope_recursion;
 pub mod smooth_input;

@@ -2,7 +2,7 @@
 //! (Python side: identification/regression/rounds.py)
 
 use flightid_core::CoreError;
-use flightid_core::fits::least_squares::{Minimum, Options, Problem};
+use flightid_core::fits::least_squares::{Minimum, Options, Problem, Progress};
 use flightid_core::fits::levenberg_marquardt::minimise;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
@@ -99,10 +99,12 @@ impl Problem for Callback<'_, '_> {
     }
 }
 
-/// least_squares(residuals: Callable[[NDArray[np.float64]], NDArray[np.float64]], jacobian: Callable[[NDArray[np.float64]], NDArray[np.float64]], start: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], n_residuals: int, maximum_iterations: int) -> tuple[NDArray[np.float64], float, NDArray[np.float64], NDArray[np.float64], int, str]
+/// least_squares(residuals: Callable[[NDArray[np.float64]], NDArray[np.float64]], jacobian: Callable[[NDArray[np.float64]], NDArray[np.float64]], start: NDArray[np.float64], lower: NDArray[np.float64], upper: NDArray[np.float64], n_residuals: int, maximum_iterations: int, stop: Callable[[float], bool] | None = None) -> tuple[NDArray[np.float64], float, NDArray[np.float64], NDArray[np.float64], int, str]
 ///
 /// Bounded Levenberg–Marquardt on callables: x, cost, residuals, Jacobian, iterations, termination.
+/// `stop` is asked after each step with the least cost so far.
 #[pyfunction]
+#[pyo3(signature = (residuals, jacobian, start, lower, upper, n_residuals, maximum_iterations, stop=None))]
 #[allow(clippy::too_many_arguments)]
 fn least_squares<'py>(
     py: Python<'py>,
@@ -113,18 +115,22 @@ fn least_squares<'py>(
     upper: PyReadonlyArray1<'_, f64>,
     n_residuals: usize,
     maximum_iterations: usize,
+    stop: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Ending<'py>> {
     let start = start.as_slice()?;
     let (n_parameters, raised) = (start.len(), None);
     let mut problem = Callback { py, residuals, jacobian, n_parameters, n_residuals, raised };
     let options = Options { maximum_iterations, ..Options::default() };
     let mut signal = None;
-    let proceed = &mut |_: &_| match py.check_signals() {
-        Ok(()) => true,
-        Err(error) => {
+    let ask = |cost: f64| {
+        py.check_signals()?;
+        stop.map_or(Ok(true), |stop| Ok(!stop.call1((cost,))?.is_truthy()?))
+    };
+    let proceed = &mut |at: &Progress| {
+        ask(at.cost).unwrap_or_else(|error| {
             signal = Some(error);
             false
-        }
+        })
     };
     let (lower, upper) = (lower.as_slice()?, upper.as_slice()?);
     let found = minimise(&mut problem, start, lower, upper, &options, proceed);

@@ -6,4 +6,5 @@ pub mod linear_recursion;
 pub mod linear_simulation;
 pub mod loop_simulation;
 pub mod nonlinear_simulation;
+pub mod slope_recursion;
 pub mod vehicle_loop;

@@ -22,7 +22,7 @@ from flightid.identification.filter_error.steady_filter import (
     steady_filter,
 )
 from flightid.identification.records.held_model import HeldModel, LinearPoint
-from flightid.identification.records.nuisance import Nuisance
+from flightid.identification.records.nuisance import NuisanceDirections
 from flightid.models import StateSpaceModel
 
 Array = NDArray[np.float64]
@@ -70,6 +70,14 @@ class RecordInnovations:
     constants: Array
     space: Array
     filter: SteadyFilter
+
+
+@dataclass(frozen=True)
+class FreeResponse:
+    """What constants of a record make of the filter: states, and their share of innovations."""
+
+    states: Array
+    directions: NuisanceDirections
 
 
 Filtered = tuple[RecordInnovations, SteadyFilter | None]
@@ -129,9 +137,14 @@ class InnovationsProblem:
         return np.repeat([PROCESS_REACH, MEASUREMENT_REACH, GUST_REACH], counts)
 
     @property
+    def n_measured(self) -> int:
+        """Samples of all outputs of all records."""
+        return sum(each.outputs.size for each in self.data)
+
+    @property
     def n_residuals(self) -> int:
         """Innovations of all records, and one row for each output of each record."""
-        return sum(each.outputs.size + len(each.outputs) for each in self.data)
+        return self.n_measured + sum(len(each.outputs) for each in self.data)
 
     def noise(self, unknowns: Array) -> tuple[Array, Array]:
         """Process densities by state and output variances, relative to the common factor."""
@@ -190,14 +203,29 @@ class InnovationsProblem:
         """
         linear = self.linear(unknowns)
         point, slopes = self._noisy(linear, unknowns)
-        known = {}
-        for step in {each.sample_time_s for each in self.data}:
-            filters = steady_filter(point, slopes if with_slopes else [], step)
-            known[step] = (HeldModel.of(linear, step, self.hold), *filters)
+        filters = {
+            step: (
+                HeldModel.of(linear, step, self.hold),
+                *steady_filter(point, slopes if with_slopes else [], step),
+            )
+            for step in {each.sample_time_s for each in self.data}
+        }
+        # What constants make of innovations is the same in all records of one length.
+        whole = [(each.sample_time_s, each.outputs.shape[1]) for each in self.data]
+        free = {key: self._free(*filters[key[0]][:2], key[1]) for key in set(whole)}
         return [
-            (self._record(each, *known[each.sample_time_s]), known[each.sample_time_s][2])
-            for each in self.data
+            (self._record(each, *filters[key[0]], free[key]), filters[key[0]][2])
+            for each, key in zip(self.data, whole, strict=True)
         ]
+
+    def _free(self, held: HeldModel, found: SteadyFilter, n_samples: int) -> FreeResponse:
+        n, p = len(found.closed), len(found.c)
+        runs = self._constants(n, p, held.steady())
+        states = _run(found, runs, n_samples)
+        left = np.array([y - x @ found.c.T for x, (_, y, _) in zip(states, runs, strict=True)])
+        whitener = np.linalg.inv(np.linalg.cholesky(found.innovation))
+        flat = (left @ whitener.T).reshape(len(runs), -1)
+        return FreeResponse(states, NuisanceDirections.of(-flat.T))
 
     def _record(
         self,
@@ -205,34 +233,32 @@ class InnovationsProblem:
         held: HeldModel,
         found: SteadyFilter,
         slopes: SteadyFilter,
+        free: FreeResponse,
     ) -> RecordInnovations:
-        pushes, through = (part.swapaxes(1, 2) for part in held.driven(data.inputs))
-        outputs = data.outputs.T
+        taps = held.taps(data.inputs)
         whitener = np.linalg.inv(np.linalg.cholesky(found.innovation))
-        (n_samples, p), n = outputs.shape, len(found.closed)
-        steady = held.steady()
-        runs = [(np.zeros(n), outputs - through[0], pushes[0]), *self._constants(n, p, steady)]
-        states = _run(found, runs, n_samples)
-        left = np.array(
-            [seen - x @ found.c.T for x, (_, seen, _) in zip(states, runs, strict=True)]
-        )
-        flat = (left @ whitener.T).reshape(len(runs), -1)
-        nuisance = Nuisance.best(-flat[1:].T, flat[0])
-        state = np.tensordot(np.concatenate([[1.0], nuisance.values]), states, axes=1)
+        p, n = found.c.shape
+        weights, steady = held.weights[0], held.steady()
+        push, seen = taps.T @ weights[:, :n], data.outputs.T - taps.T @ weights[:, n:]
+        state = _run(found, [(np.zeros(n), seen, push)], len(seen))[0]
+        nuisance = free.directions.best(((seen - state @ found.c.T) @ whitener.T).ravel())
+        state = state + np.tensordot(nuisance.values, free.states, axes=1)
         if self.output_bias:
-            outputs = outputs - nuisance.values[n : n + p]
+            seen = seen - nuisance.values[n : n + p]
         if self.input_bias:
             shift = nuisance.values[len(nuisance.values) - len(data.inputs) :]
-            pushes, through = (
-                pushes + (steady[0] @ shift)[:, None],
-                through + (steady[1] @ shift)[:, None],
-            )
-        seen = outputs - through[0]
-        slope = _slopes(found, slopes, state, seen, (pushes[1:], through[1:])) @ whitener.T
-        white = nuisance.removed_from(slope.reshape(len(slope), flat.shape[1]).T)
-        kept = white.reshape(n_samples, p, len(slope))
-        innovations = seen - state @ found.c.T
-        return RecordInnovations(innovations, state, kept, nuisance.values, nuisance.space, found)
+            seen = seen - steady[1][0] @ shift
+            taps = taps + shift[[row for row, _ in held.places], None]
+        slope = _slopes(found, slopes, whitener, held, (state, seen, taps))
+        white = nuisance.removed_from(slope.reshape(seen.size, -1))
+        return RecordInnovations(
+            seen - state @ found.c.T,
+            state,
+            white.reshape(slope.shape),
+            nuisance.values,
+            nuisance.space,
+            found,
+        )
 
     def _constants(
         self, n: int, p: int, steady: tuple[Array, Array]
@@ -261,39 +287,43 @@ class InnovationsProblem:
         except (FlightidError, np.linalg.LinAlgError):
             return np.full(size, np.nan), np.full((size, self.n_all), np.nan)
         count = self.n_all if with_slopes else 0
-        total = sum(each.outputs.size for each in self.data)
+        total = self.n_measured
         level, rise = 0.0, np.zeros(count)
         widened: list[Array] = []
-        rows, jacobians = [], []
+        rows, turns = [], []
         for each, slopes in found:
             triangle = np.linalg.cholesky(each.filter.innovation)
             inverse = np.linalg.inv(triangle)
-            white = each.innovations @ inverse.T
-            n_samples = len(white)
-            level += n_samples * float(np.sum(np.log(np.diag(triangle))))
-            jacobian = each.slopes
+            rows.append(each.innovations @ inverse.T)
+            level += len(each.innovations) * float(np.sum(np.log(np.diag(triangle))))
+            turn = np.zeros((count, *triangle.shape))
             if slopes is not None and count:
                 relative = inverse @ slopes.innovation @ inverse.T
                 diagonal = np.diagonal(relative, axis1=1, axis2=2)
                 mean = diagonal.mean(axis=1, keepdims=True)
-                widened.append(0.5 * np.sqrt(n_samples) * (diagonal - mean))
+                widened.append(0.5 * np.sqrt(len(rows[-1])) * (diagonal - mean))
                 turn = _lower(relative)
-                rise += n_samples * np.trace(turn, axis1=1, axis2=2)
-                jacobian = jacobian - np.tensordot(white, turn, axes=(1, 2)).transpose(0, 2, 1)
-            rows.append(white.ravel())
-            jacobians.append(jacobian.reshape(white.size, count))
+                rise += len(rows[-1]) * np.trace(turn, axis1=1, axis2=2)
+            turns.append(turn)
         factor = np.exp(level / total)
-        white = np.concatenate(rows)
-        jacobian = np.concatenate(jacobians) + np.multiply.outer(white, rise / total)
+        white = np.concatenate([each.ravel() for each in rows])
+        whole, first = np.zeros((size, count)), 0
+        for (each, _), row, turn in zip(found, rows, turns, strict=True):
+            # All that turns and stretches whitened innovations is one product with them.
+            by = (rise / total)[:, None, None] * np.eye(row.shape[1]) - turn
+            moved = row @ by.transpose(2, 1, 0).reshape(row.shape[1], -1)
+            into = whole[first : first + row.size]
+            np.add(each.slopes.reshape(into.shape), moved.reshape(into.shape), out=into)
+            first += row.size
         still = np.zeros(size - total)
         curvature = (
             np.array(widened)
             .reshape(len(found), count, len(still) // len(found))
             .transpose(0, 2, 1)
         )
-        curvature = np.sqrt(np.mean(white**2)) * curvature.reshape(len(still), count)
-        whole = np.concatenate([jacobian, curvature])
-        return factor * np.concatenate([white, still]), np.ascontiguousarray(factor * whole)
+        whole[total:] = np.sqrt(np.mean(white**2)) * curvature.reshape(len(still), count)
+        whole *= factor
+        return factor * np.concatenate([white, still]), whole
 
 
 def _lower(matrix: Array) -> Array:
@@ -305,25 +335,37 @@ def _lower(matrix: Array) -> Array:
 def _slopes(
     found: SteadyFilter,
     slopes: SteadyFilter,
-    state: Array,
-    seen: Array,
-    moved: tuple[Array, Array],
+    whitener: Array,
+    held: HeldModel,
+    signals: tuple[Array, Array, Array],
 ) -> Array:
-    """Derivatives of the innovations, (n_slopes, n_samples, n_outputs): one more run for each.
+    """Derivatives of the whitened innovations, (n_samples, n_outputs, n_slopes).
 
-    `moved` are the derivatives of q and v by the parameters, the first of the slopes.
+    `signals` are the states, the outputs less what inputs show at once, and the inputs' taps.
     """
-    count, n = slopes.closed.shape[:2]
+    state, seen, taps = signals
+    (count, n), (p, _) = slopes.closed.shape[:2], found.c.shape
     if not count:
-        return np.zeros((0, *seen.shape))
-    forcings = state @ slopes.closed.swapaxes(1, 2) + seen @ slopes.gain.swapaxes(1, 2)
-    direct = -state @ slopes.c.swapaxes(1, 2)
-    pushed = len(moved[0])
-    forcings[:pushed] += moved[0] - moved[1] @ found.gain.T
-    direct[:pushed] -= moved[1]
-    closed, rest = np.ascontiguousarray(found.closed), np.zeros((count, n))
-    paths = _native.linear_recursion(closed, forcings, rest)
-    return np.asarray(direct - paths @ found.c.T)
+        return np.zeros((*seen.shape, 0))
+    forced, direct = (
+        np.zeros((count, n, n + p + len(taps))),
+        np.zeros((count, p, n + p + len(taps))),
+    )
+    forced[:, :, :n], forced[:, :, n : n + p], direct[:, :, :n] = (
+        slopes.closed,
+        slopes.gain,
+        -slopes.c,
+    )
+    moved = held.weights[1:].swapaxes(1, 2)
+    forced[: len(moved), :, n + p :] = moved[:, :n] - found.gain @ moved[:, n:]
+    direct[: len(moved), :, n + p :] = -moved[:, n:]
+    return _native.slope_recursion(
+        np.ascontiguousarray(found.closed),
+        whitener @ found.c,
+        forced,
+        whitener @ direct,
+        np.concatenate([state.T, seen.T, taps]),
+    )
 
 
 def _run(found: SteadyFilter, runs: Sequence[tuple[Array, Array, Array]], n_samples: int) -> Array:

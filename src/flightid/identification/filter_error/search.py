@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -20,28 +21,16 @@ TRIAL_ITERATIONS = 12
 """Of each candidate's search, before the best one goes on."""
 CALM = -3.0
 """Logarithm of all process noise, over its first guess, below which there may be none."""
-NEAR = 1e-8
-"""Share of the cost that a last step gains before gusts are tried: far less than they must."""
-
-
-class _NearEnd(Exception):  # noqa: N818  # no error: the search has come near enough
-    """Steps of a search no longer lower the cost by what matters."""
+NEAR = 0.01
+"""Gain of a last step in −2 ln p before gusts are tried or left: far less than they must gain."""
 
 
 class _LastPoint:
-    """Residuals and Jacobian, computed once where both are asked for at one point.
+    """Residuals and Jacobian, computed once where both are asked for at one point."""
 
-    Raises `_NearEnd` where a point lowers the least cost by less than `enough`, as its share.
-    """
-
-    def __init__(
-        self, problem: InnovationsProblem, advance: Callable[..., None], enough: float
-    ) -> None:
+    def __init__(self, problem: InnovationsProblem, advance: Callable[..., None]) -> None:
         self._problem = problem
         self._advance = advance
-        self._enough = enough
-        self._least = np.inf
-        self.count = 0
         self._x = np.empty(0)
         self._found = (np.empty(0), np.empty((0, 0)))
 
@@ -51,21 +40,11 @@ class _LastPoint:
     def jacobian(self, x: Array) -> Array:
         return self._at(x)[1]
 
-    def end(self) -> DenseEnd:
-        """The last point, as an end that is near."""
-        residuals, jacobian = self._found
-        return DenseEnd(self._x, self._least, self.count, "cost", residuals, jacobian)
-
     def _at(self, x: Array) -> tuple[Array, Array]:
         if not np.array_equal(x, self._x):
             self._found = self._problem.residuals(x, with_slopes=True)
             self._x = x.copy()
-            self.count += 1
             self._advance()
-            cost = float(self._found[0] @ self._found[0])
-            gained, self._least = self._least - cost, min(self._least, cost)
-            if 0.0 <= gained < self._enough * cost:
-                raise _NearEnd
         return self._found
 
 
@@ -79,23 +58,27 @@ def minimise(
 ) -> DenseEnd:
     """Search from one start: parameters inside their bounds, noises inside their reach.
 
-    It ends at `iterations`, or where a step lowers the cost by a share of less than `enough`.
+    It ends at `iterations`, or where a step that lowers −2 ln p does so by less than `enough`.
     """
-    reach = problem.reach
+    reach, last, total = problem.reach, np.inf, problem.n_measured
+
+    def is_near(cost: float) -> bool:
+        nonlocal last
+        gained, last = total * math.log(last / max(cost, 1e-300)), cost
+        return 0.0 < gained < enough
+
     with progress(None, "running the filter") as advance:
-        point = _LastPoint(problem, advance, enough)
-        try:
-            return DenseEnd.searched(
-                point.residuals,
-                point.jacobian,
-                start,
-                np.concatenate([limits.lower, -reach]),
-                np.concatenate([limits.upper, reach]),
-                problem.n_residuals,
-                limits.maximum_iterations if iterations is None else iterations,
-            )
-        except _NearEnd:
-            return point.end()
+        point = _LastPoint(problem, advance)
+        return DenseEnd.searched(
+            point.residuals,
+            point.jacobian,
+            start,
+            np.concatenate([limits.lower, -reach]),
+            np.concatenate([limits.upper, reach]),
+            problem.n_residuals,
+            limits.maximum_iterations if iterations is None else iterations,
+            is_near if enough else None,
+        )
 
 
 def with_gust(
@@ -103,8 +86,9 @@ def with_gust(
 ) -> tuple[InnovationsProblem, list[list[DenseEnd]]]:
     """The problem and its ends, with a gust state where the likelihood asks for one.
 
-    Each candidate continues from the best end for a few iterations; the likeliest goes on to its
-    end and replaces all others if it gains more than its two unknowns may by chance (BIC). A test
+    Each candidate continues from the best end for a few iterations; the likeliest goes on until it
+    is `NEAR` its end, and to that end if it gains more than its two unknowns may by chance (BIC):
+    it replaces all others then. A test
     of the innovations alone would not do: a gust as long as the vehicle's own motion bends its
     derivatives and leaves hardly any colour. Nothing is tried where no state has process noise.
     An end that is only `NEAR` is followed to its end where no gust replaces it.
@@ -129,15 +113,17 @@ def with_gust(
     trials = []
     for gust in candidates(LinearPoint.of(problem.model, values), states, step, longest):
         tried = replace(problem, gust=gust)
-        trials.append((tried, minimise(tried, start, limits, iterations=TRIAL_ITERATIONS)))
+        first = minimise(tried, start, limits, iterations=TRIAL_ITERATIONS, enough=NEAR)
+        trials.append((tried, first))
     if not trials:
         return problem, _followed(problem, groups, limits)
     tried, begun = min(trials, key=lambda trial: trial[1].cost)
-    ended = minimise(tried, begun.x, limits)
-    total = sum(each.outputs.size for each in problem.data)
-    if total * np.log(end.cost / ended.cost) <= GUST_UNKNOWNS * np.log(total):
+    if not begun.is_converged:
+        begun = minimise(tried, begun.x, limits, enough=NEAR)
+    total = problem.n_measured
+    if total * np.log(end.cost / begun.cost) <= GUST_UNKNOWNS * np.log(total):
         return problem, _followed(problem, groups, limits)
-    return tried, [[ended]]
+    return tried, [[minimise(tried, begun.x, limits)]]
 
 
 def _followed(

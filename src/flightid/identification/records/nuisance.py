@@ -50,13 +50,37 @@ class Nuisance:
         directions : ndarray, shape (n_rows, n_constants)
         rows : ndarray, shape (n_rows,)
         """
-        size = np.linalg.norm(directions, axis=0)
-        size[size == 0.0] = 1.0
-        left, values, right = np.linalg.svd(directions / size, full_matrices=False)
-        kept = values > _RANK * max(float(values.max(initial=0.0)), 1e-300)
-        space = left[:, kept]
-        return cls((right[kept].T @ (space.T @ rows / values[kept])) / size, space)
+        return NuisanceDirections.of(directions).best(rows)
 
     def removed_from(self, rows: Array) -> Array:
         """Rows (n_rows, …) less their part along the directions."""
         return np.asarray(rows - self.space @ (self.space.T @ rows))
+
+
+@dataclass(frozen=True)
+class NuisanceDirections:
+    """Directions of the constants, factored once for all records that have the same.
+
+    Attributes
+    ----------
+    space : ndarray, shape (n_rows, rank)
+        Orthonormal directions that the constants can follow.
+    weights : ndarray, shape (n_constants, rank)
+        Constants by what rows show along them.
+    """
+
+    space: Array
+    weights: Array
+
+    @classmethod
+    def of(cls, directions: Array) -> NuisanceDirections:
+        """From directions of shape (n_rows, n_constants)."""
+        size = np.linalg.norm(directions, axis=0)
+        size[size == 0.0] = 1.0
+        left, values, right = np.linalg.svd(directions / size, full_matrices=False)
+        kept = values > _RANK * max(float(values.max(initial=0.0)), 1e-300)
+        return cls(left[:, kept], right[kept].T / values[kept] / size[:, None])
+
+    def best(self, rows: Array) -> Nuisance:
+        """The best constants for some rows (n_rows,)."""
+        return Nuisance(self.weights @ (self.space.T @ rows), self.space)
