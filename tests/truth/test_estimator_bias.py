@@ -274,7 +274,7 @@ def _oscillator(u: NDArray[np.float64], wn2: float, zeta: float) -> fid.Record:
     )
 
 
-@pytest.mark.parametrize("zeta", [0.02, 0.05])
+@pytest.mark.parametrize("zeta", [0.02, pytest.param(0.05, marks=pytest.mark.nightly)])
 def test_light_damping_in_a_short_record_is_found_at_no_higher_cost(zeta: float) -> None:
     t = 0.02 * np.arange(1000)
     record = _oscillator(0.1 * np.sin(0.5 * t + 0.28 * t**2), 4.09, zeta)
@@ -298,7 +298,7 @@ def test_light_damping_in_a_short_record_is_found_at_no_higher_cost(zeta: float)
         assert abs(fit.parameters[name].value - value) < 3.5 * error
 
 
-@pytest.mark.parametrize("delay_s", [0.1, 0.1137])
+@pytest.mark.parametrize("delay_s", [pytest.param(0.1, marks=pytest.mark.nightly), 0.1137])
 def test_a_held_input_that_feeds_through_late(delay_s: float) -> None:
     trial = fly_feedthrough(0, delay_s=delay_s)
     assert not trial.refusal

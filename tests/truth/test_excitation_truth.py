@@ -154,7 +154,7 @@ def test_multisine_lines_lie_where_they_were_dealt() -> None:
         period_s=10.0,
         sample_rate_hz=100.0,
         names=("a", "b", "c"),
-        starts=2,
+        starts=1,
     )
     amplitude = 2 * np.abs(np.fft.rfft(made.signals, axis=1)) / made.n_samples
     for index in range(3):

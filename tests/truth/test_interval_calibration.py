@@ -83,7 +83,14 @@ def test_the_fitted_structure_holds_the_truth(axis: str) -> None:
         assert_close(found, value, rtol=2e-3, why=f"{name}: hold and filter act as a delay")
 
 
-@pytest.mark.parametrize(("axis", "seed"), [("roll", 11), ("pitch", 12), ("yaw", 13)])
+@pytest.mark.parametrize(
+    ("axis", "seed"),
+    [
+        ("roll", 11),
+        pytest.param("pitch", 12, marks=pytest.mark.nightly),
+        pytest.param("yaw", 13, marks=pytest.mark.nightly),
+    ],
+)
 def test_each_parameter_lies_within_four_standard_errors(axis: str, seed: int) -> None:
     fit = fit_flight(axis, seed)
     for name, value in true_values(axis).items():

@@ -156,15 +156,14 @@ def test_nothing_that_is_computed_from_a_fit_is_greener_than_it(tmp_path: Path) 
     control, rate = truth.inputs[0], truth.outputs[0]
     for source in (fit, stored):
         closed = fid.close_loop(source, {control: {rate: 0.05}}, draws=0)
-        made = [
-            closed,
-            closed.margins()[control],
-            fid.margins(source),
-            fid.disk_margin(source),
-            fid.modes(source),
-            fid.handling_qualities(source, axes={}),
-            fid.lower_order(source, kind="roll"),
-        ]
+        made = [closed, fid.margins(source), fid.modes(source)]
+        if source is fit:  # a file of it is the same source to the others
+            made += [
+                closed.margins()[control],
+                fid.disk_margin(source),
+                fid.handling_qualities(source, axes={}),
+                fid.lower_order(source, kind="roll"),
+            ]
         for result in made:
             assert worst(result.findings) is Light.RED, result
             said = [f.message for f in result.findings if f.code == "source-evidence"]

@@ -64,15 +64,16 @@ def test_a_rotorcraft_model_in_one_table() -> None:
 
 def test_a_control_of_the_other_sign_is_found_and_said() -> None:
     hover = fid.load_model("r50_hover")
-    found = fid.handling_qualities(hover, band_rad_s=(1.0, 60.0))
-    told = fid.handling_qualities(hover, signs={"pitch": -1}, band_rad_s=(1.0, 60.0))
+    asked = {"band_rad_s": (1.0, 60.0), "axes": {"pitch": ("theta", "lon")}}
+    found = fid.handling_qualities(hover, **asked)
+    told = fid.handling_qualities(hover, signs={"pitch": -1}, **asked)
     ours, theirs = found.bandwidths["pitch"].uncertain, told.bandwidths["pitch"].uncertain
     assert_close(ours.numbers, theirs.numbers, rtol=1e-12, why="the same sign")
     (said,) = [each for each in found.findings if each.code == "sign-found"]
     assert said.message.startswith("pitch: the control pulls the other way")
     assert "sign-found" not in {each.code for each in told.findings}
     # Told wrongly, it is not rated.
-    wrong = fid.handling_qualities(hover, signs={"pitch": 1}, band_rad_s=(1.0, 60.0))
+    wrong = fid.handling_qualities(hover, signs={"pitch": 1}, **asked)
     assert "theta/lon" not in {rating.subject for rating in wrong.ratings}
 
 

@@ -14,6 +14,9 @@ from flightid.models import load_model
 from tests.closeness import assert_close
 from tests.strangers import holds
 
+NIGHTLY = pytest.mark.nightly
+IN_EVERY_RUN = ["steps", *(pytest.param(each, marks=NIGHTLY) for each in ("straight", "smooth"))]
+
 
 def _fit(shape: str, *, told: bool, method: str = "output_error") -> fid.Fit:
     return fid.identify(holds.model(), holds.flight(0, shape, told=told), method=method)
@@ -64,7 +67,7 @@ def test_a_hold_that_is_told_wrong_is_amber_and_bars_reach_the_truth(
     assert low < holds.TRUTH["tau"] < high
 
 
-@pytest.mark.parametrize("shape", ["steps", "straight", "smooth"])
+@pytest.mark.parametrize("shape", IN_EVERY_RUN)
 def test_a_response_tells_what_its_records_know_of_a_wrong_hold(shape: str) -> None:
     lights = []
     for told in (True, holds.WRONG[shape]):
@@ -115,7 +118,7 @@ def test_a_hold_that_moves_nothing_is_green() -> None:
     assert "4 standard errors" in asked.message
 
 
-@pytest.mark.parametrize("shape", ["steps", "straight", "smooth"])
+@pytest.mark.parametrize("shape", IN_EVERY_RUN)
 def test_verify_and_predict_take_the_hold_of_the_fit(shape: str, tmp_path: Path) -> None:
     fit = _fit(shape, told=True)
     unseen, known = holds.flight(1, shape, told=False), holds.flight(1, shape, told=True)
