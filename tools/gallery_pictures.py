@@ -20,7 +20,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from pictures import PICTURES, keep, photograph
-from plotly.offline import get_plotlyjs
+
+from flightid.plot.graph_objects import plotting_library
 
 ROOT = Path(__file__).parent.parent
 EXAMPLES = ROOT / "examples"
@@ -87,7 +88,7 @@ def figure_page(spec: dict[str, Any], size: tuple[int, int]) -> str:
     drawn = json.dumps({"data": spec["data"], "layout": layout}).replace("<", "\\u003c")
     return (
         '<!doctype html><meta charset="utf-8"><body style="margin:0"><div id="plot"></div>'
-        f"<script>{get_plotlyjs()}</script><script>const spec = {drawn};"
+        f"<script>{plotting_library()}</script><script>const spec = {drawn};"
         'Plotly.newPlot("plot", spec.data, spec.layout, {staticPlot: true});</script>'
     )
 

@@ -21,6 +21,7 @@ HEAD = """# Software of others
 
 Made by `python tools/licences.py --write`. The crates are inside the wheel, whose
 `dist-info/sboms` lists them with versions and checksums; the packages are installed beside it.
+Reports draw with plotly.js 4.1.1 (MIT, Copyright 2012-2026, Plotly, Inc.), which the wheel holds.
 """
 
 

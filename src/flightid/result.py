@@ -120,7 +120,7 @@ class Result(TableView):
 
         Returns
         -------
-        plotly.graph_objects.Figure
+        Figure
 
         Raises
         ------

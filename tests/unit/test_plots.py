@@ -1,9 +1,14 @@
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
+import plotly.graph_objects
 from hypothesis import given
 from hypothesis import strategies as st
 
+from flightid.plot import graph_objects as go
 from flightid.plot.fit import EstimateBar, parameter_intervals
 from flightid.plot.frequency_response import Curve, bode
 from flightid.plot.record import Panel, Trace, thinned, time_histories
@@ -117,3 +122,29 @@ def test_intervals_are_drawn_about_their_own_centre() -> None:
         rtol=1e-9,
         why="a whole turn is taken off",
     )
+
+
+def test_figures_are_what_plotly_takes(tmp_path: Path) -> None:
+    made = go.PlotFigure(2, 2, row_heights=(2, 1), column_titles=("a", "b"), shared_x=True)
+    made.add_traces([go.Bar(x=[1, 2], y=[3, np.nan])], rows=1, cols=2)
+    made.add_trace(go.Heatmap(z=np.eye(2), x=["p", "q"]), row=2, col=1)
+    made.add_trace(go.Contour(z=np.eye(3, dtype=np.int64)), row=2, col=2)
+    made.add_hline(1.0, row=1, col=2, annotation_text="here", annotation_position="top left")
+    made.add_vline(2.0, row=2, col=1, line={"dash": "dot"})
+    made.add_vrect(0.0, 1.0, row=2, fillcolor="red", line_width=0)
+    made.update_xaxes(title_text="x", type="log", row=2, col=1)
+    theirs = plotly.graph_objects.Figure(json.loads(made.to_json()))
+    assert (theirs.data[1].xaxis, theirs.data[1].yaxis) == ("x3", "y3")
+    assert theirs.layout.xaxis3.title.text == "x"
+    assert (theirs.layout.xaxis2.matches, theirs.layout.yaxis.domain) == ("x4", (0.38, 1.0))
+    here, left, right = (each for each in theirs.layout.shapes if each.type != "line" or each.y0)
+    assert (here.xref, here.yref, here.y0) == ("x2 domain", "y2", 1.0)
+    assert [(each.xref, each.yref, each.line.width) for each in (left, right)] == [
+        ("x3", "y3 domain", 0),
+        ("x4", "y4 domain", 0),
+    ]
+    note = theirs.layout.annotations[-1]
+    assert (note.x, note.xref, note.yanchor) == (0.0, "x2 domain", "bottom")
+    assert made.to_dict()["data"][0]["y"] == [3, None]
+    page = made.write_html(tmp_path / "a.html").read_text()
+    assert "plotly.js (cartesian - minified) v4.1.1" in page

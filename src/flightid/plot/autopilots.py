@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from flightid.control.autopilots.axis_loop import AxisLoop
 from flightid.control.autopilots.replay_result import Replay
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
 from flightid.plot.record import Panel, Trace, time_histories
@@ -16,7 +16,7 @@ SHOWN_TERMS = ("P", "I", "D", "FF", "DFF")
 QUIET_SHARE = 1e-6
 
 
-def controller(loop: AxisLoop, omega_rad_s: NDArray[np.float64] | None = None) -> go.Figure:
+def controller(loop: AxisLoop, omega_rad_s: NDArray[np.float64] | None = None) -> go.PlotFigure:
     """Feedback and set-point path of a controller, with the terms that make the feedback.
 
     Parameters
@@ -28,7 +28,7 @@ def controller(loop: AxisLoop, omega_rad_s: NDArray[np.float64] | None = None) -
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     highest = np.pi * loop.loop_rate_hz
     omega = np.geomspace(highest / 1000, highest, 400) if omega_rad_s is None else omega_rad_s
@@ -45,7 +45,7 @@ def controller(loop: AxisLoop, omega_rad_s: NDArray[np.float64] | None = None) -
     return bode(curves, unit=f"{loop.output_unit}/(rad/s)")
 
 
-def replay(result: Replay) -> go.Figure:
+def replay(result: Replay) -> go.PlotFigure:
     """Logged and replayed output, their difference, and the terms that move.
 
     Parameters
@@ -55,7 +55,7 @@ def replay(result: Replay) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     unit = result.loop.output_unit
     time_s = result.time_s

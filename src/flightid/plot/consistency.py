@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import plotly.graph_objects as go
-
 from flightid.conditioning.consistency_result import KinematicConsistency
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.record import Panel, Trace, time_histories
 
 
-def consistency(result: KinematicConsistency) -> go.Figure:
+def consistency(result: KinematicConsistency) -> go.PlotFigure:
     """Draw each output as measured and as rebuilt with the estimated instrument errors.
 
     Parameters
@@ -19,7 +18,7 @@ def consistency(result: KinematicConsistency) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     time_s = result.corrected.time_s
     return time_histories(

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flightid.excitation import Excitation, Plan
 from flightid.excitation.excitation import COVERAGE_LEVEL_DB
 from flightid.excitation.plan import LEAST_COHERENCE
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.record import Panel, Trace, time_histories
 
 
-def excitation_history(excitation: Excitation) -> go.Figure:
+def excitation_history(excitation: Excitation) -> go.PlotFigure:
     """Draw each input over time, one panel each.
 
     Parameters
@@ -22,7 +22,7 @@ def excitation_history(excitation: Excitation) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     return time_histories(
         [
@@ -35,7 +35,7 @@ def excitation_history(excitation: Excitation) -> go.Figure:
     )
 
 
-def plan_spectrum(plan: Plan) -> go.Figure:
+def plan_spectrum(plan: Plan) -> go.PlotFigure:
     """Draw the spectra of a plan with the coherence and random error that it expects.
 
     Parameters
@@ -45,7 +45,7 @@ def plan_spectrum(plan: Plan) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     made = look.figure(3)
     _add_spectrum(made, plan.excitation, plan.band_rad_s)
@@ -71,7 +71,7 @@ def plan_spectrum(plan: Plan) -> go.Figure:
     return made
 
 
-def _add_spectrum(made: go.Figure, excitation: Excitation, band: tuple[float, float]) -> None:
+def _add_spectrum(made: go.PlotFigure, excitation: Excitation, band: tuple[float, float]) -> None:
     spectrum = excitation.smoothed_spectrum()
     floor = np.finfo(np.float64).tiny
     for index, (name, density) in enumerate(zip(spectrum.names, spectrum.density, strict=True)):

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import plotly.graph_objects as go
-
 from flightid.errors import UnknownNameError
 from flightid.identification import Fit, FittedResponse
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
 from flightid.uncertainty.quantiles import interval_words, shown
@@ -43,7 +42,9 @@ class EstimateBar:
     truth: float | None = None
 
 
-def parameter_intervals(estimates: Sequence[EstimateBar], *, name: str = "estimate") -> go.Figure:
+def parameter_intervals(
+    estimates: Sequence[EstimateBar], *, name: str = "estimate"
+) -> go.PlotFigure:
     """Draw 95 % intervals in percent of the reference: the truth where known, else the estimate.
 
     Where the truth is zero, departures from it are in percent of the estimate.
@@ -57,7 +58,7 @@ def parameter_intervals(estimates: Sequence[EstimateBar], *, name: str = "estima
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Example
     -------
@@ -110,7 +111,7 @@ def _departures(item: EstimateBar) -> list[float]:
     return [100.0 * (edge - reference) / scale for edge in (item.value, item.low, item.high)]
 
 
-def fit_figure(fit: Fit, name: str | None = None) -> go.Figure:
+def fit_figure(fit: Fit, name: str | None = None) -> go.PlotFigure:
     """Bode plot of one measured response, its 95 % band, and the model where it was fitted.
 
     Parameters
@@ -122,7 +123,7 @@ def fit_figure(fit: Fit, name: str | None = None) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Raises
     ------
@@ -139,7 +140,7 @@ def fit_figure(fit: Fit, name: str | None = None) -> go.Figure:
     )
 
 
-def _response_figure(each: FittedResponse) -> go.Figure:
+def _response_figure(each: FittedResponse) -> go.PlotFigure:
     measured = each.measured
     low, high = each.band_rad_s
     inside = (measured.omega_rad_s >= low) & (measured.omega_rad_s <= high)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flightid.identification import FittedRecord
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.record import Panel, Trace, time_histories
 
 
-def record_figure(item: FittedRecord, *, residuals: bool = True) -> go.Figure:
+def record_figure(item: FittedRecord, *, residuals: bool = True) -> go.PlotFigure:
     """Draw the inputs, and each output as measured and as the fitted model gives it.
 
     Parameters
@@ -22,7 +22,7 @@ def record_figure(item: FittedRecord, *, residuals: bool = True) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     measured, modelled = item.measured, item.modelled
     time_s = measured.time_s

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flightid.errors import DataError
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.review import FlightComparison, FlightReview, GyroNoise, LoopResponse
 
@@ -15,7 +15,7 @@ COLOURS = {"roll": look.BLUE, "pitch": look.ORANGE, "yaw": look.GREEN}
 DASHES = {"roll": "solid", "pitch": "dash", "yaw": "dashdot"}
 
 
-def flight_steps(review: FlightReview) -> go.Figure:
+def flight_steps(review: FlightReview) -> go.PlotFigure:
     """Draw the steps of all loops that a flight tells, rate loops above attitude loops.
 
     Parameters
@@ -24,7 +24,7 @@ def flight_steps(review: FlightReview) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Raises
     ------
@@ -38,7 +38,7 @@ def flight_steps(review: FlightReview) -> go.Figure:
     return loop_steps(*review.loops)
 
 
-def loop_steps(*loops: LoopResponse) -> go.Figure:
+def loop_steps(*loops: LoopResponse) -> go.PlotFigure:
     """Draw steps of loops with their bands.
 
     Parameters
@@ -47,7 +47,7 @@ def loop_steps(*loops: LoopResponse) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Raises
     ------
@@ -93,7 +93,7 @@ def loop_steps(*loops: LoopResponse) -> go.Figure:
     return made
 
 
-def compared_steps(result: FlightComparison) -> go.Figure:
+def compared_steps(result: FlightComparison) -> go.PlotFigure:
     """Draw the steps of two flights, or of a promise and a flight, one panel a loop.
 
     Parameters
@@ -102,7 +102,7 @@ def compared_steps(result: FlightComparison) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Example
     -------
@@ -131,7 +131,7 @@ def compared_steps(result: FlightComparison) -> go.Figure:
     return made
 
 
-def gyro_spectrum(noise: GyroNoise) -> go.Figure:
+def gyro_spectrum(noise: GyroNoise) -> go.PlotFigure:
     """Draw the spectrum of a gyroscope with its bands, and below it against throttle.
 
     Parameters
@@ -140,7 +140,7 @@ def gyro_spectrum(noise: GyroNoise) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Raises
     ------

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from flightid.errors import DataError
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.responses.response_band import TAKEN_OUT, ResponseIntervals
 from flightid.uncertainty.quantiles import half_width, shown
@@ -54,7 +54,9 @@ class Curve:
     intervals: ResponseIntervals | None = None
 
 
-def bode(curves: Sequence[Curve], *, unit: str = "", minimum_coherence: float = 0.6) -> go.Figure:
+def bode(
+    curves: Sequence[Curve], *, unit: str = "", minimum_coherence: float = 0.6
+) -> go.PlotFigure:
     """Gain, phase and coherence over frequency.
 
     Parameters
@@ -68,7 +70,7 @@ def bode(curves: Sequence[Curve], *, unit: str = "", minimum_coherence: float = 
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Raises
     ------
@@ -116,13 +118,13 @@ def _curves(given: object) -> tuple[Curve, ...]:
     return items
 
 
-def _line(curve: Curve, values: NDArray[np.float64], *, legend: bool) -> go.Scatter:
+def _line(curve: Curve, values: NDArray[np.float64], *, legend: bool) -> go.Node:
     return look.line(
         curve.name, curve.omega_rad_s, values, colour=curve.colour, dash=curve.dash, legend=legend
     )
 
 
-def _add_gain(made: go.Figure, curve: Curve) -> None:
+def _add_gain(made: go.PlotFigure, curve: Curve) -> None:
     magnitude = np.abs(curve.response)
     low, high = 0.0 * magnitude, magnitude
     if curve.intervals is not None:
@@ -137,7 +139,7 @@ def _add_gain(made: go.Figure, curve: Curve) -> None:
         _add_centre(made, curve, _decibel(np.abs(curve.intervals.centre)), 1)
 
 
-def _add_phase(made: go.Figure, curve: Curve, phase_deg: NDArray[np.float64]) -> None:
+def _add_phase(made: go.PlotFigure, curve: Curve, phase_deg: NDArray[np.float64]) -> None:
     low, high = phase_deg, phase_deg
     if curve.intervals is not None:
         low, high = np.degrees(curve.intervals.phase_rad)
@@ -152,7 +154,7 @@ def _add_phase(made: go.Figure, curve: Curve, phase_deg: NDArray[np.float64]) ->
         _add_centre(made, curve, 0.5 * (low + high), 2)
 
 
-def _add_centre(made: go.Figure, curve: Curve, values: Array, row: int) -> None:
+def _add_centre(made: go.PlotFigure, curve: Curve, values: Array, row: int) -> None:
     """What the band stands about, where leakage and resolution were taken out."""
     assert curve.intervals is not None
     if curve.intervals.reason == TAKEN_OUT:
@@ -163,7 +165,7 @@ def _add_centre(made: go.Figure, curve: Curve, values: Array, row: int) -> None:
         made.add_trace(drawn, row=row, col=1)
 
 
-def _add_band(made: go.Figure, curve: Curve, edges: tuple[Array, Array], row: int) -> None:
+def _add_band(made: go.PlotFigure, curve: Curve, edges: tuple[Array, Array], row: int) -> None:
     if curve.intervals is not None or curve.random_error is not None:
         drawn = look.band(curve.name, curve.omega_rad_s, *edges, colour=curve.colour)
         made.add_traces(drawn, rows=row, cols=1)

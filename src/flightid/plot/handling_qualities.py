@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from flightid.dynamics.handling_qualities.pilot_cutoff import PilotCutoff
@@ -14,6 +14,7 @@ from flightid.dynamics.handling_qualities.rating_charts import RatingChart
 from flightid.dynamics.handling_qualities.result import AttitudeBandwidth
 from flightid.dynamics.lower_order.result import LowerOrder
 from flightid.errors import DataError
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
 from flightid.uncertainty.quantiles import ellipse_radius, shown
@@ -28,7 +29,7 @@ LEAST_SPAN = {"bandwidth": (0.0, 5.0), "phase_delay": (0.0, 0.2), "damping": (0.
 Array = NDArray[np.float64]
 
 
-def level_chart(ratings: Rating | Sequence[Rating]) -> go.Figure:
+def level_chart(ratings: Rating | Sequence[Rating]) -> go.PlotFigure:
     """Draw a chart of levels with one or more estimates and their 95 % regions.
 
     Parameters
@@ -38,7 +39,7 @@ def level_chart(ratings: Rating | Sequence[Rating]) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Raises
     ------
@@ -64,14 +65,14 @@ def level_chart(ratings: Rating | Sequence[Rating]) -> go.Figure:
         chart.axes, spans, (made.update_xaxes, made.update_yaxes), strict=True
     ):
         if name in LOGARITHMIC:
-            ticks = {"tickvals": look.LOG_TICKS, "ticktext": look.LOG_LABELS}
+            ticks: dict[str, Any] = {"tickvals": look.LOG_TICKS, "ticktext": look.LOG_LABELS}
             update(type="log", range=[float(np.log10(end)) for end in span], **ticks)
         else:
             update(range=list(span))
     return made
 
 
-def bandwidth_curves(found: AttitudeBandwidth) -> go.Figure:
+def bandwidth_curves(found: AttitudeBandwidth) -> go.PlotFigure:
     """Draw gain and phase of the attitude, and where bandwidths and phase delay are read.
 
     Parameters
@@ -80,7 +81,7 @@ def bandwidth_curves(found: AttitudeBandwidth) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     curve, crossing = found.curve, found.omega_180_rad_s
     low = 0.3 * min(found.phase_bandwidth_rad_s, found.gain_bandwidth_rad_s or crossing)
@@ -102,7 +103,7 @@ def bandwidth_curves(found: AttitudeBandwidth) -> go.Figure:
     return made
 
 
-def lower_order_curves(found: LowerOrder) -> go.Figure:
+def lower_order_curves(found: LowerOrder) -> go.PlotFigure:
     """Draw the response and its equivalent system of low order.
 
     Parameters
@@ -111,7 +112,7 @@ def lower_order_curves(found: LowerOrder) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     pair = found.response.pair(found.output, found.input)
     measured = found.response.estimator != "model"
@@ -137,7 +138,7 @@ def lower_order_curves(found: LowerOrder) -> go.Figure:
     return bode((first, equivalent), unit=pair.unit)
 
 
-def cutoff_spectrum(found: PilotCutoff) -> go.Figure:
+def cutoff_spectrum(found: PilotCutoff) -> go.PlotFigure:
     """Draw the share of a control's power below each frequency, with the cut-off.
 
     Parameters
@@ -146,7 +147,7 @@ def cutoff_spectrum(found: PilotCutoff) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     omega, density = found.omega_rad_s, found.density
     steps = np.diff(omega) * 0.5 * (density[1:] + density[:-1])
@@ -185,7 +186,7 @@ def _span(chart: RatingChart, name: str, ratings: Sequence[Rating]) -> tuple[flo
 
 
 def _regions(
-    made: go.Figure, chart: RatingChart, spans: Sequence[tuple[float, float]], rating: Rating
+    made: go.PlotFigure, chart: RatingChart, spans: Sequence[tuple[float, float]], rating: Rating
 ) -> None:
     """Shade each level, and name it in its middle."""
     axes = [
@@ -254,7 +255,7 @@ def _coordinate(name: str, value: float) -> float:
     return float(np.log10(value)) if name in LOGARITHMIC else float(value)
 
 
-def _estimate(made: go.Figure, rating: Rating, colour: str, number: int) -> None:
+def _estimate(made: go.PlotFigure, rating: Rating, colour: str, number: int) -> None:
     name = rating.subject or "estimate"
     x, y = (rating.values[axis] for axis in rating.chart.axes)
     outline = _ellipse(rating)
@@ -304,7 +305,7 @@ def _ellipse(rating: Rating) -> tuple[Array, Array] | None:
     return np.asarray(x), np.asarray(y)
 
 
-def _level(made: go.Figure, value: float, text: str, row: int) -> None:
+def _level(made: go.PlotFigure, value: float, text: str, row: int) -> None:
     made.add_hline(
         value,
         row=row,
@@ -312,11 +313,11 @@ def _level(made: go.Figure, value: float, text: str, row: int) -> None:
         line={"color": look.LINE, "dash": "dot", "width": 1},
         annotation_text=text,
         annotation_position="bottom left",
-        annotation_font_size=11,
+        annotation_font={"size": 11},
     )
 
 
-def _marks(made: go.Figure, found: AttitudeBandwidth) -> None:
+def _marks(made: go.PlotFigure, found: AttitudeBandwidth) -> None:
     curve, crossing = found.curve, found.omega_180_rad_s
     points: list[tuple[str, float, int, str, str]] = [
         ("ω_180", crossing, 2, look.ORANGE, "circle"),
@@ -343,7 +344,7 @@ def _marks(made: go.Figure, found: AttitudeBandwidth) -> None:
         made.add_vrect(*interval, fillcolor=look.MODEL, opacity=0.12, line_width=0)
 
 
-def _slope(made: go.Figure, found: AttitudeBandwidth) -> None:
+def _slope(made: go.PlotFigure, found: AttitudeBandwidth) -> None:
     """The least-squares line of the phase beyond ω_180."""
     if found.phase_slope_delay_s is None:
         return

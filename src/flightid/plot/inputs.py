@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flightid.excitation.spectrum import smoothed_matrix
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.record import Record
 
@@ -16,7 +16,7 @@ FAINTEST_DB = 60.0
 """How far below its peak a spectrum is drawn."""
 
 
-def input_figure(record: Record, inputs: Iterable[str] | None = None) -> go.Figure:
+def input_figure(record: Record, inputs: Iterable[str] | None = None) -> go.PlotFigure:
     """Draw the spectrum of each input, and beside it the distribution of its amplitudes.
 
     Spectra are means over third-octave bands of the periodogram about the mean, per Hz.
@@ -29,7 +29,7 @@ def input_figure(record: Record, inputs: Iterable[str] | None = None) -> go.Figu
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Example
     -------

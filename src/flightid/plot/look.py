@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-import plotly.graph_objects as go
-from plotly.subplots import make_subplots
+from flightid.plot import graph_objects as go
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,7 +55,7 @@ def figure(
     column_titles: Sequence[str] | None = None,
     shared_x: bool = True,
     height_px: int | None = None,
-) -> go.Figure:
+) -> go.PlotFigure:
     """Empty figure in the shared look, with a grid of plots that share their x axes by column.
 
     Parameters
@@ -76,11 +75,11 @@ def figure(
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     height = height_px or MARGIN_PX + ROW_HEIGHT_PX * rows
     heights, titles = tuple(row_heights or ()), tuple(column_titles or ())
-    return go.Figure(_empty(rows, columns, title, heights, titles, shared_x, height))
+    return _empty(rows, columns, title, heights, titles, shared_x, height).copied()
 
 
 @lru_cache(maxsize=64)
@@ -92,20 +91,13 @@ def _empty(
     titles: tuple[str, ...],
     shared_x: bool,
     height: int,
-) -> go.Figure:
+) -> go.PlotFigure:
     """What figures of one form are copies of: a copy costs a fiftieth of a figure."""
-    made = make_subplots(
-        rows=rows,
-        cols=columns,
-        shared_xaxes="columns" if shared_x else False,
-        vertical_spacing=0.07 / max(1, rows - 1) if rows > 1 else 0.0,
-        horizontal_spacing=0.09,
-        row_heights=list(heights) or None,
-        column_titles=list(titles) or None,
+    made = go.PlotFigure(
+        rows, columns, row_heights=heights or None, column_titles=titles, shared_x=shared_x
     )
     made.update_layout(
-        title={"text": title} if title else None,
-        template="none",
+        title={"text": title} if title else {},
         font={"family": FONT, "size": 13},
         height=height,
         margin={"l": 70, "r": 20, "t": 60 if title else 40, "b": 50},
@@ -115,20 +107,20 @@ def _empty(
         hovermode="x unified",
         colorway=list(SERIES),
     )
-    box = {"showline": True, "linecolor": LINE, "mirror": True, "gridcolor": GRID}
+    box: dict[str, Any] = {"showline": True, "linecolor": LINE, "mirror": True, "gridcolor": GRID}
     made.update_xaxes(zeroline=False, ticks="outside", tickcolor=LINE, **box)
     made.update_yaxes(zeroline=False, ticks="outside", tickcolor=LINE, title_standoff=6, **box)
     return made
 
 
 def label_axes(
-    made: go.Figure, *, x: str, y: Sequence[str], column: int = 1, log_x: bool = False
+    made: go.PlotFigure, *, x: str, y: Sequence[str], column: int = 1, log_x: bool = False
 ) -> None:
     """Title the axes of one column; only the lowest x axis carries the title.
 
     Parameters
     ----------
-    made : plotly.graph_objects.Figure
+    made : PlotFigure
         Figure of `figure`.
     x : str
         Title of the shared x axis.
@@ -159,7 +151,7 @@ def line(
     width: float = 1.8,
     legend: bool = True,
     hover: str | None = None,
-) -> go.Scatter:
+) -> go.Node:
     """Line of one series; series of one `name` share a legend entry and hide together."""
     return go.Scatter(
         x=x,
@@ -175,7 +167,7 @@ def line(
 
 def band(
     name: str, x: ArrayLike, low: ArrayLike, high: ArrayLike, *, colour: str
-) -> tuple[go.Scatter, go.Scatter]:
+) -> tuple[go.Node, go.Node]:
     """Shaded band between two curves (its lower edge, then its upper edge with the fill).
 
     Parameters
@@ -189,7 +181,7 @@ def band(
 
     Returns
     -------
-    tuple of plotly.graph_objects.Scatter
+    tuple of Node
     """
     red, green, blue = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     edge: dict[str, Any] = {

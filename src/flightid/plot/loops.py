@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flightid.control.loops import Block, Interconnection
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.record import Record
 
@@ -17,7 +17,7 @@ LANE = 0.25
 ROW_PX, COLUMN_PX = 90, 165
 
 
-def diagram(loops: Interconnection) -> go.Figure:
+def diagram(loops: Interconnection) -> go.PlotFigure:
     """Blocks with the signals between them; feedback runs below, from right to left.
 
     Parameters
@@ -26,7 +26,7 @@ def diagram(loops: Interconnection) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Example
     -------
@@ -103,7 +103,7 @@ def _end(
 
 
 def _arrow(
-    made: go.Figure, start: tuple[float, float], end: tuple[float, float], name: str
+    made: go.PlotFigure, start: tuple[float, float], end: tuple[float, float], name: str
 ) -> None:
     tail = (start[0] + (0.5 * WIDTH if start[0] >= -0.5 else 0.0), start[1])
     head = (end[0] - 0.5 * WIDTH, end[1])
@@ -115,7 +115,7 @@ def _arrow(
 
 
 def _feedback(
-    made: go.Figure, start: tuple[float, float], end: tuple[float, float], name: str, low: float
+    made: go.PlotFigure, start: tuple[float, float], end: tuple[float, float], name: str, low: float
 ) -> None:
     """Below all blocks, from the bottom of one to the bottom of another."""
     colour = look.RIVAL
@@ -130,7 +130,7 @@ def _feedback(
 
 
 def _head(
-    made: go.Figure, tail: tuple[float, float], head: tuple[float, float], colour: str
+    made: go.PlotFigure, tail: tuple[float, float], head: tuple[float, float], colour: str
 ) -> None:
     made.add_annotation(
         x=head[0], y=head[1], ax=tail[0], ay=tail[1], xref="x", yref="y", axref="x", ayref="y",
@@ -138,7 +138,7 @@ def _head(
     )  # fmt: skip
 
 
-def _box(made: go.Figure, place: tuple[float, float], block: Block) -> None:
+def _box(made: go.PlotFigure, place: tuple[float, float], block: Block) -> None:
     x, y = place
     made.add_shape(
         type="rect", x0=x - WIDTH / 2, x1=x + WIDTH / 2, y0=y - HEIGHT / 2, y1=y + HEIGHT / 2,
@@ -159,7 +159,7 @@ def step(
     duration_s: float = 10.0,
     sample_time_s: float = 0.01,
     outputs: Sequence[str] | None = None,
-) -> go.Figure:
+) -> go.PlotFigure:
     """Answers of signals to a step from outside, limits included.
 
     Parameters
@@ -176,7 +176,7 @@ def step(
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Example
     -------

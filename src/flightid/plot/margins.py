@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from flightid.control.margins.disk_geometry import gain_limits
@@ -11,6 +10,7 @@ from flightid.control.margins.disk_margin import DiskMargin
 from flightid.control.margins.disturbance_rejection import DisturbanceRejection
 from flightid.control.margins.loop_metrics import DISTURBANCE_LEVEL_DB
 from flightid.control.margins.margins import GAIN_GUIDE_DB, PHASE_GUIDE_DEG, LoopCurve, Margins
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.uncertainty.estimate import Reading
 from flightid.uncertainty.quantiles import half_width, shown
@@ -25,7 +25,7 @@ SEEN_DEG = (-400.0, 20.0)
 NYQUIST_REACH = 2.4
 
 
-def loop_bode(margins: Margins) -> go.Figure:
+def loop_bode(margins: Margins) -> go.PlotFigure:
     """Gain and phase of a loop with 95 % bands; its margins drawn where they are taken.
 
     Parameters
@@ -34,7 +34,7 @@ def loop_bode(margins: Margins) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Example
     -------
@@ -66,7 +66,7 @@ def loop_bode(margins: Margins) -> go.Figure:
     return made
 
 
-def loop_nyquist(margins: Margins, disk: DiskMargin | None = None) -> go.Figure:
+def loop_nyquist(margins: Margins, disk: DiskMargin | None = None) -> go.PlotFigure:
     """A loop in the complex plane around −1, with the disk that it must not enter.
 
     Parameters
@@ -77,7 +77,7 @@ def loop_nyquist(margins: Margins, disk: DiskMargin | None = None) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Example
     -------
@@ -126,7 +126,7 @@ def loop_nichols(
     *,
     phase_guide_deg: float = PHASE_GUIDE_DEG,
     gain_guide_db: float = GAIN_GUIDE_DB,
-) -> go.Figure:
+) -> go.PlotFigure:
     """Gain over phase of a loop, with the zone that the guides keep free around −1.
 
     Parameters
@@ -137,7 +137,7 @@ def loop_nichols(
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Example
     -------
@@ -179,7 +179,7 @@ def loop_nichols(
     return made
 
 
-def disturbance_figure(found: DisturbanceRejection) -> go.Figure:
+def disturbance_figure(found: DisturbanceRejection) -> go.PlotFigure:
     """Response to disturbances over frequency with its 95 % band, bandwidth and peak.
 
     Parameters
@@ -188,7 +188,7 @@ def disturbance_figure(found: DisturbanceRejection) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     made = look.figure(height_px=340)
     curve = found.curve
@@ -225,7 +225,7 @@ def disturbance_figure(found: DisturbanceRejection) -> go.Figure:
     return made
 
 
-def disk_figure(found: DiskMargin) -> go.Figure:
+def disk_figure(found: DiskMargin) -> go.PlotFigure:
     """Disk margin over frequency, as the gain and the phase that all loops stand there.
 
     Parameters
@@ -234,7 +234,7 @@ def disk_figure(found: DiskMargin) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     made = look.figure(height_px=340)
     made.add_trace(look.line("α", found.omega_rad_s, found.alphas, colour=look.MODEL, legend=False))
@@ -265,7 +265,9 @@ def _curve(curve: LoopCurve, crossover: Reading) -> tuple[Array, Array, Array]:
     return omega, 20.0 * np.log10(np.abs(curve.response)), degrees
 
 
-def _add_band(made: go.Figure, omega: Array, values: Array, stderr: Array | None, row: int) -> None:
+def _add_band(
+    made: go.PlotFigure, omega: Array, values: Array, stderr: Array | None, row: int
+) -> None:
     if stderr is None:
         return
     wide = np.minimum(half_width(shown()) * np.nan_to_num(stderr, nan=WIDEST_DEG), WIDEST_DEG)
@@ -274,7 +276,7 @@ def _add_band(made: go.Figure, omega: Array, values: Array, stderr: Array | None
 
 
 def _mark(
-    made: go.Figure,
+    made: go.PlotFigure,
     margin: Reading,
     place: Reading,
     omega: Array,
@@ -320,7 +322,7 @@ def _forbidden(
     return f"modulus margin {margins.modulus_margin.text}", np.asarray(edge)
 
 
-def _nyquist_marks(made: go.Figure, margins: Margins) -> None:
+def _nyquist_marks(made: go.PlotFigure, margins: Margins) -> None:
     for margin in (margins.phase_margin,):
         if margin.value is not None:
             side = next(
@@ -369,7 +371,7 @@ def _points(
     symbol: str,
     y_error: float | None = None,
     x_error: float | None = None,
-) -> go.Scatter:
+) -> go.Node:
     errors = {
         key: {"type": "data", "array": [each]}
         for key, each in (("error_x", x_error), ("error_y", y_error))

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from flightid.dynamics.modes.result import Mode, Modes
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.uncertainty.quantiles import ellipse_radius, shown
 
@@ -25,7 +25,7 @@ MARKERS = ("x", "circle-open", "diamond-open", "square-open", "triangle-up-open"
 Points = NDArray[np.complex128]
 
 
-def pole_map(found: Modes | Mapping[str, Modes]) -> go.Figure:
+def pole_map(found: Modes | Mapping[str, Modes]) -> go.PlotFigure:
     """Draw eigenvalues in the upper half of the s plane with their 95 % regions.
 
     A complex eigenvalue has an ellipse, a real one a bar. Where slow and fast modes lie far apart
@@ -38,7 +38,7 @@ def pole_map(found: Modes | Mapping[str, Modes]) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Example
     -------
@@ -63,7 +63,7 @@ def pole_map(found: Modes | Mapping[str, Modes]) -> go.Figure:
     return made
 
 
-def _modes(made: go.Figure, name: str, modes: Iterable[Mode], number: int, column: int) -> None:
+def _modes(made: go.PlotFigure, name: str, modes: Iterable[Mode], number: int, column: int) -> None:
     colour = look.SERIES[number % len(look.SERIES)]
     for mode in modes:
         outline = _region(mode)
@@ -115,7 +115,7 @@ def _region(mode: Mode) -> Points | None:
     return np.asarray(mode.eigenvalue + x + 1j * y)
 
 
-def _frame(made: go.Figure, visible: list[Mode], column: int, words: str) -> None:
+def _frame(made: go.PlotFigure, visible: list[Mode], column: int, words: str) -> None:
     """Range of the axes, lines of equal damping, circles of equal natural frequency."""
     corners = [np.array([m.eigenvalue or 0.0]) for m in visible]
     corners += [outline for m in visible if (outline := _region(m)) is not None and len(outline)]
@@ -165,7 +165,7 @@ def _rounds(reach: float) -> list[float]:
     return [step * k for k in range(1, math.floor(reach / step) + 1)]
 
 
-def _thin(made: go.Figure, points: Points, column: int, width: float = 0.8) -> None:
+def _thin(made: go.PlotFigure, points: Points, column: int, width: float = 0.8) -> None:
     made.add_trace(
         go.Scatter(
             x=points.real,
@@ -180,7 +180,7 @@ def _thin(made: go.Figure, points: Points, column: int, width: float = 0.8) -> N
     )
 
 
-def _label(made: go.Figure, place: complex, text: str, column: int) -> None:
+def _label(made: go.PlotFigure, place: complex, text: str, column: int) -> None:
     made.add_annotation(
         x=place.real,
         y=place.imag,

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import plotly.graph_objects as go
-
 from flightid.control.closed_loop.result import ClosedLoop
 from flightid.control.tuning.result import Tuning
 from flightid.dynamics.handling_qualities.handling_qualities import HandlingQualities
 from flightid.errors import DataError
 from flightid.identification import Advice, Fit
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.autopilots import controller, replay
 from flightid.plot.consistency import consistency
@@ -41,7 +40,7 @@ from flightid.validation import ResidualSpectra, ResidualTests, Verification
 from flightid.vehicles import GainFlight
 
 
-def fit_picture(fit: Fit, *, name: str | None = None, record: int = 0) -> go.Figure:
+def fit_picture(fit: Fit, *, name: str | None = None, record: int = 0) -> go.PlotFigure:
     """Draw a fit beside its data: a response, or a record where records were fitted.
 
     Parameters
@@ -55,7 +54,7 @@ def fit_picture(fit: Fit, *, name: str | None = None, record: int = 0) -> go.Fig
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Raises
     ------
@@ -78,7 +77,7 @@ def fit_picture(fit: Fit, *, name: str | None = None, record: int = 0) -> go.Fig
     raise DataError("the fit keeps no data to draw", action="draw fid.predict(fit, records)")
 
 
-def record_history(record: Record) -> go.Figure:
+def record_history(record: Record) -> go.PlotFigure:
     """Draw every channel of a record over time, one panel each.
 
     Parameters
@@ -87,7 +86,7 @@ def record_history(record: Record) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Example
     -------
@@ -107,43 +106,43 @@ def record_history(record: Record) -> go.Figure:
     )
 
 
-def _verification(result: Verification, *, record: int = 0) -> go.Figure:
+def _verification(result: Verification, *, record: int = 0) -> go.PlotFigure:
     return prediction(result.predictions[record])
 
 
 def _residual_tests(
     result: ResidualTests, *, output: str | None = None, input: str | None = None
-) -> go.Figure:
+) -> go.PlotFigure:
     first = result.inputs[0] if result.inputs else None
     return correlations(result, output or result.outputs[0], input or first)
 
 
-def _residual_spectra(result: ResidualSpectra, *, output: str | None = None) -> go.Figure:
+def _residual_spectra(result: ResidualSpectra, *, output: str | None = None) -> go.PlotFigure:
     return residual_spectra(result, output or result.outputs[0])
 
 
-def _closed_loop(result: ClosedLoop) -> go.Figure:
+def _closed_loop(result: ClosedLoop) -> go.PlotFigure:
     return diagram(result.loops)
 
 
-def _tuning(result: Tuning, *, axis: str | None = None) -> go.Figure:
+def _tuning(result: Tuning, *, axis: str | None = None) -> go.PlotFigure:
     return time_responses(result.designs[0] if axis is None else result[axis])
 
 
-def _gain_flight(result: GainFlight, *, name: str | None = None) -> go.Figure:
+def _gain_flight(result: GainFlight, *, name: str | None = None) -> go.PlotFigure:
     if not result.loops:
         raise DataError("the flight shows no loop to draw", found=", ".join(result.lost.values()))
     return loop_bode(result.loops[name or next(iter(result.loops))])
 
 
-def _handling_qualities(result: HandlingQualities) -> go.Figure:
+def _handling_qualities(result: HandlingQualities) -> go.PlotFigure:
     on_charts = [rating for rating in result.ratings if len(rating.chart.axes) == 2]
     if not on_charts:
         raise DataError("no requirement on two numbers was rated, and others have no chart")
     return level_chart(on_charts[0])
 
 
-def _advice(result: Advice, *, name: str | None = None) -> go.Figure:
+def _advice(result: Advice, *, name: str | None = None) -> go.PlotFigure:
     if result.response is None:
         raise DataError("the records carry no impulse response to draw")
     return impulse_response(result.response, name)

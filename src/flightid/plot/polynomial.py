@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from flightid.identification import Fit, ImpulseResponse
 from flightid.identification.subspace.roots import ALL
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.uncertainty.quantiles import ellipse_radius, half_width, interval_words, shown
 from flightid.validation import OrderScan
@@ -17,7 +17,7 @@ HIGHEST = 3.0
 """Errors beyond this many times the smallest are drawn at the upper edge."""
 
 
-def order_scan(scan: OrderScan, taken: Structure | None = None) -> go.Figure:
+def order_scan(scan: OrderScan, taken: Structure | None = None) -> go.PlotFigure:
     """Draw free-run error and (of one kind) BIC of structures over their coefficients.
 
     Parameters
@@ -29,7 +29,7 @@ def order_scan(scan: OrderScan, taken: Structure | None = None) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     several = scan.is_of_several_kinds
     made = look.figure(1 if several else 2)
@@ -86,7 +86,7 @@ def order_scan(scan: OrderScan, taken: Structure | None = None) -> go.Figure:
     return made
 
 
-def pole_zero(fit: Fit, response: str | None = None) -> go.Figure:
+def pole_zero(fit: Fit, response: str | None = None) -> go.PlotFigure:
     """Draw poles and zeros in the z plane with 95 % ellipses, and the unit circle.
 
     Parameters
@@ -98,7 +98,7 @@ def pole_zero(fit: Fit, response: str | None = None) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     name = response or f"{fit.model.outputs[0]}/{fit.model.inputs[0]}"
     within = [root for root in fit.details.roots if root.response in (name, ALL)]
@@ -127,7 +127,8 @@ def pole_zero(fit: Fit, response: str | None = None) -> go.Figure:
             for z, sign in zip(_both(root.z), (1.0, -1.0), strict=False):
                 x, y = _ellipse(z, root.covariance, sign)
                 edge = look.line(f"{kind}s", x, y, colour=colour, width=1.0, legend=False)
-                made.add_trace(edge.update(legendgroup=kind, hoverinfo="skip"))
+                edge.merge({"legendgroup": kind, "hoverinfo": "skip"})
+                made.add_trace(edge)
     look.label_axes(made, x="real", y=["imaginary"])
     reach = max([1.15, *(abs(root.z) * 1.1 for root in within)])
     reach = min(reach, 3.0)
@@ -151,7 +152,7 @@ def _ellipse(
     return centre.real + x, centre.imag + sign * y
 
 
-def impulse_response(item: ImpulseResponse, name: str | None = None) -> go.Figure:
+def impulse_response(item: ImpulseResponse, name: str | None = None) -> go.PlotFigure:
     """Draw pulse and step response of one input with their 95 % bands.
 
     Parameters
@@ -163,7 +164,7 @@ def impulse_response(item: ImpulseResponse, name: str | None = None) -> go.Figur
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     place = 0 if name is None else item.inputs.index(name)
     name = item.inputs[place]

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
 
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 
 MAXIMUM_POINTS = 3000
@@ -64,7 +64,7 @@ class Panel:
     traces: tuple[Trace, ...]
 
 
-def time_histories(panels: Sequence[Panel]) -> go.Figure:
+def time_histories(panels: Sequence[Panel]) -> go.PlotFigure:
     """Draw panels below each other over one time axis.
 
     Parameters
@@ -74,7 +74,7 @@ def time_histories(panels: Sequence[Panel]) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Example
     -------

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import plotly.graph_objects as go
-
 from flightid.identification.reduction.result import Reduction, worst_percents
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 
 HEIGHT_PX = 520
@@ -12,7 +11,7 @@ FLATTENING = 10.0
 """Ratio of the highest cost to the path's from which a linear axis shows nothing of the path."""
 
 
-def reduction_path(reduction: Reduction) -> go.Figure:
+def reduction_path(reduction: Reduction) -> go.PlotFigure:
     """Draw the average cost, and the worst insensitivity and Cramér–Rao bound, by step.
 
     Parameters
@@ -22,7 +21,7 @@ def reduction_path(reduction: Reduction) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     made = look.figure(rows=2, height_px=HEIGHT_PX)
     labels = ["start", *(f"{k}  {each.name}" for k, each in enumerate(reduction.path, 1))]
@@ -81,7 +80,7 @@ def _cost_axis(stands: list, undone: list) -> dict[str, str]:  # type: ignore[ty
     return {"rangemode": "tozero"}
 
 
-def _guides(made: go.Figure, reduction: Reduction, stands: list) -> None:  # type: ignore[type-arg]
+def _guides(made: go.PlotFigure, reduction: Reduction, stands: list) -> None:  # type: ignore[type-arg]
     limits = reduction.limits
     curves = (
         ("insensitivity", 0, limits.maximum_insensitivity_percent, look.TRUTH, "solid"),

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import plotly.graph_objects as go
-
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.validation import (
     CorrelationTest,
@@ -14,7 +13,7 @@ from flightid.validation import (
 )
 
 
-def correlations(tests: ResidualTests, output: str, input: str | None = None) -> go.Figure:
+def correlations(tests: ResidualTests, output: str, input: str | None = None) -> go.PlotFigure:
     """Draw the correlation functions of one output and one input, below each other.
 
     The shaded band holds one lag in 95 % of cases; the dashed lines hold all of them.
@@ -30,7 +29,7 @@ def correlations(tests: ResidualTests, output: str, input: str | None = None) ->
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     shown = [test for test in tests.tests if test.output == output and test.input in (None, input)]
     made = look.figure(len(shown), shared_x=False)
@@ -45,7 +44,7 @@ def correlations(tests: ResidualTests, output: str, input: str | None = None) ->
     return made
 
 
-def _draw(made: go.Figure, test: CorrelationTest, row: int) -> None:
+def _draw(made: go.PlotFigure, test: CorrelationTest, row: int) -> None:
     ends = [int(test.lags[0]), int(test.lags[-1])]
     colour = look.RIVAL if test.verdict is Verdict.FAIL else look.MODEL
     band, whole = test.pointwise_band or 0.0, test.simultaneous_band or 0.0
@@ -75,7 +74,7 @@ def _draw(made: go.Figure, test: CorrelationTest, row: int) -> None:
     made.add_trace(bars, row=row, col=1)
 
 
-def residual_spectra(item: ResidualSpectra, output: str) -> go.Figure:
+def residual_spectra(item: ResidualSpectra, output: str) -> go.PlotFigure:
     """Draw the spectrum of a residual with its bounds, and its coherence with each input.
 
     Parameters
@@ -87,7 +86,7 @@ def residual_spectra(item: ResidualSpectra, output: str) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     place = item.outputs.index(output)
     made = look.figure(2)
@@ -121,7 +120,7 @@ def residual_spectra(item: ResidualSpectra, output: str) -> go.Figure:
     return made
 
 
-def spectrum_comparison(item: SpectrumComparison) -> go.Figure:
+def spectrum_comparison(item: SpectrumComparison) -> go.PlotFigure:
     """Draw measured and predicted spectra of each output, with their peaks marked.
 
     Parameters
@@ -131,7 +130,7 @@ def spectrum_comparison(item: SpectrumComparison) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     made = look.figure(len(item.outputs))
     for row, name in enumerate(item.outputs, start=1):

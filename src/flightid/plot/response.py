@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-import plotly.graph_objects as go
-
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.frequency_response import Curve, bode
 from flightid.responses import FrequencyResponse
@@ -18,7 +17,7 @@ def response_figure(
     pairs: Iterable[tuple[str, str]] | None = None,
     *,
     minimum_coherence: float = 0.6,
-) -> go.Figure:
+) -> go.PlotFigure:
     """Draw measured responses over frequency, with 95 % bands (`response_band`).
 
     Parameters
@@ -32,7 +31,7 @@ def response_figure(
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     chosen = list(pairs) if pairs is not None else leading_pairs(response)
     drawn = [response.pair(output, name) for output, name in chosen]

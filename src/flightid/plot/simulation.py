@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import plotly.graph_objects as go
-
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.record import Panel, Trace, time_histories
 from flightid.record import Record
 from flightid.units import DIMENSIONLESS
 
 
-def simulated_history(simulated: Record, measured: Record | None = None) -> go.Figure:
+def simulated_history(simulated: Record, measured: Record | None = None) -> go.PlotFigure:
     """Inputs above outputs over time; measured channels of the same names beside the outputs.
 
     Parameters
@@ -22,7 +21,7 @@ def simulated_history(simulated: Record, measured: Record | None = None) -> go.F
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     panels = [
         Panel(

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flightid.identification import OrderChoice
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 
 
-def singular_values(order: OrderChoice) -> go.Figure:
+def singular_values(order: OrderChoice) -> go.PlotFigure:
     """Draw singular values on a logarithmic axis and the order criteria below.
 
     Parameters
@@ -19,7 +19,7 @@ def singular_values(order: OrderChoice) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     made = look.figure(2)
     values = order.singular_values[: max(2 * len(order.svc), 2)]

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from flightid.control.tuning.pid_design import PidDesign
 from flightid.errors import UnknownNameError
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ WIDEST = 2.0
 """Factor by which the trade-off map goes beyond the new gains."""
 
 
-def time_responses(design: PidDesign) -> go.Figure:
+def time_responses(design: PidDesign) -> go.PlotFigure:
     """Draw steps and disturbances: the estimate, the extremes of all plants, and the flown gains.
 
     Parameters
@@ -37,7 +37,7 @@ def time_responses(design: PidDesign) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     names = [name for name in TITLES if any(each.name == name for each in design.responses)]
     columns = 2
@@ -63,7 +63,7 @@ def time_responses(design: PidDesign) -> go.Figure:
     return made
 
 
-def nichols(design: PidDesign) -> go.Figure:
+def nichols(design: PidDesign) -> go.PlotFigure:
     """Draw the loops in the Nichols plane with the zone that they must leave free.
 
     Parameters
@@ -72,7 +72,7 @@ def nichols(design: PidDesign) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     problem = design.problem
     count = min(SHOWN, len(problem.plants))
@@ -105,7 +105,7 @@ def nichols(design: PidDesign) -> go.Figure:
     return made
 
 
-def gain_map(design: PidDesign, across: str = "P", up: str = "D") -> go.Figure:
+def gain_map(design: PidDesign, across: str = "P", up: str = "D") -> go.PlotFigure:
     """Draw what two gains trade: the area that meets all requirements, and how good it is.
 
     The other gains keep their ratio to P, so that a loop keeps its shape along a ray.
@@ -118,7 +118,7 @@ def gain_map(design: PidDesign, across: str = "P", up: str = "D") -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Raises
     ------
@@ -151,7 +151,7 @@ def gain_map(design: PidDesign, across: str = "P", up: str = "D") -> go.Figure:
 
 def _map_figure(
     design: PidDesign, sides: list[Array], places: tuple[int, int], slack: Array, merit: Array
-) -> go.Figure:
+) -> go.PlotFigure:
     made = look.figure(height_px=520)
     names = [change.name for change in design.changes]
     shown = np.where(slack > -1.0, 20.0 / np.log(10.0) * (merit - merit.max()), np.nan)
@@ -160,7 +160,7 @@ def _map_figure(
         go.Contour(
             x=sides[0], y=sides[1], z=shown - top, colorscale="Greys", reversescale=True,
             contours={"coloring": "heatmap", "showlines": False}, opacity=0.6,
-            zmin=-6.0, zmax=6.0, colorbar={"title": "objective [dB]"}, name="objective",
+            zmin=-6.0, zmax=6.0, colorbar={"title": {"text": "objective [dB]"}}, name="objective",
         )
     )  # fmt: skip
     made.add_trace(
@@ -214,7 +214,7 @@ def _nichols_curve(loop: NDArray[np.complex128]) -> tuple[Array, Array]:
     return phase, 20.0 * np.log10(np.abs(loop))
 
 
-def _zone(design: PidDesign, *, legend: bool) -> go.Scatter:
+def _zone(design: PidDesign, *, legend: bool) -> go.Node:
     """Where the sensitivity would be above the limit, about the critical point."""
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     points = -1.0 + np.exp(1j * turn) / design.requirements.peak

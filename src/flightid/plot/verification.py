@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import plotly.graph_objects as go
 
 from flightid.errors import UnknownNameError
+from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.record import Panel, Trace, time_histories
 from flightid.validation import Comparison, Mismatch, Prediction
@@ -16,7 +16,7 @@ RIVALS = (look.ORANGE, look.PURPLE, look.SKY, look.YELLOW)
 Models = Mapping[str, Prediction]
 
 
-def prediction(item: Prediction) -> go.Figure:
+def prediction(item: Prediction) -> go.PlotFigure:
     """Draw the inputs, and each output as measured and as predicted.
 
     Parameters
@@ -26,12 +26,12 @@ def prediction(item: Prediction) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     return _predictions({"model": item})
 
 
-def comparison(item: Comparison, record: int = 0) -> go.Figure:
+def comparison(item: Comparison, record: int = 0) -> go.PlotFigure:
     """Draw the inputs, and each output as measured and as every model predicts it.
 
     Parameters
@@ -43,14 +43,14 @@ def comparison(item: Comparison, record: int = 0) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     return _predictions(
         {name: each.predictions[record] for name, each in item.verifications.items()}
     )
 
 
-def _predictions(models: Models) -> go.Figure:
+def _predictions(models: Models) -> go.PlotFigure:
     first = next(iter(models.values()))
     measured, inputs = first.measured, first.predicted.inputs
     time_s = measured.time_s
@@ -79,7 +79,7 @@ def _style(place: int) -> tuple[str, str]:
     return RIVALS[(place - 1) % len(RIVALS)], look.DASHES[(place + 1) % len(look.DASHES)]
 
 
-def residuals(item: Prediction) -> go.Figure:
+def residuals(item: Prediction) -> go.PlotFigure:
     """Draw measured minus predicted for each output.
 
     Parameters
@@ -89,7 +89,7 @@ def residuals(item: Prediction) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
     """
     predicted = item.predicted
     names = [name for name in predicted.channels if name not in predicted.inputs]
@@ -104,7 +104,7 @@ def residuals(item: Prediction) -> go.Figure:
     )
 
 
-def mismatch_envelopes(item: Mismatch, name: str | None = None) -> go.Figure:
+def mismatch_envelopes(item: Mismatch, name: str | None = None) -> go.PlotFigure:
     """Draw the ratio model over flight inside its envelopes.
 
     Parameters
@@ -116,7 +116,7 @@ def mismatch_envelopes(item: Mismatch, name: str | None = None) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Raises
     ------
@@ -131,7 +131,7 @@ def mismatch_envelopes(item: Mismatch, name: str | None = None) -> go.Figure:
     return _envelopes([(each, item, each) for each in drawn], styles)
 
 
-def mismatch_comparison(items: Mapping[str, Mismatch], name: str) -> go.Figure:
+def mismatch_comparison(items: Mapping[str, Mismatch], name: str) -> go.PlotFigure:
     """Draw one pair's ratio model over flight for several models inside the envelopes.
 
     Parameters
@@ -143,7 +143,7 @@ def mismatch_comparison(items: Mapping[str, Mismatch], name: str) -> go.Figure:
 
     Returns
     -------
-    plotly.graph_objects.Figure
+    PlotFigure
 
     Raises
     ------
@@ -156,7 +156,7 @@ def mismatch_comparison(items: Mapping[str, Mismatch], name: str) -> go.Figure:
 
 def _envelopes(
     drawn: Sequence[tuple[str, Mismatch, str]], styles: Sequence[tuple[str, str]]
-) -> go.Figure:
+) -> go.PlotFigure:
     """Ratios by label, where coherence carries a judgement of them."""
     bounds = drawn[0][1].envelopes
     made = look.figure(2)

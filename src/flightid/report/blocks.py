@@ -12,7 +12,7 @@ from flightid.result import Result
 from flightid.table import Cell, Table
 from flightid.version import VERSION
 
-LIBRARIES = ("numpy", "scipy", "h5py", "plotly")
+LIBRARIES = ("numpy", "scipy", "h5py")
 
 
 def result_blocks(result: Result, *, title: str = "", folded: bool = False) -> tuple[Block, ...]:

@@ -1,9 +1,8 @@
-"""A Plotly figure as plain values for the content tree, small enough to embed."""
+"""A figure as plain values for the content tree, small enough to embed."""
 
 from __future__ import annotations
 
 import base64
-import json
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,23 +10,23 @@ import numpy as np
 from flightid.report.content import Figure
 
 if TYPE_CHECKING:
-    import plotly.graph_objects as go
+    from flightid.plot import graph_objects as go
 
 SINGLE_LIMIT = 3e38
 """Just inside the range of single precision."""
 
 
-def figure_block(figure: go.Figure, caption: str) -> Figure:
+def figure_block(figure: go.PlotFigure, caption: str) -> Figure:
     """Take a picture into the content tree.
 
     Parameters
     ----------
-    figure : plotly.graph_objects.Figure
+    figure : flightid.plot.graph_objects.PlotFigure
         Picture; its samples are kept in single precision, which no screen can tell from double.
     caption : str
         What to see in it.
     """
-    return Figure(_in_single_precision(json.loads(figure.to_json())), caption)
+    return Figure(_in_single_precision(figure.to_dict()), caption)
 
 
 def _in_single_precision(node: Any) -> Any:  # noqa: ANN401 — any JSON value

@@ -17,8 +17,8 @@ from typing import Any
 
 import jinja2
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
+from flightid.plot.graph_objects import plotting_library
 from flightid.report.content import Document, Figure
 from flightid.report.json import to_dict
 from flightid.table import Column, Table
@@ -49,7 +49,7 @@ def to_html(document: Document, *, packed: bool = True) -> str:
     numbers = _Numbering()
     sections = [numbers.section(section) for section in tree["sections"]]
     has_plots = any(isinstance(block, Figure) for block in document.walk())
-    library = get_plotlyjs() if has_plots else ""
+    library = plotting_library() if has_plots else ""
     script = _resource("page.js")
     hashes = [_script_hash(text) for text in ([script, library] if has_plots else [script])]
     return (
