@@ -109,3 +109,26 @@ def test_quiet_gyros_get_faster_filters_and_noisy_ones_slower_within_ranges_and_
     assert hopeless.values["INS_GYRO_FILTER"] == 10.0
     fixed = choose_filters(loops, spectra, at, dict.fromkeys(axes, flown), step_limit=1.0)
     assert fixed.changes == (), "no step is allowed"
+
+
+def test_gains_are_tuned_with_the_new_filter_around_a_plant_that_holds_the_old_one() -> None:
+    plant = fid.load_model("rate_integrator", axis="roll").with_values(
+        {"Ltphi": 140.0, "tau": 0.03}
+    )
+    flown = fid.axis_loop("arducopter", "roll", loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
+    loop = flown.with_filters({"INS_GYRO_FILTER": 40.0})
+    design = fid.tune_pid(
+        plant, gains=loop, band_rad_s=(1.0, 100.0), nominal=True, angle_loop=False,
+        requirements=fid.TuningRequirements(noise_growth=None),
+    )  # fmt: skip
+    found = design.worst_case("rate loop", "phase margin").nominal
+    omega = np.geomspace(1.0, 200.0, 4000)
+    # Twice the cut-off, around a plant whose delay holds the old one.
+    faster = design.loop.gyro_response(omega) / flown.gyro_response(omega)
+    control = replace(design.loop, plant_gyro=None).feedback(
+        omega, gyro="filtered", with_hold=False
+    )
+    whole = control * faster * plant.frequency_response(omega)[0, 0]
+    cross = int(np.flatnonzero(np.abs(whole) >= 1.0)[-1])
+    phase = 180.0 + np.degrees(np.unwrap(np.angle(whole)))[cross]
+    assert_close(found, phase, atol=0.5, why="old filter out, new filter in")

@@ -28,6 +28,8 @@ PID_TERMS = ("P", "I", "D", "FF", "DFF")
 BUTTERWORTH = float(np.sqrt(0.5))
 Stream = tuple[Signal, Signal, NDArray[np.float64]]
 """Output and rate of an axis, and the integrator's part of the output."""
+LOWEST_RAD_S, BELOW_NYQUIST = 0.5, 0.95
+"""Where margins are looked for: a sampled controller has no crossing above half of its rate."""
 PAST_S = 0.08
 """Longer than the delays and most of the lag of a vehicle's motors."""
 SLOWEST_HZ = 40.0
@@ -147,7 +149,8 @@ def template(axis: str, gyro_filter_hz: float) -> TransferFunctionModel:
 
 def _margins(fit: Fit, loop: AxisLoop) -> Margins:
     """Of the rate loop around a model from output to filtered rate, which holds the hold."""
-    return margins(fit, controller=_controller(loop))
+    band = (LOWEST_RAD_S, BELOW_NYQUIST * np.pi * loop.loop_rate_hz)
+    return margins(fit, controller=_controller(loop), band_rad_s=band)
 
 
 def _controller(loop: AxisLoop) -> Callable[[Complex], Complex]:
