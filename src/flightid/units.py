@@ -50,6 +50,8 @@ SPELLINGS = {
     "psf": "lbf/ft^2",
 }
 """Spellings of logs and test reports that pint does not read, or reads as something else."""
+LONGEST = 100
+"""Letters of a unit; what is longer is none."""
 DIGIT_POWER = re.compile(r"(?<![A-Za-z_0-9])(s|sec|m|ft|in|kg|rad|deg|slug)([2-4])(?![A-Za-z_0-9])")
 """A power without its sign, as in ``ft/s2``."""
 
@@ -71,11 +73,13 @@ def _parse(unit: str) -> pint.Unit:
     if text in ("", "1", "-"):
         return _registry().dimensionless
     try:
+        if len(text) > LONGEST:  # pint takes the square of its length to read it
+            raise ValueError(f"a unit of {len(text)} letters")
         return _registry().parse_units(text)
     except Exception as error:
         raise UnitError(
             "unit is not known",
-            found=repr(unit),
+            found=repr(unit[:LONGEST]),
             needed="a unit such as 'rad/s', 'deg', 'ft/s^2', 'm/s', 'V' or '1'",
             action="correct the spelling, or declare '1' for a number without unit",
         ) from error
