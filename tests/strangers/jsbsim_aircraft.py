@@ -6,6 +6,7 @@ where they act. No cases where JSBSim is not installed.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -33,6 +34,7 @@ SURFACES = {
     "dr": ("fcs/rudder-pos-rad", "fcs/rudder-cmd-norm"),
 }
 """Where each surface is read, and commanded."""
+SWEEPS_S = 120.0
 SPEED = "velocities/vt-fps"
 """Trimmed ailerons hold the propeller's torque: what speed is lost moves the bank."""
 UNITS = {
@@ -101,7 +103,20 @@ def slopes() -> dict[tuple[str, str], float]:
     return found
 
 
-def _commands() -> Array:
+def _sweeps() -> Array:
+    """A sweep of the ailerons, then one of the rudder, 0.3 to 12 rad/s; quiet between and after."""
+    n = round(SWEEPS_S / STEP_S)
+    t, u = np.arange(n) * STEP_S, np.zeros((2, n))
+    half, low, high = SWEEPS_S / 2.0, 0.3, 12.0
+    rate = np.log(high / low) / (half - 6.0)
+    for row in (0, 1):
+        at = np.clip(t - row * half - 1.0, 0.0, half - 6.0)
+        fade = np.minimum(1.0, np.minimum(at, half - 6.0 - at))
+        u[row] = 0.04 * fade * np.sin(low * (np.exp(rate * at) - 1.0) / rate)
+    return u
+
+
+def _doublets() -> Array:
     """Doublets of ailerons and rudder, share of full, at the samples; straight lines between."""
     n = round(20.0 / STEP_S)
     t, u = np.arange(n) * STEP_S, np.zeros((2, n))
@@ -114,9 +129,9 @@ def _commands() -> Array:
 
 
 @lru_cache
-def flown() -> tuple[Array, Array]:
+def flown(commands: Callable[[], Array] = _doublets) -> tuple[Array, Array]:
     """Surfaces with airspeed, and states, of one run from trim, departures, without noise."""
-    asked = _commands()
+    asked = commands()
     n = asked.shape[1]
     fine = np.arange(n * FINE) / FINE
     asked = np.array([np.interp(fine, np.arange(n), row) for row in asked])
@@ -136,9 +151,9 @@ def flown() -> tuple[Array, Array]:
     return u - rest[:3], y - rest[3:]
 
 
-def record(seed: int) -> fid.Record:
+def record(seed: int, commands: Callable[[], Array] = _doublets) -> fid.Record:
     """A run with white noise on its sensors."""
-    u, y = flown()
+    u, y = flown(commands)
     random = np.random.default_rng(seed)
     n = u.shape[1]
     return fid.Record.from_arrays(
@@ -153,10 +168,10 @@ def record(seed: int) -> fid.Record:
     )
 
 
-def model() -> fid.StateSpaceModel:
+def model(*, airspeed: bool = True) -> fid.StateSpaceModel:
     """Lateral motion; kinematics, side force and small cross-controls are known.
 
-    What airspeed does is fitted: the propeller's torque settles with it.
+    What `airspeed` does is fitted: the propeller's torque settles with it.
     """
     at = slopes()
     units = {"da": "1/s^2", "dr": "1/s^2", "beta": "1/s^2", "p": "1/s", "r": "1/s"}
@@ -166,16 +181,20 @@ def model() -> fid.StateSpaceModel:
     fixed = [
         fid.Parameter(n, at[place], plain.get(n, "1/s"), free=n in ("Lv", "Nv"))
         for n, place in KNOWN.items()
+        if airspeed or place[1] != "V"
     ]
+    inputs, roll, yaw = (*SURFACES, "V"), " + Lv*V", " + Nv*V"
+    if not airspeed:
+        inputs, roll, yaw = tuple(SURFACES), "", ""
     states = {name: UNITS[name] for name in STATES}
     return fid.StateSpaceModel(
         states=states,
-        input_units={name: UNITS[name] for name in (*SURFACES, "V")},
+        input_units={name: UNITS[name] for name in inputs},
         equations={
             "beta'": "Yb*beta + Yp*p + Yphi*phi + Yr*r + Yda*da + Ydr*dr",
-            "p'": "Lb*beta + Lp*p + Lr*r + Lda*da + Ldr*dr + Lv*V",
+            "p'": "Lb*beta + Lp*p + Lr*r + Lda*da + Ldr*dr" + roll,
             "phi'": "p + Tr*r",
-            "r'": "Nb*beta + Np*p + Nr*r + Nda*da + Ndr*dr + Nv*V",
+            "r'": "Nb*beta + Np*p + Nr*r + Nda*da + Ndr*dr" + yaw,
         },
         measurements={name: fid.Output(name, unit) for name, unit in states.items()},
         parameters=fid.Parameters((*free, *fixed)),
@@ -197,4 +216,27 @@ def fly(seed: int) -> Trial:
     )
 
 
-CASES = (Case("JSBSim c172x, doublets, output error", fly),) if find_spec("jsbsim") else ()
+def fly_sweeps(seed: int) -> Trial:
+    """Fit to the responses of all states to both surfaces, all options at their defaults.
+
+    Airspeed is no input that a sweep moves: it is left out, as the refusal of its responses says.
+    """
+    truth = {name: slopes()[at] for name, at in NAMES.items()}
+    swept = record(seed, _sweeps)
+    return fit_trial(
+        lambda: fid.identify(
+            model(airspeed=False),
+            fid.estimate_response(swept, inputs=tuple(SURFACES), loop="open"),
+        ),
+        truth,
+    )
+
+
+CASES = (
+    (
+        Case("JSBSim c172x, doublets, output error", fly),
+        Case("JSBSim c172x, sweeps, response", fly_sweeps),
+    )
+    if find_spec("jsbsim")
+    else ()
+)
