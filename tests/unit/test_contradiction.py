@@ -10,6 +10,7 @@ from scipy.signal import lfilter
 
 import flightid as fid
 from flightid.conventions import Light
+from flightid.identification.withheld_intervals import without_intervals
 from flightid.validation.verification.contradiction import CODE
 
 TIME_S = np.arange(800) / 20.0
@@ -42,6 +43,13 @@ def test_a_record_beyond_the_bars_is_not_green(
     for source in (fit, fid.load_model(tmp_path / "model.toml")):
         found = [each.light for each in fid.verify(source, told).findings if each.code == CODE]
         assert found == ([] if light is None else [light])
+
+
+def test_nothing_is_said_of_intervals_that_there_are_not() -> None:
+    bare = without_intervals(fid.identify(STRUCTURES[0], flown(1, 1.0)), "withheld")
+    (found,) = (each for each in fid.verify(bare, flown(2, 2.5)).findings if each.code == CODE)
+    assert found.light is Light.AMBER
+    assert "intervals of this model do not hold" not in found.message
 
 
 def test_bars_of_the_parameters_allow_for_what_the_fit_could_not_tell() -> None:

@@ -88,19 +88,23 @@ def _judged(
     size, own = float(np.mean(error**2)), float(left["rms"]) ** 2
     if not _is_beyond(size, own, power):
         return None
-    own += _by_parameters(source, way, run, request, name)
+    known = _by_parameters(source, way, run, request, name)
+    own += known or 0.0
     freedom = (independent_samples([error]), float(left["independent_samples"]))
     chance = float(scipy.stats.f.sf(size / max(own, np.finfo(float).tiny), *freedom))
     if not _is_beyond(size, own, power) or chance > FALSE_ALARMS:
         return None
     share = (size - own) / power
     times = np.sqrt(size / own) if own > 0.0 else np.inf
+    allowed = "and its intervals allow" if known is not None else "left of its own records"
+    told = "intervals of this model do not hold here"
+    if known is None:
+        told = "it has no intervals, and knows less than this record asks"
     return Finding(
         CODE,
-        Light.RED if share > GROSS else Light.AMBER,
+        Light.RED if share > GROSS and known is not None else Light.AMBER,
         f"{run.measured.name}: {name} errs by {np.sqrt(size):.3g}, {times:.2g} times what the fit "
-        f"and its intervals allow ({100 * np.sqrt(share):.2g} % of its motion, p = {chance:.1g}): "
-        "intervals of this model do not hold here",
+        f"{allowed} ({100 * np.sqrt(share):.2g} % of its motion, p = {chance:.1g}): {told}",
         "fit the records together (one may excite what the other does not), or find what changed "
         "between them: operating point, gain, load",
     )
@@ -112,16 +116,16 @@ def _is_beyond(size: float, allowed: float, power: float) -> bool:
 
 def _by_parameters(
     source: object, way: Predictor, run: Prediction, request: Request, name: str
-) -> float:
-    """Mean square of what errors of the parameters move in this run; zero where none are known."""
+) -> float | None:
+    """Mean square of what errors of the parameters move in this run; None where none are known."""
     try:
         answer = partial(_answer, source, way, run, request, name)
         ends = uncertain_of(source).steps(STEP)
         moved = [answer(model_of(up)) - answer(model_of(down)) for up, down in ends]
     except FlightidError:
-        return 0.0
+        return None
     size = [float(np.mean(np.square(each))) for each in moved]
-    return float(np.nansum(size)) / (2.0 * STEP) ** 2
+    return float(np.nansum(size)) / (2.0 * STEP) ** 2 if size else None
 
 
 def _answer(
