@@ -11,7 +11,7 @@ from flightid.plot import graph_objects as go
 from flightid.plot import look
 
 Array = NDArray[np.float64]
-SHOWN = 40
+SHOWN = 16
 TITLES = {
     "rate step": ("rate, its set-point 1", "rad/s"),
     "angle step": ("angle, its set-point 1", "rad"),

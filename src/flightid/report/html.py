@@ -20,11 +20,14 @@ from markupsafe import Markup
 
 from flightid.plot.graph_objects import plotting_library
 from flightid.report.content import Document, Figure
+from flightid.report.glossary import GLOSSARY
 from flightid.report.json import to_dict
 from flightid.table import Column, Table
 from flightid.version import VERSION
 
 DEFAULT_HEIGHT_PX = 420
+LONG_PAYLOAD = 8192
+"""Letters of a plot above which it is compressed."""
 LONG_CELL = 20
 """Letters of a cell above which its column keeps its width and the table scrolls instead."""
 _VALUE = Column("value", digits=6)
@@ -38,7 +41,8 @@ def to_html(document: Document, *, packed: bool = True) -> str:
     document : Document
         What to say.
     packed : bool
-        Compress the plotting library (2 MB instead of 5 MB; browsers since 2023 unpack it).
+        Compress plots and the plotting library (2 MB instead of 5 MB and more; browsers since 2023
+        unpack them).
 
     Returns
     -------
@@ -46,7 +50,7 @@ def to_html(document: Document, *, packed: bool = True) -> str:
         The whole page.
     """
     tree = to_dict(document)
-    numbers = _Numbering()
+    numbers = _Numbering(packed)
     sections = [numbers.section(section) for section in tree["sections"]]
     has_plots = any(isinstance(block, Figure) for block in document.walk())
     library = plotting_library() if has_plots else ""
@@ -72,7 +76,8 @@ def to_html(document: Document, *, packed: bool = True) -> str:
 class _Numbering:
     """Adds to plain values what the template needs: identifiers, shown cells, plot payloads."""
 
-    def __init__(self) -> None:
+    def __init__(self, packed: bool) -> None:
+        self._packed = packed
         self._sections = 0
         self._plots = 0
 
@@ -95,11 +100,14 @@ class _Numbering:
             case "figure":
                 self._plots += 1
                 spec = values["spec"]
+                text = _script_json(spec)
+                small = self._packed and len(text) > LONG_PAYLOAD
                 return {
                     **values,
                     "id": f"plot-{self._plots}",
                     "height": int(spec.get("layout", {}).get("height") or DEFAULT_HEIGHT_PX),
-                    "payload": Markup(_script_json(spec)),
+                    "packed": "gzip" if small else "no",
+                    "payload": Markup(_gzipped(text) if small else text),
                 }
         return values
 
@@ -112,7 +120,12 @@ def _shown_table(values: dict[str, Any]) -> dict[str, Any]:
     table = Table(values["title"], columns, tuple(map(tuple, values["rows"])))
     kinds = [_kind(table, index) for index in range(len(columns))]
     headings = [
-        {"name": column.name, "unit": column.unit, "kind": kind}
+        {
+            "name": column.name,
+            "unit": column.unit,
+            "kind": kind,
+            "meaning": GLOSSARY.get(column.name, ""),
+        }
         for column, kind in zip(columns, kinds, strict=True)
     ]
     return {"columns": headings, "rows": table.shown()}
@@ -130,6 +143,10 @@ def _script_hash(text: str) -> str:
 
 @cache
 def _packed(text: str) -> str:
+    return _gzipped(text)
+
+
+def _gzipped(text: str) -> str:
     return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
 
 

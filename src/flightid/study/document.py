@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -136,9 +136,17 @@ def parameter_table(study: StudyResults) -> Table:
         row += [low, high]
         if beside:
             row += [true_value, _inside(parameter, true_value)]
-        rows.append(tuple(row))
+        rows.append((*row, _meaning(item, parameter.name)))
+    columns.append(Column("meaning"))
     notes = () if study.truth is None else ("Truth: what the simulated vehicle obeys at hover.",)
-    return Table("Parameters", tuple(columns), tuple(rows), notes)
+    return Table("Parameters", tuple(columns), tuple(rows), notes).without_empty_columns()
+
+
+def _meaning(item: ModelResults, name: str) -> str:
+    """What a parameter is, in the words of its model."""
+    known = getattr(None if item.fit is None else item.fit.model, "parameters", {})
+    found = known.get(name) if isinstance(known, Mapping) else None
+    return getattr(found, "note", "") or ""
 
 
 def _beside(study: StudyResults) -> str:

@@ -7,15 +7,18 @@
   const drawn = new Set();
   let library = null;
 
-  // The library is stored as gzip in base64; the page's content policy knows its hash.
+  // Long texts are stored as gzip in base64.
+  async function text(holder) {
+    if (holder.dataset.packed !== "gzip") return holder.textContent;
+    const bytes = Uint8Array.from(atob(holder.textContent), (letter) => letter.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return new Response(stream).text();
+  }
+
+  // The page's content policy knows the hash of the library.
   async function unpack() {
     const holder = document.getElementById("library");
-    let source = holder.textContent;
-    if (holder.dataset.packed === "gzip") {
-      const bytes = Uint8Array.from(atob(source), (letter) => letter.charCodeAt(0));
-      const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-      source = await new Response(stream).text();
-    }
+    const source = await text(holder);
     holder.remove();
     const element = document.createElement("script");
     element.textContent = source;
@@ -32,7 +35,7 @@
 
   async function draw(place) {
     const holder = document.querySelector(`script[data-plot="${place.id}"]`);
-    const spec = JSON.parse(recolour(holder.textContent));
+    const spec = JSON.parse(recolour(await text(holder)));
     const style = getComputedStyle(root);
     spec.layout.font = { ...spec.layout.font, color: style.getPropertyValue("--ink").trim() };
     spec.layout.hoverlabel = {
