@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -46,6 +48,22 @@ def test_phase_margin_of_integrator_and_delay(margin_deg: float) -> None:
     exact = np.radians(90.0 - (1 + HEADROOM) * margin_deg) / DELAY_S / GAIN
     assert found.binding == ("rate loop: phase margin",)
     assert_close(found.gains[0], exact, rtol=5e-4, why="grid of the loop")
+
+
+def test_noise_and_the_ratio_of_the_autopilot_bound_gains_of_integrator_and_delay() -> None:
+    free = _one(("P", "I"), **{**LOOSE, "phase_margin_deg": 30.0})
+    best = _solve(free)
+    noise = float(free.judge(best.gains[None]).noise.max())
+    quiet = _solve(replace(free, noise_limit=0.5 * noise))
+    assert "output noise" in quiet.binding
+    assert quiet.gains[0] < 0.9 * best.gains[0]
+    slow = _solve(replace(free, integral_ratio=0.5 * best.gains[1] / best.gains[0]))
+    assert_close(
+        slow.gains[1] / slow.gains[0], 0.5 * best.gains[1] / best.gains[0], rtol=1e-3, why="bound"
+    )
+    loop = axis_loop("arducopter", "roll", loop_rate_hz=400.0)
+    ratios = [ControllerPaths(loop, "raw", False).integral_ratio(each) for each in (1.0, 3.0, None)]
+    assert ratios == [1.0, 3.0, np.inf], "ArduCopter's defaults have I = P"
 
 
 @pytest.mark.parametrize("margin_db", [6.0, 10.0])

@@ -164,6 +164,14 @@ def study_settings(folder: Path, text: str) -> Settings:
     return read_settings(folder / "study.toml")
 
 
+def test_a_pattern_stands_for_all_files_that_match(folder: Path) -> None:
+    (folder / "a2.csv").touch()
+    (record,) = study_settings(folder, STUDY.replace('"a.csv"', '"a*.csv"')).record_files
+    assert [path.name for path in record.paths] == ["a.csv", "a2.csv"]
+    with pytest.raises(fid.errors.StudyError, match="path matches no file"):
+        study_settings(folder, STUDY.replace('"a.csv"', '"z*.csv"'))
+
+
 @pytest.mark.nightly
 @pytest.mark.usefixtures("no_report")
 def test_one_record_may_stand_for_several_files(folder: Path) -> None:
@@ -173,8 +181,6 @@ def test_one_record_may_stand_for_several_files(folder: Path) -> None:
     assert list(made.records) == ["a: a", "a: a2"]
     assert len(made.identified[0].fit.records) == 2
     assert {"a.csv", "a2.csv"} <= set(made.files)
-    with pytest.raises(fid.errors.StudyError, match="path matches no file"):
-        study_settings(folder, STUDY.replace('"a.csv"', '"z*.csv"'))
 
 
 @pytest.mark.usefixtures("no_report")

@@ -140,6 +140,12 @@ def test_a_change_runs_what_lies_behind_it(
     assert set(found.carried_out) == rerun | beside
 
 
+def test_a_path_in_settings_stands_for_the_content_of_its_file(tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    digests = {digest(file) for text in ("a", "b", "a") if file.write_text(text, encoding="utf-8")}
+    assert len(digests) == 2
+
+
 @pytest.mark.nightly
 def test_a_changed_file_is_read_again(folder: Path, cache: dict[str, Any]) -> None:
     own = folder / "own.toml"
