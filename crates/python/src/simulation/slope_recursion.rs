@@ -7,6 +7,14 @@ use pyo3::prelude::*;
 
 use crate::error::from_core;
 
+fn rows(of: &PyReadonlyArray2<'_, f64>) -> Vec<f64> {
+    of.as_array().iter().copied().collect()
+}
+
+fn blocks(of: &PyReadonlyArray3<'_, f64>) -> Vec<f64> {
+    of.as_array().iter().copied().collect()
+}
+
 /// slope_recursion(transition: NDArray[np.float64], output: NDArray[np.float64], forced: NDArray[np.float64], direct: NDArray[np.float64], signals: NDArray[np.float64]) -> NDArray[np.float64]
 ///
 /// (n_samples, p, n_unknowns) of δe = G s − C δx, δx⁺ = A δx + F s: F (n_unknowns, n, q),
@@ -22,15 +30,18 @@ fn slope_recursion<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f64>>> {
     let ((p, n), (q, n_samples)) = (output.as_array().dim(), signals.as_array().dim());
     let count = forced.as_array().dim().0;
+    // Any order of memory: transposed signals are common here.
+    let (transition, output, signals) = (rows(&transition), rows(&output), rows(&signals));
+    let (forced, direct) = (blocks(&forced), blocks(&direct));
     let of = Slopes {
-        transition: transition.as_slice()?,
-        output: output.as_slice()?,
-        forced: forced.as_slice()?,
-        direct: direct.as_slice()?,
+        transition: &transition,
+        output: &output,
+        forced: &forced,
+        direct: &direct,
         sizes: [n, p, q],
         count,
     };
-    let given = signals.as_slice()?;
+    let given = &signals;
     let found = py.detach(|| slopes(of, given, n_samples)).map_err(from_core)?;
     found.into_pyarray(py).reshape([n_samples, p, count])
 }

@@ -360,7 +360,7 @@ def _slopes(
     forced[: len(moved), :, n + p :] = moved[:, :n] - found.gain @ moved[:, n:]
     direct[: len(moved), :, n + p :] = -moved[:, n:]
     return _native.slope_recursion(
-        np.ascontiguousarray(found.closed),
+        found.closed,
         whitener @ found.c,
         forced,
         whitener @ direct,

@@ -88,11 +88,28 @@ class SubspaceData:
             return tuple(np.zeros((0, 0)) for _ in range(3))  # type: ignore[return-value]
         return np.hstack(past), np.hstack(now), np.hstack(driven)
 
-    def hankel(self, record: int, blocks: int) -> tuple[Array, Array]:
-        """Block Hankel matrices of inputs and outputs, what is constant in a record taken out."""
-        signals = self.inputs[record], self.outputs[record]
-        u, y = (self._about(_hankel(rows, blocks)) for rows in signals)
-        return u, y
+    def hankel_factor(self, blocks: int, rows: NDArray[np.int64]) -> Array:
+        """Triangular factor R of the block Hankel matrices of all records, folded bit by bit.
+
+        Parameters
+        ----------
+        blocks : int
+        rows : ndarray of int
+            Rows in the order of the factor, of u then y at one time, time by time. What is
+            constant in a record is taken out.
+        """
+        triangle: Array = np.zeros((0, len(rows)))
+        for y, u in zip(self.outputs, self.inputs, strict=True):
+            joint, columns = np.vstack([u, y]), y.shape[1] - blocks + 1
+            means = np.zeros((blocks * len(joint), 1))
+            if self.channels.levels and columns > 0:
+                spans = [joint[:, first : first + columns] for first in range(blocks)]
+                means = np.concatenate([span.mean(axis=1, keepdims=True) for span in spans])
+            for first in range(0, columns, BLOCK):
+                part = joint[:, first : min(first + BLOCK, columns) + blocks - 1]
+                some = (_hankel(part, blocks) - means)[rows]
+                triangle = np.asarray(np.linalg.qr(np.vstack([triangle, some.T]), mode="r"))
+        return triangle
 
     def _about(self, rows: Array) -> Array:
         return rows - rows.mean(axis=1, keepdims=True) if self.channels.levels else rows
@@ -151,12 +168,11 @@ def acts_at_once(data: SubspaceData, horizon: int) -> bool:
 
     Reference: Schwarz (1978), Estimating the dimension of a model, *Annals of Statistics* 6.
     """
-    past, now, driven = data.lagged(horizon)
-    p, m, samples = data.n_outputs, data.n_inputs, now.shape[1] if now.size else 0
-    if samples <= len(past) + m + p:
+    p, m = data.n_outputs, data.n_inputs
+    first, samples = horizon * (m + p), sum(max(y.shape[1] - horizon, 0) for y in data.outputs)
+    if samples <= first + m + p:
         return False
-    triangle = np.asarray(np.linalg.qr(np.vstack([past, driven, now]).T, mode="r"))
-    first = len(past)
+    triangle = data.hankel_factor(horizon + 1, np.arange(first + m + p))
     late, prompt = triangle[first:, first + m :], triangle[first + m :, first + m :]
     levels = [np.linalg.slogdet(each.T @ each / samples)[1] for each in (late, prompt)]
     if not np.isfinite(levels[0]) or levels[0] < -ROUNDING * p:
@@ -254,16 +270,9 @@ def compress(data: SubspaceData, horizon: int) -> RowSpaceFactor:
             needed=f"at least {needed}",
             action="give longer records, a shorter horizon or a smaller maximum_order",
         )
-    triangle: Array = np.zeros((0, needed))
-    for record, y in enumerate(data.outputs):
-        if y.shape[1] < 2 * horizon:
-            continue
-        inputs, outputs = data.hankel(record, 2 * horizon)
-        split = horizon * m
-        for start in range(0, inputs.shape[1], BLOCK):
-            part = slice(start, start + BLOCK)
-            rows = np.vstack([inputs[split:, part], inputs[:split, part], outputs[:, part]])
-            triangle = np.asarray(np.linalg.qr(np.vstack([triangle, rows.T]), mode="r"))
+    places = np.arange(2 * horizon * (m + p)).reshape(2 * horizon, m + p)
+    ordered = places[horizon:, :m], places[:horizon, :m], places[:, m:]
+    triangle = data.hankel_factor(2 * horizon, np.concatenate([each.ravel() for each in ordered]))
     excited = np.linalg.svd(triangle[: 2 * horizon * m, : 2 * horizon * m], compute_uv=False)
     if excited[-1] < POOR * excited[0]:
         order = int(np.sum(excited > POOR * excited[0]))

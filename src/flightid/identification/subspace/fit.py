@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -22,6 +23,7 @@ from flightid.identification.prediction_error.roots import Errors
 from flightid.identification.prediction_error.sampling_rate import sampling_findings
 from flightid.identification.subspace.data import SubspaceData, acts_at_once, gather
 from flightid.identification.subspace.details import SubspaceDetails
+from flightid.identification.subspace.determinant import log_determinant
 from flightid.identification.subspace.estimate import Matrices, decompose, realise
 from flightid.identification.subspace.findings import judge_innovations
 from flightid.identification.subspace.order import OrderChoice, choose_order, determinant_criteria
@@ -29,7 +31,6 @@ from flightid.identification.subspace.prediction_errors import (
     Predictor,
     RefinementResult,
     refine,
-    spare_states,
     whitener,
 )
 from flightid.identification.subspace.roots import (
@@ -69,21 +70,61 @@ def fit_subspace(structure: SubspaceStructure, data: Record | Sequence[Record]) 
             numbers = 2 * len(structure.outputs) + len(structure.inputs)
             for order in sorted({min(fewer), choice.chosen - 1}):
                 less = realise(structure, gathered, decomposed, order)
-                lower = _refined(structure, gathered, less)
-                spare = spare or spare_states(lower, found, numbers)
+                limit = _spared_level(found, order, numbers)
+                lower = _refined(structure, gathered, less, enough=limit)
+                if spare := _spare_states(lower, found, numbers):
+                    break
     else:
         found = _unrefined(structure, gathered, _scaled(start, 1.0 / size))
     return _assemble(structure, records, gathered, choice, found, spare)
 
 
-def _refined(structure: SubspaceStructure, data: SubspaceData, start: Matrices) -> RefinementResult:
+def _refined(
+    structure: SubspaceStructure,
+    data: SubspaceData,
+    start: Matrices,
+    *,
+    enough: float | None = None,
+) -> RefinementResult:
     return refine(
         data,
         _scaled(start, 1.0 / data.scales),
         direct=bool(structure.direct),
         initial_state=structure.initial_state,
         maximum_iterations=structure.maximum_iterations,
+        enough=enough,
     )
+
+
+def _spared_level(found: RefinementResult, fewer: int, numbers: int) -> float:
+    """Log determinant below which so many states do as well, by the Bayesian criterion.
+
+    Parameters
+    ----------
+    found : RefinementResult
+        With the states that were asked.
+    fewer : int
+        States.
+    numbers : int
+        Parameters that a state brings.
+
+    Reference
+    ---------
+    Schwarz (1978), Estimating the dimension of a model, *Annals of Statistics* 6.
+    """
+    samples = sum(each.shape[1] for each in found.errors)
+    saved = (found.matrices[0].shape[0] - fewer) * numbers
+    penalty: float = saved * math.log(samples) / samples
+    return log_determinant(found.errors) + penalty
+
+
+def _spare_states(lower: RefinementResult, found: RefinementResult, numbers: int) -> str:
+    """Why fewer states do as well, by `_spared_level`; else empty."""
+    order, fewer = (each.matrices[0].shape[0] for each in (found, lower))
+    level, limit = log_determinant(lower.errors), _spared_level(found, fewer, numbers)
+    if not (np.isfinite(level - limit) and level < limit):
+        return ""
+    return f"{fewer} states foretell the outputs as well as {order}"
 
 
 def _scaled(matrices: Matrices, size: Array) -> Matrices:

@@ -6,10 +6,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from flightid.errors import FitError
+from flightid import _native
+from flightid.errors import DataError, FitError
 from flightid.identification.subspace.data import SubspaceData
-from flightid.models.innovations.prediction import free_motion
-from flightid.models.sampled.recursion import run_recursion, spectral_radius
+from flightid.models.sampled.recursion import spectral_radius
 
 Array = NDArray[np.float64]
 STABLE = 1.0 - 1e-6
@@ -17,6 +17,8 @@ INSIDE = 1.0 - 1e-3
 """Size of a pole that was at the circle."""
 NOISELESS = 1e-16
 """Innovations with less than this share of the outputs' power are rounding."""
+ROWS = 20_000
+"""Rows that are folded into a triangular factor at a time."""
 
 
 def kalman_gain(a: Array, c: Array, q: Array, s: Array, r: Array) -> Array:
@@ -80,50 +82,79 @@ def feedthrough(
     n, p, m = a.shape[0], data.n_outputs, data.n_inputs
     closed = a - k @ c
     n_free = n * m + (p * m if direct else 0)
-    records, own = len(data.outputs), n + (p if data.channels.levels else 0)
-    rows, targets = [], []
+    own_forced, own_shown = own_columns(closed, c, k, m, levels=data.channels.levels)
+    records, own = len(data.outputs), len(own_forced)
+    forced, shown = (
+        np.concatenate([np.zeros((n_free, *each.shape[1:])), each, np.zeros((1, *each.shape[1:]))])
+        for each in (own_forced, own_shown)
+    )
+    for i, j in np.ndindex(n, m):
+        forced[i * m + j, i, j] = -1.0
+    for o, j in np.ndindex(p if direct else 0, m):
+        forced[n * m + o * m + j, :, j] = k[:, o]
+        shown[n * m + o * m + j, o, j] = 1.0
+    # Last the outputs themselves, as the predictor leaves them without inputs.
+    forced[-1, :, m : m + p], shown[-1, :, m : m + p] = k, np.eye(p)
+    rows = []
     for place, (y, u) in enumerate(zip(data.outputs, data.inputs, strict=True)):
-        count = y.shape[1]
-        columns = np.zeros((n_free + own * records, p, count))
-        for j in range(m):
-            passed = adjoint_run(closed, c, u[j : j + 1])[0]
-            columns[j : n * m : m] = passed
-            if direct:
-                for o in range(p):
-                    column = columns[n * m + o * m + j]
-                    column -= np.tensordot(k[:, o], passed, axes=1)
-                    column[o] += u[j]
+        try:
+            made = run_columns(closed, c, (forced, shown), y, u)
+        except DataError:
+            poles = np.abs(np.linalg.eigvals(closed)).max()
+            raise FitError(
+                "a subspace model's predictions run away over the records",
+                found=f"order {n}, predictor poles up to {poles:.3g}",
+                action="choose another order, or look for outliers and unlike scales in the "
+                "records",
+            ) from None
+        triangle = folded(made.reshape(y.size, -1))
+        wide = np.zeros((len(triangle), n_free + own * records + 1))
+        wide[:, :n_free], wide[:, -1] = triangle[:, :n_free], triangle[:, -1]
         first = n_free + own * place
-        columns[first : first + n] = free_motion(closed, c, count)
-        if own > n:
-            columns[first + n : first + own] = level_motion(closed, c, k, count)[1]
-        rows.append(columns.reshape(columns.shape[0], -1))
-        targets.append((y - c @ run_recursion(closed, k @ y)).ravel())
-    if not all(np.all(np.isfinite(each)) for each in (*rows, *targets)):
-        raise FitError(
-            "a subspace model's predictions run away over the records",
-            found=f"order {n}, predictor poles up to {np.abs(np.linalg.eigvals(closed)).max():.3g}",
-            action="choose another order, or look for outliers and unlike scales in the records",
-        )
-    found = np.linalg.lstsq(np.hstack(rows).T, np.concatenate(targets), rcond=None)[0]
+        wide[:, first : first + own] = triangle[:, n_free:-1]
+        rows.append(wide)
+    whole = np.concatenate(rows)
+    poor = np.finfo(float).eps * sum(y.size for y in data.outputs)
+    found = np.linalg.lstsq(whole[:, :-1], whole[:, -1], rcond=poor)[0]
     d = found[n * m : n_free].reshape(p, m) if direct else np.zeros((p, m))
     return found[: n * m].reshape(n, m), d
 
 
-def level_motion(closed: Array, c: Array, k: Array, count: int) -> tuple[Array, Array]:
-    """What a level of each output makes of a predictor's states and of its outputs.
+def own_columns(
+    closed: Array, c: Array, k: Array, m: int, *, levels: bool, start: bool = True
+) -> tuple[Array, Array]:
+    """What a record's own numbers push and show of a predictor: initial states, then levels.
 
     Returns
     -------
-    tuple of ndarray, shapes (p, n, n_samples) and (p, p, n_samples)
+    tuple of ndarray, shapes (n_own, n, q) and (n_own, p, q)
+        By the signals of `run_columns`.
     """
-    p = len(c)
-    forcing = np.repeat(-k.T[:, :, None], count, axis=2)
-    moved = run_recursion(closed, forcing)
-    return moved, np.asarray(c @ moved + np.eye(p)[:, :, None])
+    (p, n), at = c.shape, m + len(c)
+    first = n if start else 0
+    count = first + (p if levels else 0)
+    forced, shown = np.zeros((count, n, at + 2)), np.zeros((count, p, at + 2))
+    if start:
+        forced[:n, :, at], shown[:n, :, at] = -closed.T, c.T
+    if levels:
+        forced[first:, :, at + 1], shown[first:, :, at + 1] = k.T, np.eye(p)
+    return forced, shown
 
 
-def adjoint_run(a: Array, c: Array, signals: Array) -> Array:
-    """C (q - A)⁻¹ applied to each signal entering each state, (n_signals, n, p, n_samples)."""
-    forcing = signals[:, None, None] * c[:, :, None]
-    return run_recursion(a.T, forcing).swapaxes(1, 2)
+def run_columns(closed: Array, c: Array, columns: tuple[Array, Array], y: Array, u: Array) -> Array:
+    """G s − C x with x⁺ = Ā x + F s for several F and G, shape (n_samples, p, n_columns).
+
+    The signals s are inputs, outputs, a one at the first sample, and ones.
+    """
+    begun = np.zeros((2, y.shape[1]))
+    begun[0, :1], begun[1] = 1.0, 1.0
+    return _native.slope_recursion(closed, c, *columns, np.concatenate([u, y, begun]))
+
+
+def folded(rows: Array) -> Array:
+    """Triangular factor of many rows, some at a time."""
+    triangle: Array = np.zeros((0, rows.shape[1]))
+    for first in range(0, len(rows), ROWS):
+        part = np.concatenate([triangle, rows[first : first + ROWS]])
+        triangle = np.asarray(np.linalg.qr(part, mode="r"))
+    return triangle

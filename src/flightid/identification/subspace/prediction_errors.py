@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid import _native
+from flightid.errors import DataError
 from flightid.identification.multistart import DenseEnd
+from flightid.identification.records.nuisance import Nuisance, NuisanceDirections
 from flightid.identification.subspace.data import SubspaceData
-from flightid.identification.subspace.matrices import STABLE, adjoint_run, level_motion
-from flightid.models.innovations.prediction import RANK
+from flightid.identification.subspace.determinant import Goal, log_determinant
+from flightid.identification.subspace.matrices import STABLE, own_columns, run_columns
 from flightid.models.sampled.recursion import run_recursion, spectral_radius
 from flightid.progress import progress
 from flightid.uncertainty.agreement import Agreement
@@ -20,12 +24,8 @@ from flightid.uncertainty.coloured_residuals import white_covariance
 
 Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array, Array, Array]
-Run = tuple[Array, Array, Array]
-"""Errors of a record, its states, and its free motions."""
 DISTINCT = 1e-12
 """Least share of an error that the other outputs do not hold, below which it is rounding."""
-BATCH = 2**20
-"""Numbers of runs that are made at once: long records are run signal by signal."""
 ROUNDS = 12
 SETTLED = 1e-10
 """Relative change of the log determinant of the innovations between rounds."""
@@ -101,62 +101,53 @@ class Predictor:
         free = (a, b, c, d, k) if self.direct else (a, b, c, k)
         return np.concatenate([matrix.ravel() for matrix in free])
 
-    def errors(self, matrices: Matrices) -> list[Run]:
-        """Errors, states and free motions of each record, those of levels after those of states."""
+    def errors(self, matrices: Matrices, whiten: Array) -> list[Array]:
+        """Whitened errors of each record and, in further columns, what its own numbers make."""
         a, b, c, d, k = matrices
-        closed, found = a - k @ c, []
+        closed, (p, m), found = a - k @ c, d.shape, []
+        forced, shown = own_columns(
+            closed, c, k, m, levels=self.data.channels.levels, start=self.free_initial
+        )
+        run = np.zeros((1, len(a), m + p + 2)), np.zeros((1, p, m + p + 2))
+        run[0][0, :, : m + p] = np.concatenate([b - k @ d, k], axis=1)
+        run[1][0, :, : m + p] = np.concatenate([-d, np.eye(p)], axis=1)
+        columns = np.concatenate([run[0], forced]), whiten @ np.concatenate([run[1], shown])
         for y, u in zip(self.data.outputs, self.data.inputs, strict=True):
-            n = a.shape[0]
-            forcing = np.zeros((n + 1, n, y.shape[1]))
-            forcing[n] = (b - k @ d) @ u + k @ y
-            runs = run_recursion(closed, forcing, np.eye(n + 1, n))
-            moved, state = runs[:n], runs[n]
-            if not self.free_initial:
-                moved = moved[:0]
-            if self.data.channels.levels:
-                moved = np.concatenate([moved, level_motion(closed, c, k, y.shape[1])[0]])
-            error = y - c @ state - d @ u
-            found.append((error, state, moved))
+            try:
+                made = run_columns(closed, whiten @ c, columns, y, u)
+            except DataError:
+                made = np.full((y.shape[1], p, len(columns[0])), np.inf)
+            found.append(made.swapaxes(0, 1).reshape(y.size, -1))
         return found
 
-    def residuals(
-        self, matrices: Matrices, whiten: Array, runs: list[Run] | None = None
-    ) -> tuple[list[Array], list[Array]]:
-        """Whitened errors of each record after the initial state, and the bases taken out.
+    def states(self, matrices: Matrices, own: Sequence[Array]) -> list[Array]:
+        """States of each record with its own numbers."""
+        a, b, c, d, k = matrices
+        n, p, found = len(a), len(c), []
+        for y, u, values in zip(self.data.outputs, self.data.inputs, own, strict=True):
+            start = values[:n] if self.free_initial and len(values) else np.zeros(n)
+            forcing = (b - k @ d) @ u + k @ (y - self._level(values, p)[:, None])
+            found.append(run_recursion(a - k @ c, forcing, start))
+        return found
 
-        `runs` are the `errors` of these matrices, where they are known.
-        """
-        c, out, bases = matrices[2], [], []
-        for error, _, moved in self.errors(matrices) if runs is None else runs:
-            basis = self._basis(whiten @ self._seen(c, moved))
-            flat = (whiten @ error).ravel()
-            out.append(flat - basis @ (basis.T @ flat))
-            bases.append(basis)
-        return out, bases
+    def _level(self, own: Array, p: int) -> Array:
+        return own[-p:] if self.data.channels.levels and len(own) else np.zeros(p)
 
-    def _basis(self, motion: Array) -> Array:
-        columns = motion.reshape(len(motion), math.prod(motion.shape[1:])).T
-        if not len(motion):
-            return columns
-        left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
-        return np.asarray(left[:, sizes > RANK * max(float(sizes[0]), 1e-300)])
-
-    def _seen(self, c: Array, moved: Array) -> Array:
-        """What own numbers of a record make of its outputs: initial states, then levels."""
-        seen = np.asarray(c @ moved)
-        p = len(c) if self.data.channels.levels else 0
-        seen[len(moved) - p :] += np.eye(len(c))[: p or 0, :, None]
-        return seen
+    def residuals(self, matrices: Matrices, whiten: Array) -> tuple[list[Array], list[Nuisance]]:
+        """Whitened errors of each record after its own numbers, and what was taken out."""
+        out, found = [], []
+        for made in self.errors(matrices, whiten):
+            # Where a run has no end, nothing is taken out of errors without end.
+            kept = made if np.all(np.isfinite(made)) else np.full((len(made), 1), np.inf)
+            own = NuisanceDirections.of(kept[:, 1:]).best(kept[:, 0])
+            out.append(own.removed_from(kept[:, 0]))
+            found.append(own)
+        return out, found
 
     def levels(self, matrices: Matrices, whiten: Array) -> list[Array]:
         """Level of each output in each record, beside its initial state."""
-        c, p = matrices[2], self.data.n_outputs
-        found = []
-        for error, _, moved in self.errors(matrices):
-            columns = (whiten @ self._seen(c, moved)).reshape(len(moved), error.size).T
-            own = np.linalg.lstsq(columns, (whiten @ error).ravel(), rcond=RANK)[0]
-            found.append(np.asarray(own[-p:]) if self.data.channels.levels else np.zeros(p))
-        return found
+        p = self.data.n_outputs
+        return [self._level(own.values, p) for own in self.residuals(matrices, whiten)[1]]
 
     def fitted_errors(self, matrices: Matrices, whiten: Array) -> tuple[Array, ...]:
         """Errors of each record with its initial state, in the outputs' units."""
@@ -171,55 +162,56 @@ class Predictor:
         matrices: Matrices,
         whiten: Array,
         basis: Array,
-        runs: list[Run] | None = None,
-        bases: list[Array] | None = None,
+        found: list[Nuisance] | None = None,
     ) -> Array:
         """Derivatives of `residuals` along the columns of a basis, shape (rows, n_basis).
 
-        `runs` and `bases` are what `errors` and `residuals` made of these matrices, where known.
+        `found` is what `residuals` took out at these matrices, where that is known.
 
         Reference: Kaufman (1975), *BIT* 15, for the elimination of the initial states.
         """
-        c = matrices[2]
+        _, _, c, d, _ = matrices
+        found = self.residuals(matrices, whiten)[1] if found is None else found
+        states = self.states(matrices, [own.values for own in found])
         parts = []
-        runs = self.errors(matrices) if runs is None else runs
-        bases = self.residuals(matrices, whiten, runs)[1] if bases is None else bases
-        for (error, state, moved), taken, u in zip(runs, bases, self.data.inputs, strict=True):
-            seen = self._seen(c, moved)
-            columns = seen.reshape(len(moved), error.size).T
-            own = np.linalg.lstsq(columns, error.ravel(), rcond=RANK)[0]
-            made = np.zeros((basis.shape[1], *error.shape))
-            left = error - np.tensordot(own, seen, axes=1)
-            signals = (left, state + np.tensordot(own, moved, axes=1), u)
-            self._add_slopes(made, matrices, basis, signals)
-            flat = (whiten @ made).reshape(basis.shape[1], -1).T
-            parts.append(flat - taken @ (taken.T @ flat))
-        return np.ascontiguousarray(np.vstack(parts))
+        for own, state, y, u in zip(
+            found, states, self.data.outputs, self.data.inputs, strict=True
+        ):
+            error = y - self._level(own.values, len(c))[:, None] - c @ state - d @ u
+            made = self._slopes(matrices, whiten, basis, (error, state, u))
+            made -= own.space @ (own.space.T @ made)
+            parts.append(made)
+        return parts[0] if len(parts) == 1 else np.vstack(parts)
 
-    def _add_slopes(
-        self, made: Array, matrices: Matrices, basis: Array, signals: tuple[Array, Array, Array]
-    ) -> None:
-        """De = -C (q - A + K C)⁻¹ (dA x + dB u + dK e - K dC x - K dD u) - dC x - dD u."""
+    def _slopes(
+        self,
+        matrices: Matrices,
+        whiten: Array,
+        basis: Array,
+        signals: tuple[Array, Array, Array],
+    ) -> Array:
+        """De = -C (q - A + K C)⁻¹ (dA x + dB u + dK e - K dC x - K dD u) - dC x - dD u, whitened.
+
+        Shape (p · n_samples, n_basis), output after output.
+        """
         a, _, c, _, k = matrices
         error, state, u = signals
-        closed = a - k @ c
         by = iter(np.split(basis, np.cumsum([r * w for r, w in self.shapes])[:-1]))
-        slopes = [each.reshape(*s, -1) for each, s in zip(by, self.shapes, strict=True)]
-        da, db, dc = slopes[:3]
-        dk = slopes[-1]
-        entering = [da - np.tensordot(k, dc, axes=1), dk, db]
-        if self.direct:
-            entering[2] = db - np.tensordot(k, slopes[3], axes=1)
-        wide, rows = np.concatenate(entering, axis=1).T, np.concatenate([state, error, u])
-        together = max(BATCH // (c.size * rows.shape[1]), 1)
-        for first in range(0, len(rows), together):
-            some = slice(first, first + together)
-            # Every signal enters every state: one product over both.
-            passed = adjoint_run(closed, c, rows[some]).reshape(-1, made[0].size)
-            made -= (wide[:, some].reshape(len(made), -1) @ passed).reshape(made.shape)
-        made -= np.tensordot(dc, state, axes=(1, 0)).swapaxes(0, 1)
-        if self.direct:
-            made -= np.tensordot(slopes[3], u, axes=(1, 0)).swapaxes(0, 1)
+        slopes = [
+            np.moveaxis(each.reshape(*s, -1), 2, 0) for each, s in zip(by, self.shapes, strict=True)
+        ]
+        da, db, dc, dk = *slopes[:3], slopes[-1]
+        dd = slopes[3] if self.direct else np.zeros((len(dc), len(c), len(u)))
+        forced = np.concatenate([da - k @ dc, dk, db - k @ dd], axis=2)
+        shown = -np.concatenate([dc, np.zeros((len(dc), len(c), len(c))), dd], axis=2)
+        made = _native.slope_recursion(
+            a - k @ c,
+            whiten @ c,
+            forced,
+            whiten @ shown,
+            np.concatenate([state, error, u]),
+        )
+        return made.swapaxes(0, 1).reshape(error.size, -1)
 
 
 def refine(
@@ -229,8 +221,12 @@ def refine(
     direct: bool,
     initial_state: str,
     maximum_iterations: int,
+    enough: float | None = None,
 ) -> RefinementResult:
     """Smallest log determinant of the innovations' covariance, from a subspace estimate.
+
+    Where only whether it is below `enough` is asked, the search ends where that is known or its
+    steps gain less than `FAR` of what is missing; there is no covariance then.
 
     Each round weights the errors of different outputs by their covariance and searches along the
     directions that change the model's behaviour, not only its coordinates.
@@ -246,16 +242,21 @@ def refine(
     errors = predictor.fitted_errors(matrices, np.eye(data.n_outputs))
     with progress(ROUNDS, "refining the model") as advance:
         for _ in range(ROUNDS):
-            level = _level(errors)
+            level = log_determinant(errors)
             if not np.isfinite(level) or last - level <= SETTLED * max(1.0, abs(level)):
                 termination = "cost" if np.isfinite(level) else "zero"
                 break
             last = level
             whiten = whitener(errors)
-            matrices, steps, ended = _search(predictor, matrices, whiten, maximum_iterations)
+            goal = None if enough is None else Goal(level, enough, sum(e.size for e in errors))
+            search = _search(predictor, matrices, whiten, maximum_iterations, goal)
+            matrices, steps, ended = search
             errors = predictor.fitted_errors(matrices, whiten)
             iterations += steps
             advance()
+            if goal is not None and goal.is_known:
+                termination = ended
+                break
             if ended == "iterations":
                 termination = ended
                 break
@@ -263,7 +264,12 @@ def refine(
     own = n * len(errors) if initial_state == "estimate" else 0
     own += data.n_outputs * len(errors) * data.channels.levels
     degrees = max(samples * data.n_outputs - _count(free, n) - own, 1)
-    covariance, agreement = _covariance(predictor, matrices, errors, degrees)
+    covariance, agreement = None, None
+    if enough is None:
+        if np.isfinite(last):
+            # Initial states and levels are weighed by what was found, as predictions are.
+            errors = predictor.fitted_errors(matrices, whitener(errors))
+        covariance, agreement = _covariance(predictor, matrices, errors, degrees)
     if agreement is not None and agreement.freedom is not None:
         degrees = max(1, int(np.min(agreement.freedom)))
     return RefinementResult(
@@ -275,39 +281,11 @@ def _count(shapes: tuple[tuple[int, ...], ...], n: int) -> int:
     return sum(r * c for r, c in shapes) - n * n
 
 
-def _level(errors: tuple[Array, ...]) -> float:
-    joint = np.hstack(errors)
-    covariance = joint @ joint.T / joint.shape[1]
-    sign, value = np.linalg.slogdet(covariance)
-    return float(value) if sign > 0 and value > -60.0 * len(joint) else -np.inf
-
-
-def spare_states(lower: RefinementResult, found: RefinementResult, numbers: int) -> str:
-    """Why fewer states do as well, by the Bayesian information criterion; else empty.
-
-    Parameters
-    ----------
-    lower, found : RefinementResult
-        With fewer states, and as asked.
-    numbers : int
-        Parameters that a state brings.
-
-    Reference
-    ---------
-    Schwarz (1978), Estimating the dimension of a model, *Annals of Statistics* 6.
-    """
-    samples = sum(each.shape[1] for each in found.errors)
-    order, fewer = (each.matrices[0].shape[0] for each in (found, lower))
-    gained = samples * (_level(lower.errors) - _level(found.errors))
-    if not np.isfinite(gained) or gained >= (order - fewer) * numbers * np.log(samples):
-        return ""
-    return f"{fewer} states foretell the outputs as well as {order}"
-
-
 def _balanced(predictor: Predictor, matrices: Matrices) -> Matrices:
     """States of unit covariance over the records, so that steps have one size."""
     a, b, c, d, k = matrices
-    states = np.hstack([state for _, state, _ in predictor.errors(matrices)])
+    none = [np.zeros(0)] * len(predictor.data.outputs)
+    states = np.hstack(predictor.states(matrices, none))
     left, sizes, _ = np.linalg.svd(states @ states.T / states.shape[1])
     size = np.sqrt(np.maximum(sizes, 1e-24 * sizes[0]))
     to, back = left.T / size[:, None], left * size
@@ -342,12 +320,16 @@ def whitener(errors: tuple[Array, ...], degrees: int | None = None) -> Array:
 
 
 def _search(
-    predictor: Predictor, matrices: Matrices, whiten: Array, maximum_iterations: int
+    predictor: Predictor,
+    matrices: Matrices,
+    whiten: Array,
+    maximum_iterations: int,
+    goal: Goal | None,
 ) -> tuple[Matrices, int, str]:
     basis = _tangent(predictor, matrices)
     origin = predictor.pack(matrices)
     rows = sum(y.size for y in predictor.data.outputs)
-    last: dict[bytes, tuple[Matrices, list[Run], list[Array]]] = {}
+    last: dict[bytes, tuple[Matrices, list[Nuisance]]] = {}
 
     def residuals(step: Array) -> Array:
         trial = predictor.unpack(origin + basis @ step)
@@ -355,22 +337,21 @@ def _search(
             return np.full(rows, np.inf)
         if predictor.stable and spectral_radius(trial[0]) >= STABLE:
             return np.full(rows, np.inf)
-        runs = predictor.errors(trial)
-        found, taken = predictor.residuals(trial, whiten, runs)
+        found, own = predictor.residuals(trial, whiten)
         last.clear()
-        last[step.tobytes()] = trial, runs, taken
+        last[step.tobytes()] = trial, own
         return np.concatenate(found)
 
     def jacobian(step: Array) -> Array:
         known = last.get(step.tobytes())
         if known is None:
             return predictor.jacobian(predictor.unpack(origin + basis @ step), whiten, basis)
-        at, runs, bases = known
-        return predictor.jacobian(at, whiten, basis, runs, bases)
+        return predictor.jacobian(known[0], whiten, basis, known[1])
 
     free = np.full(basis.shape[1], np.inf)
+    known = None if goal is None else partial(goal.is_decided, predictor.data.n_outputs)
     end = DenseEnd.searched(
-        residuals, jacobian, np.zeros(basis.shape[1]), -free, free, rows, maximum_iterations
+        residuals, jacobian, np.zeros(len(free)), -free, free, rows, maximum_iterations, known
     )
     return predictor.unpack(origin + basis @ end.x), end.iterations, end.termination
 
@@ -378,7 +359,7 @@ def _search(
 def _covariance(
     predictor: Predictor, matrices: Matrices, errors: tuple[Array, ...], degrees: int
 ) -> tuple[Array | None, Agreement | None]:
-    if not np.isfinite(_level(errors)):
+    if not np.isfinite(log_determinant(errors)):
         return None, None
     basis = _tangent(predictor, matrices)
     whiten = whitener(errors, degrees)
