@@ -43,6 +43,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     logs::dataflash::register(module)?;
     logs::delimited::register(module)?;
     logs::ulog::register(module)?;
+    logs::blackbox::register(module)?;
     vehicles::quadrotor::register(module)?;
     models::equation_records::register(module)?;
     models::expression::register(module)?;

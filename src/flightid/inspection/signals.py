@@ -17,7 +17,7 @@ from flightid.record import Record
 from flightid.record.timebase import to_uniform
 
 Span = tuple[float, float]
-FALLBACK = {"ardupilot": "arducopter", "px4": "px4_multicopter"}
+FALLBACK = {"ardupilot": "arducopter", "px4": "px4_multicopter", "betaflight": "betaflight"}
 """Map for a log that does not tell its vehicle."""
 
 

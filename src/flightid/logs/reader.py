@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from flightid.errors import FileFormatError, LogFormatError
+from flightid.logs.blackbox.reader import PRODUCT, open_blackbox
 from flightid.logs.dataflash.reader import open_dataflash
 from flightid.logs.log import Log
 from flightid.logs.source import LogSource
@@ -20,6 +21,7 @@ SNIFFED = 65536
 # Content test, name of the format, opener.
 _FORMATS: tuple[tuple[Callable[[bytes], bool], str, Callable[[Path], LogSource]], ...] = (
     (lambda head: head.startswith(ULOG_MAGIC), "PX4 ULog", UlogSource),
+    (lambda head: PRODUCT in head, "Betaflight or INAV blackbox", open_blackbox),
     (lambda head: DATAFLASH_HEADER in head, "ArduPilot DataFlash", open_dataflash),
 )
 # Contents that people do hand in, and what to do with them.
@@ -28,7 +30,6 @@ _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
     (b"PK\x03\x04", "a zip archive", "unpack it first"),
     (b"FMT,", "an ArduPilot text log", "hand in the .bin file that it was made from"),
     (b"\xfd", "a MAVLink telemetry stream", "hand in the log of the autopilot itself"),
-    (b"H Product:Blackbox", "a Betaflight blackbox log", "convert it to CSV with blackbox_decode"),
 )
 
 

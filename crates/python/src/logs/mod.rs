@@ -1,5 +1,6 @@
 //! Log files: bytes to columns.
 
+pub mod blackbox;
 pub mod dataflash;
 pub mod delimited;
 pub mod ulog;

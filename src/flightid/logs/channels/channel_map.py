@@ -20,6 +20,7 @@ DEFAULTS = {
     ("ardupilot", "plane"): "arduplane",
     ("px4", "copter"): "px4_multicopter",
     ("px4", "plane"): "px4_fixed_wing",
+    ("betaflight", "copter"): "betaflight",
 }
 ANGLES = ("roll", "pitch", "yaw")
 _SOURCE_KEYS = {
@@ -196,7 +197,7 @@ def channel_map(name: str | Path) -> ChannelMap:
     ----------
     name : str or Path
         Shipped map (``"arducopter"``, ``"arduplane"``, ``"px4_multicopter"``,
-        ``"px4_fixed_wing"``), or a TOML file of the same form.
+        ``"px4_fixed_wing"``, ``"betaflight"``), or a TOML file of the same form.
 
     Raises
     ------

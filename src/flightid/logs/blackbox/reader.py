@@ -1,0 +1,209 @@
+"""Blackbox logs as a `LogSource` (native half: `crates/logs/src/blackbox/mod.rs`).
+
+Numbers come in the units that the firmware's own viewer shows, which the header's scales give: rates
+in deg/s, accelerations in g, throttle and commands as logged. They carry no declared unit; the
+channel map knows them.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from flightid import _native
+from flightid.conventions import Light
+from flightid.errors import LogFormatError
+from flightid.findings import Finding, counted
+from flightid.logs.source import ByteRange, Event, Gap
+from flightid.logs.table_source import Array, Rows, TableSource
+from flightid.reading import bounded_bytes
+
+PRODUCT = b"H Product:Blackbox flight data recorder"
+LARGEST = 1 << 30
+"""Bytes of a file that are read: decoded frames are held in memory."""
+GAP_FRAMES = 20.0
+"""Median steps without a frame that count as a gap."""
+LOOP = "main"
+EVENTS = {0: "beep", 15: "disarmed", 255: "end of log"}
+DISARMED, FLIGHT_MODE = 15, 30
+MODES = {1: "ANGLE", 2: "HORIZON"}
+"""Bits of Betaflight's active modes that tell what levels the vehicle (`rc_modes.h`)."""
+GRAVITY = "acc_1G"
+HIGH_RESOLUTION = 10.0
+RATES = ("gyroADC[", "gyroUnfilt[")
+FINE = (*RATES, "setpoint[", "rcCommand[")
+"""Fields that ``blackbox_high_resolution`` stores ten times as fine."""
+
+_VERSION = re.compile(r"(?P<name>Betaflight|Cleanflight|INAV)\s+(?P<age>\d+\.\d+)", re.IGNORECASE)
+
+
+def open_blackbox(path: Path) -> TableSource:
+    """Read a blackbox log; of a file with several flights, the longest.
+
+    Raises
+    ------
+    LogFormatError
+        The header does not say what frames hold, or the file is larger than is read.
+    OSError
+        The file cannot be read.
+    """
+    data = bounded_bytes(path, LARGEST, LogFormatError)
+    data = data[max(data.find(PRODUCT), 0) :]
+    flights = _native.blackbox_flights(data)
+    sizes = [stop - start for start, stop in flights]
+    taken = int(np.argmax(sizes)) if sizes else 0
+    native = _native.Blackbox(data, taken)
+    header = _header(native.headers())
+    tables = dict(_tables(native, header))
+    lost = [ByteRange(*part) for part in native.skipped()]
+    return TableSource(
+        "betaflight",
+        "copter" if header.get("Firmware type", "").lower() != "inav" else None,
+        header.get("Firmware revision", "blackbox"),
+        tables,
+        _parameters(header),
+        events=_events(native),
+        skipped=lost,
+        gaps=_gaps(tables[LOOP].time_s) if LOOP in tables else (),
+        findings=tuple(_findings(native, lost, len(data), taken, len(flights))),
+    )
+
+
+def _header(lines: list[tuple[str, str]]) -> dict[str, str]:
+    return dict(lines)
+
+
+def _parameters(header: Mapping[str, str]) -> dict[str, float]:
+    """Settings that are numbers; ``rollPID`` with three becomes ``rollPID[0]`` to ``[2]``."""
+    found: dict[str, float] = {}
+    for name, value in header.items():
+        if name.startswith("Field "):
+            continue
+        parts = value.split(",")
+        for place, part in enumerate(parts):
+            try:
+                number = float(part)
+            except ValueError:
+                continue
+            found[name if len(parts) == 1 else f"{name}[{place}]"] = number
+    return found
+
+
+def _tables(
+    native: _native.Blackbox, header: Mapping[str, str]
+) -> Iterator[tuple[str, Rows]]:
+    scales = _scales(header)
+    for name, columns, count in native.tables():
+        if not count:
+            continue
+        places = {column: place for place, column in reversed(list(enumerate(columns)))}
+        read = partial(_scaled, native, name, places, scales)
+        units = {column: "µs" if column == "time" else "1" for column in columns}
+        yield name, Rows(units, read, native.stamps_us(name) / 1e6)
+
+
+def _scaled(
+    native: _native.Blackbox,
+    table: str,
+    places: Mapping[str, int],
+    scales: Mapping[str, float],
+    column: str,
+) -> Array:
+    values = native.numbers(table, places[column])
+    scale = next((factor for start, factor in scales.items() if column.startswith(start)), 1.0)
+    return values if scale == 1.0 else values * scale
+
+
+def _scales(header: Mapping[str, str]) -> dict[str, float]:
+    """Factor by the beginning of a field's name."""
+    fine = 1.0 / HIGH_RESOLUTION if header.get("blackbox_high_resolution") == "1" else 1.0
+    scales = dict.fromkeys(FINE, fine)
+    for name in RATES:
+        scales[name] *= _gyro_scale(header)
+    gravity = _number(header.get(GRAVITY))
+    if gravity:
+        scales["accSmooth["] = 1.0 / gravity
+    age = _VERSION.search(header.get("Firmware revision", ""))
+    if age is not None and age["name"].lower() == "betaflight":
+        major = int(age["age"].split(".")[0])
+        scales["vbatLatest"] = 0.01 if major >= 4 else 0.1
+        scales["amperageLatest"] = 0.01
+    return scales
+
+
+def _gyro_scale(header: Mapping[str, str]) -> float:
+    """Degrees per second of one count: the bits of a float, in hexadecimal."""
+    text = header.get("gyro_scale", header.get("gyro.scale", ""))
+    try:
+        scale = struct.unpack(">f", bytes.fromhex(text.removeprefix("0x").rjust(8, "0")))[0]
+    except (ValueError, struct.error):
+        return 1.0
+    if not (np.isfinite(scale) and scale > 0.0):
+        return 1.0
+    # Baseflight counts in rad/µs.
+    return float(np.degrees(scale * 1e6)) if scale < 1e-6 else float(scale)
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        return float(text or "")
+    except ValueError:
+        return None
+
+
+def _events(native: _native.Blackbox) -> list[Event]:
+    found = []
+    for stamp_us, kind, first, second in native.events():
+        time_s = None if stamp_us is None else stamp_us / 1e6
+        if kind == FLIGHT_MODE:
+            names = [name for bit, name in MODES.items() if first >> bit & 1]
+            found.append(Event(time_s, "mode", names[0] if names else "ACRO"))
+        elif kind == DISARMED:
+            found.append(Event(time_s, "arming", f"disarmed (reason {first})"))
+        else:
+            text = EVENTS.get(kind, f"event {kind}: {first}, {second}")
+            found.append(Event(time_s, "event", text))
+    return found
+
+
+def _gaps(time_s: Array) -> list[Gap]:
+    steps = np.diff(time_s)
+    if not steps.size:
+        return []
+    places = np.flatnonzero(steps > GAP_FRAMES * np.median(steps))
+    why = "the logger lost frames"
+    return [Gap(float(time_s[i]), float(time_s[i + 1]), why) for i in places]
+
+
+def _findings(
+    native: _native.Blackbox, lost: list[ByteRange], size: int, taken: int, flights: int
+) -> Iterator[Finding]:
+    ended, undecodable = native.ending()
+    damaged = sum(part.size for part in lost)
+    if damaged or undecodable:
+        yield Finding(
+            "bytes-skipped",
+            Light.AMBER,
+            f"{damaged} of {size} bytes in {counted(len(lost), 'place')} are no frame, and "
+            f"{counted(undecodable, 'frame')} had lost the one before: the logger could not keep up",
+            "log at a lower rate, or to a faster card; look for gaps in the span you use",
+        )
+    if flights > 1:
+        yield Finding(
+            "several-flights",
+            Light.AMBER,
+            f"the file holds {flights} flights; the longest, number {taken + 1}, is read",
+            "save each flight to its own file to read the others",
+        )
+    if not ended:
+        yield Finding(
+            "log-cut",
+            Light.AMBER,
+            "the log does not end as the firmware ends it: it was cut, or the power was",
+            "what came before is read",
+        )

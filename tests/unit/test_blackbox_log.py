@@ -1,0 +1,118 @@
+"""Blackbox logs: every encoding and predictor against a writer that shares no code."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.errors import LogFormatError
+from flightid.logs.blackbox.reader import open_blackbox
+from tests.blackbox_builder import END, FIELDS, SETTINGS, blackbox, header
+
+
+def _columns(n: int = 400, seed: int = 0, size: float = 1.0) -> dict[str, np.ndarray]:
+    """Samples that reach every width of every encoding, negative ones among them."""
+    rng = np.random.default_rng(seed)
+    spread = 10.0 ** rng.uniform(0.0, 4.3 * size, n)
+    columns = {
+        known.name: np.round(spread * rng.standard_normal(n)).astype(int) for known in FIELDS[2:]
+    }
+    for name in columns:
+        limit = 2**14 - 1 if "rcCommand" in name or "setpoint" in name else 10**6
+        columns[name] = np.clip(columns[name], -limit, limit)
+    for known in FIELDS[2:]:
+        if not known.signed:
+            columns[known.name] = np.abs(columns[known.name]) % 4000
+    columns["vbatLatest"] = columns["vbatLatest"] % 1600
+    columns["time"] = 10_000_000 + 500 * np.arange(n) + rng.integers(-20, 20, n)
+    return columns
+
+
+def _open(folder: Path, content: bytes) -> fid.Log:
+    path = folder / "LOG00001.BFL"
+    path.write_bytes(content)
+    return fid.read_log(path)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_every_value_comes_back(tmp_path: Path, seed: int) -> None:
+    columns = _columns(seed=seed)
+    log = _open(tmp_path, blackbox(columns))
+    assert log.kind == "betaflight" and not log.skipped and not log.findings
+    table = log.table("main")
+    for name, values in columns.items():
+        scale = 0.01 if name in ("vbatLatest", "amperageLatest") else 1.0
+        np.testing.assert_array_equal(table[name], values * scale, err_msg=name)
+    np.testing.assert_array_equal(table.time_s, columns["time"] / 1e6)
+    assert log.parameters["rollPID[1]"] == 80.0 and log.parameters["motorOutput[1]"] == 2047.0
+
+
+def test_clock_turns_over(tmp_path: Path) -> None:
+    columns = _columns(n=100)
+    true = 2**32 - 20_000 + 500 * np.arange(100)
+    columns["time"] = true % 2**32
+    time_s = _open(tmp_path, blackbox(columns)).table("main").time_s
+    np.testing.assert_array_equal(time_s, true / 1e6)
+
+
+def test_damage_costs_frames_up_to_the_next_whole_one(tmp_path: Path) -> None:
+    columns = _columns(n=400, size=0.5)
+    content = blackbox(columns)
+    at = len(header()) + (len(content) - len(header())) // 2
+    log = _open(tmp_path, content[:at] + content[at + 40 :])
+    table = log.table("main")
+    stamps = (np.asarray(table.time_s) * 1e6).round().astype(int)
+    places = np.searchsorted(columns["time"], stamps)
+    assert 370 <= stamps.size < 400
+    agree = np.mean(table["gyroADC[1]"] == columns["gyroADC[1]"][places])
+    assert agree == 1.0
+    assert "bytes-skipped" in {finding.code for finding in log.findings}
+
+
+def test_longest_of_several_flights_is_read_and_said(tmp_path: Path) -> None:
+    long, short = _columns(n=300), _columns(n=64, seed=3)
+    log = _open(tmp_path, blackbox(short) + blackbox(long) + blackbox(short))
+    assert len(log.table("main")) == 300
+    said = next(f.message for f in log.findings if f.code == "several-flights")
+    assert "3 flights" in said and "number 2" in said
+
+
+def test_log_without_end_is_called_cut(tmp_path: Path) -> None:
+    log = _open(tmp_path, blackbox(_columns(n=64)).removesuffix(END))
+    assert [finding.code for finding in log.findings] == ["log-cut"]
+    assert len(log.table("main")) == 64
+
+
+def test_scales_of_the_header(tmp_path: Path) -> None:
+    columns = _columns(n=64)
+    fine = {**SETTINGS, "blackbox_high_resolution": "1", "gyro_scale": "0x3d800000"}
+    table = _open(tmp_path, blackbox(columns, fine)).table("main")
+    np.testing.assert_allclose(table["gyroADC[0]"], columns["gyroADC[0]"] * 0.0625 / 10)
+    np.testing.assert_allclose(table["setpoint[2]"], columns["setpoint[2]"] / 10)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("Field I name", "time"), ("Field I encoding", "99"), ("Field I predictor", "")],
+)
+def test_header_that_contradicts_itself_is_refused(tmp_path: Path, name: str, value: str) -> None:
+    path = tmp_path / "bad.bbl"
+    path.write_bytes(header() + f"H {name}:{value}\n".encode() + END)
+    with pytest.raises(LogFormatError):
+        open_blackbox(path)
+
+
+def test_fields_that_take_no_bytes_do_not_fill_memory(tmp_path: Path) -> None:
+    names = ["time", *(f"f{i}" for i in range(200))]
+    lines = {
+        "I name": names, "I signed": "0" * 201, "I predictor": "0" * 201, "I encoding": "9" * 201,
+        "P predictor": "0" * 201, "P encoding": "9" * 201,
+    }  # fmt: skip
+    start = header().split(b"\n")[0]
+    fields = "\n".join(f"H Field {key}:{','.join(value)}" for key, value in lines.items())
+    path = tmp_path / "claims.bbl"
+    path.write_bytes(start + b"\n" + fields.encode() + b"\n" + b"I" * 100_000)
+    log = open_blackbox(path)
+    assert sum(info.count for info in log.messages.values()) * 201 <= 16 * 110_000
+    assert "more values" in log.skipped[-1].reason
