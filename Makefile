@@ -82,7 +82,7 @@ fuzz-files: develop  ## throw damaged files at the Python readers, in children w
 	$(BIN)/python -m tests.fuzz --runs $(FUZZ_RUNS) --keep build/fuzz
 
 fuzz: fuzz-files  ## and damaged logs, formulas and models at the native ones (nightly toolchain, cargo-fuzz)
-	cd fuzz && for target in dataflash ulog expression model; do \
+	cd fuzz && for target in dataflash ulog small_logs expression model; do \
 	  mkdir -p corpus/$$target seeds/$$target && cargo +nightly fuzz run -s none $$target \
 	    corpus/$$target seeds/$$target -- -runs=$(FUZZ_RUNS) -max_len=4096 || exit 1; done
 

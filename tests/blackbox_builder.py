@@ -1,4 +1,4 @@
-"""Blackbox files written as the firmware writes them: for tests of the reader, which shares no code.
+"""Blackbox files as the firmware writes them: for tests of the reader, which shares no code.
 
 Reference: Betaflight ``src/main/blackbox/blackbox.c`` and ``blackbox_encoding.c``.
 """
@@ -116,7 +116,9 @@ def four(values: Sequence[int]) -> bytes:
     """Encoding 8 of data version 2: fields of 0, 4, 8 or 16 bits, one after the other."""
     digits, tags = "", 0
     for place, value in enumerate(values):
-        kind = next(k for k, n in enumerate((0, 4, 8, 16)) if value == 0 or (n and _fits([value], [n])))
+        kind = next(
+            k for k, n in enumerate((0, 4, 8, 16)) if value == 0 or (n and _fits([value], [n]))
+        )
         tags |= kind << 2 * place
         n = (0, 1, 2, 4)[kind]
         digits += f"{value & (1 << 4 * n) - 1:0{n}x}" if n else ""
@@ -219,7 +221,7 @@ def blackbox(columns: Mapping[str, np.ndarray], settings: Mapping[str, str] = SE
     rows = table.tolist()
     out = [header(settings), b"S" + unsigned(2) + unsigned(0)]
     last = older = rows[0]
-    for at, row in enumerate(rows):
+    for row in rows:
         whole = row[0] % INTERVAL == 0
         out.append(frame("I" if whole else "P", (row, last, older)))
         last, older = row, row if whole else last

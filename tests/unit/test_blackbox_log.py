@@ -18,9 +18,9 @@ def _columns(n: int = 400, seed: int = 0, size: float = 1.0) -> dict[str, np.nda
     columns = {
         known.name: np.round(spread * rng.standard_normal(n)).astype(int) for known in FIELDS[2:]
     }
-    for name in columns:
+    for name, values in columns.items():
         limit = 2**14 - 1 if "rcCommand" in name or "setpoint" in name else 10**6
-        columns[name] = np.clip(columns[name], -limit, limit)
+        columns[name] = np.clip(values, -limit, limit)
     for known in FIELDS[2:]:
         if not known.signed:
             columns[known.name] = np.abs(columns[known.name]) % 4000
@@ -39,13 +39,16 @@ def _open(folder: Path, content: bytes) -> fid.Log:
 def test_every_value_comes_back(tmp_path: Path, seed: int) -> None:
     columns = _columns(seed=seed)
     log = _open(tmp_path, blackbox(columns))
-    assert log.kind == "betaflight" and not log.skipped and not log.findings
+    assert log.kind == "betaflight"
+    assert not log.skipped
+    assert not log.findings
     table = log.table("main")
     for name, values in columns.items():
         scale = 0.01 if name in ("vbatLatest", "amperageLatest") else 1.0
         np.testing.assert_array_equal(table[name], values * scale, err_msg=name)
     np.testing.assert_array_equal(table.time_s, columns["time"] / 1e6)
-    assert log.parameters["rollPID[1]"] == 80.0 and log.parameters["motorOutput[1]"] == 2047.0
+    assert log.parameters["rollPID[1]"] == 80.0
+    assert log.parameters["motorOutput[1]"] == 2047.0
 
 
 def test_clock_turns_over(tmp_path: Path) -> None:
@@ -75,7 +78,8 @@ def test_longest_of_several_flights_is_read_and_said(tmp_path: Path) -> None:
     log = _open(tmp_path, blackbox(short) + blackbox(long) + blackbox(short))
     assert len(log.table("main")) == 300
     said = next(f.message for f in log.findings if f.code == "several-flights")
-    assert "3 flights" in said and "number 2" in said
+    assert "3 flights" in said
+    assert "number 2" in said
 
 
 def test_log_without_end_is_called_cut(tmp_path: Path) -> None:

@@ -7,6 +7,7 @@ pub mod blackbox;
 pub mod dataflash;
 pub mod delimited;
 pub mod error;
+pub mod mavlink;
 pub mod ulog;
 
 pub use error::LogError;

@@ -44,6 +44,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     logs::delimited::register(module)?;
     logs::ulog::register(module)?;
     logs::blackbox::register(module)?;
+    logs::mavlink::register(module)?;
     vehicles::quadrotor::register(module)?;
     models::equation_records::register(module)?;
     models::expression::register(module)?;

@@ -54,7 +54,8 @@ class Actuators:
 
 def find_actuators(log: Log) -> Actuators | None:
     """Motor commands of a log, or None where it holds none that can be told apart."""
-    return _ardupilot(log) if log.kind == "ardupilot" else _px4(log)
+    known = {"ardupilot": _ardupilot, "px4": _px4, "betaflight": _betaflight}
+    return known[log.kind](log) if log.kind in known else None
 
 
 def _ardupilot(log: Log) -> Actuators | None:
@@ -93,6 +94,18 @@ def _px4(log: Log) -> Actuators | None:
     used = [name for name in used if np.any(table[name] > 0)]
     low, high = _limits(log.parameters, ("PWM", "PWM_MAIN"), DEFAULT_PWM)
     return _made(table, used, low, high) if used else None
+
+
+def _betaflight(log: Log) -> Actuators | None:
+    """Commands of a blackbox, whose header says between which of them the mixer moves."""
+    if "main" not in log:
+        return None
+    table = log.table("main")
+    used = [f"motor[{i}]" for i in range(8) if f"motor[{i}]" in table]
+    low, high = (log.parameters.get(f"motorOutput[{i}]", 0.0) for i in range(2))
+    if not used or not 0.0 < low < high:
+        return None
+    return _made(table, used, low, high)
 
 
 def _limits(

@@ -37,6 +37,8 @@ def logging(log: Log) -> str:
     """Settings that make the autopilot log fast enough."""
     if log.kind == "px4":
         return _px4_logging(log)
+    if log.kind == "betaflight":
+        return "set blackbox_sample_rate 1/2 or faster, and log set-point, gyro and PID terms"
     wanted_bits = LOG_BITS.get(log.vehicle or "")
     present = log.parameters.get("LOG_BITMASK")
     if wanted_bits is None:
@@ -77,6 +79,11 @@ def excitation(log: Log) -> str:
         tunes = [name for name in ("MC_AT_START", "FW_AT_START") if name in log.parameters]
         autotune = f", or the autotune ({' or '.join(tunes)})" if tunes else ""
         return f"{piloted}{autotune}; {repeats}"
+    if log.kind == "betaflight":
+        return (
+            "fly the CHIRP mode of firmware 2025.12 or later (a build with USE_CHIRP), debug_mode "
+            f"CHIRP, or {piloted.removeprefix('fly ')}; {repeats}"
+        )
     if log.vehicle == "copter" and "SID_AXIS" not in log.parameters and log.parameters:
         return f"{piloted}; {repeats}"
     if log.vehicle == "copter":

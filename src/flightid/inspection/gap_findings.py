@@ -49,6 +49,8 @@ def _remedy(log: Log, gaps: list[Span]) -> str:
     """What to do about gaps: a card loses samples only where the logger counted them."""
     dropouts = [gap for gap in log.gaps if log.kind == "px4" and gap.duration_s > 0]
     lost = any(d.start_s < stop and d.stop_s > start for d in dropouts for start, stop in gaps)
+    if log.kind == "betaflight":
+        return "log at a lower rate (blackbox_sample_rate), or to a faster card"
     if lost or any(finding.code == "messages-dropped" for finding in log.findings):
         return "use a faster card, or log less"
     if log.kind == "px4" or "DSF" in log:

@@ -17,7 +17,12 @@ from flightid.record import Record
 from flightid.record.timebase import to_uniform
 
 Span = tuple[float, float]
-FALLBACK = {"ardupilot": "arducopter", "px4": "px4_multicopter", "betaflight": "betaflight"}
+FALLBACK = {
+    "ardupilot": "arducopter",
+    "px4": "px4_multicopter",
+    "betaflight": "betaflight",
+    "mavlink": "mavlink",
+}
 """Map for a log that does not tell its vehicle."""
 
 

@@ -5,16 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from flightid import _native
 from flightid.errors import FileFormatError, LogFormatError
 from flightid.logs.blackbox.reader import PRODUCT, open_blackbox
+from flightid.logs.dataflash.printed import open_printed
 from flightid.logs.dataflash.reader import open_dataflash
 from flightid.logs.log import Log
+from flightid.logs.mavlink.reader import open_telemetry
 from flightid.logs.source import LogSource
 from flightid.logs.ulog.reader import UlogSource
 from flightid.record.formats.sniff import file_format
 
 ULOG_MAGIC = b"ULog\x01\x12\x35"
 DATAFLASH_HEADER = b"\xa3\x95"
+TEXT_LOG = b"FMT, 128, 89, FMT"
+TEXT_WITHIN = 4096
+"""Bytes in which a text log defines its own definitions; ground stations write lines before."""
 SNIFFED = 65536
 """Bytes searched for a first DataFlash header: a log whose beginning is damaged is still a log."""
 
@@ -22,19 +28,31 @@ SNIFFED = 65536
 _FORMATS: tuple[tuple[Callable[[bytes], bool], str, Callable[[Path], LogSource]], ...] = (
     (lambda head: head.startswith(ULOG_MAGIC), "PX4 ULog", UlogSource),
     (lambda head: PRODUCT in head, "Betaflight or INAV blackbox", open_blackbox),
-    (lambda head: DATAFLASH_HEADER in head, "ArduPilot DataFlash", open_dataflash),
+    (lambda head: TEXT_LOG in head[:TEXT_WITHIN], "ArduPilot text log", open_printed),
+    (_native.is_telemetry_log, "MAVLink telemetry", open_telemetry),
 )
+# In other files these two bytes may stand by chance: asked last, and not where rig records are.
+_BY_CHANCE = (lambda head: DATAFLASH_HEADER in head, "ArduPilot DataFlash", open_dataflash)
 # Contents that people do hand in, and what to do with them.
 _FOREIGN: tuple[tuple[bytes, str, str], ...] = (
     (b"\x1f\x8b", "gzip data", "unpack it first"),
     (b"PK\x03\x04", "a zip archive", "unpack it first"),
-    (b"FMT,", "an ArduPilot text log", "hand in the .bin file that it was made from"),
-    (b"\xfd", "a MAVLink telemetry stream", "hand in the log of the autopilot itself"),
+    (
+        b"\xfd",
+        "a MAVLink stream without stamps",
+        "record it as .tlog, or hand in the vehicle's log",
+    ),
+    (b"\x89MCAP0", "a ROS 2 bag (MCAP)", "export the topics to CSV: one column a field, with time"),
+    (b"#ROSBAG", "a ROS bag", "export the topics to CSV: one column a field, with time"),
+    (b"SQLite format 3", "a database, perhaps a ROS 2 bag", "export the topics to CSV, with time"),
 )
 
 
 def read_log(path: str | Path) -> Log:
-    """Open a flight log: ArduPilot DataFlash or PX4 ULog, told apart by their content.
+    """Open a flight log, whose format its content tells.
+
+    ArduPilot DataFlash (binary and text), PX4 ULog, blackbox logs of Betaflight and INAV, and
+    telemetry that ground stations record (``.tlog``).
 
     The file is indexed once; columns are extracted when they are asked for. Damaged places are
     skipped and reported in `Log.skipped`.
@@ -67,7 +85,7 @@ def read_log(path: str | Path) -> Log:
     path = Path(path)
     with path.open("rb") as file:
         head = file.read(SNIFFED)
-    for holds, _, open_source in _FORMATS:
+    for holds, _, open_source in (*_FORMATS, _BY_CHANCE):
         if holds(head):
             return Log(path, open_source(path))
     raise _not_a_log(path, head)
@@ -86,13 +104,13 @@ def is_log(path: str | Path) -> bool:
     path = Path(path)
     with path.open("rb") as file:
         head = file.read(SNIFFED)
-    signs = (ULOG_MAGIC, DATAFLASH_HEADER, *(magic for magic, _, _ in _FOREIGN))
-    if head.startswith(signs):
+    signs = (DATAFLASH_HEADER, *(magic for magic, _, _ in _FOREIGN))
+    if head.startswith(signs) or any(holds(head) for holds, _, _ in _FORMATS):
         return True
     try:
         file_format(path)
     except FileFormatError:
-        return DATAFLASH_HEADER in head
+        return _BY_CHANCE[0](head)
     return False
 
 
@@ -103,5 +121,5 @@ def _not_a_log(path: Path, head: bytes) -> LogFormatError:
         for magic, what, advice in _FOREIGN:
             if head.startswith(magic):
                 found, action = what, advice
-    formats = " or ".join(name for _, name, _ in _FORMATS)
+    formats = " or ".join(name for _, name, _ in (*_FORMATS, _BY_CHANCE))
     return LogFormatError(f"{path.name} is not a log", found=found, needed=formats, action=action)

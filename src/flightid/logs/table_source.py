@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class MessageRows:
     """Rows of a message by column.
 
     Attributes
@@ -61,7 +61,7 @@ class TableSource:
     ----------
     kind, vehicle, firmware
         As in `LogSource`.
-    tables : mapping of str to Rows
+    tables : mapping of str to MessageRows
         Messages that have rows.
     parameters, parameter_changes, events, skipped, gaps, findings
         As in `LogSource`.
@@ -70,7 +70,7 @@ class TableSource:
     kind: str
     vehicle: str | None
     firmware: str
-    tables: Mapping[str, Rows]
+    tables: Mapping[str, MessageRows]
     parameters: Mapping[str, float] = field(default_factory=dict)
     parameter_changes: Sequence[ParameterChange] = ()
     events: Sequence[Event] = ()
@@ -88,6 +88,8 @@ class TableSource:
         rows = self.tables[message]
         return rows.units, tuple(rows.words)
 
+    # No format here has instances, of which the protocol asks.
+    # ruff: noqa: ARG002
     def rows(self, message: str, instance: int | None) -> int:
         """Rows of a message."""
         return int(self.tables[message].time_s.size)

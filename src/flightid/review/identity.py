@@ -93,6 +93,14 @@ def flight_identity(log: Log, phases: FlightPhases) -> FlightIdentity:
     )
 
 
+BATTERY = {
+    "ardupilot": ("BAT", "Volt", "Curr", "CurrTot"),
+    "px4": ("battery_status", "voltage_v", "current_a", "discharged_mah"),
+    "betaflight": ("main", "vbatLatest", "amperageLatest", ""),
+}
+"""Message, and fields of voltage, current and charge drawn."""
+
+
 def _frame(log: Log) -> str:
     said = [e.text for e in log.events if e.kind == "text" and e.text.startswith("Frame: ")]
     if said:
@@ -122,9 +130,7 @@ def _modes(log: Log) -> tuple[ModeSpan, ...]:
 
 
 def _battery(log: Log, spans: tuple[Span, ...]) -> Battery | None:
-    px4 = log.kind == "px4"
-    message = "battery_status" if px4 else "BAT"
-    fields = ("voltage_v", "current_a", "discharged_mah") if px4 else ("Volt", "Curr", "CurrTot")
+    message, *fields = BATTERY.get(log.kind, BATTERY["ardupilot"])
     if message not in log or fields[0] not in log.messages[message].fields:
         return None
     table = log.table(message, (log.messages[message].instances or (None,))[0])

@@ -16,6 +16,7 @@ from flightid.review.vibration import Vibration
 FAST_GYRO = {
     "ardupilot": "set INS_LOG_BAT_MASK 1 for raw batches of the first gyroscope",
     "px4": "set SDLOG_PROFILE 25, with system identification and high rate",
+    "betaflight": "set blackbox_sample_rate 1/1, and log the unfiltered gyroscope",
 }
 
 
@@ -49,7 +50,7 @@ def _noise(review: FlightReview) -> Iterator[Finding]:
             "no-noise-spectrum",
             Light.UNKNOWN,
             f"no spectrum of the gyroscope: {review.noise.reason}",
-            FAST_GYRO[review.kind],
+            FAST_GYRO.get(review.kind, "log the gyroscope faster"),
         )
 
 

@@ -10,6 +10,7 @@ mod describe;
 mod format;
 mod log_index;
 mod message_table;
+pub mod printed;
 mod scan;
 
 pub use describe::Stamps;

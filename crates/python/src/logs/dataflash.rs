@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 
 use flightid_logs::LogError;
-use flightid_logs::dataflash::{Dataflash, Field, Table};
+use flightid_logs::dataflash::{Dataflash, Field, Table, printed};
 use numpy::{IntoPyArray, PyArray1};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 use crate::error::from_logs;
 use crate::file_bytes::FileBytes;
@@ -36,6 +37,15 @@ fn open_dataflash(py: Python<'_>, path: PathBuf) -> PyResult<DataflashFile> {
 #[pyfunction]
 fn index_dataflash(py: Python<'_>, data: &[u8]) -> PyResult<DataflashFile> {
     index(py, FileBytes::Owned(data.to_vec()))
+}
+
+/// dataflash_of_text(text: bytes) -> tuple[bytes, int]
+///
+/// The binary log that a text log was printed from, and how many of its lines are no message.
+#[pyfunction]
+fn dataflash_of_text<'py>(py: Python<'py>, text: &[u8]) -> (Bound<'py, PyBytes>, usize) {
+    let made = py.detach(|| printed::to_binary(text));
+    (PyBytes::new(py, &made.bytes), made.bad_lines)
 }
 
 fn index(py: Python<'_>, bytes: FileBytes) -> PyResult<DataflashFile> {
@@ -192,5 +202,6 @@ impl DataflashFile {
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<DataflashFile>()?;
     module.add_function(wrap_pyfunction!(open_dataflash, module)?)?;
-    module.add_function(wrap_pyfunction!(index_dataflash, module)?)
+    module.add_function(wrap_pyfunction!(index_dataflash, module)?)?;
+    module.add_function(wrap_pyfunction!(dataflash_of_text, module)?)
 }

@@ -3,4 +3,5 @@
 pub mod blackbox;
 pub mod dataflash;
 pub mod delimited;
+pub mod mavlink;
 pub mod ulog;

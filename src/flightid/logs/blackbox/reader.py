@@ -1,8 +1,8 @@
 """Blackbox logs as a `LogSource` (native half: `crates/logs/src/blackbox/mod.rs`).
 
-Numbers come in the units that the firmware's own viewer shows, which the header's scales give: rates
-in deg/s, accelerations in g, throttle and commands as logged. They carry no declared unit; the
-channel map knows them.
+Numbers come in the units that the firmware's own viewer shows, by the header: rates in
+deg/s, accelerations in g, throttle and commands as logged. They carry no declared unit; the channel
+map knows them.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from flightid.conventions import Light
 from flightid.errors import LogFormatError
 from flightid.findings import Finding, counted
 from flightid.logs.source import ByteRange, Event, Gap
-from flightid.logs.table_source import Array, Rows, TableSource
+from flightid.logs.table_source import Array, MessageRows, TableSource
 from flightid.reading import bounded_bytes
 
 PRODUCT = b"H Product:Blackbox flight data recorder"
@@ -96,7 +96,7 @@ def _parameters(header: Mapping[str, str]) -> dict[str, float]:
 
 def _tables(
     native: _native.Blackbox, header: Mapping[str, str]
-) -> Iterator[tuple[str, Rows]]:
+) -> Iterator[tuple[str, MessageRows]]:
     scales = _scales(header)
     for name, columns, count in native.tables():
         if not count:
@@ -104,7 +104,7 @@ def _tables(
         places = {column: place for place, column in reversed(list(enumerate(columns)))}
         read = partial(_scaled, native, name, places, scales)
         units = {column: "µs" if column == "time" else "1" for column in columns}
-        yield name, Rows(units, read, native.stamps_us(name) / 1e6)
+        yield name, MessageRows(units, read, native.stamps_us(name) / 1e6)
 
 
 def _scaled(
@@ -190,7 +190,7 @@ def _findings(
             "bytes-skipped",
             Light.AMBER,
             f"{damaged} of {size} bytes in {counted(len(lost), 'place')} are no frame, and "
-            f"{counted(undecodable, 'frame')} had lost the one before: the logger could not keep up",
+            f"{counted(undecodable, 'frame')} had lost the one before: the logger did not keep up",
             "log at a lower rate, or to a faster card; look for gaps in the span you use",
         )
     if flights > 1:

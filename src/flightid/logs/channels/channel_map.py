@@ -21,6 +21,8 @@ DEFAULTS = {
     ("px4", "copter"): "px4_multicopter",
     ("px4", "plane"): "px4_fixed_wing",
     ("betaflight", "copter"): "betaflight",
+    ("mavlink", "copter"): "mavlink",
+    ("mavlink", "plane"): "mavlink",
 }
 ANGLES = ("roll", "pitch", "yaw")
 _SOURCE_KEYS = {
@@ -197,7 +199,7 @@ def channel_map(name: str | Path) -> ChannelMap:
     ----------
     name : str or Path
         Shipped map (``"arducopter"``, ``"arduplane"``, ``"px4_multicopter"``,
-        ``"px4_fixed_wing"``, ``"betaflight"``), or a TOML file of the same form.
+        ``"px4_fixed_wing"``, ``"betaflight"``, ``"mavlink"``), or a TOML file of the same form.
 
     Raises
     ------
@@ -215,7 +217,7 @@ def channel_map(name: str | Path) -> ChannelMap:
         raise UnknownNameError(
             "there is no such channel map",
             found=name,
-            needed="one of " + ", ".join(DEFAULTS.values()) + ", or a TOML file",
+            needed="one of " + ", ".join(dict.fromkeys(DEFAULTS.values())) + ", or a TOML file",
         )
     try:
         return _parse(text)

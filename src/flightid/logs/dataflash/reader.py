@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from flightid import _native
 from flightid.conventions import Light
 from flightid.errors import MissingColumnError
-from flightid.findings import Finding
+from flightid.findings import Finding, counted
 from flightid.logs.dataflash.events import error_text, event_text, mode_text, vehicle_of
 from flightid.logs.dataflash.field_units import (
     DEGREES_SINCE,
@@ -132,12 +132,15 @@ class DataflashSource:
     ----------
     file : _native.DataflashFile
         The indexed file.
+    bad_lines : int
+        Lines of a text log that are no message.
     """
 
     kind = "ardupilot"
 
-    def __init__(self, file: _native.DataflashFile) -> None:
+    def __init__(self, file: _native.DataflashFile, bad_lines: int = 0) -> None:
         self._file = file
+        self._bad_lines = bad_lines
         self._layouts: dict[str, _Layout] = {}
         self._renamed: list[str] = []
         for index, (name, _, count) in enumerate(file.tables()):
@@ -307,6 +310,13 @@ class DataflashSource:
     def _loss(self) -> Iterator[Finding]:
         harmless = ("filled with", "the file ends inside")
         lost = [r for r in self.skipped if not r.reason.startswith(harmless)]
+        if self._bad_lines:
+            yield Finding(
+                "lines-skipped",
+                Light.AMBER,
+                f"{counted(self._bad_lines, 'line')} of the text log are no message of its own",
+                "hand in the .bin file that it was made from, if it still exists",
+            )
         if lost:
             size = sum(r.size for r in lost)
             yield Finding(

@@ -132,10 +132,12 @@ def _coherence_and_slope(
     a, b = x[0], x[1]
     re, im = x[2] * scale[2], x[3] * scale[3]
     power = a * b * scale[0] * scale[1] * scale[4]
-    value = (re**2 + im**2) / power
-    slope = np.stack(
-        [-value / a, -value / b, 2.0 * re * scale[2] / power, 2.0 * im * scale[3] / power]
-    )
+    # A channel that never moves has no power, and its coherence is not a number.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = (re**2 + im**2) / power
+        slope = np.stack(
+            [-value / a, -value / b, 2.0 * re * scale[2] / power, 2.0 * im * scale[3] / power]
+        )
     return value, slope
 
 

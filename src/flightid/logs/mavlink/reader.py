@@ -1,0 +1,182 @@
+"""Telemetry of ground stations as a `LogSource` (native half: `crates/logs/src/mavlink.rs`).
+
+Messages that tell when they were made are stamped by that, on the autopilot's clock; the others by
+when they arrived, brought onto that clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flightid import _native
+from flightid.conventions import Light
+from flightid.errors import LogFormatError
+from flightid.findings import Finding
+from flightid.logs.mavlink.messages import TelemetryMessage, telemetry_messages
+from flightid.logs.source import Event, ParameterChange
+from flightid.logs.table_source import Array, MessageRows, TableSource
+from flightid.reading import bounded_bytes
+
+LARGEST = 1 << 30
+"""Bytes of a file that are read."""
+AUTOPILOTS = {3: "ArduPilot", 12: "PX4"}
+VEHICLES = {1: "plane", 2: "copter", 3: "copter", 4: "copter", 10: "rover", 13: "copter",
+            14: "copter", 15: "copter", 29: "copter"}  # fmt: skip
+"""MAV_TYPE of vehicles whose channels are known."""
+ARMED = 0x80
+NO_AUTOPILOT = 8
+STAMPS = {"time_boot_ms": 1e3, "time_usec": 1e6}
+"""Stamps of messages that tell when they were made, and their counts a second."""
+LATEST_BOOT_S = 1e8
+"""Stamps beyond it, s, count from 1970, not from the start of the autopilot."""
+SEVERITIES = ("emergency", "alert", "critical", "error", "warning", "notice", "info", "debug")
+Table = NDArray[np.void]
+
+
+def open_telemetry(path: Path) -> TableSource:
+    """Read a telemetry log: of the first autopilot that is heard in it.
+
+    Raises
+    ------
+    LogFormatError
+        No autopilot is heard in it, or the file is larger than is read.
+    OSError
+        The file cannot be read.
+    """
+    known = telemetry_messages()
+    data = bounded_bytes(path, LARGEST, LogFormatError)
+    asked = {number: (m.layout.itemsize, m.seed) for number, m in known.items()}
+    frames, lost = _native.telemetry_frames(data, asked)
+    sender = _autopilot(frames, known[0])
+    heard: dict[str, tuple[Array, Table]] = {}
+    for (number, system, component), arrived_s, payloads in frames:
+        if (system, component) == sender:
+            message = known[number]
+            heard[message.name] = (arrived_s, np.frombuffer(payloads, message.layout))
+    ahead_s = _clock(heard)
+    by_name = {message.name: message for message in known.values()}
+    stamps = {name: _stamps(arrived, rows, ahead_s) for name, (arrived, rows) in heard.items()}
+    tables = {name: _rows(by_name[name], rows, stamps[name]) for name, (_, rows) in heard.items()}
+    beats = heard["HEARTBEAT"][1]
+    parameters, changes = _parameters(heard, stamps)
+    return TableSource(
+        "mavlink",
+        VEHICLES.get(int(beats["type"][0])),
+        f"{AUTOPILOTS.get(int(beats['autopilot'][0]), 'autopilot')}, by telemetry",
+        tables,
+        parameters,
+        changes,
+        sorted(_events(heard, stamps), key=lambda event: event.time_s or 0.0),
+        findings=tuple(_findings(lost, len(data))),
+    )
+
+
+def _autopilot(frames: list[Any], beat: TelemetryMessage) -> tuple[int, int]:
+    for (number, system, component), _, payloads in frames:
+        if number == beat.id:
+            kinds = np.frombuffer(payloads, beat.layout)["autopilot"]
+            if kinds[0] != NO_AUTOPILOT:
+                return system, component
+    raise LogFormatError(
+        "no autopilot is heard in the telemetry",
+        found="no heartbeat of one",
+        needed="a .tlog that a ground station recorded",
+        action="hand in the log of the autopilot itself",
+    )
+
+
+def _clock(heard: dict[str, tuple[Array, Table]]) -> float:
+    """How far the ground station's clock is ahead of the autopilot's, s: by the fastest arrival."""
+    gaps = [
+        float(np.min(arrived - made))
+        for arrived, rows in heard.values()
+        if (made := _made_s(rows)) is not None
+    ]
+    return min(gaps, default=0.0)
+
+
+def _made_s(rows: Table) -> Array | None:
+    for name, per_second in STAMPS.items():
+        if rows.dtype.names is not None and name in rows.dtype.names:
+            made = rows[name].astype(np.float64) / per_second
+            return made if 0.0 < float(made.max(initial=0.0)) < LATEST_BOOT_S else None
+    return None
+
+
+def _stamps(arrived_s: Array, rows: Table, ahead_s: float) -> Array:
+    made = _made_s(rows)
+    return arrived_s - ahead_s if made is None else made
+
+
+def _rows(message: TelemetryMessage, rows: Table, time_s: Array) -> MessageRows:
+    units: dict[str, str] = {}
+    for name, unit in message.units.items():
+        width = message.layout[name].shape
+        names = [f"{name}[{i}]" for i in range(width[0])] if width else [name]
+        units.update(dict.fromkeys(names, unit))
+    words = {
+        name: [bytes(word).split(b"\0")[0].decode("utf-8", "replace") for word in rows[name]]
+        for name in message.units
+        if message.layout[name].kind == "S"
+    }
+    return MessageRows(units, partial(_column, rows), time_s, words)
+
+
+def _column(rows: Table, name: str) -> Array:
+    base, _, index = name.partition("[")
+    values = rows[base][:, int(index[:-1])] if index else rows[base]
+    return np.asarray(values, np.float64)
+
+
+def _parameters(
+    heard: dict[str, tuple[Array, Table]], stamps: dict[str, Array]
+) -> tuple[dict[str, float], list[ParameterChange]]:
+    values: dict[str, float] = {}
+    changes: list[ParameterChange] = []
+    if "PARAM_VALUE" not in heard:
+        return values, changes
+    for time_s, row in zip(stamps["PARAM_VALUE"], heard["PARAM_VALUE"][1], strict=True):
+        name = bytes(row["param_id"]).split(b"\0")[0].decode("ascii", "replace")
+        value = float(row["param_value"])
+        if values.get(name, value) != value:
+            changes.append(ParameterChange(float(time_s), name, values[name], value))
+        values[name] = value
+    return values, changes
+
+
+def _events(heard: dict[str, tuple[Array, Table]], stamps: dict[str, Array]) -> Iterator[Event]:
+    beats, beat_s = heard["HEARTBEAT"][1], stamps["HEARTBEAT"]
+    armed = (beats["base_mode"] & ARMED) != 0
+    for at in np.flatnonzero(np.diff(armed, prepend=~armed[:1])):
+        yield Event(float(beat_s[at]), "arming", "armed" if armed[at] else "disarmed")
+    modes = beats["custom_mode"].astype(np.int64)
+    for at in np.flatnonzero(np.diff(modes, prepend=modes[:1] - 1)):
+        yield Event(float(beat_s[at]), "mode", f"mode {modes[at]}")
+    if "STATUSTEXT" in heard:
+        for time_s, row in zip(stamps["STATUSTEXT"], heard["STATUSTEXT"][1], strict=True):
+            text = bytes(row["text"]).split(b"\0")[0].decode("utf-8", "replace")
+            level = SEVERITIES[min(int(row["severity"]), len(SEVERITIES) - 1)]
+            yield Event(float(time_s), "text", f"{level}: {text}")
+
+
+def _findings(lost: int, size: int) -> Iterator[Finding]:
+    yield Finding(
+        "telemetry",
+        Light.AMBER,
+        "this is telemetry: a few samples a second, sent over a radio, without the commands to the "
+        "motors",
+        "hand in the log that the autopilot wrote to its own card",
+    )
+    if lost:
+        yield Finding(
+            "bytes-skipped",
+            Light.AMBER,
+            f"{lost} of {size} bytes are in no frame whose checksum holds",
+            "look for gaps in the span you use",
+        )

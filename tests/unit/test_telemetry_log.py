@@ -1,0 +1,85 @@
+"""Telemetry logs against pymavlink, which packs the frames here."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flightid as fid
+from flightid.errors import LogFormatError
+from flightid.logs.mavlink.messages import telemetry_messages
+
+mavlink = pytest.importorskip("pymavlink.dialects.v20.ardupilotmega")
+START_US = 1_700_000_000_000_000
+
+
+def _telemetry(n: int = 200, *, old: bool = False, signed: bool = False, damage: int = 0) -> bytes:
+    link = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+    if signed:
+        link.signing.secret_key = bytes(32)
+        link.signing.sign_outgoing = True
+    out = []
+    for at in range(n):
+        boot_ms = 50_000 + 100 * at
+        messages = [
+            mavlink.MAVLink_heartbeat_message(2, 3, 0x80 if at > 10 else 0, 5, 4, 3),
+            mavlink.MAVLink_attitude_message(boot_ms, 0.1 * np.sin(at), 0.0, 0.2, 0.5, 0.0, 0.0),
+            mavlink.MAVLink_vfr_hud_message(0.0, 1.0, 90, 40, 3.0, 0.0),
+            mavlink.MAVLink_param_value_message(
+                b"ATC_RAT_RLL_P", 0.135 if at < 9 else 0.15, 9, 5, 0
+            ),
+            mavlink.MAVLink_system_time_message(1, 2),
+            mavlink.MAVLink_statustext_message(6, f"line {at}".encode()),
+        ]
+        for place, message in enumerate(messages):
+            stamp = START_US + 1000 * boot_ms + 3000 * (at % 3) + place
+            out.append(struct.pack(">Q", stamp) + message.pack(link, force_mavlink1=old))
+    if damage:
+        out[damage] = out[damage][:12] + b"\x99" + out[damage][13:]
+    return b"".join(out)
+
+
+def _open(folder: Path, content: bytes) -> fid.Log:
+    path = folder / "2026-11-23 12-00-00.tlog"
+    path.write_bytes(content)
+    return fid.read_log(path)
+
+
+@pytest.mark.parametrize("how", [{}, {"old": True}, {"signed": True}])
+def test_frames_come_back(tmp_path: Path, how: dict[str, bool]) -> None:
+    log = _open(tmp_path, _telemetry(**how))
+    assert (log.kind, log.vehicle) == ("mavlink", "copter")
+    attitude = log.table("ATTITUDE")
+    np.testing.assert_allclose(attitude["roll"], 0.1 * np.sin(np.arange(200)), rtol=1e-6)
+    np.testing.assert_array_equal(attitude.time_s, (50_000 + 100 * np.arange(200)) / 1e3)
+    # What tells no time of its own: by arrival, on the autopilot's clock.
+    late = log.table("VFR_HUD").time_s - attitude.time_s
+    np.testing.assert_allclose(late, 0.003 * (np.arange(200) % 3), atol=1e-4)
+    assert log.parameters == {"ATC_RAT_RLL_P": pytest.approx(0.15)}
+    assert [round(change.old, 3) for change in log.parameter_changes] == [0.135]
+    assert [e.text for e in log.events if e.kind == "arming"] == ["disarmed", "armed"]
+    assert log.table("STATUSTEXT").text("text")[7] == "line 7"
+    assert [f.code for f in log.findings] == ["telemetry"]
+
+
+def test_damaged_frame_is_left_out_and_said(tmp_path: Path) -> None:
+    log = _open(tmp_path, _telemetry(damage=7))
+    assert len(log.table("ATTITUDE")) == 199
+    assert len(log.table("VFR_HUD")) == 200
+    assert {f.code for f in log.findings} == {"telemetry", "bytes-skipped"}
+
+
+def test_no_autopilot_is_refused(tmp_path: Path) -> None:
+    link = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
+    beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(link)
+    with pytest.raises(LogFormatError, match="no autopilot"):
+        _open(tmp_path, 5 * (struct.pack(">Q", START_US) + beat))
+
+
+@pytest.mark.parametrize("message", telemetry_messages().values(), ids=lambda m: m.name)
+def test_table_agrees_with_the_definitions(message: object) -> None:
+    peer = getattr(mavlink, f"MAVLink_{message.name.lower()}_message")
+    assert (message.id, message.seed) == (peer.id, peer.crc_extra)
+    assert list(message.layout.names) == list(peer.ordered_fieldnames)
+    assert message.layout.itemsize == peer.unpacker.size
