@@ -132,7 +132,7 @@ class Result(TableView):
         >>> import flightid as fid
         >>> record = fid.Record.from_arrays([0.0, 0.1], outputs={"p": [0.0, 0.2]})
         >>> type(record.plot()).__name__
-        'Figure'
+        'PlotFigure'
         """
         return _drawing(type(self))(self, **options)
 

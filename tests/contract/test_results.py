@@ -138,7 +138,7 @@ def test_examples_show_themselves(examples: list[Result]) -> None:
         lost = [f.name for f in fields if f.name not in plain and f.name not in result.untold]
         assert not lost
         assert "<table>" in result._repr_html_()
-        assert type(result.plot()).__name__ == "Figure"
+        assert type(result.plot()).__name__ == "PlotFigure"
         assert isinstance(result.findings, tuple)
 
 

@@ -34,7 +34,7 @@ def diagram(loops: Interconnection) -> go.PlotFigure:
     >>> roll = fid.LinearSystem([[-4.0]], [[20.0]], [[1.0]], [[0.0]], ("lat",), ("p",))
     >>> loop = fid.connect([roll, fid.loops.gain("p", "lat", -0.2)], inputs=[], outputs=["p"])
     >>> type(diagram(loop)).__name__
-    'Figure'
+    'PlotFigure'
     """
     made, columns = look.figure(1, 1), _columns(loops)
     places: dict[int, tuple[float, float]] = {}

@@ -41,7 +41,7 @@ def loop_bode(margins: Margins) -> go.PlotFigure:
     >>> import flightid as fid
     >>> loop = fid.LinearSystem([[0.0]], [[4.0]], [[1.0]], [[0.0]], ("e",), ("y",), [0.1])
     >>> type(loop_bode(fid.margins(loop))).__name__
-    'Figure'
+    'PlotFigure'
     """
     made = look.figure(rows=2, row_heights=(1.0, 1.0), height_px=500)
     omega, decibel, degrees = _curve(margins.curve, margins.crossover)
@@ -84,7 +84,7 @@ def loop_nyquist(margins: Margins, disk: DiskMargin | None = None) -> go.PlotFig
     >>> import flightid as fid
     >>> loop = fid.LinearSystem([[0.0]], [[4.0]], [[1.0]], [[0.0]], ("e",), ("y",), [0.1])
     >>> type(loop_nyquist(fid.margins(loop))).__name__
-    'Figure'
+    'PlotFigure'
     """
     made = look.figure(height_px=520)
     values = margins.curve.response
@@ -144,7 +144,7 @@ def loop_nichols(
     >>> import flightid as fid
     >>> loop = fid.LinearSystem([[0.0]], [[4.0]], [[1.0]], [[0.0]], ("e",), ("y",), [0.1])
     >>> type(loop_nichols(fid.margins(loop))).__name__
-    'Figure'
+    'PlotFigure'
     """
     made = look.figure(height_px=500)
     _, decibel, degrees = _curve(margins.curve, margins.crossover)
