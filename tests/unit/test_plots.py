@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid.plot import graph_objects as go
+from flightid.plot import look
 from flightid.plot.fit import EstimateBar, parameter_intervals
-from flightid.plot.frequency_response import Curve, bode
+from flightid.plot.frequency_response import Curve, bode, bode_page
 from flightid.plot.record import Panel, Trace, thinned, time_histories
 from flightid.responses.response_band import TAKEN_OUT, ResponseIntervals
 from tests.closeness import assert_close
@@ -148,3 +150,37 @@ def test_figures_are_what_plotly_takes(tmp_path: Path) -> None:
     assert made.to_dict()["data"][0]["y"] == [3, None]
     page = made.write_html(tmp_path / "a.html").read_text()
     assert "plotly.js (cartesian - minified) v4.1.1" in page
+
+
+def test_bode_greys_what_lies_beyond_the_band_and_shows_hertz() -> None:
+    whole = _curve("measured", 1.0 / (1j * OMEGA), coherence=np.ones(OMEGA.size))
+    made = bode([whole, _curve("model", 1.0 / (1j * OMEGA))], band_rad_s=(2.0, 20.0))
+    grey = [(each.x0, each.x1) for each in made.layout.shapes if each.type == "rect"]
+    assert grey == [(OMEGA[0], 2.0)] * 3 + [(20.0, OMEGA[-1])] * 3
+    hertz = made.layout["xaxis99"]
+    place = hertz.ticktext.index("2")
+    assert_close(hertz.tickvals[place], 4.0 * np.pi, rtol=1e-12, why="2 Hz in rad/s")
+    assert [each.name for each in made.data if each.xaxis == "x99"] == ["model"]
+
+
+def test_many_responses_share_a_page_of_small_plots() -> None:
+    curve = _curve("measured", 1.0 / (1j * OMEGA), coherence=np.ones(OMEGA.size))
+    names = ["p/lat", "q/lon", "r/ped", "w/col"]
+    made = bode_page({name: [curve] for name in names}, bands_rad_s={"w/col": (2.0, 60.0)})
+    assert [each.text for each in made.layout.annotations] == [f"<b>{name}</b>" for name in names]
+    assert made.layout.annotations[3].xref == "x10 domain"
+    assert {each.xref for each in made.layout.shapes if each.type == "rect"} == {
+        "x10",
+        "x13",
+        "x16",
+    }
+    assert [bool(each.visible) for each in made.select_yaxes(row=4)] == [True, False, False]
+    assert sum(bool(each.showlegend) for each in made.data) == 1
+
+
+def test_rows_with_axes_of_their_own_have_room_for_numbers() -> None:
+    made = look.figure(5, shared_x=False, height_px=1060)
+    ends = [axis.domain for axis in made.select_yaxes()]
+    inner = 1060 - 90
+    for above, below in pairwise(ends):
+        assert_close(inner * (above[0] - below[1]), 36.0, rtol=0.03, why="px for the numbers")

@@ -13,6 +13,7 @@ from flightid.control.autopilots import AxisLoop, axis_loop, read_parameters
 from flightid.control.tuning.sampled_plants import SampledPlants, sample_plants
 from flightid.conventions import Light
 from flightid.errors import DataError, ModelError, OptionError, UnknownNameError
+from flightid.plot.gains import overlaid_steps, promised_margins
 from flightid.plot.tuning import gain_map, nichols, time_responses
 from flightid.report.content import Document
 from flightid.report.html import to_html
@@ -292,6 +293,13 @@ def test_pictures_and_report_show_every_loop(tuning: fid.Tuning) -> None:
     assert len({trace.name for trace in time_responses(design).data if trace.name}) == 2
     titles = {note.text for note in nichols(design).layout.annotations}
     assert {"rate loop", "whole loop", "angle loop"} <= titles
+    steps = overlaid_steps(tuning.designs)
+    assert {"roll", "roll as flown", "pitch"} <= {trace.name for trace in steps.data}
+    promise = promised_margins(tuning.designs)
+    bars = [trace for trace in promise.data if trace.type == "bar"]
+    worst = [each.worst for each in design.worst_cases if each.name == "phase margin"]
+    assert set(worst) <= set(bars[0].x)
+    assert set(promise.data[2].x) == {45.0, 60.0}
     drawn = gain_map(design)
     line = next(trace for trace in drawn.data if trace.name == "all requirements met")
     assert np.nanmax(line.z) > 0.0

@@ -79,4 +79,6 @@ def write_page(result: Result, title: str, path: Path, *beside: Result) -> Path:
         except (OptionError, DataError) as reason:
             note(f"No picture: {reason}")
         sections.append(Section(one.summary().title, tuple(blocks)))
-    return write_atomically(path, to_html(Document(title, repr(result), tuple(sections))))
+    return write_atomically(
+        path, to_html(Document(title, getattr(result, "in_short", ""), tuple(sections)))
+    )

@@ -154,7 +154,7 @@ def _response_figure(each: FittedResponse) -> go.PlotFigure:
         ),
         Curve("model", measured.omega_rad_s[inside], each.model[inside], look.MODEL),
     ]
-    return bode(curves, unit=measured.unit)
+    return bode(curves, unit=measured.unit, band_rad_s=each.band_rad_s)
 
 
 def estimates_of(fit: Fit, truth: Mapping[str, float] | None = None) -> list[EstimateBar]:

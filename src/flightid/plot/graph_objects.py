@@ -89,6 +89,8 @@ class PlotFigure:
         One above each column.
     shared_x : bool
         Plots of a column share their x axis.
+    between_rows : float
+        Part of the height that is left free between rows, all gaps together.
     """
 
     def __init__(
@@ -99,11 +101,12 @@ class PlotFigure:
         row_heights: Sequence[float] | None = None,
         column_titles: Sequence[str] = (),
         shared_x: bool = False,
+        between_rows: float = 0.07,
     ) -> None:
         self.data: list[Node] = []
         self.layout = Node({"annotations": [], "shapes": []})
         self._shape = rows, columns
-        heights = _spans(np.array(row_heights or [1.0] * rows)[::-1], 0.07 if rows > 1 else 0.0)
+        heights = _spans(np.array(row_heights or [1.0] * rows)[::-1], between_rows * (rows > 1))
         widths = _spans(np.ones(columns), 0.09 * (columns - 1))
         for row, column, number in self._places():
             x, y = self._axes(row, column)

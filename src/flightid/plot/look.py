@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -27,11 +28,14 @@ DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot", "solid")
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 GRID = "rgba(128,128,128,0.22)"
 LINE = "rgba(128,128,128,0.65)"
+GREYED = "rgba(128,128,128,0.2)"
 BAND_OPACITY = 0.16
 # 1, 2 and 5 of each decade, whole: the library's own labels drop the zeros of 20 and 50.
 LOG_TICKS = [digit * 10.0**decade for decade in range(-5, 6) for digit in (1, 2, 5)]
 LOG_LABELS = [f"{tick:g}" for tick in LOG_TICKS]
 ROW_HEIGHT_PX = 170
+GAP_PX = 36
+"""Between plots whose x axes have numbers of their own."""
 MARGIN_PX = 130
 
 
@@ -93,8 +97,14 @@ def _empty(
     height: int,
 ) -> go.PlotFigure:
     """What figures of one form are copies of: a copy costs a fiftieth of a figure."""
+    free = 0.07 if shared_x else min(0.5, GAP_PX * (rows - 1) / (height - 90))
     made = go.PlotFigure(
-        rows, columns, row_heights=heights or None, column_titles=titles, shared_x=shared_x
+        rows,
+        columns,
+        row_heights=heights or None,
+        column_titles=titles,
+        shared_x=shared_x,
+        between_rows=free,
     )
     made.update_layout(
         title={"text": title} if title else {},
@@ -139,6 +149,20 @@ def label_axes(
         axis.type, axis.tickvals, axis.ticktext = "log", LOG_TICKS, LOG_LABELS
         axis.minor.showgrid, axis.tickfont.size = False, 11
     below[len(y) - 1].title.text = x
+
+
+def hertz_above(made: go.PlotFigure) -> None:
+    """Put an axis in hertz above the uppermost plot, whose own frequencies are in rad/s."""
+    ticks = [2.0 * math.pi * tick for tick in LOG_TICKS]
+    made.layout.xaxis99 = {
+        "overlaying": "x", "matches": "x", "side": "top", "type": "log", "tickvals": ticks,
+        "ticktext": LOG_LABELS, "tickfont": {"size": 11}, "ticks": "outside", "tickcolor": LINE,
+        "showgrid": False, "anchor": "y",
+        "title": {"text": "frequency [Hz]", "standoff": 4, "font": {"size": 11}},
+    }  # fmt: skip
+    # An axis without a series is not drawn: it takes the last line of its plot.
+    next(each for each in reversed(made.data) if each["xaxis"] == "x")["xaxis"] = "x99"
+    made.update_layout(margin={"t": 90}, legend={"y": 1.09})
 
 
 def line(

@@ -13,6 +13,7 @@ from flightid.plot import graph_objects as go
 from flightid.plot import look
 
 MAXIMUM_POINTS = 3000
+SMOOTH_POINTS = 300
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +104,11 @@ def time_histories(panels: Sequence[Panel]) -> go.PlotFigure:
             named.add(trace.name)
     look.label_axes(made, x="time [s]", y=[panel.title for panel in panels])
     return made
+
+
+def sparse(n: int) -> slice:
+    """Every so many points of a smooth curve of n, as many as a screen can tell apart."""
+    return slice(None, None, max(1, n // SMOOTH_POINTS))
 
 
 def thinned(

@@ -9,9 +9,12 @@ from flightid.control.tuning.pid_design import PidDesign
 from flightid.errors import UnknownNameError
 from flightid.plot import graph_objects as go
 from flightid.plot import look
+from flightid.plot.record import sparse
 
 Array = NDArray[np.float64]
 SHOWN = 16
+POINTS_ACROSS = 80
+"""Points of a curve that is as long as the window is wide."""
 TITLES = {
     "rate step": ("rate, its set-point 1", "rad/s"),
     "angle step": ("angle, its set-point 1", "rad"),
@@ -46,14 +49,16 @@ def time_responses(design: PidDesign) -> go.PlotFigure:
     for place, name in enumerate(names):
         found = design.response(name)
         row, column = place // columns + 1, place % columns + 1
-        for edge in look.band("new gains", found.time_s, found.low, found.high, colour=look.MODEL):
+        few = sparse(found.time_s.size)
+        time_s, low, high = (each[few] for each in (found.time_s, found.low, found.high))
+        for edge in look.band("new gains", time_s, low, high, colour=look.MODEL):
             made.add_trace(edge, row=row, col=column)
         curves = [("new gains", found.estimate, look.MODEL, "solid")]
         if found.flown is not None:
             curves.append(("flown gains", found.flown, look.RIVAL, "dash"))
         for label, values, colour, dash in curves:
             line = look.line(
-                label, found.time_s, values, colour=colour, dash=dash, legend=place == 0
+                label, time_s, values[few], colour=colour, dash=dash, legend=place == 0
             )
             made.add_trace(line, row=row, col=column)
         words, unit = TITLES[name]
@@ -88,11 +93,16 @@ def nichols(design: PidDesign) -> go.PlotFigure:
         for label in reversed(_labels(design)):
             colour = look.MODEL if label == "new gains" else look.RIVAL
             rows = named[label][loop][0][:, keep]
-            for place in range(len(rows) if label == "new gains" else 1):
-                phase, gain = _nichols_curve(rows[place])
+            first, *others = (_nichols_curve(row) for row in rows)
+            curves = [(first, 2.0)]
+            if others and label == "new gains":
+                # One series, with a gap after each plant: NaN breaks a line.
+                joined = np.concatenate([np.c_[each, [[np.nan], [np.nan]]] for each in others], 1)
+                curves.append((joined, 0.5))
+            for (phase, gain), width in curves:
                 line = look.line(
-                    label, phase, gain, colour=colour, width=2.0 if place == 0 else 0.5,
-                    legend=column == 1 and place == 0,
+                    label, phase, gain, colour=colour, width=width,
+                    legend=column == 1 and width > 1.0,
                 )  # fmt: skip
                 made.add_trace(line, row=1, col=column)
         made.add_trace(_zone(design, legend=column == 1), row=1, col=column)
@@ -206,12 +216,22 @@ def _gains(design: PidDesign, label: str) -> Array:
     return gains
 
 
-def _nichols_curve(loop: NDArray[np.complex128]) -> tuple[Array, Array]:
-    """Phase on the branch of an integrator, degrees, and gain, dB."""
+def _nichols_curve(loop: NDArray[np.complex128]) -> Array:
+    """Phase on the branch of an integrator, degrees, and gain, dB: what the window shows of them.
+
+    Points nearer to each other than a screen tells apart are left out.
+    """
     phase = np.degrees(np.unwrap(np.angle(loop)))
     crossing = int(np.argmin(np.abs(np.log(np.abs(loop)))))
     phase -= 360.0 * np.round((phase[crossing] + 135.0) / 360.0)
-    return phase, 20.0 * np.log10(np.abs(loop))
+    curve = np.stack([phase, 20.0 * np.log10(np.abs(loop))])
+    lows, highs = np.transpose([PHASE_WINDOW_DEG, GAIN_WINDOW_DB])
+    size = (highs - lows)[:, None]
+    seen = np.all(np.abs(curve - (0.5 * (lows + highs))[:, None]) < 0.6 * size, axis=0)
+    way = np.cumsum(np.hypot(*np.diff(curve / size, axis=1, prepend=curve[:, :1] / size)))
+    step = np.diff(np.floor(POINTS_ACROSS * way), prepend=-1.0) > 0.0
+    drawn = np.where(seen, curve, np.nan)
+    return drawn[:, step & (seen | np.roll(seen, 1))]
 
 
 def _zone(design: PidDesign, *, legend: bool) -> go.Node:

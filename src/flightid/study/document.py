@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import partial
+from itertools import islice
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +14,7 @@ from flightid.findings import Finding
 from flightid.options import Options
 from flightid.plot.consistency import consistency
 from flightid.plot.fit import EstimateBar, parameter_intervals
-from flightid.plot.tuning import time_responses
+from flightid.plot.gains import overlaid_steps, promised_margins
 from flightid.report.blocks import provenance, result_blocks
 from flightid.report.closed_loop import closed_loop_section
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
@@ -181,8 +182,12 @@ def _inside(parameter: Estimate, true_value: float | None) -> bool | None:
 def _result(study: StudyResults) -> Iterator[Block]:
     answer = answer_of(study)
     yield Lights(answer.findings, repeats=True)
-    yield from map(TableBlock, answer.tables)
-    yield from _picture(study)
+    # The promise stands in a picture: its table opens on demand.
+    pictures, promises = _pictures(study), answer.tables[1:]
+    yield from islice(pictures, 1)
+    yield from map(TableBlock, answer.tables[:1])
+    yield from pictures
+    yield from (TableBlock(table, folded=True) for table in promises)
     if study.settings.notes:
         yield Paragraph(study.settings.notes)
     if study.faults:
@@ -204,12 +209,15 @@ def _result(study: StudyResults) -> Iterator[Block]:
     yield from _interval_figure(study)
 
 
-def _picture(study: StudyResults) -> Iterator[Block]:
-    """What new gains do beside the flown ones, of the first axis that has any."""
+def _pictures(study: StudyResults) -> Iterator[Figure]:
+    """What new gains do beside the flown ones, and what they promise, of all axes."""
     designs = () if study.tuning is None else study.tuning.designs
-    for design in [each for each in designs if each.exists][:1]:
-        shown = f"New gains of {design.axis} beside the flown; shaded: all that the data allow."
-        yield figure_block(time_responses(design), shown)
+    made = [each for each in designs if each.exists]
+    if made:
+        shown = "Steps with the new gains, dashed as flown; shaded: all that the data allow."
+        yield figure_block(overlaid_steps(made), shown)
+        shown = "Margins of the worst vehicle that the data allow; upright: what was required."
+        yield figure_block(promised_margins(made), shown)
 
 
 def _review(study: StudyResults) -> Iterator[Section]:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from flightid.plot import look
-from flightid.plot.frequency_response import Curve, bode
+from flightid.plot.frequency_response import Curve, bode, bode_page
 from flightid.report.content import Figure
 from flightid.report.figures import figure_block
 from flightid.responses.response_band import response_band
 from flightid.study.estimate_tables import WORDS
 from flightid.uncertainty.quantiles import interval_words, shown
+
+MODEL, GUIDE = "model", 0.6
+ALONE, PAGE = 4, 9
+"""Most responses that have a picture each, and how many small ones make a picture else."""
 
 if TYPE_CHECKING:
     from flightid.study.identified import ModelResults
@@ -38,10 +43,54 @@ def response_figures(item: ModelResults, truth: Truth | None) -> list[Figure]:
         names = list(fit.ranked)
     else:
         names = [f"{output}/{name}" for output in response.outputs for name in response.inputs]
-    return [_figure(item, name, truth) for name in names]
+    bands = {} if fit is None else {each.name: each.band_rad_s for each in fit.responses}
+    if len(names) <= ALONE:
+        return [_figure(item, name, truth, bands.get(name)) for name in names]
+    parts = [names[start : start + PAGE] for start in range(0, len(names), PAGE)]
+    return [_page(item, part, truth, bands) for part in parts]
 
 
-def _figure(item: ModelResults, name: str, truth: Truth | None) -> Figure:
+def _page(
+    item: ModelResults,
+    names: list[str],
+    truth: Truth | None,
+    bands: Mapping[str, tuple[float, float]],
+) -> Figure:
+    """Small pictures of several responses."""
+    cells, costs = {name: _curves(item, name, truth)[0] for name in names}, {}
+    if item.fit is not None:
+        costs = {name: f" ({item.fit.costs[name]:.3g})" for name in names if name in bands}
+    first = WORDS[next(iter(item.responses))]
+    modelled = any(curve.name == MODEL for curves in cells.values() for curve in curves)
+    said = f"{first} with its {interval_words(shown())} band{', and model' if modelled else ''}"
+    said += ": " + ", ".join(f"{name}{costs.get(name, '')}" for name in names)
+    said += "; in brackets the cost, the best fit first" if costs else ""
+    said += "; grey: beyond the band of the fit" if bands else ""
+    page = bode_page(cells, minimum_coherence=_least(item), bands_rad_s=bands)
+    return figure_block(page, f"{said}.")
+
+
+def _least(item: ModelResults) -> float:
+    """Guideline of coherence: what chose inputs, or the usual where coherence only weighs."""
+    chosen = item.settings.structure is not None
+    return item.settings.response.minimum_coherence if chosen else GUIDE
+
+
+def _figure(
+    item: ModelResults, name: str, truth: Truth | None, band: tuple[float, float] | None
+) -> Figure:
+    curves, said = _curves(item, name, truth)
+    output, source = name.split("/")
+    response = item.response
+    assert response is not None
+    unit = response.pair(output, source).unit
+    grey = "; grey: beyond the band of the fit" if band else ""
+    picture = bode(curves, unit=unit, minimum_coherence=_least(item), band_rad_s=band)
+    return figure_block(picture, f"{said}{grey}.")
+
+
+def _curves(item: ModelResults, name: str, truth: Truth | None) -> tuple[list[Curve], str]:
+    """Curves of one response, and what they are in words."""
     output, source = name.split("/")
     curves = []
     for number, (method, response) in enumerate(item.responses.items()):
@@ -65,7 +114,7 @@ def _figure(item: ModelResults, name: str, truth: Truth | None) -> Figure:
     if fit is not None and source in fit.model.inputs and hasattr(fit.model, "frequency_response"):
         row, column = fit.model.outputs.index(output), fit.model.inputs.index(source)
         fitted = fit.model.frequency_response(omega)[row, column]
-        curves.append(Curve("model", omega, fitted, colour=look.MODEL))
+        curves.append(Curve(MODEL, omega, fitted, colour=look.MODEL))
         said += ", and model" if fit.responses else ", and model fitted in time"
         if name in fit.costs and len(fit.costs) > 1:
             place = {fit.ranked[0]: ", the best fit", fit.ranked[-1]: ", the worst fit"}
@@ -74,7 +123,4 @@ def _figure(item: ModelResults, name: str, truth: Truth | None) -> Figure:
     if exact is not None and fit is not None and len(fit.responses) == 1:
         curves.append(Curve("truth", omega, exact, colour=look.TRUTH, dash="dot"))
         said += "; truth dotted"
-    least = item.settings.response.minimum_coherence
-    if item.settings.structure is None:
-        return figure_block(bode(curves, unit=pair.unit), f"{said}.")
-    return figure_block(bode(curves, unit=pair.unit, minimum_coherence=least), f"{said}.")
+    return curves, said

@@ -1,0 +1,134 @@
+"""What new gains promise, all axes in one picture: steps, and margins against requirements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flightid.control.tuning.limits import ANGLE
+from flightid.control.tuning.pid_design import PidDesign
+from flightid.control.tuning.worst_cases import WorstCase
+from flightid.plot import graph_objects as go
+from flightid.plot import look
+from flightid.plot.flight import COLOURS
+from flightid.plot.record import sparse
+
+STEPS = {
+    "rate step": "rate per set-point",
+    "angle step": "angle per set-point",
+    "step": "output per set-point",
+}
+ROW_PX = 26
+
+
+def overlaid_steps(designs: Sequence[PidDesign]) -> go.PlotFigure:
+    """Draw the steps of all axes over each other: new gains with the extremes of all plants, flown.
+
+    Parameters
+    ----------
+    designs : sequence of PidDesign
+        Of one flight.
+
+    Returns
+    -------
+    PlotFigure
+    """
+    told = {each.name for design in designs for each in design.responses}
+    names = [name for name in STEPS if name in told]
+    made = look.figure(1, len(names), shared_x=False, height_px=330)
+    for place, design in enumerate(designs):
+        colour = COLOURS.get(design.axis, look.SERIES[place % len(look.SERIES)])
+        for column, name in enumerate(names, 1):
+            found = next((each for each in design.responses if each.name == name), None)
+            if found is None:
+                continue
+            label = design.axis if len(designs) > 1 else "new gains"
+            few = sparse(found.time_s.size)
+            time_s, low, high = (each[few] for each in (found.time_s, found.low, found.high))
+            made.add_traces(look.band(label, time_s, low, high, colour=colour), 1, column)
+            curves = [(label, found.estimate, "solid")]
+            if found.flown is not None:
+                curves.append((f"{design.axis} as flown", found.flown, "dash"))
+            for words, values, dash in curves:
+                drawn = look.line(
+                    words, time_s, values[few], colour=colour, dash=dash, legend=column == 1
+                )
+                made.add_trace(drawn, 1, column)
+    for column, name in enumerate(names, 1):
+        look.label_axes(made, x="time [s]", y=[STEPS[name]], column=column)
+    return made
+
+
+def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
+    """Draw the margins of the worst vehicle as bars, with what was required and what was flown.
+
+    Parameters
+    ----------
+    designs : sequence of PidDesign
+
+    Returns
+    -------
+    PlotFigure
+    """
+    asked = designs[0].requirements
+    panels = {"phase margin": "deg", "gain margin": "dB"}
+    found = {
+        name: [
+            (design, each) for design in designs for each in design.worst_cases if each.name == name
+        ]
+        for name in panels
+    }
+    rows = list(dict.fromkeys(_label(*each) for cases in found.values() for each in cases))
+    made = look.figure(1, 2, shared_x=False, height_px=look.MARGIN_PX + ROW_PX * len(rows))
+    for column, (name, unit) in enumerate(panels.items(), 1):
+        cases = [each for each in found[name] if each[1].worst is not None]
+        required = [
+            (asked.angle_phase_margin_deg if each.loop == ANGLE else asked.phase_margin_deg)
+            if name == "phase margin"
+            else asked.gain_margin_db
+            for _, each in cases
+        ]
+        labels = [_label(*each) for each in cases]
+        bars = go.Bar(
+            x=[each.worst for _, each in cases], y=labels, orientation="h", width=0.6,
+            name="worst vehicle, new gains", showlegend=column == 1, legendgroup="new",
+            marker={"color": [look.MODEL if each.met else look.RIVAL for _, each in cases]},
+            text=[f"{each.worst:.3g}" for _, each in cases], textposition="inside",
+            insidetextanchor="start",
+        )  # fmt: skip
+        made.add_trace(bars, 1, column)
+        flown = [(label, each) for label, (_, each) in zip(labels, cases, strict=True)]
+        marks = {
+            "worst vehicle, flown gains": (
+                [each.flown_worst for _, each in flown],
+                {"color": look.RIVAL, "symbol": "circle-open", "size": 9, "line": {"width": 2}},
+            ),
+            "required": (
+                required,
+                {
+                    "color": look.BLACK,
+                    "symbol": "line-ns-open",
+                    "size": 18,
+                    "line": {"width": 3, "color": look.BLACK},
+                },
+            ),
+        }
+        for words, (values, marker) in marks.items():
+            drawn = go.Scatter(
+                x=values, y=labels, name=words, mode="markers", marker=marker,
+                legendgroup=words, showlegend=column == 1,
+            )  # fmt: skip
+            made.add_trace(drawn, 1, column)
+        made.update_xaxes(
+            title_text=look.axis_title(name, unit), rangemode="tozero", row=1, col=column
+        )
+    made.update_yaxes(
+        categoryorder="array", categoryarray=rows[::-1], automargin=True, type="category",
+        range=[-0.5, len(rows) - 0.5],
+    )  # fmt: skip
+    made.update_yaxes(showticklabels=False, col=2)
+    made.update_layout(hovermode="closest")
+    return made
+
+
+def _label(design: PidDesign, case: WorstCase) -> str:
+    return f"{design.axis}, {case.loop}"
