@@ -153,9 +153,9 @@ OWN = {
     ),
     "record": (
         "parts of a record and columns of a file",
-        "excitation gaps history input_shape interpolation make max_gap_s outliers "
-        "record_column reference resample_to_s role roles samples stamps start_s step stop_s "
-        "time_column",
+        "column_names derive excitation gaps history input_shape interpolation make max_gap_s "
+        "outliers record_column reference resample_to_s role roles samples stamps start_s step "
+        "stop_s time_column time_unit",
     ),
     "responses": (
         "arrays of one response, and one pair in the order of its name, output/input",

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flightid import _native
+from flightid.dimensions import require_unit
 from flightid.errors import ModelError
-from flightid.models.language.dimensions import require_unit
-from flightid.models.language.formula import formula_names
+from flightid.formula import formula_names
 from tests.closeness import assert_close
 
 

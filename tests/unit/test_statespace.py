@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import flightid as fid
+from flightid.dimensions import require_balance
 from flightid.errors import DataError, FitError, ModelError, SingularError, UnknownNameError
 from flightid.models.language import symbolic
-from flightid.models.language.dimensions import require_balance
 from flightid.models.state_space.model import StateSpaceModel
 from tests.closeness import assert_close
 from tests.examples import examples

@@ -22,6 +22,7 @@ SHORT = {
     "attitude_feedback_per_s": "attitude-feedback",
     "attitude_rad": "attitude-limit",
     "band_rad_s": "band",
+    "column_names": "columns",
     "control": "control-limit",
     "control_rate_per_s": "control-rate-limit",
     "duration_s": "duration",

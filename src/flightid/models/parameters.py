@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid import _native
+from flightid.dimensions import require_unit
 from flightid.errors import ModelError, UnknownNameError
-from flightid.models.language.dimensions import require_unit
-from flightid.models.language.formula import RESERVED, formula_names
+from flightid.formula import RESERVED, formula_names
 from flightid.result import TableView
 from flightid.table import Column, Table
 from flightid.units import canonical

@@ -36,22 +36,26 @@ class ChannelOptions(ComparedOptions):
     inputs: tuple[str, ...] | None = option(None, doc="Channels that drive; default: all.")
 
 
-@dataclass(frozen=True)
-class ReadOptions(Options):
-    """How tables (CSV, Parquet, MATLAB, netCDF) are read.
+@dataclass(frozen=True, kw_only=True)
+class TableOptions(Options):
+    """How a table (CSV, Parquet, MATLAB, netCDF) becomes channels on one time base.
 
     Example
     -------
-    >>> ReadOptions(sample_time_s=0.01).to_dict()["sample_time_s"]
+    >>> TableOptions(sample_time_s=0.01).to_dict()["sample_time_s"]
     0.01
     """
 
     time_column: str = option("time", doc="Column of the time stamps.")
+    time_unit: str | None = option(None, doc="Unit of the stamps, where the file does not say.")
     units: Mapping[str, str] = option(
-        default_factory=dict, doc="Unit of a column whose heading says none, such as p=rad/s."
+        default_factory=dict, doc="Unit of a channel or column where the file says none: p=rad/s."
     )
-    record_column: str | None = option(
-        RECORD_COLUMN, doc="Column that tells records of one table apart."
+    column_names: tuple[str, ...] = option(
+        (), doc="Columns in their order, such as time,u,y, where the file has no headings."
+    )
+    derive: Mapping[str, str] = option(
+        default_factory=dict, doc="Formula of a further channel, such as roll=m1+m4-m2-m3."
     )
     interpolation: str | Mapping[str, str] | None = option(
         None, choices=[each.value for each in Interpolation],
@@ -62,4 +66,22 @@ class ReadOptions(Options):
     )
     resample_to_s: float | None = option(
         None, unit="s", above=0.0, doc="Sample time of a new uniform grid."
+    )
+    max_gap_s: float | None = option(
+        None, unit="s", above=0.0, doc="Longest gap that the new grid bridges with straight lines."
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadOptions(TableOptions):
+    """How tables are read, those of several records too.
+
+    Example
+    -------
+    >>> ReadOptions().to_dict()["record_column"]
+    'record'
+    """
+
+    record_column: str | None = option(
+        RECORD_COLUMN, doc="Column that tells records of one table apart."
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,29 +12,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.conventions import Role
-from flightid.errors import DataError, OptionError, UnitError, UnknownNameError
+from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.files import sha256_of_file
 from flightid.record.channel import DECLARED, Channel
 from flightid.record.checks import REMOVE_OUTLIERS, entry_steps
-from flightid.record.formats import ColumnTable, FileFormat, csv, file_format, matlab, netcdf
-from flightid.record.formats import parquet as parquet_format
+from flightid.record.formats import ColumnTable, file_format
 from flightid.record.formats.columns import is_unit
 from flightid.record.history import Step
 from flightid.record.hold import InputHold, InputShape, Loop
 from flightid.record.interpolation import Interpolation, is_coarser, usual_method
 from flightid.record.outlying import bridge_outliers
 from flightid.record.record import Record
-from flightid.record.rows import column_unit, manoeuvres, require_sensible_base, row_stamps
+from flightid.record.rows import (
+    column_unit,
+    manoeuvres,
+    require_sensible_base,
+    row_stamps,
+    with_time_unit,
+)
+from flightid.record.selection import Names, pairs_of, refuse_columns, selected_records
 from flightid.record.stamps import mean_spacing_s
-from flightid.record.store import RECORD_COLUMN, stored_records
+from flightid.record.store import RECORD_COLUMN
+from flightid.record.tables import read_table, sources_of
 from flightid.record.timebase import to_uniform
 from flightid.record.validation import require_period, unknown_channel
 from flightid.record.witnesses import turning_columns
 from flightid.table import Cell
 from flightid.units import canonical
 from flightid.version import VERSION
-
-Names = Iterable[str] | Mapping[str, str]
 
 
 @dataclass(frozen=True)
@@ -52,9 +58,13 @@ def read_records(
     excitations: Names | str | None = None,
     others: Names | str | None = None,
     time_column: str = "time",
+    time_unit: str | None = None,
     units: Mapping[str, str] | None = None,
+    column_names: Sequence[str] = (),
+    derive: Mapping[str, str] | None = None,
     sample_time_s: float | None = None,
     resample_to_s: float | None = None,
+    max_gap_s: float | None = None,
     interpolation: Interpolation | str | Mapping[str, Interpolation | str] | None = None,
     outliers: Mapping[str, Any] | None = None,
     record_column: str | None = RECORD_COLUMN,
@@ -80,15 +90,27 @@ def read_records(
         Columns by role, or one name; a mapping gives new names, channel to column. With none of
         the four, every numeric column becomes a channel of role "other".
     time_column : str
-        Column of the time stamps; in s unless the file or `units` says otherwise.
+        Column of the time stamps; in s unless the file, `time_unit` or `units` says otherwise.
+    time_unit : str, optional
+        Unit of the stamps, such as "ms".
     units : mapping of str to str, optional
         Unit by channel name, or by the name of the time column. It goes over what a heading says,
         and the channel's note says so; converting is `Record.to_units`.
+    column_names : sequence of str
+        Names of the columns in their order, in place of those of the file, which then need not have
+        any; ``"time,u,y"`` is three. A unit may stand in brackets, as in a heading.
+    derive : mapping of str to str, optional
+        Further columns as formulas of others, such as ``{"roll": "m1 + m4 - m2 - m3"}``, in the
+        grammar of model files; a later one may use those before it. Their units are those that the
+        columns' units make, else declared.
     sample_time_s : float, optional
         Sample time of a file without time column, s; the first sample is at 0 s.
     resample_to_s : float, optional
         Sample time, s, of a new uniform grid; for stamps that are not uniform. Channels are
         low-passed where it is coarser than the rows by more than 5 %.
+    max_gap_s : float, optional
+        Longest spacing of rows that the new grid bridges with straight lines, s; longer ones part
+        records. Default: 2.5 median spacings.
     interpolation : Interpolation or mapping of str to Interpolation, optional
         How samples of the new grid arise, for all channels or by name. Default: of inputs with
         `hold` "zero" the previous value, with "first" straight lines, of all else band-limited;
@@ -122,7 +144,9 @@ def read_records(
     UnitError
         A unit that is not known, or against what a stored record says of itself.
     OptionError
-        Time stated twice, or not at all; a channel named twice; a hold against the file's.
+        Time or its unit stated twice, or not at all; a channel named twice; a hold against the
+        file's; not one name for each column; a formula that cannot be computed; names of columns
+        or formulas for a file of `write_records`.
     DataError
         Samples that are not finite, stamps that are not uniform.
 
@@ -147,14 +171,16 @@ def read_records(
     roles: dict[Role, Names | None] = {
         role: (names,) if isinstance(names, str) else names for role, names in groups.items()
     }
-    text = _labels(source, kind)
-    if text is not None:
-        stored = stored_records(source, text, is_parquet=kind is FileFormat.PARQUET)
-        chosen = [_selected(item, roles, units or {}) for item in stored]
-        return [_declared(item, InputShape(hold, period_s, loop)) for item in chosen]
-    table = _table(source, kind)
-    stamps = row_stamps(table, time_column, units or {}, sample_time_s)
-    wanted = _wanted(table, roles, units or {}, time_column, record_column, stamps.size)
+    units, derive = with_time_unit(units or {}, time_column, time_unit), derive or {}
+    stored = selected_records(source, kind, roles, units)
+    if stored is not None:
+        refuse_columns(source, column_names, derive)
+        return [_declared(item, InputShape(hold, period_s, loop)) for item in stored]
+    table = read_table(source, kind, column_names, derive, units)
+    stamps = row_stamps(table, time_column, units, sample_time_s)
+    wanted = _wanted(
+        table, roles, units, time_column, record_column, stamps.size, sources_of(derive)
+    )
     columns = {item.channel.name: table.column(item.column) for item in wanted}
     for item in wanted:
         if columns[item.channel.name].size != stamps.size:
@@ -165,25 +191,26 @@ def read_records(
             )
     taken = {item.column: item.channel for item in wanted}
     witnesses = turning_columns(table, taken, stamps.size)
-    base = _Base(resample_to_s, interpolation, outliers, hold, time_column)
+    base = _Base(resample_to_s, max_gap_s, interpolation, outliers, hold, time_column)
     options: dict[str, Cell] = {
         "file": source.name,
         "sha256": sha256_of_file(source),
         "time": time_column if sample_time_s is None else None,
         "sample_time_s": sample_time_s,
+        **({"column_names": ",".join(column_names)} if column_names else {}),
+        **{f"derived {name}": formula for name, formula in derive.items()},
     }
     records: list[Record] = []
     for part, label in manoeuvres(table, record_column, stamps, split_gaps=resample_to_s is None):
         if sample_time_s is None:
-            options["time_unit"] = (units or {}).get(time_column) or table.units.get(time_column)
+            options["time_unit"] = units.get(time_column) or table.units.get(time_column)
             options["row_spacing_s"] = mean_spacing_s(stamps[part])
         history = (Step("read_records", dict(options), VERSION),)
         rows = {name: values[part] for name, values in columns.items()}
         beside = [(channel, stamps[part], values[part]) for channel, values in witnesses]
         for grid, samples, more in _pieces(stamps[part], rows, wanted, base, beside):
             records.append(_record(grid, samples, wanted, label or source.stem, (*history, *more)))
-    if len(records) > 1 and len({item.name for item in records}) == 1:
-        records = [item.replace(name=f"{item.name}[{index}]") for index, item in enumerate(records)]
+    records = _numbered(records)
     kept = base.hold_after(mean_spacing_s(stamps), wanted)
     return [_declared(item, InputShape(kept, period_s, loop)) for item in records]
 
@@ -193,6 +220,7 @@ class _Base:
     """What is done to the rows of a manoeuvre before they are a record."""
 
     resample_to_s: float | None
+    max_gap_s: float | None
     interpolation: Interpolation | str | Mapping[str, Interpolation | str] | None
     outliers: Mapping[str, Any] | None
     hold: InputHold | None
@@ -222,6 +250,17 @@ class _Base:
         return "band_limited" if filtered else self.hold
 
 
+def _numbered(records: Sequence[Record]) -> list[Record]:
+    """Records of one name get numbers."""
+    total, seen = Counter(item.name for item in records), Counter[str | None]()
+    named = []
+    for item in records:
+        alone = total[item.name] == 1
+        named.append(item if alone else item.replace(name=f"{item.name}[{seen[item.name]}]"))
+        seen[item.name] += 1
+    return named
+
+
 def _declared(record: Record, given: InputShape) -> Record:
     """The record with what is declared of its inputs; a file must not say otherwise."""
     known = record.input_shape
@@ -236,32 +275,6 @@ def _declared(record: Record, given: InputShape) -> Record:
     inputs = [record[name] for name in record.inputs]
     require_period(inputs, record.sample_time_s, given.period_s)
     return record if shape == known else record.replace(input_shape=shape)
-
-
-def _labels(path: Path, kind: FileFormat) -> str | None:
-    if kind is FileFormat.PARQUET:
-        return parquet_format.read_labels(path)
-    return netcdf.read_labels(path) if kind is FileFormat.NETCDF else None
-
-
-def _table(path: Path, kind: FileFormat) -> ColumnTable:
-    if kind is FileFormat.CSV:
-        return csv.read_columns(path)
-    if kind is FileFormat.PARQUET:
-        return parquet_format.read_columns(path)
-    if kind is FileFormat.MATLAB:
-        return matlab.read_columns(path)
-    if kind is FileFormat.MATLAB_HDF5:
-        return matlab.read_hdf5_columns(path)
-    return netcdf.read_columns(path, classic=kind is FileFormat.NETCDF_CLASSIC)
-
-
-def _pairs(names: Names | None) -> list[tuple[str, str]]:
-    if names is None:
-        return []
-    if isinstance(names, Mapping):
-        return list(names.items())
-    return [(name, name) for name in names]
 
 
 def _note(table: ColumnTable, column: str, name: str, units: Mapping[str, str]) -> str:
@@ -281,8 +294,9 @@ def _wanted(
     time: str,
     record: str | None,
     n_samples: int,
+    sources: set[str],
 ) -> list[_ChannelColumn]:
-    pairs = [(role, *pair) for role, names in roles.items() for pair in _pairs(names)]
+    pairs = [(role, *pair) for role, names in roles.items() for pair in pairs_of(names)]
     if not pairs:
         pairs = [
             (Role.OTHER, key, key)
@@ -295,7 +309,7 @@ def _wanted(
             "a channel is named twice", found=", ".join(sorted(repeated)), needed="one role each"
         )
     for name in units:
-        if name not in names and name != time:
+        if name not in (*names, *sources, time):
             raise UnknownNameError(
                 "a unit is declared for no channel", found=name, needed="one of " + ", ".join(names)
             )
@@ -335,6 +349,7 @@ def _pieces(
         {key: (stamps, values) for key, values in rows.items()},
         sample_time_s=base.resample_to_s,
         gaps="split",
+        max_gap_s=base.max_gap_s,
         interpolation=base.methods(wanted, mean_spacing_s(stamps)),
     )
     steps = (*steps, Step("conditioning.to_uniform", made.options, VERSION))
@@ -370,30 +385,3 @@ def _record(
     channels = [item.channel for item in wanted]
     plain = Record.from_arrays(time_s, others=samples, name=name, history=history)
     return plain.replace(channels=channels)
-
-
-def _selected(
-    stored: Record, roles: Mapping[Role, Names | None], units: Mapping[str, str]
-) -> Record:
-    """A stored record with only the named channels, in the roles they are named under."""
-    pairs = [(role, *pair) for role, names in roles.items() for pair in _pairs(names)]
-    named = stored if not pairs else _renamed(stored, pairs)
-    for name, unit in units.items():
-        if canonical(unit) != named.unit(name):
-            raise UnitError(
-                f"the declared unit of {name!r} contradicts the file",
-                found=named.unit(name),
-                needed=canonical(unit),
-                action="leave the declaration out and convert the record",
-            )
-    return named
-
-
-def _renamed(stored: Record, pairs: list[tuple[Role, str, str]]) -> Record:
-    channels = [
-        Channel(name, stored.unit(column), role, stored.channels[column].note)
-        for role, name, column in pairs
-    ]
-    samples = {name: stored[column] for _, name, column in pairs}
-    step = Step("read_records", {name: column for _, name, column in pairs})
-    return stored.replace(samples, channels=channels, step=step)

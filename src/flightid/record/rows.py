@@ -60,6 +60,28 @@ def row_stamps(
     return np.asarray(sample_time_s * np.arange(longest), dtype=np.float64)
 
 
+def with_time_unit(
+    units: Mapping[str, str], time_column: str, time_unit: str | None
+) -> Mapping[str, str]:
+    """Declared units with that of the stamps.
+
+    Raises
+    ------
+    OptionError
+        It is declared twice, and differently.
+    """
+    said = units.get(time_column, time_unit)
+    if time_unit is None or said is None:
+        return units
+    if said != time_unit:
+        raise OptionError(
+            "the unit of the time is declared twice",
+            found=f"time_unit = {time_unit!r}, units {time_column} = {said!r}",
+            needed="one of them",
+        )
+    return {**units, time_column: time_unit}
+
+
 def _looks_like_time(table: ColumnTable) -> str:
     near = [name for name in table.lengths if name.lower() == "t" or name.lower()[:4] == "time"]
     return f"{near[0]!r} looks like the time: name it as that" if near else ""

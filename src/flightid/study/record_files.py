@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, replace
+from glob import glob, has_magic
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,11 @@ from flightid.conventions import Role
 from flightid.errors import StudyError
 from flightid.option_forms import NOTHING, SPAN
 from flightid.options import Options, option
-from flightid.record import InputShape, Interpolation, Record, read_records
+from flightid.record import InputShape, Record, read_records
 from flightid.record.hold import HOLDS, LOOPS
+from flightid.record.options import TableOptions
 from flightid.record.store import RECORD_COLUMN
+from flightid.record.tables import sources_of
 from flightid.study.error_list import ErrorList
 from flightid.study.reading import TableReader, read_each
 
@@ -41,7 +44,7 @@ class ShapeOptions(Options):
 
 
 @dataclass(frozen=True)
-class RecordFile(ShapeOptions):
+class RecordFile(ShapeOptions, TableOptions):
     """One manoeuvre in files: a table ``[[record]]``, and the paths that it stands for."""
 
     name: str = option(doc="Name by which models refer to it.")
@@ -54,24 +57,9 @@ class RecordFile(ShapeOptions):
     span_s: tuple[float, float] | None = option(
         None, unit="s", forms=(SPAN, NOTHING), doc="Start and stop on the file's clock."
     )
-    time_column: str = option("time", doc="Column of the time stamps.")
-    sample_time_s: float | None = option(
-        None, unit="s", above=0.0, doc="Sample time of a file without time column."
-    )
-    resample_to_s: float | None = option(
-        None, unit="s", above=0.0, doc="Sample time of a new uniform grid."
-    )
-    time_unit: str | None = option(None, doc="Unit of the stamps, where the file does not say.")
     experiment: str = option(RECORD_COLUMN, doc="Column that tells manoeuvres of one file apart.")
-    interpolation: str | Mapping[str, str] | None = option(
-        None, choices=tuple(map(str, Interpolation)),
-        doc="Between samples of a new grid, for all channels or by channel.",
-    )  # fmt: skip
     columns: Mapping[str, str] = option(
         default_factory=dict, doc="Column of a channel, where it has another name."
-    )
-    units: Mapping[str, str] = option(
-        default_factory=dict, doc="Unit of a channel or the time, where the file does not say."
     )
     paths: tuple[Path, ...] = ()
 
@@ -90,11 +78,12 @@ def read_record_file(reader: TableReader, folder: Path) -> RecordFile:
 
 
 def _paths(reader: TableReader, folder: Path, names: Iterable[str]) -> tuple[Path, ...]:
-    """Files by name, or by a pattern with ``*``, in the order of their names."""
+    """Files by name, or by a pattern with ``*``, ``?`` or ``[``, in the order of their names."""
     found: list[Path] = []
     for text in names:
         place = folder / text
-        matches = sorted(place.parent.glob(place.name)) if "*" in place.name else [place]
+        is_pattern = has_magic(text) and not place.exists()
+        matches = sorted(map(Path, glob(str(place), recursive=True))) if is_pattern else [place]
         if not matches:
             raise reader.error("path", "matches no file", found=text, needed=f"files in {folder}")
         found += matches
@@ -184,11 +173,7 @@ def _load(
         outputs=named(Role.OUTPUT),
         excitations=named(Role.EXCITATION),
         others=named(Role.OTHER),
-        time_column=file.time_column,
-        units=_declared_units(file, roles),
-        sample_time_s=file.sample_time_s,
-        resample_to_s=file.resample_to_s,
-        interpolation=_named_in(file.interpolation, roles),
+        **_reading(file, roles),
         outliers=outliers,
         record_column=file.experiment,
         hold=file.shape.hold,
@@ -215,32 +200,14 @@ def _names(records: list[Record]) -> str:
     return ", ".join([*shown, *(["…"] if len(records) > len(shown) else [])])
 
 
-def _declared_units(file: RecordFile, roles: Mapping[str, Role]) -> dict[str, str]:
-    """Units of the channels that are taken and of the time column.
-
-    Raises
-    ------
-    StudyError
-        The unit of the time is declared twice, and differently.
-    """
-    time, told = file.time_column, file.time_unit
-    units = {key: unit for key, unit in file.units.items() if key in roles or key == time}
-    if told is not None and units.setdefault(time, told) != told:
-        raise StudyError(
-            f"study file, record {file.name!r}: the unit of the time is declared twice",
-            found=f"time_unit = {told!r}, units {time} = {units[time]!r}",
-            needed="one of them",
-        )
-    return units
-
-
-def _named_in(
-    interpolation: str | Mapping[str, str] | None, roles: Mapping[str, Role]
-) -> str | dict[str, str] | None:
-    """Interpolation of the channels that are taken: one study may use a file in several ways."""
-    if isinstance(interpolation, Mapping):
-        return {key: word for key, word in interpolation.items() if key in roles}
-    return interpolation
+def _reading(file: RecordFile, roles: Mapping[str, Role]) -> dict[str, Any]:
+    """How the file is read: one study may use it in several ways, of other channels each."""
+    asked = {each.name: getattr(file, each.name) for each in fields(TableOptions)}
+    known = {*roles, file.time_column, *sources_of(file.derive)}
+    asked["units"] = {key: unit for key, unit in file.units.items() if key in known}
+    if isinstance(file.interpolation, Mapping):
+        asked["interpolation"] = {k: way for k, way in file.interpolation.items() if k in roles}
+    return asked
 
 
 def _named(file: RecordFile, record: Record, name: str) -> Record:

@@ -1,5 +1,5 @@
 //! What a formula is made of: functions, nodes, and the bounds that keep a stranger's text small.
-//! (Python side: models/language/formula.py)
+//! (Python side: formula.py)
 
 /// Longest text accepted, in bytes.
 pub const MAXIMUM_LENGTH: usize = 10_000;

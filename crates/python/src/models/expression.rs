@@ -1,4 +1,4 @@
-//! Face of `flightid_core::language::expression` and `tape`. (Python side: models/language/formula.py)
+//! Face of `flightid_core::language::expression` and `tape`. (Python side: formula.py)
 
 use std::collections::BTreeMap;
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from flightid.errors import ModelError
-from flightid.models.language.formula import RESERVED
+from flightid.formula import RESERVED
 from flightid.models.language.reading import read_text, require_keys
 
 MAXIMUM_ORDER = 10

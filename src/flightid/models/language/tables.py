@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from flightid import _native
 from flightid.errors import FlightidError, ModelError
-from flightid.models.language.formula import RESERVED
+from flightid.formula import RESERVED
 from flightid.models.language.reading import read_number, read_text, require_keys
 from flightid.units import canonical
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
 
+from flightid.dimensions import unit_of
 from flightid.errors import ModelError
+from flightid.formula import formula_names
 from flightid.models.language.blocks import MAXIMUM_BLOCKS, ModelBlock, Realisation, wrapped
-from flightid.models.language.dimensions import unit_of
-from flightid.models.language.formula import formula_names
 from flightid.models.parameters import Parameter, Parameters
 from flightid.models.state_space.linear import Linearisation
 from flightid.models.state_space.parts import Output

@@ -6,9 +6,9 @@ import math
 import re
 from collections.abc import Mapping
 
+from flightid.dimensions import require_balance, require_unit
 from flightid.errors import ModelError
-from flightid.models.language.dimensions import require_balance, require_unit
-from flightid.models.language.formula import RESERVED, formula_names
+from flightid.formula import RESERVED, formula_names
 from flightid.models.language.tables import check_tables
 from flightid.models.state_space.linear import Linearisation
 from flightid.models.state_space.parts import derivative

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flightid import _native
+from flightid.dimensions import require_unit
 from flightid.errors import DataError, ModelError, UnknownNameError
+from flightid.formula import formula_names
 from flightid.models.adjustable import Adjustable
 from flightid.models.estimated import EstimateProvenance
-from flightid.models.language.dimensions import require_unit
-from flightid.models.language.formula import formula_names
 from flightid.models.linear.linear_system import LinearSystem
 from flightid.models.linear.realisation import Matrices, canonical_form, one_delay_for_each_input
 from flightid.models.parameters import Parameters

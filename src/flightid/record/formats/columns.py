@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid.errors import DataError, FileFormatError, UnitError, UnknownNameError
+from flightid.errors import DataError, FileFormatError, OptionError, UnitError, UnknownNameError
 from flightid.reading import require_memory
 from flightid.units import canonical
 
@@ -46,6 +46,25 @@ class ColumnTable:
     lengths: Mapping[str, int]
     load: Callable[[str], NDArray[Any]]
     units: Mapping[str, str] = field(default_factory=dict)
+
+    def named(self, headings: Sequence[str]) -> ColumnTable:
+        """The same columns under other headings, in their order.
+
+        Raises
+        ------
+        OptionError
+            There are more or fewer headings than columns.
+        """
+        require_one_each(self.path, headings, tuple(self.lengths))
+        names, units = split_headings(headings)
+        require_distinct(self.path, names)
+        old = dict(zip(names, self.lengths, strict=True))
+        return ColumnTable(
+            self.path,
+            {name: self.lengths[key] for name, key in old.items()},
+            lambda name: self.load(old[name]),
+            {n: self.units[key] for n, key in old.items() if key in self.units} | units,
+        )
 
     def require(self, name: str) -> None:
         """Refuse a name that is no column.
@@ -126,6 +145,22 @@ def split_headings(headings: Iterable[str]) -> tuple[list[str], dict[str, str]]:
             units[name] = match["unit"]
         names.append(name)
     return names, units
+
+
+def require_one_each(path: Path, headings: Sequence[str], columns: Sequence[str]) -> None:
+    """Refuse a list of headings that is not as long as a row.
+
+    Raises
+    ------
+    OptionError
+        Both numbers are named.
+    """
+    if len(headings) != len(columns):
+        raise OptionError(
+            f"column_names does not name every column of {path.name}",
+            found=f"{len(headings)} names for {len(columns)} columns ({', '.join(columns[:8])})",
+            needed="one name for each, in their order",
+        )
 
 
 def require_distinct(path: Path, names: Iterable[str]) -> None:

@@ -1,10 +1,11 @@
-"""Delimited text: one heading row, numbers below; units in brackets or in a second row."""
+"""Delimited text: a heading row or none, numbers below; units in brackets or a second row."""
 
 from __future__ import annotations
 
 import codecs
 import csv
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +19,17 @@ from flightid.record.formats.columns import (
     ColumnTable,
     is_unit,
     require_distinct,
+    require_one_each,
     split_headings,
 )
 
 DELIMITERS = (",", ";", "\t")
 LONGEST_LINE = 1 << 20
+DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:")
 QUOTED = re.compile(r'"[^"]*"')
 
 
-def read_columns(path: Path) -> ColumnTable:
+def read_columns(path: Path, headings: Sequence[str] = ()) -> ColumnTable:
     """Columns of a delimited text file.
 
     Lines that begin with ``#`` may stand above the headings. The delimiter is the one that the
@@ -38,21 +41,37 @@ def read_columns(path: Path) -> ColumnTable:
     ----------
     path : Path
         The file, UTF-8, or UTF-16 with its mark.
+    headings : sequence of str
+        Used in place of those of the file, which then need not have any: a first row that holds a
+        number is a row of samples.
 
     Raises
     ------
+    OptionError
+        Not one heading for each column.
     FileFormatError
-        Another encoding, no heading row, a line above 1 MiB, no numbers, two delimiters, ragged
-        rows, repeated names, more cells than the memory budget holds.
+        Another encoding, no heading row and no `headings`, a line above 1 MiB, no numbers, two
+        delimiters, ragged rows, repeated names, more cells than the memory budget holds.
     """
     encoding = _encoding(path)
-    headings, second, delimiter, lines = _first_rows(path, encoding)
-    names, units = split_headings(headings)
+    first, second, delimiter, lines = _first_rows(path, encoding)
+    has_headings = not any(map(_is_number, first))
+    if not headings and not has_headings and all(map(_may_be_sample, first)):
+        raise FileFormatError(
+            f"{path.name} has no heading row",
+            found=", ".join(first)[:60],
+            needed="names of the columns in the first row, or column_names, one for each column",
+            action="name them in their order, --columns time,u,y; no column is guessed",
+        )
+    if headings:
+        require_one_each(path, headings, first)
+    names, units = split_headings(headings or first)
     require_distinct(path, names)
-    has_unit_row = not units and _is_unit_row(second)
+    is_bare = bool(headings) and not has_headings
+    has_unit_row = not units and not is_bare and _is_unit_row(second)
     if has_unit_row:
         units = {name: text for name, text in zip(names, second, strict=False) if text}
-    skipped = lines[1] if has_unit_row else lines[0]
+    skipped = lines[0] - 1 if is_bare else lines[1] if has_unit_row else lines[0]
     columns = _columns(path, skipped, len(names), delimiter, encoding)
     n_rows = columns[0].size
     if not n_rows:
@@ -116,6 +135,8 @@ def _first_rows(path: Path, encoding: str) -> tuple[list[str], list[str], str, l
         raise FileFormatError(f"{path.name} holds no row", needed="a heading row and numbers")
     bare = QUOTED.sub("", rows[0])
     present = [mark for mark in DELIMITERS if mark in bare]
+    if present[0:1] == [","] and all(map(_may_be_sample, _cells(rows[0], present[-1]))):
+        present = present[-1:]  # decimal commas of a row of samples
     if len(present) > 1:
         raise FileFormatError(
             f"the heading row of {path.name} holds several delimiters",
@@ -124,15 +145,8 @@ def _first_rows(path: Path, encoding: str) -> tuple[list[str], list[str], str, l
             action="write the file with one delimiter",
         )
     delimiter = present[0] if present else ","
-    headings = _cells(rows[0], delimiter)
-    if all(map(_is_number, headings)):
-        raise FileFormatError(
-            f"{path.name} has no heading row",
-            found=rows[0][:60],
-            needed="names of the columns in the first row",
-            action="add a row of names; no column is guessed",
-        )
-    return headings, _cells(rows[1], delimiter) if len(rows) > 1 else [], delimiter, lines
+    first, second = _cells(rows[0], delimiter), _cells(rows[1], delimiter) if rows[1:] else []
+    return first, second, delimiter, lines
 
 
 def _cells(row: str, delimiter: str) -> list[str]:
@@ -140,9 +154,13 @@ def _cells(row: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
+def _may_be_sample(text: str) -> bool:
+    return text in ("", "NA") or bool(DATE.match(text)) or _is_number(text)
+
+
 def _is_number(text: str) -> bool:
     try:
-        float(text)
+        float(text.replace(",", "."))
     except ValueError:
         return False
     return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -19,12 +19,12 @@ from flightid.identification.advice.delays import delays_to_scan
 from flightid.models.polynomial.orders import USED
 from flightid.models.save import toml_value
 from flightid.record import Record, read_records
+from flightid.record.options import ReadOptions
 from flightid.study.proposal.columns import Columns, columns_of
 from flightid.study.proposal.proposal import Proposal
 from flightid.study.structures import ranked
 from flightid.validation import scan_orders
 
-TIME_COLUMN = "time"
 KINDS = ("arx", "armax", "bj", "oe")
 ORDERS = {"na": (1, 2, 3, 4), "nb": (1, 2, 3), "nc": (1, 2), "nd": (1, 2), "nf": (1, 2, 3, 4)}
 """Orders that are tried: two modes; delays are those that the record tells."""
@@ -34,33 +34,34 @@ FITTED, CHOSEN, ALONE = 0.6, 1.0, (0.5, 0.75)
 """Part of a record that is fitted, the rest ranks structures; and where it also has to verify."""
 AS_GOOD = 1.02
 """Ratio of errors of free runs that does not rank structures."""
+SHORTEST = 0.1
+"""Part of the longest manoeuvre's samples below which another is a rag between gaps."""
 RICHER = 2.0
 """Ratio of powers of an input's steps, of halves of a record, that is no chance."""
 CYCLES, SAMPLES_PER_CYCLE = 10.0, 10.0
 """What a response needs: cycles of its lowest frequency in a record, samples of its highest."""
 
 
-@dataclass(frozen=True)
-class RecordTimes:
-    """Where the times of samples stand, as `flightid.read_records` is told.
+@dataclass(frozen=True, eq=False)
+class _RecordManoeuvre:
+    """A manoeuvre, and where a study finds it: `manoeuvre` where its file holds several."""
 
-    Example
-    -------
-    >>> RecordTimes(sample_time_s=0.08).lines
-    ('sample_time_s = 0.08',)
-    """
-
-    time_column: str = TIME_COLUMN
-    sample_time_s: float | None = None
-    resample_to_s: float | None = None
+    record: Record
+    path: Path
+    manoeuvre: str | None = None
 
     @property
-    def lines(self) -> tuple[str, ...]:
-        """What a study says of it, where it is not the usual."""
-        told = {
-            name: value for name, value in vars(self).items() if value not in (None, TIME_COLUMN)
-        }
-        return tuple(f"{name} = {toml_value(value)}" for name, value in told.items())
+    def name(self) -> str:
+        return self.manoeuvre or self.path.stem
+
+    def lines(self, name: str, span: tuple[float, float] | None, folder: Path) -> Iterator[str]:
+        """Its table of the study, under a name."""
+        yield from ("", "[[record]]", f"name = {toml_value(name)}")
+        yield f"path = {toml_value(Path(os.path.relpath(self.path, folder)).as_posix())}"
+        if self.manoeuvre is not None:
+            yield f"manoeuvre = {toml_value(self.manoeuvre)}"
+        if span is not None:
+            yield f"span_s = {toml_value(list(span))}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +69,7 @@ class _Group:
     """Records in which the same inputs moved: the longest is fitted, the others verify."""
 
     inputs: tuple[str, ...]
-    paths: tuple[Path, ...]
-    records: tuple[Record, ...]
+    parts: tuple[_RecordManoeuvre, ...]
 
 
 def study_of_records(
@@ -79,38 +79,41 @@ def study_of_records(
     model: str | None,
     inputs: tuple[str, ...],
     outputs: tuple[str, ...],
-    times: RecordTimes | None = None,
+    reading: ReadOptions | None = None,
 ) -> Proposal:
     """Study file for records.
 
     Parameters
     ----------
     paths : sequence of Path
-        One manoeuvre each.
+        One manoeuvre each, or several.
     folder : Path
         Of the study file.
     model : str or None
         Equations in place of a structure that is looked for.
     inputs, outputs : tuple of str
         Columns, where their names do not tell.
-    times : RecordTimes, optional
-        Where the times of samples stand; default: in the column "time".
+    reading : ReadOptions, optional
+        How the files are read; default: with the times in the column "time".
 
     Raises
     ------
     StudyError
-        A file holds several manoeuvres, or no column can be told for an input or output.
+        No column can be told for an input or output.
     """
-    times = times or RecordTimes()
-    read = [(path, _one(path, times)) for path in paths]
-    columns = columns_of([record for _, record in read], inputs, outputs)
+    reading = reading or ReadOptions()
+    # What is named alone is read, so that no other column's gaps part its manoeuvres.
+    named = {"inputs": inputs, "outputs": outputs} if inputs and outputs else {}
+    read = [part for path in paths for part in _parts(path, {**vars(reading), **named})]
+    columns = columns_of([part.record for part in read], inputs, outputs)
+    told = _told(reading)
     groups, missed = _groups(read, columns)
     body: list[str] = []
     names: list[str] = []
     for group in groups:
         segments = _segments(group)
-        for name, path, span in segments.all:
-            body += [*_record(name, path, span, folder), *times.lines]
+        for name, part, span in segments.all:
+            body += [*part.lines(name, span, folder), *told]
         for output in columns.outputs if model is None else columns.outputs[:1]:
             name = (
                 f"{output} from {' and '.join(group.inputs)}" if model is None else Path(model).stem
@@ -125,41 +128,55 @@ def study_of_records(
     return Proposal((*head, *body), tuple(names), tuple(missed))
 
 
-def _one(path: Path, times: RecordTimes) -> Record:
-    """The record of a file."""
-    found = read_records(path, **vars(times))
-    if len(found) != 1:
-        raise StudyError(
-            f"{path.name} holds several manoeuvres",
-            found=f"{len(found)} of them",
-            needed="one a file",
-            action="write a study that names them (docs/study.md, manoeuvre), or mend its gaps",
-        )
-    return found[0]
+def _parts(path: Path, reading: Mapping[str, Any]) -> list[_RecordManoeuvre]:
+    """Manoeuvres of a file."""
+    found = read_records(path, **reading)
+    if len(found) == 1:
+        return [_RecordManoeuvre(found[0], path)]
+    return [_RecordManoeuvre(record, path, str(record.name)) for record in found]
+
+
+def _told(reading: ReadOptions) -> list[str]:
+    """What every table of the study says of reading, where it is not the usual."""
+    usual = vars(ReadOptions())
+    told = {key: value for key, value in vars(reading).items() if value != usual[key]}
+    if "record_column" in told:
+        told["experiment"] = told.pop("record_column")
+    return [f"{name} = {toml_value(value)}" for name, value in told.items()]
 
 
 def _groups(
-    read: Sequence[tuple[Path, Record]], columns: Columns
+    read: Sequence[_RecordManoeuvre], columns: Columns
 ) -> tuple[list[_Group], list[Finding]]:
     """Records by the inputs that move in them, the longest of each first."""
-    by_inputs: dict[tuple[str, ...], list[tuple[Path, Record]]] = {}
+    by_inputs: dict[tuple[str, ...], list[_RecordManoeuvre]] = {}
     missed = []
-    for path, record in read:
-        moving = tuple(name for name in columns.inputs if np.ptp(record[name]) > 0.0)
+    longest = max(part.record.n_samples for part in read)
+    for part in read:
+        if part.record.n_samples < SHORTEST * longest:
+            missed.append(
+                Finding(
+                    "short-manoeuvre", Light.AMBER,
+                    f"{part.name}: not used, {part.record.n_samples} samples where the longest "
+                    f"manoeuvre has {longest}",
+                )
+            )  # fmt: skip
+            continue
+        moving = tuple(name for name in columns.inputs if np.ptp(part.record[name]) > 0.0)
         if not moving:
             missed.append(
                 Finding(
                     "no-model", Light.RED,
-                    f"{path.name}: no model, none of {', '.join(columns.inputs)} moves in it",
+                    f"{part.name}: no model, none of {', '.join(columns.inputs)} moves in it",
                     "record a manoeuvre that moves an input: flightid design plans one",
                 )
             )  # fmt: skip
             continue
-        by_inputs.setdefault(moving, []).append((path, record))
+        by_inputs.setdefault(moving, []).append(part)
     groups = []
     for moving, members in by_inputs.items():
-        members.sort(key=lambda each: -each[1].n_samples)
-        groups.append(_Group(moving, *zip(*members, strict=True)))
+        members.sort(key=lambda each: -each.record.n_samples)
+        groups.append(_Group(moving, tuple(members)))
     return groups, missed
 
 
@@ -167,7 +184,7 @@ def _groups(
 class _Segments:
     """Names of what is fitted, what ranks structures and what verifies; all with file and span."""
 
-    all: tuple[tuple[str, Path, tuple[float, float] | None], ...]
+    all: tuple[tuple[str, _RecordManoeuvre, tuple[float, float] | None], ...]
     fitted: str
     choice: str
     unseen: tuple[str, ...]
@@ -175,9 +192,9 @@ class _Segments:
 
 
 def _segments(group: _Group) -> _Segments:
-    first, record = group.paths[0], group.records[0]
+    first, record = group.parts[0], group.parts[0].record
     start, stop = float(record.time_s[0]), float(record.time_s[-1])
-    alone = len(group.paths) == 1
+    alone = len(group.parts) == 1
     cuts: Sequence[float] = ALONE if alone else (FITTED, CHOSEN)
     turned = alone and _ends_richer(record, group.inputs)
     if turned:
@@ -186,9 +203,9 @@ def _segments(group: _Group) -> _Segments:
     spans = list(pairwise(edges))
     if turned:
         spans.reverse()
-    name = first.stem
+    name = first.name
     parts = [(f"{name}, fitted", first, spans[0]), (f"{name}, choice", first, spans[1])]
-    rest = [(path.stem, path, None) for path in group.paths[1:]]
+    rest = [(part.name, part, None) for part in group.parts[1:]]
     unseen = [(f"{name}, unseen", first, spans[2])] if alone else rest
     return _Segments(
         (*parts, *unseen), parts[0][0], parts[1][0],
@@ -206,13 +223,6 @@ def _ends_richer(record: Record, inputs: tuple[str, ...]) -> bool:
     return late > RICHER * early
 
 
-def _record(name: str, path: Path, span: tuple[float, float] | None, folder: Path) -> Iterator[str]:
-    yield from ("", "[[record]]", f"name = {toml_value(name)}")
-    yield f"path = {toml_value(Path(os.path.relpath(path, folder)).as_posix())}"
-    if span is not None:
-        yield f"span_s = {toml_value(list(span))}"
-
-
 def _model(
     name: str, group: _Group, segments: _Segments, output: str, model: str | None
 ) -> Iterator[str]:
@@ -221,7 +231,7 @@ def _model(
     if model is not None:
         template = [f"template = {toml_value(model)}", 'fit = { method = "output_error" }']
         return iter(["", "[[model]]", f"name = {toml_value(name)}", *template, *lines])
-    record = group.records[0]
+    record = group.parts[0].record
     kind, found, orders_of = _structure(record, group.inputs, output, segments)
     span_s = record.duration_s * FITTED
     low = CYCLES * math.tau / span_s

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from flightid.options import Options, option
+from flightid.options import option
+from flightid.record.options import ReadOptions
 
 
 @dataclass(frozen=True)
-class ProposalOptions(Options):
+class ProposalOptions(ReadOptions):
     """What a proposal is told; see `flightid.study.proposal.propose_study`.
 
     Example
@@ -20,10 +21,3 @@ class ProposalOptions(Options):
     model: str | None = option(None, doc="Library model or model file in place of the usual one.")
     inputs: tuple[str, ...] = option((), doc="Columns of records that drive.")
     outputs: tuple[str, ...] = option((), doc="Columns of records that answer.")
-    time_column: str = option("time", doc="Name of the time column of records.")
-    sample_time_s: float | None = option(
-        None, unit="s", above=0.0, doc="Sample time of records without time column."
-    )
-    resample_to_s: float | None = option(
-        None, unit="s", above=0.0, doc="Sample time of a new uniform grid for records."
-    )

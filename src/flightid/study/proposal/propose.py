@@ -8,8 +8,10 @@ from typing import Any
 
 from flightid.errors import OptionError
 from flightid.logs import is_log
+from flightid.options import checked
+from flightid.record.options import ReadOptions
 from flightid.study.proposal.of_log import study_of_log
-from flightid.study.proposal.of_records import TIME_COLUMN, RecordTimes, study_of_records
+from flightid.study.proposal.of_records import study_of_records
 from flightid.study.proposal.proposal import Proposal
 
 
@@ -20,11 +22,9 @@ def propose_study(
     model: str | None = None,
     inputs: Sequence[str] = (),
     outputs: Sequence[str] = (),
-    time_column: str = TIME_COLUMN,
-    sample_time_s: float | None = None,
-    resample_to_s: float | None = None,
     tune: bool = False,
     cache: MutableMapping[str, Any] | None = None,
+    **reading: Any,  # noqa: ANN401 — fields of ReadOptions
 ) -> Proposal:
     """Write the study that data ask for: what was flown says what can be identified, and how.
 
@@ -39,16 +39,12 @@ def propose_study(
         in place of a structure that is looked for.
     inputs, outputs : sequence of str
         Columns of records, where their names do not tell.
-    time_column : str
-        Name of the time column of records.
-    sample_time_s : float, optional
-        Time between samples of records without a time column, s.
-    resample_to_s : float, optional
-        Sample time of a new uniform grid, s, for records whose stamps are not uniform.
     tune : bool
         Let the study end in gains of the autopilot that flew.
     cache : mutable mapping of str to object, optional
         Takes what is read of a log and found in it; given to `run_study`, nothing is done twice.
+    **reading : object
+        How records are read: arguments of `flightid.read_records`.
 
     Returns
     -------
@@ -62,7 +58,8 @@ def propose_study(
         A file cannot be read.
     """
     paths = [Path(file) for file in files]
-    times = RecordTimes(time_column, sample_time_s, resample_to_s)
+    usual = ReadOptions()
+    asked = checked(ReadOptions, reading, "a study of records")
     logs = [path for path in paths if is_log(path)]
     if not logs:
         return study_of_records(
@@ -71,12 +68,12 @@ def propose_study(
             model=model,
             inputs=tuple(inputs),
             outputs=tuple(outputs),
-            times=times,
+            reading=asked,
         )
-    if len(paths) > 1 or inputs or outputs or times != RecordTimes():
+    if len(paths) > 1 or inputs or outputs or asked != usual:
         raise OptionError(
-            "a log is taken alone, and its channels have names and stamps",
+            "a log is taken alone, and its channels have names, units and stamps",
             found=", ".join(path.name for path in paths),
-            needed="one log without columns and times of samples, or records from files",
+            needed="one log without options of tables, or records from files",
         )
     return study_of_log(logs[0], Path(folder), model=model, tune=tune, cache=cache)

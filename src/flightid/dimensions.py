@@ -8,19 +8,31 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations, product
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from flightid import _native
 from flightid.errors import ModelError, UnitError
 from flightid.units import canonical, exponents, si_base
 
-if TYPE_CHECKING:
-    from flightid.models.language.tables import TableFunction
+
+class _UnitBearer(Protocol):
+    """What has a unit."""
+
+    @property
+    def unit(self) -> str: ...
+
+
+class _Table(_UnitBearer, Protocol):
+    """A table that formulas call; see `flightid.models.language.tables`."""
+
+    @property
+    def axes(self) -> Sequence[_UnitBearer]: ...
+
 
 Powers = dict[str, float]
-Tables = Mapping[str, "TableFunction"]
+Tables = Mapping[str, _Table]
 _NO_TABLES: Tables = {}
 _SAME = 1e-9
 _ALIKE = {"add": "adds", "subtract": "subtracts", "minimum": "compares", "maximum": "compares"}
@@ -166,7 +178,7 @@ def _constant(kind: str, values: list[float | None]) -> float | None:
     return None
 
 
-def _looked_up(name: str, table: TableFunction, inner: list[Powers | None]) -> Powers:
+def _looked_up(name: str, table: _Table, inner: list[Powers | None]) -> Powers:
     if len(inner) != len(table.axes):
         raise _ClashError(f"calls table {name} with {len(inner)} values for {len(table.axes)} axes")
     for powers, axis in zip(inner, table.axes, strict=True):
