@@ -43,7 +43,7 @@ CYCLES, SAMPLES_PER_CYCLE = 10.0, 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class _RecordManoeuvre:
+class _Stretch:
     """A manoeuvre, and where a study finds it: `manoeuvre` where its file holds several."""
 
     record: Record
@@ -69,7 +69,7 @@ class _Group:
     """Records in which the same inputs moved: the longest is fitted, the others verify."""
 
     inputs: tuple[str, ...]
-    parts: tuple[_RecordManoeuvre, ...]
+    parts: tuple[_Stretch, ...]
 
 
 def study_of_records(
@@ -128,12 +128,12 @@ def study_of_records(
     return Proposal((*head, *body), tuple(names), tuple(missed))
 
 
-def _parts(path: Path, reading: Mapping[str, Any]) -> list[_RecordManoeuvre]:
+def _parts(path: Path, reading: Mapping[str, Any]) -> list[_Stretch]:
     """Manoeuvres of a file."""
     found = read_records(path, **reading)
     if len(found) == 1:
-        return [_RecordManoeuvre(found[0], path)]
-    return [_RecordManoeuvre(record, path, str(record.name)) for record in found]
+        return [_Stretch(found[0], path)]
+    return [_Stretch(record, path, str(record.name)) for record in found]
 
 
 def _told(reading: ReadOptions) -> list[str]:
@@ -145,11 +145,9 @@ def _told(reading: ReadOptions) -> list[str]:
     return [f"{name} = {toml_value(value)}" for name, value in told.items()]
 
 
-def _groups(
-    read: Sequence[_RecordManoeuvre], columns: Columns
-) -> tuple[list[_Group], list[Finding]]:
+def _groups(read: Sequence[_Stretch], columns: Columns) -> tuple[list[_Group], list[Finding]]:
     """Records by the inputs that move in them, the longest of each first."""
-    by_inputs: dict[tuple[str, ...], list[_RecordManoeuvre]] = {}
+    by_inputs: dict[tuple[str, ...], list[_Stretch]] = {}
     missed = []
     longest = max(part.record.n_samples for part in read)
     for part in read:
@@ -184,7 +182,7 @@ def _groups(
 class _Segments:
     """Names of what is fitted, what ranks structures and what verifies; all with file and span."""
 
-    all: tuple[tuple[str, _RecordManoeuvre, tuple[float, float] | None], ...]
+    all: tuple[tuple[str, _Stretch, tuple[float, float] | None], ...]
     fitted: str
     choice: str
     unseen: tuple[str, ...]
