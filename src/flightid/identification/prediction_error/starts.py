@@ -50,16 +50,16 @@ def polynomial_starts(structure: PolynomialStructure, data: SampledChannels) -> 
     found = [np.array(structure.start)] if structure.start else []
     if len(found) == structure.starts:
         return np.ascontiguousarray(found)
-    for plant in _plants(structure, data, innovations, long_a, long_b):
+    plants = _plants(structure, data, innovations, long_a, long_b)
+    for plant in plants:
         noise = _noise(structure, data, plant)
         found.append(_flat(plant, *noise))
         if structure.nc or structure.nd:
             found.append(_flat(plant, np.zeros(structure.nc), np.zeros(structure.nd)))
     generator = np.random.default_rng(structure.seed)
-    plant = _plants(structure, data, innovations, long_a, long_b)[0]
     while len(found) < structure.starts and (structure.nc or structure.nd):
         noise = (_random(generator, structure.nc), _random(generator, structure.nd))
-        found.append(_flat(plant, *noise))
+        found.append(_flat(plants[0], *noise))
     starts = np.array(found[: max(structure.starts, 1)])
     return np.ascontiguousarray(np.where(np.isfinite(starts), starts, 0.0))
 

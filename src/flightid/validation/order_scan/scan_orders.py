@@ -19,6 +19,7 @@ from flightid.identification.prediction.predict import predict
 from flightid.identification.prediction.request import usual_stretch
 from flightid.identification.prediction_error.information_criteria import Criteria, criteria
 from flightid.identification.prediction_error.part_blocks import about_levels
+from flightid.identification.prediction_error.search import search_polynomial
 from flightid.models.model import Model
 from flightid.models.polynomial.model import PolynomialModel
 from flightid.models.polynomial.orders import ANY, USED, ScanOptions
@@ -156,11 +157,13 @@ def scan_orders(
     trials: list[OrderTrial] = []
     for each, group in asked.items():
         quick = each in ("arx", "armax")
-        trials += _native_trials(group, data, check, scan) if quick else _fitted_trials(group, scan)
+        trials += (
+            _native_trials(group, data, check, scan) if quick else _fitted_trials(group, data, scan)
+        )
     if kind == ANY:
-        trials += _fitted_trials(box_jenkins_of(trials, orders), scan)
-        trials += _fitted_trials(subspace_of(structures), scan)
-        trials += _fitted_trials(narx_of(trials, whole_numbers("nb", nb)), scan)
+        trials += _fitted_trials(box_jenkins_of(trials, orders), data, scan)
+        trials += _fitted_trials(subspace_of(structures), data, scan)
+        trials += _fitted_trials(narx_of(trials, whole_numbers("nb", nb)), data, scan)
     ranked, best = _delivered(trials, scan)
     return OrderScan(
         kind, tuple(ranked), best, tuple(r.name for r in unseen), scan.settle_s, data.units[name]
@@ -268,19 +271,15 @@ def _common_skip(structures: Sequence[PolynomialStructure]) -> int:
     return max([*spans, *(s.na for s in structures), *(s.nc for s in structures)])
 
 
-def _fitted_trials(structures: Sequence[Structure], scan: _Scan) -> list[OrderTrial]:
-    """Full fits, of which the best is kept with its trial."""
+def _fitted_trials(
+    structures: Sequence[Structure], data: SampledChannels, scan: _Scan
+) -> list[OrderTrial]:
+    """Fits one by one, the best kept with its trial; of polynomials that one alone is whole."""
     trials: list[OrderTrial] = []
     best = None
     for structure in track(structures, "Scanning orders"):
         try:
-            fit = identify(structure, list(scan.fitted))
-            measures = getattr(fit.details, "criteria", None)
-            straight = any(finding.code == LINEAR for finding in fit.findings)
-            note = "linear: no nonlinear model beats it" if straight else ""
-            trial = _ended(
-                replace(_judged(structure, fit.model, measures, scan, note), fit=fit), fit
-            )
+            trial = _fitted_trial(structure, data, scan)
         except (DataError, FitError, OptionError) as error:
             trials.append(OrderTrial(structure, None, None, None, None, str(error)))
             continue
@@ -289,7 +288,21 @@ def _fitted_trials(structures: Sequence[Structure], scan: _Scan) -> list[OrderTr
                 trials[best] = replace(trials[best], fit=None)
             best = len(trials)
         trials.append(trial if best == len(trials) else replace(trial, fit=None))
+    if best is not None and trials[best].fit is None:
+        whole = identify(trials[best].structure, list(scan.fitted))
+        trials[best] = replace(trials[best], fit=whole)
     return trials
+
+
+def _fitted_trial(structure: Structure, data: SampledChannels, scan: _Scan) -> OrderTrial:
+    if isinstance(structure, PolynomialStructure):
+        model, measures, settled = search_polynomial(structure, data)
+        trial = _judged(structure, model, measures, scan)
+        return trial if settled else replace(trial, settled=False, note="not converged")
+    fit = identify(structure, list(scan.fitted))
+    straight = any(finding.code == LINEAR for finding in fit.findings)
+    note = "linear: no nonlinear model beats it" if straight else ""
+    return _ended(replace(_judged(structure, fit.model, None, scan, note), fit=fit), fit)
 
 
 def _judged(
