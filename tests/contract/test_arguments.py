@@ -89,7 +89,7 @@ OWN = {
     ),
     "control.autopilots": (
         "what a firmware calls its parameters, filters and clocks",
-        "airspeed_scale at_s changes computation_delay_s denominator detuning eas2tas flags "
+        "airspeed_scale at_s changes computation_delay_s denominator detuning eas2tas flags flown "
         "gyro_rate_hz integers loop_rate_hz named notch_tracking numerator parameters "
         "rate_rad_s rise_time_s setpoint_rad_s single_precision with_hold",
     ),
@@ -107,7 +107,7 @@ OWN = {
     ),
     "control.tuning": (
         "requirements of a design and its evidence",
-        "accept_red angle_loop gyro_noise name nominal other_loops requirements sign signs "
+        "accept_red angle_loop filters gyro_noise name nominal other_loops requirements sign signs "
         "verification verifications",
     ),
     "dynamics": (

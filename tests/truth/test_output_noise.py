@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +11,8 @@ import pytest
 import flightid as fid
 from flightid.control.autopilots.output_noise import GyroSpectrum, output_noise
 from flightid.control.tuning.filter_choice import choose_filters
+from flightid.control.tuning.result import RefusedAxis
+from flightid.errors import DataError
 from tests.closeness import assert_close
 
 LOOP_HZ, GYRO_HZ, N = 400.0, 2000.0, 20_000
@@ -132,3 +135,73 @@ def test_gains_are_tuned_with_the_new_filter_around_a_plant_that_holds_the_old_o
     cross = int(np.flatnonzero(np.abs(whole) >= 1.0)[-1])
     phase = 180.0 + np.degrees(np.unwrap(np.angle(whole)))[cross]
     assert_close(found, phase, atol=0.5, why="old filter out, new filter in")
+
+
+def test_tuning_with_a_choice_judges_its_filters_and_leaves_the_flown_margins_alone(
+    tmp_path: Path,
+) -> None:
+    _, spectrum = _noise(5, 30.0, 900.0)
+    axes = ("roll", "yaw")
+    loops = {
+        axis: fid.axis_loop("arducopter", axis, loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
+        for axis in axes
+    }
+    spectra, at = dict.fromkeys(axes, spectrum), dict.fromkeys(axes, 30.0)
+    flown_noise = output_noise(loops["roll"], spectrum).total
+    choice = choose_filters(loops, spectra, at, dict.fromkeys(axes, 4.0 * flown_noise))
+    assert choice.values["INS_GYRO_FILTER"] > 20.0
+    plant = fid.load_model("rate_integrator", axis="roll").with_values(
+        {"Ltphi": 140.0, "tau": 0.03}
+    )
+    shared = {"gains": loops, "band_rad_s": (1.0, 100.0), "nominal": True, "angle_loop": False}
+    with_choice = fid.tune({"roll": plant}, filters=choice, **shared)
+    plain = fid.tune({"roll": plant}, **shared)
+    design = with_choice["roll"]
+    for name in ("crossover", "phase margin", "gain margin"):
+        found = (each["roll"].worst_case("rate loop", name).flown for each in (with_choice, plain))
+        assert_close(*found, rtol=1e-9, why="flown gains are judged with the flown filters")
+    started = fid.tune_pid(
+        plant, gains=loops["roll"].with_filters(choice.loops["roll"].gains),
+        band_rad_s=(1.0, 100.0), nominal=True, angle_loop=False,
+        gyro_noise=spectrum.behind(loops["roll"]),
+        requirements=fid.TuningRequirements(
+            noise_growth=None, output_noise_rms=4.0 * flown_noise
+        ),
+    )  # fmt: skip
+    assert design.gains == started.gains, "the same loop, and the same limit of noise"
+    assert with_choice.filters is not None
+    told = with_choice.filters.axes[0]
+    assert_close(told.noise_flown, flown_noise, rtol=1e-9, why="as flown")
+    exact = output_noise(design.loop, spectrum, flown=loops["roll"]).total
+    assert_close(told.noise_tuned, exact, rtol=1e-9, why="filters and gains")
+    first, back, *_ = with_choice.write(tmp_path / "gains.param")
+    names = {"INS_GYRO_FILTER", "ATC_RAT_RLL_FLTD"}
+    written, before = fid.read_parameters(first), fid.read_parameters(back)
+    assert {name: written[name] for name in names} == {n: choice.values[n] for n in names}
+    assert {before[name] for name in names} == {20.0}
+    assert not any("YAW" in name for name in written), "yaw keeps its own filters"
+
+
+def test_filters_that_all_axes_share_cost_no_phase_where_nothing_is_tuned(tmp_path: Path) -> None:
+    _, spectrum = _noise(3, 30.0, 900.0)
+    axes = ("roll", "pitch")
+    loops = {
+        axis: fid.axis_loop("arducopter", axis, loop_rate_hz=LOOP_HZ, gyro_rate_hz=GYRO_HZ)
+        for axis in axes
+    }
+    spectra, at = dict.fromkeys(axes, spectrum), dict.fromkeys(axes, 30.0)
+    limits = dict.fromkeys(axes, 0.6 * output_noise(loops["roll"], spectrum).total)
+    slower = choose_filters(loops, spectra, at, limits)
+    kept = choose_filters(loops, spectra, at, limits, keep_phase=["pitch"])
+    assert slower.axes[1].phase_gained_deg < -1.0 <= kept.axes[1].phase_gained_deg
+    plant = fid.load_model("rate_integrator", axis="roll").with_values(
+        {"Ltphi": 140.0, "tau": 0.03}
+    )
+    tuning = fid.tune(
+        {"roll": plant}, gains=loops, filters=slower, band_rad_s=(1.0, 100.0), nominal=True,
+        angle_loop=False,
+    )  # fmt: skip
+    left = replace(tuning, refused=(RefusedAxis("pitch", "its fit is red"),))
+    assert "the filters that it shares cost pitch" in left.left_out["roll"]
+    with pytest.raises(DataError):
+        left.write(tmp_path / "gains.param")

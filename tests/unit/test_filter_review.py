@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 import flightid as fid
 from flightid.cli.flight import command
+from flightid.cli.program import program
 from flightid.logs.dataflash.layout import MessageLayout
 from flightid.logs.dataflash.writer import DataflashWriter
 from tests.closeness import assert_close
@@ -110,3 +111,22 @@ def test_filters_that_cannot_be_told_say_why_and_nothing_is_written(tmp_path: Pa
     )
     assert "Not written" in made.output
     assert not (tmp_path / "none.param").exists()
+
+
+def test_the_command_tunes_with_suggested_filters_and_writes_them(tmp_path: Path) -> None:
+    log, file = tmp_path / "quiet.bin", tmp_path / "gains.param"
+    _write(log, tone=0.0, white=0.001, esc=False)
+    plant = fid.load_model("rate_integrator", axis="roll").with_values(
+        {"Ltphi": 140.0, "tau": 0.03}
+    )
+    fid.write_model(plant, tmp_path / "roll.toml")
+    words = [
+        "tune", str(tmp_path / "roll.toml"), "--log", str(log), "--nominal", "--band-rad-s", "1",
+        "100", "--filters", "suggested", "--write", str(file), "--accept-red",
+    ]  # fmt: skip
+    made = CliRunner().invoke(program, words)
+    assert "INS_GYRO_FILTER 40 → 80" in made.output, made.output
+    assert "pitch and yaw fly the shared filters" in " ".join(made.output.split())
+    written = sorted(tmp_path.glob("gains*.param"))
+    changed = {fid.read_parameters(each)["INS_GYRO_FILTER"] for each in written}
+    assert changed == {80.0, 40.0}, "every step, and the way back"

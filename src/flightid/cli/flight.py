@@ -72,13 +72,10 @@ def _write(review: FlightReview, target: Path, overwrite: bool) -> None:
         note(f"Not written: {target}: no better filters ({why})")
         return
     notes = ["flightid: filters for the noise of this flight", *review.filters.words()]
-    if review.kind == "px4":
-        whole = [change.name for change in choice.changes if change.name == "IMU_GYRO_DNF_EN"]
-        made = write_px4_parameters(
-            choice.changes, target, notes=notes, integers=whole, overwrite=overwrite
-        )
-    else:
-        made = write_ardupilot_parameters(choice.changes, target, notes=notes, overwrite=overwrite)
+    px4 = review.kind == "px4"
+    made = (write_px4_parameters if px4 else write_ardupilot_parameters)(
+        choice.changes, target, notes=notes, overwrite=overwrite
+    )
     note(f"Wrote {made.path}")
     if made.rollback is not None:
         note(f"Wrote {made.rollback}")

@@ -145,6 +145,8 @@ def _show(tuning: Tuning, level: float | None) -> None:
     """Every table of the gains."""
     click.echo(str(tuning.summary()))
     at = {} if level is None else {"level": level}
+    if tuning.filters is not None:
+        click.echo(f"\n{tuning.filters.table()}")
     for design in tuning.designs:
         if design.plain and design.exists:
             click.echo(f"\n{design.plain.form_table()}")

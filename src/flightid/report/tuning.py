@@ -53,6 +53,8 @@ def tuning_section(tuning: Tuning, title: str = "Gains") -> Section:
         blocks += [Lights(tuple(verdicts)), TableBlock(tuning.together_table())]
     if any(each.closed for each in tuning.together):
         blocks.append(TableBlock(tuning.closed_table()))
+    if tuning.filters is not None:
+        blocks += [Lights(tuning.filters.findings()), TableBlock(tuning.filters.table())]
     parts = tuple(
         Section(f"{design.axis.capitalize()} gains", design_blocks(design))
         for design in tuning.designs

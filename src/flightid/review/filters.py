@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -160,7 +160,12 @@ def _path(noise: OutputNoise, letter: str, scale: float) -> float | None:
 
 
 def filter_review(
-    log: Log, spans: Sequence[Span], noise: GyroNoise, loops: Sequence[LoopResponse]
+    log: Log,
+    spans: Sequence[Span],
+    noise: GyroNoise,
+    loops: Sequence[LoopResponse],
+    *,
+    keep_phase: Collection[str] = (),
 ) -> FilterReview:
     """Read the filters from the log's parameters and judge them by the spectrum of the flight.
 
@@ -172,6 +177,8 @@ def filter_review(
     noise : GyroNoise
     loops : sequence of LoopResponse
         Rate loops tell where phase counts.
+    keep_phase : collection of str
+        Axes that the better filters may cost no phase.
     """
     try:
         flown: dict[str, AxisLoop] = {axis: axis_loop_of(log, axis) for axis in AXES}
@@ -200,6 +207,7 @@ def filter_review(
         dict.fromkeys(flown, 2.0 * np.pi * at_hz),
         {use.axis: OUTPUT_NOISE.value * use.full for use in uses},
         variants=list(proposed_notches(log, spans, noise, flown)),
+        keep_phase=keep_phase,
     )
     return replace(found, choice=choice, missed=tuple(_missed(flown["roll"], noise)))
 

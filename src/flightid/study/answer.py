@@ -19,6 +19,7 @@ from flightid.table import Cell, Column, Table
 if TYPE_CHECKING:
     from flightid.control.tuning.pid_design import PidDesign
     from flightid.control.tuning.result import Tuning
+    from flightid.control.tuning.tuned_filters import TunedFilters
     from flightid.study.identified import ModelResults
     from flightid.study.results import StudyResults
     from flightid.vehicles import GainFlight
@@ -61,7 +62,8 @@ def answer_of(study: StudyResults, *, source: str | None = None) -> StudyAnswer:
     if study.gain_flight is not None:
         findings.append(_flown(study.gain_flight))
     made = tuning.sound or tuple(design for design in tuning.designs if design.exists)
-    return StudyAnswer(tuple(findings), (_gain_table(made), _margin_table(made)) if made else ())
+    tables = (_gain_table(made, tuning.filters), _margin_table(made)) if made else ()
+    return StudyAnswer(tuple(findings), tables)
 
 
 def in_short(item: ModelResults) -> Finding:
@@ -204,12 +206,18 @@ def _flown(flight: GainFlight) -> Finding:
     return Finding("flown-again", worst(flight.findings), told, first.action if first else "")
 
 
-def _gain_table(designs: tuple[PidDesign, ...]) -> Table:
+def _gain_table(designs: tuple[PidDesign, ...], filters: TunedFilters | None) -> Table:
     columns = (
         Column("axis"), Column("parameter"), Column("flown"), Column("new"),
         Column("ratio", digits=3), Column("first step"),
     )  # fmt: skip
+    named = {each.name: each for design in designs for each in design.filters}
     rows: list[tuple[Cell, ...]] = [
+        ("filter", each.name, each.old, each.value, each.value / each.old if each.old else None,
+         each.value)
+        for each in named.values()
+    ]  # fmt: skip
+    rows += [
         (
             design.axis, change.name, change.flown, change.new, change.ratio,
             design.stages[0].gains.get(change.name) if len(design.stages) > 1 else None,
@@ -217,7 +225,8 @@ def _gain_table(designs: tuple[PidDesign, ...]) -> Table:
         for design in designs
         for change in design.changes
     ]  # fmt: skip
-    return Table("Gains to fly", columns, tuple(rows)).without_empty_columns()
+    notes = () if filters is None else filters.words
+    return Table("Gains to fly", columns, tuple(rows), notes).without_empty_columns()
 
 
 def _margin_table(designs: tuple[PidDesign, ...]) -> Table:

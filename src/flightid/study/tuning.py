@@ -15,10 +15,12 @@ from flightid.control.tuning.result import RefusedAxis, Tuning
 from flightid.control.tuning.tune import tune
 from flightid.control.tuning.tune_controller import tune_controller
 from flightid.control.tuning.tune_pid import CHANNELS
+from flightid.control.tuning.tuned_filters import TunedFilters
 from flightid.errors import DataError, FlightidError, ModelError, StudyError
 from flightid.models import Model, load_model
 from flightid.models.model import model_of
 from flightid.options import options_of
+from flightid.review.suggested_filters import suggested_filters
 from flightid.study.reading import TableReader, read_each
 from flightid.validation import Comparison, Verification
 
@@ -29,7 +31,7 @@ if TYPE_CHECKING:
 
 KINDS = (TuningRequirements, TuneOptions, ControllerOptions)
 """Dataclasses whose options are the keys of [tune], and options of ``flightid tune``."""
-AUTOPILOT_ONLY = ("gyro", "angle_loop", "signs", "other_loops")
+AUTOPILOT_ONLY = ("gyro", "angle_loop", "signs", "other_loops", "filters")
 """Options that a PID of its own does not know."""
 
 
@@ -231,10 +233,16 @@ def _tuned(
     settings: TuneSettings,
     checks: Mapping[str, Iterable[Verification | Comparison]],
 ) -> Tuning:
-    return tune(
+    asked = {name: value for name, value in vars(settings.options).items() if name != "filters"}
+    choice, reason = None, ""
+    if settings.options.filters == "suggested":
+        choice, reason = suggested_filters(log, fits)
+    made = tune(
         fits,
         gains=log,
         requirements=settings.requirements,
         verifications=checks,
-        **vars(settings.options),
+        filters=choice,
+        **asked,
     )
+    return replace(made, filters=TunedFilters(reason=reason)) if reason else made

@@ -107,7 +107,7 @@ def fly_gains(
             needed="an axis without a red verdict",
         )
     asked = options or GainFlightOptions()
-    gains = {name: value for each in tuning.sound for name, value in each.gains.items()}
+    gains = {name: value for each in tuning.sound for name, value in each.parameters.items()}
     flown = (autopilot or Autopilot()).with_parameters(gains)
     made: list[FlownMargin] = []
     loops: dict[str, Margins] = {}

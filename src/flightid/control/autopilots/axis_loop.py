@@ -156,8 +156,12 @@ class AxisLoop(Result, schema="flightid.axis_loop/1"):
         UnknownNameError
             The controller has no such parameter.
         """
-        held = self._gyro_sections() if self.plant_gyro is None else self.plant_gyro
-        return replace(self.with_gains(values), plant_gyro=held)
+        return self.with_gains(values).around_plant_of(self)
+
+    def around_plant_of(self, flown: AxisLoop) -> Self:
+        """Copy around a plant that was identified behind the gyro filters of another loop."""
+        held = flown._gyro_sections() if flown.plant_gyro is None else flown.plant_gyro
+        return replace(self, plant_gyro=held)
 
     def with_notes(self, notes: tuple[str, ...]) -> Self:
         """Copy with more sentences in `unmodelled`."""

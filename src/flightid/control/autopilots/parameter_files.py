@@ -16,6 +16,7 @@ from flightid.files import as_path, write_atomically
 
 NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
 """Both autopilots keep names in 16 characters."""
+PX4_INTEGERS = ("IMU_GYRO_DNF_EN",)
 REAL32, INT32 = 9, 6
 """MAVLink's numbers for the types of a parameter."""
 LARGEST_FILE_BYTES = 10_000_000
@@ -178,7 +179,7 @@ def write_px4_parameters(
     path: str | Path,
     *,
     notes: Iterable[str] = (),
-    integers: Iterable[str] = (),
+    integers: Iterable[str] = PX4_INTEGERS,
     overwrite: bool = False,
 ) -> WrittenParameters:
     """Write a QGroundControl parameter file, as PX4 users load it.

@@ -86,6 +86,9 @@ class Setting:
     requirements : TuningRequirements
     noise : tuple of ndarray or None
         Frequencies (rad/s) and spectral density ((rad/s)²/Hz) of the rate's noise.
+    noise_allowed : float or None
+        Output noise that is fine where that of the flight is known: bounds it in place of its
+        growth, or as much as the flown gains make behind the filters that are tuned with.
     """
 
     evidence: TuningEvidence
@@ -95,6 +98,7 @@ class Setting:
     with_angle: bool
     requirements: TuningRequirements
     noise: tuple[Array, Array] | None = None
+    noise_allowed: float | None = None
 
     def coherence_of(self, place: int) -> tuple[Array, Array] | None:
         """Frequencies and coherence of an axis' measured response, where the fit rests on one."""
@@ -161,10 +165,17 @@ def noise_limit(setting: Setting, problem: LoopProblem, flown: Array) -> float |
     need, limits = setting.requirements, []
     if need.output_noise_rms is not None and setting.noise is not None:
         limits.append(need.output_noise_rms)
-    if need.noise_growth is not None and flown.any():
+    allowed = setting.noise_allowed
+    if allowed is not None:
+        limits.append(allowed)
+    if (allowed is not None or need.noise_growth is not None) and flown.any():
         judged = problem.judge(flown[None], [0])
         if bool(judged.stable[0, 0]):
-            limits.append(need.noise_growth * float(judged.noise[0, 0]))
+            noise = float(judged.noise[0, 0])
+            if allowed is not None:
+                limits[-1] = max(allowed, noise)
+            elif need.noise_growth is not None:
+                limits.append(need.noise_growth * noise)
     return min(limits, default=None)
 
 
@@ -242,8 +253,10 @@ def _judged(
     fresh = problem_of(setting, setting.judged.axis(place, loops, setting.gyro), paths, limit)
     if not flown[place].has_flown:
         return fresh, None
-    around = replace(fresh, plants=setting.judged.axis(place, flown, setting.gyro))
-    return fresh, around.judge(paths.gains_of(flown[place])[None])
+    own = ControllerPaths(flown[place], setting.gyro, setting.with_angle)
+    plants = setting.judged.axis(place, flown, setting.gyro)
+    around = problem_of(setting, plants, own, limit)
+    return fresh, around.judge(own.gains_of(flown[place])[None])
 
 
 def axis_steps(setting: Setting, loop: AxisLoop) -> int:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import product
 
 import numpy as np
@@ -40,6 +40,8 @@ class AxisFilters:
         Rms of the output from the gyro's noise, and what it may be.
     unit : str
         Of the output.
+    noise_tuned : float or None
+        With new gains too; None where none were tuned.
     """
 
     axis: str
@@ -50,6 +52,7 @@ class AxisFilters:
     noise_new: float
     noise_limit: float
     unit: str
+    noise_tuned: float | None = None
 
     @property
     def phase_gained_deg(self) -> float:
@@ -57,8 +60,12 @@ class AxisFilters:
         return self.phase_new_deg - self.phase_flown_deg
 
 
-@dataclass(frozen=True, repr=False)
-class FilterChoice(Result, schema="flightid.filter_choice/1"):
+@dataclass(frozen=True, eq=False, repr=False)
+class FilterChoice(
+    Result,
+    schema="flightid.filter_choice/1",
+    untold={"loops": "controllers with the filters", "spectra": "the log's own"},
+):
     """Filters that cost the least phase and keep the output's noise below a limit.
 
     Attributes
@@ -68,6 +75,9 @@ class FilterChoice(Result, schema="flightid.filter_choice/1"):
     axes : tuple of AxisFilters
     within_limit : bool
         Whether every axis keeps its limit; False: the least noise that the ranges allow.
+    loops : mapping of str to AxisLoop
+        By axis: gains as flown and the chosen filters, around the plant of the flown ones.
+    spectra : mapping of str to GyroSpectrum
 
     Example
     -------
@@ -82,6 +92,8 @@ class FilterChoice(Result, schema="flightid.filter_choice/1"):
     changes: tuple[GainChange, ...]
     axes: tuple[AxisFilters, ...]
     within_limit: bool
+    loops: Mapping[str, AxisLoop] = field(default_factory=dict)
+    spectra: Mapping[str, GyroSpectrum] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         """Changes on one line."""
@@ -95,6 +107,14 @@ class FilterChoice(Result, schema="flightid.filter_choice/1"):
             for c in self.changes
         )
         return ", ".join(each)
+
+    def changes_of(self, axis: str) -> tuple[GainChange, ...]:
+        """Changes of an axis: its own, and those that all axes share."""
+        others = {
+            name for other, loop in self.loops.items() if other != axis for name in loop.gains
+        }
+        foreign = others - set(self.loops[axis].gains)
+        return tuple(each for each in self.changes if each.name not in foreign)
 
     @property
     def values(self) -> dict[str, float]:
@@ -134,6 +154,7 @@ def choose_filters(
     *,
     step_limit: float = 2.0,
     variants: Sequence[tuple[Sequence[GainChange], Mapping[str, AxisLoop]]] = (),
+    keep_phase: Collection[str] = (),
 ) -> FilterChoice:
     """Choose low-passes of gyro and D: the least lag at the crossover within a limit of noise.
 
@@ -147,6 +168,8 @@ def choose_filters(
         Largest ratio of a cut-off to the flown one.
     variants : sequence of pairs
         Other notches to try: their parameters, and the loops with them.
+    keep_phase : collection of str
+        Axes that may lose no phase (1° at most), for no gains are tuned to it.
 
     Notes
     -----
@@ -164,8 +187,9 @@ def choose_filters(
     for place, (_, base) in enumerate(every):
         for values in _grid(loops[axes[0]], shared, step_limit, spectra[axes[0]]):
             score, chosen = _score(
-                base, loops, values, shared, spectra, crossovers_rad_s, noise_limits, step_limit
-            )
+                base, loops, values, shared, spectra, crossovers_rad_s, noise_limits, step_limit,
+                keep_phase,
+            )  # fmt: skip
             worth = score[1] - (WORTH_DEG if place else 0.0)
             if best is None or (score[0], worth) > best[0]:
                 best = ((score[0], worth), values | chosen, place)
@@ -213,7 +237,7 @@ def _own(loop: AxisLoop, shared: Sequence[str]) -> list[str]:
     return [name for name in names if name not in shared]
 
 
-def _phase_deg(loop: AxisLoop, omega: float) -> float:
+def phase_deg(loop: AxisLoop, omega: float) -> float:
     """Phase of the controller from the raw gyro to the output."""
     return float(np.angle(loop.feedback([omega], with_hold=False)[0], deg=True))
 
@@ -227,21 +251,26 @@ def _score(
     crossovers: Mapping[str, float],
     limits: Mapping[str, float],
     step_limit: float,
+    keep_phase: Collection[str],
 ) -> tuple[tuple[bool, float], dict[str, float]]:
     """Whether all limits hold, and the mean phase gained (else the worst excess, as a loss)."""
     gained: list[float] = []
     excess: list[float] = []
     chosen: dict[str, float] = {}
     for axis, loop in base.items():
-        before = _phase_deg(flown[axis], crossovers[axis])
+        before = phase_deg(flown[axis], crossovers[axis])
         found: list[tuple[bool, float, float, float, dict[str, float]]] = []
         for own in _grid(loop, _own(loop, shared), step_limit, spectra[axis]):
             tried = loop.with_gains({**values, **own})
             noise = output_noise(tried, spectra[axis], flown=flown[axis]).total / limits[axis]
-            gain = _phase_deg(tried, crossovers[axis]) - before
+            gain = phase_deg(tried, crossovers[axis]) - before
+            if axis in keep_phase and gain < -WORTH_DEG:
+                continue
             moved = any(value != flown[axis].gains[name] for name, value in own.items())
             worth = gain - WORTH_DEG * moved if noise <= 1.0 else -noise
             found.append((noise <= 1.0, worth, gain, noise, own))
+        if not found:
+            return (False, -np.inf), {}
         _, _, gain, noise, own = max(found, key=lambda each: each[:2])
         gained.append(gain)
         excess.append(noise)
@@ -270,20 +299,21 @@ def _told(
         for name, value in values.items()
         if value != flown[name]
     ]
-    told = []
+    told, chosen = [], {}
     for axis, loop in loops.items():
         known = {name: value for name, value in values.items() if name in loop.gains}
         new = every[place][1][axis].with_gains(known)
+        chosen[axis] = new.around_plant_of(loop)
         told.append(
             AxisFilters(
                 axis,
                 crossovers[axis],
-                _phase_deg(loop, crossovers[axis]),
-                _phase_deg(new, crossovers[axis]),
+                phase_deg(loop, crossovers[axis]),
+                phase_deg(new, crossovers[axis]),
                 output_noise(loop, spectra[axis]).total,
                 output_noise(new, spectra[axis], flown=loop).total,
                 limits[axis],
                 loop.output_unit,
             )
         )
-    return FilterChoice((*every[place][0], *moved), tuple(told), within)
+    return FilterChoice((*every[place][0], *moved), tuple(told), within, chosen, dict(spectra))

@@ -11,6 +11,7 @@ from flightid.control.tuning.tune_pid import DRAWS
 from flightid.options import Options, option
 
 OtherLoops = Literal["closed", "open"]
+TunedWith = Literal["flown", "suggested"]
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,12 @@ class TuneOptions(Options):
         choices=("closed", "open"),
         doc="Loops of the other axes of one model while an axis is designed; open: each alone, "
         "and then judged with all closed.",
+    )
+    filters: TunedWith = option(
+        "flown",
+        choices=("flown", "suggested"),
+        doc="Filters that the gains are tuned with: those that flew, or better ones for the gyro's "
+        "noise in the log, which then bounds the output's noise.",
     )
     accept_red: bool = option(
         False,

@@ -16,14 +16,14 @@ from flightid.control.autopilots import (
 from flightid.control.autopilots.pid_loop import PidLoop
 from flightid.control.tuning.gain_steps import Stage, TunedGain
 from flightid.control.tuning.loop_problem import LoopProblem
+from flightid.control.tuning.pid_file import write_settings
 from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.responses import ResponseBand
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.conventions import Light
-from flightid.errors import DataError, OptionError, UnknownNameError
-from flightid.files import as_path, write_atomically
+from flightid.errors import DataError, UnknownNameError
+from flightid.files import as_path
 from flightid.findings import Finding
-from flightid.models.save import toml_value
 from flightid.result import Result
 from flightid.table import Cell, Column, Table
 from flightid.uncertainty.quantiles import interval_words, shown
@@ -65,6 +65,8 @@ class PidDesign(
         Plants that the worst cases rest on, the search having seen none of them.
     findings : tuple of Finding
     provenance : mapping
+    filters : tuple of GainChange
+        Filters that were not flown and that the gains were tuned with: set with the first step.
 
     Example
     -------
@@ -93,6 +95,7 @@ class PidDesign(
     problem: LoopProblem
     findings: tuple[Finding, ...] = ()
     provenance: Mapping[str, object] = field(default_factory=dict)
+    filters: tuple[GainChange, ...] = ()
 
     @property
     def axis(self) -> str:
@@ -103,6 +106,11 @@ class PidDesign(
     def gains(self) -> dict[str, float]:
         """New gains by the autopilot's names."""
         return {change.name: change.new for change in self.changes}
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """All that is to be set: filters, then gains."""
+        return {each.name: each.value for each in self.filters} | self.gains
 
     def worst_case(self, loop: str, name: str) -> WorstCase:
         """One number, for example ``worst_case("rate loop", "phase margin")``.
@@ -321,7 +329,7 @@ def write_steps(
     accepted = [*left, *require_gains(designs, findings, accept_red=accept_red)]
     plain = [design.plain for design in designs if design.plain is not None]
     if plain:
-        return _write_settings(plain, as_path(path), accepted, overwrite=overwrite)
+        return write_settings(plain, as_path(path), accepted, overwrite=overwrite)
     final, count = Path(path), max(len(design.stages) for design in designs)
     write = (
         write_px4_parameters
@@ -335,7 +343,9 @@ def write_steps(
         )
         name = final if count == 1 else final.with_name(f"{final.stem}-{k + 1}{final.suffix}")
         notes = [f"flightid: step {k + 1} of {count}; fly each before the next", *accepted]
-        made = write(changes, name, notes=notes, overwrite=overwrite)
+        made = write(
+            {each.name: each for each in changes}.values(), name, notes=notes, overwrite=overwrite
+        )
         written += [each for each in (made.path, made.rollback) if each is not None]
     return tuple(written)
 
@@ -371,27 +381,12 @@ def require_gains(
     return [f"RED, accepted by the user: {message}" for message in red]
 
 
-def _write_settings(
-    loops: Sequence[PidLoop], path: Path, notes: Sequence[str], *, overwrite: bool
-) -> tuple[Path, ...]:
-    """Numbers of controllers, one table each."""
-    if path.suffix != ".toml" or (path.exists() and not overwrite):
-        raise OptionError(
-            "the gains of a PID are written to a new TOML file",
-            found=path.name,
-            needed="a name that ends in .toml, of no file that is there",
-            action="name another file, or export the design as C",
-        )
-    lines = [f"# {' '.join(note.split())}" for note in notes]
-    for loop in loops:
-        told = loop.settings().items()
-        lines += ["[[controller]]", *(f"{key} = {toml_value(value)}" for key, value in told), ""]
-    return (write_atomically(path, "\n".join(lines)),)
-
-
 def _step_changes(design: PidDesign, step: int) -> list[GainChange]:
     flown = design.flown.gains
     return [
-        GainChange(name, value, flown[name], f"{design.axis}")
-        for name, value in design.stages[step].gains.items()
+        *design.filters,
+        *(
+            GainChange(name, value, flown[name], f"{design.axis}")
+            for name, value in design.stages[step].gains.items()
+        ),
     ]

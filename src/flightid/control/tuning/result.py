@@ -7,6 +7,7 @@ from pathlib import Path
 
 from flightid.control.tuning.pid_design import PidDesign, require_gains, write_steps
 from flightid.control.tuning.together import Together
+from flightid.control.tuning.tuned_filters import TunedFilters
 from flightid.conventions import Light
 from flightid.errors import FlightidError, UnknownNameError
 from flightid.findings import Finding
@@ -59,6 +60,8 @@ class Tuning(Result, schema="flightid.tuning/1"):
         One for each set of axes that one model couples.
     refused : tuple of RefusedAxis
         Axes that were asked for and that their data do not allow; the others stand.
+    filters : TunedFilters or None
+        Filters that the gains were tuned with; None: those that flew, unasked.
 
     Example
     -------
@@ -69,6 +72,7 @@ class Tuning(Result, schema="flightid.tuning/1"):
     designs: tuple[PidDesign, ...]
     together: tuple[Together, ...]
     refused: tuple[RefusedAxis, ...] = ()
+    filters: TunedFilters | None = None
 
     def __getitem__(self, axis: str) -> PidDesign:
         """Design of an axis.
@@ -117,6 +121,10 @@ class Tuning(Result, schema="flightid.tuning/1"):
                     red[0] if red else f"one model couples it with {bad[0]}, which has none to fly"
                 )
                 reasons = dict.fromkeys(each.axes, why) | reasons
+        lost = {} if self.filters is None else self.filters.unjudged(reasons)
+        for axis, phase_deg in lost.items():
+            why = f"the filters that it shares cost {axis} {phase_deg:.2g} deg, whose gains stay"
+            reasons = {each.axis: why for each in self.designs} | reasons
         return reasons
 
     @property
@@ -124,7 +132,8 @@ class Tuning(Result, schema="flightid.tuning/1"):
         """Verdicts on each axis and on what they do together."""
         single = [finding for design in self.designs for finding in design.findings]
         together = [finding for each in self.together for finding in each.findings()]
-        return (*(each.finding for each in self.refused), *single, *together)
+        filters = () if self.filters is None else self.filters.findings()
+        return (*(each.finding for each in self.refused), *single, *together, *filters)
 
     def __repr__(self) -> str:
         """Axes with their worst phase margins on one line."""
@@ -143,6 +152,8 @@ class Tuning(Result, schema="flightid.tuning/1"):
         )
         together = tuple(str(finding) for each in self.together for finding in each.findings())
         refused = tuple(str(each.finding) for each in self.refused)
+        if self.filters is not None:
+            together += tuple(map(str, self.filters.findings()))
         columns = tables[0].columns if tables else (Column("parameter"),)
         return Table("Gains", columns, rows, (*refused, *notes, *together))
 
@@ -250,7 +261,8 @@ class Tuning(Result, schema="flightid.tuning/1"):
         }
 
     def _tables(self) -> tuple[Table, ...]:
-        return tuple(table for design in self.designs for table in design._tables())
+        filters = () if self.filters is None else (self.filters.table(),)
+        return (*filters, *(table for design in self.designs for table in design._tables()))
 
 
 def _unsound(design: PidDesign) -> str:

@@ -20,6 +20,7 @@ from flightid.control.tuning.axis_tuning import (
 )
 from flightid.control.tuning.controller_paths import ControllerPaths, has_angle_loop
 from flightid.control.tuning.evidence import Verdicts, gather
+from flightid.control.tuning.filter_choice import FilterChoice
 from flightid.control.tuning.flown_gains import GainsOfAxes, flown_loop
 from flightid.control.tuning.judge_together import judge_together
 from flightid.control.tuning.options import OtherLoops
@@ -28,7 +29,16 @@ from flightid.control.tuning.requirements import TuningRequirements
 from flightid.control.tuning.result import RefusedAxis, Tuning
 from flightid.control.tuning.structure_error import Band
 from flightid.control.tuning.together import ClosedAxis, Together
-from flightid.control.tuning.tune_pid import CHANNELS, DRAWS, design_of, make_setting, tune_pid
+from flightid.control.tuning.tune_pid import (
+    CHANNELS,
+    DRAWS,
+    design_of,
+    make_setting,
+    naming_filters,
+    tune_pid,
+    with_filters,
+)
+from flightid.control.tuning.tuned_filters import tuned_filters
 from flightid.errors import DataError, FlightidError, ModelError, OptionError
 from flightid.progress import progress
 
@@ -54,6 +64,7 @@ def tune(
     nominal: bool = False,
     accept_red: bool = False,
     other_loops: OtherLoops = "closed",
+    filters: FilterChoice | None = None,
 ) -> Tuning:
     """Gains of several axes; axes of one model are tuned with each other's loops closed.
 
@@ -81,6 +92,9 @@ def tune(
     other_loops : {"closed", "open"}
         ``"open"``: axes of one model are designed each as if the other had no controller, and then
         judged with all loops closed; where that breaks a requirement they are red.
+    filters : FilterChoice, optional
+        Filters to tune with, as `choose_filters` found them for the noise of the flight, which then
+        bounds the output's in place of its growth; default: those that flew.
 
     Raises
     ------
@@ -115,7 +129,7 @@ def tune(
         )
     shared: dict[str, Any] = {
         "band_rad_s": band_rad_s, "draws": draws, "seed": seed,
-        "nominal": nominal, "accept_red": accept_red,
+        "nominal": nominal, "accept_red": accept_red, "filters": filters,
     }  # fmt: skip
     designs: dict[str, PidDesign] = {}
     together: list[Together] = []
@@ -141,7 +155,9 @@ def tune(
     if not designs:
         raise errors[0][1]
     kept = tuple(designs[axis] for axis in fits if axis in designs)
-    return Tuning(kept, tuple(together), tuple(RefusedAxis.by(*each) for each in errors))
+    refused = tuple(RefusedAxis.by(*each) for each in errors)
+    told = None if filters is None else tuned_filters(filters, designs)
+    return Tuning(kept, tuple(together), refused, told)
 
 
 @dataclass(frozen=True)
@@ -194,7 +210,7 @@ def _tuned(
         fresh=shared["draws"],
         verification=[verdict for each in asked for verdict in each.verdicts],
         needs_band=any(each.requirements.band_factor is not None for each in asked),
-        **shared,
+        **{name: value for name, value in shared.items() if name != "filters"},
     )
     setting = make_setting(
         evidence,
@@ -209,7 +225,7 @@ def _tuned(
     )
     if alone:
         return alone, [_closed(setting, alone, flown, asked)]
-    made, whole = _coupled(setting, flown, asked, shared["seed"])
+    made, whole = _coupled(setting, flown, asked, shared["seed"], shared["filters"])
     return made, [whole]
 
 
@@ -260,11 +276,20 @@ def _groups(fits: Mapping[str, object]) -> list[list[str]]:
 
 
 def _coupled(
-    setting: Setting, flown: list[AxisLoop], asked: Sequence[AxisRequest], seed: int
+    setting: Setting,
+    flown: list[AxisLoop],
+    asked: Sequence[AxisRequest],
+    seed: int,
+    filters: FilterChoice | None,
 ) -> tuple[list[PidDesign], Together]:
     """Each axis with the others closed, in turn, until the gains settle."""
-    loops, axes = list(flown), [each.axis for each in asked]
-    settings = [replace(setting, requirements=each.requirements) for each in asked]
+    axes = [each.axis for each in asked]
+    given = [with_filters(setting, loop, filters) for loop in flown]
+    settings = [
+        replace(each, requirements=request.requirements)
+        for (each, _), request in zip(given, asked, strict=True)
+    ]
+    loops = [start for _, start in given]
     results: list[AxisResult] = []
     total = ROUNDS * sum(axis_steps(setting, loop) for loop in flown)
     with progress(total, f"tuning {' and '.join(axes)}") as advance:
@@ -279,7 +304,7 @@ def _coupled(
             if all(_settled(setting, *pair) for pair in zip(before, loops, strict=True)):
                 break
     designs = [
-        design_of(settings[place], result, loops, place, flown, [], seed)
+        naming_filters(design_of(settings[place], result, loops, place, flown, [], seed), filters)
         for place, result in enumerate(results)
     ]
     return designs, judge_together(setting, loops, flown, axes)

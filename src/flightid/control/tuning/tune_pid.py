@@ -23,6 +23,7 @@ from flightid.control.tuning.axis_tuning import (
 )
 from flightid.control.tuning.controller_paths import ControllerPaths, has_angle_loop
 from flightid.control.tuning.evidence import TuningEvidence, Verdicts, gather
+from flightid.control.tuning.filter_choice import FilterChoice
 from flightid.control.tuning.findings import low_coherence, remarks, verdict
 from flightid.control.tuning.flown_gains import Gains, flown_loop
 from flightid.control.tuning.margins_beyond import beyond_findings
@@ -61,6 +62,7 @@ def tune_pid(
     band_rad_s: Band | None = None,
     verification: Verdicts | Iterable[Verdicts] | None = None,
     gyro_noise: float | tuple[ArrayLike, ArrayLike] | None = None,
+    filters: FilterChoice | None = None,
     draws: int = DRAWS,
     seed: int = 0,
     nominal: bool = False,
@@ -100,6 +102,9 @@ def tune_pid(
     gyro_noise : float or tuple of array_like, optional
         Noise of the rate that the controller takes: rms of white samples, rad/s, or frequencies
         (rad/s) and density ((rad/s)²/Hz). Left out: output noise is told per unit of gyro noise.
+    filters : FilterChoice, optional
+        Filters to tune with, and the noise that bounds the output in place of its growth; default:
+        those that flew.
     draws : int
         Plants drawn for the search, and as many again to judge its result by.
     seed : int
@@ -176,10 +181,31 @@ def tune_pid(
         [sign],
         noise_density(gyro_noise, step),
     )
-    with progress(axis_steps(setting, flown), f"tuning {flown.axis}") as advance:
-        result = tune_axis(setting, [flown], [flown], 0, advance)
+    setting, start = with_filters(setting, flown, filters)
+    with progress(axis_steps(setting, start), f"tuning {flown.axis}") as advance:
+        result = tune_axis(setting, [start], [flown], 0, advance)
     couplings = _couplings(evidence.estimate, channels[0][0])
-    return design_of(setting, result, [flown], 0, [flown], couplings, seed)
+    design = design_of(setting, result, [start], 0, [flown], couplings, seed)
+    return naming_filters(design, filters)
+
+
+def with_filters(
+    setting: Setting, flown: AxisLoop, filters: FilterChoice | None
+) -> tuple[Setting, AxisLoop]:
+    """The setting with the noise of the flight, and the axis with the filters to tune with."""
+    if filters is None or flown.axis not in filters.loops:
+        return setting, flown
+    noise = filters.spectra[flown.axis].behind(flown)
+    (allowed,) = (each.noise_limit for each in filters.axes if each.axis == flown.axis)
+    start = filters.loops[flown.axis]
+    return replace(setting, noise=noise, noise_allowed=allowed), start
+
+
+def naming_filters(design: PidDesign, filters: FilterChoice | None) -> PidDesign:
+    """The design with the filters that it was tuned with."""
+    if filters is None or not design.exists or design.axis not in filters.loops:
+        return design
+    return replace(design, filters=filters.changes_of(design.axis))
 
 
 def make_setting(

@@ -1,0 +1,131 @@
+"""Filters that gains were tuned with: phase, noise, and axes that fly them unjudged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from flightid.control.autopilots import GainChange
+from flightid.control.autopilots.output_noise import GyroSpectrum, output_noise
+from flightid.control.tuning.filter_choice import WORTH_DEG, AxisFilters, FilterChoice, phase_deg
+from flightid.control.tuning.pid_design import PidDesign
+from flightid.conventions import Light
+from flightid.findings import Finding
+from flightid.table import Cell, Column, Table
+
+REACHED = 1.005
+"""A limit that is passed by less is kept."""
+
+
+@dataclass(frozen=True)
+class TunedFilters:
+    """Filters that were chosen by the noise of the flight, and gains tuned with them.
+
+    Attributes
+    ----------
+    changes : tuple of GainChange
+        Parameters to set with the gains; none where the flown ones are as good.
+    axes : tuple of AxisFilters
+        With the new gains where the axis was tuned, at the crossover that they make.
+    tuned : tuple of str
+        Axes whose gains are new.
+    reason : str
+        Why no filters could be chosen; the flown ones stand.
+
+    Example
+    -------
+    >>> TunedFilters(reason="no spectrum").findings()[0].code
+    'filters-as-flown'
+    """
+
+    changes: tuple[GainChange, ...] = ()
+    axes: tuple[AxisFilters, ...] = ()
+    tuned: tuple[str, ...] = ()
+    reason: str = ""
+
+    def table(self) -> Table:
+        """Phase and noise of each axis, as flown, with the filters, and with the gains too."""
+        columns = (
+            *(Column("axis"), Column("at", "Hz", 3), Column("phase saved", "deg", 2)),
+            *(Column("noise as flown", digits=2), Column("with these filters", digits=2)),
+            *(Column("and the new gains", digits=2), Column("fine below", digits=2)),
+            Column("unit"),
+        )
+        rows: list[tuple[Cell, ...]] = [
+            (
+                *(each.axis, each.crossover_rad_s / (2.0 * np.pi), each.phase_gained_deg),
+                *(each.noise_flown, each.noise_new, each.noise_tuned, each.noise_limit, each.unit),
+            )
+            for each in self.axes
+        ]
+        told = [f"{c.name} {'' if c.old is None else f'{c.old:.4g} → '}{c.value:.4g}"
+                for c in self.changes]  # fmt: skip
+        said = "; ".join(told) or self.reason or "As flown: no other is worth a change."
+        notes = (said, "Noise: rms of the gyroscope's in the output from 20 Hz up, 1 is full.")
+        return Table("Filters tuned with", columns, tuple(rows), notes if self.axes else (said,))
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What the filters do to each axis, one sentence each; why there are none."""
+        if self.reason or not self.changes:
+            return (f"Filters as flown: {self.reason or 'no other is worth a change'}.",)
+        return tuple(
+            f"Filters, {each.axis}: {abs(each.phase_gained_deg):.2g} deg "
+            f"{'saved' if each.phase_gained_deg >= 0.0 else 'lost'} at the crossover, output noise "
+            f"{each.noise_flown:.2g} as flown, {each.noise_new:.2g} with the filters"
+            + ("" if each.noise_tuned is None else f", {each.noise_tuned:.2g} with the gains too")
+            for each in self.axes
+        )
+
+    def unjudged(self, left: Iterable[str]) -> dict[str, float]:
+        """Phase that axes which stay as flown would lose to filters that all axes share, deg."""
+        lost = {each.axis: -each.phase_gained_deg for each in self.axes if self.changes}
+        return {axis: lost[axis] for axis in left if lost.get(axis, 0.0) > WORTH_DEG}
+
+    def findings(self) -> tuple[Finding, ...]:
+        """Verdicts."""
+        return tuple(self._findings())
+
+    def _findings(self) -> Iterator[Finding]:
+        if self.reason:
+            said = f"filters are kept as flown: {self.reason}"
+            yield Finding("filters-as-flown", Light.AMBER, said, "log the gyro at the loop's rate")
+        for each in self.axes:
+            noise = each.noise_new if each.noise_tuned is None else each.noise_tuned
+            if noise > REACHED * each.noise_limit:
+                said = (
+                    f"noise of the gyroscope moves the {each.axis} output by {noise:.2g}, rms "
+                    f"({each.noise_flown:.2g} as flown); {each.noise_limit:g} is fine"
+                )
+                mend = "balance propellers and damp the mount"
+                yield Finding(f"output-noise-{each.axis}", Light.AMBER, said, mend)
+        still = [each.axis for each in self.axes if each.axis not in self.tuned]
+        if self.changes and still:
+            said = f"{' and '.join(still)} fly the shared filters with their old gains, unjudged"
+            yield Finding(
+                "filters-unjudged", Light.AMBER,
+                f"{said}; they lose at most {WORTH_DEG:g} deg by them", "sweep these axes too",
+            )  # fmt: skip
+
+
+def tuned_filters(choice: FilterChoice, designs: Mapping[str, PidDesign]) -> TunedFilters:
+    """Phase and noise of the filters with the gains that were tuned with them."""
+    axes = tuple(
+        _with_gains(each, designs[each.axis], choice.spectra[each.axis])
+        if each.axis in designs and designs[each.axis].exists
+        else each
+        for each in choice.axes
+    )
+    return TunedFilters(choice.changes, axes, tuple(a for a, d in designs.items() if d.exists))
+
+
+def _with_gains(told: AxisFilters, design: PidDesign, spectrum: GyroSpectrum) -> AxisFilters:
+    crossing = design.worst_case("rate loop", "crossover").nominal or told.crossover_rad_s
+    gains = design.flown.with_gains(design.gains)
+    noise = output_noise(design.loop, spectrum, flown=design.flown).total
+    return AxisFilters(
+        told.axis, crossing, phase_deg(gains, crossing), phase_deg(design.loop, crossing),
+        told.noise_flown, told.noise_new, told.noise_limit, told.unit, noise,
+    )  # fmt: skip
