@@ -34,15 +34,21 @@ NAMES = {
     "rad": "radian", "s": "second", "µs": "microsecond", "V": "volt",
 }  # fmt: skip
 """By whose order the canonical spelling goes."""
+SHORT = {"us": "µs"} | {name: symbol for symbol, name in NAMES.items()}
+"""Units that go by their names, and microseconds in plain letters."""
 FACTOR = re.compile(r"([*/]|^1/|^)([A-Za-zµ]+)(?:\^([2-9]))?")
 
 
 class CommonUnit(NamedTuple):
-    """A unit: its canonical spelling, and factor times powers of SI base units and the radian."""
+    """A unit: its canonical spelling, and factor times powers of SI base units and the radian.
+
+    `names` holds powers of the names it is written in, SI units without factor written out.
+    """
 
     text: str
     factor: float
     powers: dict[str, int]
+    names: dict[str, int]
 
     def without_angle(self) -> dict[str, int]:
         """Powers of physical dimension: a radian is a plain number."""
@@ -51,19 +57,19 @@ class CommonUnit(NamedTuple):
 
 @cache
 def common_unit(text: str) -> CommonUnit | None:
-    """What a unit in its canonical spelling, or ``us``, stands for; None where pint must say.
+    """What a unit in its canonical spelling or by its name stands for; None where pint must say.
 
     Example
     -------
-    >>> common_unit("ft/s^2")
-    CommonUnit(text='ft/s^2', factor=0.3048, powers={'meter': 1, 'second': -2})
+    >>> common_unit("ft/s^2")[1:]
+    (0.3048, {'meter': 1, 'second': -2}, {'foot': 1, 'second': -2})
     >>> common_unit("radian / second") is common_unit("s*rad") is common_unit("g") is None
     True
     """
     if text == "1":
-        return CommonUnit(text, 1.0, {})
-    if text == "us":
-        return common_unit("µs")
+        return CommonUnit(text, 1.0, {}, {})
+    if text in SHORT:
+        return common_unit(SHORT[text])
     parts = list(FACTOR.finditer(text))
     if text[:1] in "*/" or "".join(part[0] for part in parts) != text:
         return None
@@ -74,11 +80,18 @@ def common_unit(text: str) -> CommonUnit | None:
     order = [*sorted(above, key=NAMES.__getitem__), *sorted(below, key=NAMES.__getitem__)]
     if order != [part[2] for part in parts] or len(set(order)) < len(order):
         return None
-    factor, powers = 1.0, dict[str, int]()
+    factor, powers, names = 1.0, dict[str, int](), dict[str, int]()
     for part in parts:
         power = int(part[3] or 1) * (1 if part[1] in ("", "*") else -1)
         size, bases = SYMBOLS[part[2]]
         factor *= size**power
-        for base, inner in bases.items():
-            powers[base] = powers.get(base, 0) + power * inner
-    return CommonUnit(text, factor, {base: n for base, n in sorted(powers.items()) if n})
+        _add(powers, bases, power)
+        _add(names, bases if size == 1.0 else {NAMES[part[2]]: 1}, power)
+    return CommonUnit(text, factor, powers, names)
+
+
+def _add(total: dict[str, int], powers: dict[str, int], times: int) -> None:
+    for name, power in powers.items():
+        total[name] = total.get(name, 0) + times * power
+        if total[name] == 0:
+            del total[name]

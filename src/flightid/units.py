@@ -325,9 +325,8 @@ def exponents(unit: str) -> dict[str, float]:
     >>> exponents("ft/s^2"), exponents("rad/s"), exponents("N*m/W")
     ({'foot': 1.0, 'second': -2.0}, {'second': -1.0}, {'second': 1.0})
     """
-    known = common_unit(unit)
-    if known is not None and known.factor == 1.0:
-        return {name: float(n) for name, n in known.powers.items() if name != "radian"}
+    if (known := common_unit(unit)) is not None:
+        return {name: float(n) for name, n in known.names.items() if name != "radian"}
     registry = _registry()
     result: dict[str, float] = {}
     for name, power in registry.Quantity(1.0, _parse(unit)).unit_items():

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from flightid import units
-from flightid.common_units import SYMBOLS, common_unit
+from flightid.common_units import SHORT, SYMBOLS, common_unit
 
 WRITTEN = [
     "1",
-    "us",
+    *SHORT,
     *SYMBOLS,
     *(f"1/{symbol}^{power}" for symbol in SYMBOLS for power in (2, 3)),
     *(f"{a}/{b}" for a, b in product(SYMBOLS, SYMBOLS) if a != b),
@@ -60,7 +60,7 @@ def test_pairs_are_what_pint_says(by_pint: Callable[..., object]) -> None:
         "deg/s",
         "ft",
         "m",
-        "us",
+        *SHORT,
         "µs",
         "s",
         "g",

@@ -126,12 +126,29 @@ def draw_starts(free: Sequence[Parameter], starts: int, seed: int) -> Array:
     own = np.array([[parameter.value or 0.0 for parameter in free]])
     if starts == 1 or not free:
         return own
-    from scipy.stats import qmc  # noqa: PLC0415  # a second that commands without a search do not need
-
-    shares = qmc.LatinHypercube(d=len(free), rng=np.random.default_rng(seed)).random(starts - 1)
+    shares = _latin_hypercube(len(free), starts - 1, seed)
     reach = np.where(np.arange(1, starts) < _MANY, _NEAR, _WIDE)
     columns = [_spread(parameter, shares[:, k], reach) for k, parameter in enumerate(free)]
     return np.ascontiguousarray(np.vstack([own, np.column_stack(columns)]))
+
+
+def _latin_hypercube(dimensions: int, count: int, seed: int) -> Array:
+    """Points of which each has a row and a column of its own: those of ``scipy.stats.qmc``.
+
+    That module is not asked: loading it takes longer than most fits.
+
+    Example
+    -------
+    >>> np.sort(_latin_hypercube(2, 4, seed=0) // 0.25, axis=0).T
+    array([[0., 1., 2., 3.],
+           [0., 1., 2., 3.]])
+    """
+    (random,) = np.random.default_rng(seed).spawn(1)
+    inside = random.uniform(size=(count, dimensions))
+    places = np.tile(np.arange(1, count + 1), (dimensions, 1))
+    for row in places:
+        random.shuffle(row)
+    return np.asarray((places.T - inside) / count)
 
 
 def _spread(parameter: Parameter, share: Array, reach: Array) -> Array:
