@@ -82,7 +82,7 @@ def test_matlab_files_that_declare_what_they_do_not_hold(tmp_path: Path, content
 def test_inflated_matlab_files_hold_what_was_written(compressed: bool) -> None:
     file, given = io.BytesIO(), {"a": np.arange(5.0), "s": {"b": np.eye(3), "c": "text"}}
     scipy.io.savemat(file, given, do_compression=compressed)
-    found = scipy.io.loadmat(inflated("a.mat", file.getvalue()))
+    found = scipy.io.loadmat(inflated("a.mat", file.getvalue())[0])
     assert (found["a"] == given["a"]).all()
     assert (found["s"]["b"][0, 0] == np.eye(3)).all()
 

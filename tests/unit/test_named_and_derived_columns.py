@@ -1,9 +1,11 @@
-"""Tables without headings, derived channels and gaps on a grid that was asked for."""
+"""Tables without headings, objects, derived channels and gaps on a grid that was asked for."""
 
 from __future__ import annotations
 
+import struct
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -160,3 +162,37 @@ def test_a_study_names_derives_and_globs(tmp_path: Path) -> None:
     run_study(study, output=tmp_path / "out")
     report = (tmp_path / "out" / "report.txt").read_text()
     assert report.index("all: a") < report.index("all: b")
+
+
+def _element(kind: int, data: bytes) -> bytes:
+    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def _timetable(path: Path) -> Path:
+    """A level 5 file as MATLAB writes it: an array, a timetable, and what that refers to."""
+    scipy.io.savemat(path, {"x": np.arange(3.0)})
+    opaque = _element(6, struct.pack("<II", 17, 0)) + _element(1, b"data") + _element(1, b"MCOS")
+    held = _element(6, struct.pack("<II", 13, 0)) + _element(5, struct.pack("<ii", 1, 1))
+    held += _element(1, b"") + _element(6, struct.pack("<I", 0xDD000000))
+    opaque += _element(1, b"timetable") + _element(14, held)
+    rest = _element(6, struct.pack("<II", 9, 0)) + _element(5, struct.pack("<ii", 1, 8))
+    rest += _element(1, b"") + _element(2, bytes(8))
+    path.write_bytes(path.read_bytes() + _element(14, opaque) + _element(14, rest))
+    return path
+
+
+@pytest.mark.parametrize("level", ["5", "7.3"])
+def test_a_timetable_is_named_with_the_way_out_of_it(tmp_path: Path, level: str) -> None:
+    path = tmp_path / "rig.mat"
+    if level == "5":
+        _timetable(path)
+    else:
+        with h5py.File(path, "w", userblock_size=512) as file:
+            file["x"] = np.arange(3.0)
+            file["data"] = np.zeros((1, 6), dtype=np.uint32)
+            file["data"].attrs["MATLAB_class"] = np.bytes_("timetable")
+            file["data"].attrs["MATLAB_object_decode"] = np.int32(3)
+    with pytest.raises(OptionError, match=r"columns x;.*data is a MATLAB timetable.*writetable"):
+        read_records(path)
+    (record,) = read_records(path, sample_time_s=0.1)
+    assert list(record.channels) == ["x"]

@@ -52,7 +52,9 @@ def row_stamps(
             f"{table.path.name} has no time column {time_column!r}",
             found="columns " + ", ".join(table.lengths),
             needed="time_column=<name of the column> or sample_time_s=<seconds>",
-            action=_looks_like_time(table) or "no sample time is invented: state it",
+            action=_looks_like_time(table)
+            or table.advice
+            or "no sample time is invented: state it",
         )
     if not (np.isfinite(sample_time_s) and sample_time_s > 0):
         raise OptionError("sample time is not positive", found=sample_time_s, needed="above 0 s")

@@ -198,7 +198,7 @@ def _save_mat(system: LinearSystem, extra: Mapping[str, object], path: Path) -> 
 
 
 def _from_mat(content: bytes) -> dict[str, object]:
-    found = scipy.io.loadmat(inflated("the file", content))  # type: ignore[arg-type] # its stub knows paths alone
+    found = scipy.io.loadmat(inflated("the file", content)[0])  # type: ignore[arg-type] # its stub knows paths alone
     missing = {"A", "B", "C", "D", "inputs", "outputs"} - set(found)
     if missing:
         raise ModelError("the file lacks variables", found=", ".join(sorted(missing)))

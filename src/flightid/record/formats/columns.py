@@ -34,6 +34,8 @@ class ColumnTable:
         Takes a column name, returns its values (any one-dimensional array).
     units : mapping of str to str
         Units as the file spells them; columns left out state none.
+    advice : str
+        What the file holds that is no column, and how to make columns of it.
 
     Example
     -------
@@ -46,6 +48,7 @@ class ColumnTable:
     lengths: Mapping[str, int]
     load: Callable[[str], NDArray[Any]]
     units: Mapping[str, str] = field(default_factory=dict)
+    advice: str = ""
 
     def named(self, headings: Sequence[str]) -> ColumnTable:
         """The same columns under other headings, in their order.
@@ -64,6 +67,7 @@ class ColumnTable:
             {name: self.lengths[key] for name, key in old.items()},
             lambda name: self.load(old[name]),
             {n: self.units[key] for n, key in old.items() if key in self.units} | units,
+            self.advice,
         )
 
     def require(self, name: str) -> None:
@@ -79,6 +83,7 @@ class ColumnTable:
                 f"{self.path.name} has no column of this name",
                 found=name,
                 needed="one of " + ", ".join(self.lengths),
+                action=self.advice or None,
             )
 
     def raw(self, name: str) -> NDArray[Any]:

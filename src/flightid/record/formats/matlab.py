@@ -6,6 +6,7 @@ Level 5 to 7.2 through SciPy, 7.3 (an HDF5 file) through h5py. Columns of a matr
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,14 @@ from flightid.record.formats.columns import ColumnTable
 from flightid.record.formats.hdf5 import plain_datasets, read_dataset
 from flightid.record.formats.matlab_bytes import inflated
 
+PLAIN = "save its numbers as plain arrays"
+WAYS = {
+    "timetable": "T = timetable2table({0}, 'ConvertRowTimes', false); t = {0}.Properties.RowTimes; "
+    "T.time = seconds(t - t(1)); writetable(T, '{0}.csv')",
+    "table": "writetable({0}, '{0}.csv'), or s = table2struct({0}, 'ToScalar', true), and save s",
+    "timeseries": "time = {0}.Time; y = squeeze({0}.Data); and save those",
+}
+"""How objects of a class become columns."""
 NUMERIC = {
     *("double", "single", "logical"),
     *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
@@ -39,7 +48,8 @@ def read_columns(path: Path) -> ColumnTable:
     FileFormatError
         The file is damaged, absurdly large, or holds no numeric array.
     """
-    plain: Any = inflated(path.name, bounded_bytes(path, memory_budget()))
+    plain: Any
+    plain, objects = inflated(path.name, bounded_bytes(path, memory_budget()))
     with decoding(path.name, "a whole MATLAB file", "save it again with save -v7"):
         inside = scipy.io.whosmat(plain)
         wanted = [name for name, _, kind in inside if kind in NUMERIC or kind == "struct"]
@@ -48,7 +58,7 @@ def read_columns(path: Path) -> ColumnTable:
     columns: dict[str, NDArray[Any]] = {}
     for name in wanted:
         _add(columns, name, content.get(name))
-    return _table(path, columns)
+    return _table(path, columns, objects)
 
 
 def read_hdf5_columns(path: Path) -> ColumnTable:
@@ -65,20 +75,27 @@ def read_hdf5_columns(path: Path) -> ColumnTable:
         The file is damaged, absurdly large, points to other files, or holds no numeric array.
     """
     columns: dict[str, NDArray[Any]] = {}
+    objects: dict[str, str] = {}
     with plain_datasets(path) as datasets:
         for key, dataset in datasets.items():
             with decoding(path.name, "a whole MATLAB file"):
                 is_numeric = _is_numeric(dataset)
+                if "MATLAB_object_decode" in dataset.attrs:
+                    objects[key] = _class(dataset)
             if is_numeric:
                 # MATLAB writes column-major arrays, so HDF5 shows them transposed.
                 _add(columns, key.replace("/", "."), read_dataset(path, dataset).T)
-    return _table(path, columns)
+    return _table(path, columns, objects)
+
+
+def _class(dataset: h5py.Dataset) -> str:
+    kind = dataset.attrs.get("MATLAB_class", b"double")
+    return kind.decode("ascii", "replace") if isinstance(kind, bytes) else str(kind)
 
 
 def _is_numeric(dataset: h5py.Dataset) -> bool:
-    kind = dataset.attrs.get("MATLAB_class", b"double")
-    text = kind.decode() if isinstance(kind, bytes) else str(kind)
-    return text in NUMERIC and dataset.dtype.kind in "fiub" and "MATLAB_empty" not in dataset.attrs
+    is_number = _class(dataset) in NUMERIC and dataset.dtype.kind in "fiub"
+    return is_number and "MATLAB_empty" not in dataset.attrs
 
 
 def _add(columns: dict[str, NDArray[Any]], name: str, value: object) -> None:
@@ -96,11 +113,17 @@ def _add(columns: dict[str, NDArray[Any]], name: str, value: object) -> None:
                 columns[f"{name}_{index + 1}"] = value[:, index]
 
 
-def _table(path: Path, columns: dict[str, NDArray[Any]]) -> ColumnTable:
+def _table(path: Path, columns: dict[str, NDArray[Any]], objects: Mapping[str, str]) -> ColumnTable:
+    advice = "; ".join(
+        f"{name} is a MATLAB {kind}, an object: in MATLAB, {WAYS.get(kind, PLAIN).format(name)}"
+        for name, kind in objects.items()
+    )
     if not columns:
         raise FileFormatError(
             f"{path.name} holds no numeric array",
+            found=", ".join(f"{name}, a {kind}" for name, kind in objects.items()) or None,
             needed="vectors of one length, a matrix of columns, or a structure of them",
-            action="save timetables and objects as plain arrays",
+            action=advice or "save timetables and objects as plain arrays",
         )
-    return ColumnTable(path, {key: v.size for key, v in columns.items()}, lambda key: columns[key])
+    lengths = {key: values.size for key, values in columns.items()}
+    return ColumnTable(path, lengths, columns.__getitem__, advice=advice)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import struct
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import prod
 
 from flightid.errors import FileFormatError
@@ -18,16 +18,17 @@ WIDTHS = {1: 1, 2: 1, 3: 2, 4: 2, 5: 4, 6: 4, 7: 4, 9: 8, 12: 8, 13: 8, 16: 1, 1
 """Bytes of one number by storage type; numbers become doubles."""
 ELEMENT_BYTES = 256
 """What a decoder makes of one array, however empty."""
-LAST_CLASS = 17
+OPAQUE = 17
 DEEPEST = 32
 
 
-def inflated(name: str, content: bytes) -> io.BytesIO:
+def inflated(name: str, content: bytes) -> tuple[io.BytesIO, dict[str, str]]:
     """A level 5 MATLAB file without compression, whose arrays hold what they declare.
 
     A decoder allocates what an array declares before it reads it: a structure of 10⁹ fields takes
     56 bytes. Here every element must lie inside the one that holds it, arrays of arrays must have
-    room for their members, and what all numbers take stays within the memory budget.
+    room for their members, and what all numbers take stays within the memory budget. Objects, such
+    as timetables, are left out with the bytes they refer to: no reader of plain arrays knows them.
 
     Parameters
     ----------
@@ -35,6 +36,12 @@ def inflated(name: str, content: bytes) -> io.BytesIO:
         Of the file.
     content : bytes
         Of the file.
+
+    Returns
+    -------
+    file : BytesIO
+    objects : dict of str to str
+        Class of each object that was left out, by name.
 
     Raises
     ------
@@ -53,13 +60,11 @@ def inflated(name: str, content: bytes) -> io.BytesIO:
     try:
         while at < len(content):
             kind, first, last, _ = walk.tag(view, at)
-            if kind == COMPRESSED:
-                inner = walk.inflate(view[first:last])
-                walk.element(memoryview(inner), 0, 0)
-                parts.append(inner)
-            else:
-                walk.element(view, at, 0)
-                parts.append(bytes(view[at:last]))
+            is_packed = kind == COMPRESSED
+            inner = walk.inflate(view[first:last]) if is_packed else bytes(view[at:last])
+            walk.is_plain = True
+            walk.element(memoryview(inner), 0, 0)
+            parts += [inner] * walk.is_plain
             at = last
     except (struct.error, zlib.error) as error:
         raise FileFormatError(
@@ -67,7 +72,7 @@ def inflated(name: str, content: bytes) -> io.BytesIO:
             found=str(error),
             action="save it again with save -v7",
         ) from error
-    return io.BytesIO(b"".join(parts))
+    return io.BytesIO(b"".join(parts)), walk.objects
 
 
 @dataclass
@@ -77,6 +82,8 @@ class _Elements:
     name: str
     order: str
     taken: int = 0
+    is_plain: bool = True
+    objects: dict[str, str] = field(default_factory=dict)
 
     def take(self, n_bytes: int) -> None:
         """Count bytes against the budget."""
@@ -130,13 +137,18 @@ class _Elements:
         self.take(ELEMENT_BYTES)
         _, flags, _, at = self.tag(view, 0)
         kind = struct.unpack_from(f"{self.order}I", view, flags)[0] & 0xFF
-        if not 1 <= kind <= LAST_CLASS:
+        if not 1 <= kind <= OPAQUE:
             raise self.fault(f"an array of class {kind}")
         _, first, last, at = self.tag(view, at)
+        if kind == OPAQUE:
+            self._object(view, bytes(view[first:last]), at, depth)
+            return
         shape = struct.unpack_from(f"{self.order}{(last - first) // 4}i", view, first)
         if len(shape) < 2 or min(shape) < 0:
             raise self.fault(f"an array of shape {shape[:8]}")
-        _, _, _, at = self.tag(view, at)
+        _, first, last, at = self.tag(view, at)
+        if not depth and first == last:
+            self.is_plain = False  # what objects refer to has no name
         if kind in (CELL, STRUCT, OBJECT):
             members = prod(shape)
             if kind != CELL:
@@ -146,6 +158,18 @@ class _Elements:
                     raise self.fault("many structures without a field")
             if members * 8 > len(view) - at:
                 raise self.fault(f"{members} arrays in {len(view) - at} bytes")
+        while at < len(view):
+            at = self.element(view, at, depth + 1)
+
+    def _object(self, view: memoryview, name: bytes, at: int, depth: int) -> None:
+        """Note an object of a class: its name, the word MCOS, its class and what it refers to."""
+        _, _, _, at = self.tag(view, at)
+        _, first, last, at = self.tag(view, at)
+        self.is_plain = False
+        if not depth:
+            self.objects[name.decode("ascii", "replace")] = bytes(view[first:last]).decode(
+                "ascii", "replace"
+            )
         while at < len(view):
             at = self.element(view, at, depth + 1)
 
