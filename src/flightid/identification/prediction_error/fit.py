@@ -69,7 +69,7 @@ def fit_polynomial(structure: PolynomialStructure, data: Record | Sequence[Recor
     channels = gather_channels(records, structure.output, structure.inputs, structure.offsets)
     channels.require_change()
     (taken, found), choice = optimum(structure, channels)
-    return replace(_assemble(taken, records, channels, found, choice), structure=structure)
+    return replace(_assemble(taken, records, channels, found, choice), structure=taken)
 
 
 def _assemble(

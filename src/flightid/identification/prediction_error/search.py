@@ -65,7 +65,7 @@ def search_polynomial(
         operating_point=about.operating_point,
     )
     settled = found.minima[0].termination in CONVERGED
-    return model, criteria(squares, n, structure.n_parameters), settled
+    return model, criteria(squares, n, taken.n_parameters), settled
 
 
 def optimum(
