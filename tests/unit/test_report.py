@@ -54,6 +54,7 @@ def _document(text: str = "Roll rate") -> Document:
                     Lights(()),
                     TableBlock(table),
                     figure_block(made, text),
+                    figure_block(made, text, folded=True),
                 ),
                 (Section("Below", (TableBlock(table, folded=True), KeyValues(((text, 0.5),)))),),
             ),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -11,9 +13,14 @@ from click.testing import CliRunner
 
 import flightid as fid
 from flightid.cli.flight import command
+from flightid.control.tuning.pid_design import PidDesign
+from flightid.control.tuning.responses import ResponseBand
 from flightid.conventions import Light
 from flightid.errors import DataError
+from flightid.plot.gains import has_both, measured_and_predicted
+from flightid.plot.glance import flight_glance
 from flightid.review.deconvolution import LoopSamples, closed_loop
+from tests.closeness import assert_close
 from tests.ordinary_log import write_ordinary_log
 from tests.strangers.ordinary_flights import Axis, step
 
@@ -111,3 +118,43 @@ def test_the_command_prints_text_values_and_a_page(log: Path, tmp_path: Path) ->
     values = json.loads(CliRunner().invoke(command, [str(log), "--json"]).stdout)
     assert values["schema"] == "flightid.flight_review/1"
     assert [loop["step"] == [] for loop in values["loops"]].count(False) == 2
+
+
+def test_a_glance_shows_throttle_modes_and_what_models_were_made_of(
+    review: fid.FlightReview,
+) -> None:
+    start_s = review.phases.airborne[0][0]
+    time_s = start_s + np.arange(100) / 50.0
+    record = fid.Record.from_arrays(
+        time_s, inputs={"tau_phi": np.sin(time_s)}, outputs={"p": np.cos(time_s)},
+        units={"p": "rad/s"},
+    )  # fmt: skip
+    made = flight_glance(review, {"Roll rate": [(record, ("tau_phi", "p"))]})
+    throttle, *others = made.data
+    assert review.throttle is not None
+    assert max(throttle.y) == 100.0 * max(review.throttle.values)
+    assert [(each.name, each.yaxis) for each in others] == [
+        ("Roll rate", "y2"),
+        ("Roll rate", "y3"),
+    ]
+    assert made.layout.yaxis3.title.text == "p [rad/s]"
+    shaded = [(each.x0, each.x1) for each in made.layout.shapes if each.type == "rect"]
+    assert shaded == list(review.phases.airborne)
+    assert {mode.mode for mode in review.identity.modes} >= {
+        each.text for each in made.layout.annotations
+    }
+
+
+def test_measured_loops_stand_beside_what_models_have(review: fid.FlightReview) -> None:
+    told = [loop for loop in review.loops if loop.loop == "rate" and loop.is_told]
+    time_s = np.linspace(0.0, 1.0, 801)
+    rises = 1.0 - np.exp(-10.0 * time_s)
+    band = ResponseBand("rate step", "rad/s", time_s, rises, rises, rises, 0.5 * rises)
+    design = cast(PidDesign, SimpleNamespace(axis=told[0].axis, responses=(band,)))
+    assert not has_both(review, ())
+    assert has_both(review, (design,))
+    drawn = measured_and_predicted(review, (design,)).data
+    model = next(each for each in drawn if each.name == "model")
+    assert_close(model.y, 0.5 * rises[::2], rtol=1e-12, why="with the gains that flew")
+    measured = next(each for each in drawn if each.name == "measured" and each.line.width)
+    assert_close(measured.y[:5], told[0].step[:5], rtol=1e-12, why="as the review has it")

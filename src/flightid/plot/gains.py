@@ -6,11 +6,13 @@ from collections.abc import Sequence
 
 from flightid.control.tuning.limits import ANGLE
 from flightid.control.tuning.pid_design import PidDesign
+from flightid.control.tuning.responses import ResponseBand
 from flightid.control.tuning.worst_cases import WorstCase
 from flightid.plot import graph_objects as go
 from flightid.plot import look
 from flightid.plot.flight import COLOURS
 from flightid.plot.record import sparse
+from flightid.review import FlightReview, LoopResponse
 
 STEPS = {
     "rate step": "rate per set-point",
@@ -128,6 +130,60 @@ def promised_margins(designs: Sequence[PidDesign]) -> go.PlotFigure:
     made.update_yaxes(showticklabels=False, col=2)
     made.update_layout(hovermode="closest")
     return made
+
+
+def has_both(review: FlightReview, designs: Sequence[PidDesign]) -> bool:
+    """Whether a rate loop is both measured and predicted with the gains that flew."""
+    return bool(_both(review, designs))
+
+
+def measured_and_predicted(review: FlightReview, designs: Sequence[PidDesign]) -> go.PlotFigure:
+    """Draw steps of rate set-points as the flight has them, and as models do with its gains.
+
+    Parameters
+    ----------
+    review : FlightReview
+    designs : sequence of PidDesign
+        Made of the same flight.
+
+    Returns
+    -------
+    PlotFigure
+    """
+    pairs = _both(review, designs)
+    made = look.figure(1, len(pairs), shared_x=False, height_px=330)
+    for column, (loop, predicted) in enumerate(pairs, 1):
+        kept = loop.time_s <= predicted.time_s[-1]
+        time_s, edges = loop.time_s[kept], [edge[kept] for edge in loop.band()]
+        made.add_traces(look.band("measured", time_s, *edges, colour=look.BLACK), 1, column)
+        shown, few = column == 1, sparse(predicted.time_s.size)
+        assert predicted.flown is not None
+        for words, when, values, colour, dash in (
+            ("measured", time_s, loop.step[kept], look.BLACK, "solid"),
+            ("model", predicted.time_s[few], predicted.flown[few], look.MODEL, "dash"),
+        ):
+            drawn = look.line(words, when, values, colour=colour, dash=dash, legend=shown)
+            made.add_trace(drawn, 1, column)
+        title = f"{loop.axis} rate per set-point"
+        look.label_axes(made, x="time [s]", y=[title], column=column)
+        made.update_xaxes(range=[0.0, float(time_s[-1])], row=1, col=column)
+    return made
+
+
+def _both(
+    review: FlightReview, designs: Sequence[PidDesign]
+) -> list[tuple[LoopResponse, ResponseBand]]:
+    predicted = {
+        design.axis: each
+        for design in designs
+        for each in design.responses
+        if each.name == "rate step" and each.flown is not None
+    }
+    return [
+        (loop, predicted[loop.axis])
+        for loop in review.loops
+        if loop.loop == "rate" and loop.is_told and loop.axis in predicted
+    ]
 
 
 def _label(design: PidDesign, case: WorstCase) -> str:

@@ -28,6 +28,7 @@ DASHES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot", "solid")
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', Arial, sans-serif"
 GRID = "rgba(128,128,128,0.22)"
 LINE = "rgba(128,128,128,0.65)"
+AIR = "rgba(86,180,233,0.13)"
 GREYED = "rgba(128,128,128,0.2)"
 BAND_OPACITY = 0.16
 # 1, 2 and 5 of each decade, whole: the library's own labels drop the zeros of 20 and 50.

@@ -14,6 +14,8 @@ from flightid.plot import look
 
 MAXIMUM_POINTS = 3000
 SMOOTH_POINTS = 300
+ONE_COLUMN = 7
+"""Most panels that stand below each other; more stand in two columns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,7 @@ class Panel:
 
 
 def time_histories(panels: Sequence[Panel]) -> go.PlotFigure:
-    """Draw panels below each other over one time axis.
+    """Draw panels over one time axis: below each other, many of them in two columns.
 
     Parameters
     ----------
@@ -83,9 +85,10 @@ def time_histories(panels: Sequence[Panel]) -> go.PlotFigure:
     >>> len(time_histories([Panel("p [rad/s]", (trace,))]).data)
     1
     """
-    made = look.figure(len(panels))
+    columns = 2 if len(panels) > ONE_COLUMN else 1
+    made = look.figure(-(-len(panels) // columns), columns)
     named: set[str] = set()
-    for row, panel in enumerate(panels, start=1):
+    for place, panel in enumerate(panels):
         for trace in panel.traces:
             time_s, samples = thinned(trace.time_s, trace.samples)
             made.add_trace(
@@ -98,11 +101,16 @@ def time_histories(panels: Sequence[Panel]) -> go.PlotFigure:
                     width=1.3,
                     legend=trace.name not in named,
                 ),
-                row=row,
-                col=1,
+                row=place // columns + 1,
+                col=place % columns + 1,
             )
             named.add(trace.name)
-    look.label_axes(made, x="time [s]", y=[panel.title for panel in panels])
+    for axes in (made.select_xaxes, made.select_yaxes):
+        for axis in list(axes())[len(panels) :]:
+            axis.visible = False
+    for column in range(columns):
+        titles = [panel.title for panel in panels[column::columns]]
+        look.label_axes(made, x="time [s]", y=titles, column=column + 1)
     return made
 
 

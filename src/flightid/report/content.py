@@ -90,10 +90,13 @@ class Figure:
         Plain values of a Plotly figure: ``data`` and ``layout``.
     caption : str
         What to see in it; text output shows this alone.
+    folded : bool
+        One of many, or a detail: HTML shows its caption and opens it on demand.
     """
 
     spec: Mapping[str, Any]
     caption: str
+    folded: bool = False
 
     @property
     def series(self) -> tuple[str, ...]:

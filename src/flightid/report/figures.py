@@ -16,7 +16,7 @@ SINGLE_LIMIT = 3e38
 """Just inside the range of single precision."""
 
 
-def figure_block(figure: go.PlotFigure, caption: str) -> Figure:
+def figure_block(figure: go.PlotFigure, caption: str, *, folded: bool = False) -> Figure:
     """Take a picture into the content tree.
 
     Parameters
@@ -25,8 +25,10 @@ def figure_block(figure: go.PlotFigure, caption: str) -> Figure:
         Picture; its samples are kept in single precision, which no screen can tell from double.
     caption : str
         What to see in it.
+    folded : bool
+        Open it on demand.
     """
-    return Figure(_in_single_precision(figure.to_dict()), caption)
+    return Figure(_in_single_precision(figure.to_dict()), caption, folded)
 
 
 def _in_single_precision(node: Any) -> Any:  # noqa: ANN401 — any JSON value

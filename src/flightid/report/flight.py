@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flightid.plot.glance import flight_glance, has_glance
 from flightid.report.content import Block, Document, Lights, Paragraph, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.review import AutotuneReview, FlightReview
@@ -11,10 +12,14 @@ CAPTION = (
     "Steps of the closed loops with their bands, from ordinary flying: what follows when a "
     "set-point jumps by 1"
 )
-NOISE = "Spectrum of the gyroscope in the air with its band; below it the same by throttle"
+GLANCE = "The flight: throttle, flight modes, and shaded what was in the air"
+NOISE = "Spectrum of the gyroscope in the air with its band"
+BY_THROTTLE = "; below it the same by throttle"
 
 
-def flight_blocks(review: FlightReview, *, repeats: bool = False) -> tuple[Block, ...]:
+def flight_blocks(
+    review: FlightReview, *, repeats: bool = False, glance: bool = True
+) -> tuple[Block, ...]:
     """Verdicts, picture and tables of a flight.
 
     Parameters
@@ -22,13 +27,21 @@ def flight_blocks(review: FlightReview, *, repeats: bool = False) -> tuple[Block
     review : FlightReview
     repeats : bool
         The verdicts are not counted among those of the page: it is about something else.
+    glance : bool
+        Begin the pictures with throttle and modes.
     """
     worst_first = tuple(reversed(review.findings))
     blocks: list[Block] = [Lights(worst_first, repeats=repeats)] if worst_first else []
+    if glance and has_glance(review):
+        blocks.append(figure_block(flight_glance(review), GLANCE))
     if any(loop.is_told for loop in review.loops):
         blocks.append(figure_block(review.plot(), CAPTION))
     if review.noise.is_told:
-        blocks.append(figure_block(review.noise.plot(), NOISE))
+        blocks.append(
+            figure_block(
+                review.noise.plot(), NOISE + BY_THROTTLE * bool(review.noise.throttle.size)
+            )
+        )
     blocks += [TableBlock(table, table.title in FOLDED) for table in review.tables()]
     return tuple(blocks)
 

@@ -47,6 +47,7 @@ def _curves(found: HandlingQualities) -> list[Block]:
             bandwidth_curves(each),
             f"{axis}: where bandwidth and phase delay are read; the band is the "
             f"{interval_words(shown())} interval of the bandwidth.",
+            folded=True,
         )
         for axis, each in found.bandwidths.items()
     ]

@@ -28,6 +28,8 @@ from flightid.version import VERSION
 DEFAULT_HEIGHT_PX = 420
 LONG_PAYLOAD = 8192
 """Letters of a plot above which it is compressed."""
+MANY_PLOTS = 8
+"""Plots of a picture above which a phone scrolls it."""
 LONG_CELL = 20
 """Letters of a cell above which its column keeps its width and the table scrolls instead."""
 _VALUE = Column("value", digits=6)
@@ -106,6 +108,9 @@ class _Numbering:
                     **values,
                     "id": f"plot-{self._plots}",
                     "height": int(spec.get("layout", {}).get("height") or DEFAULT_HEIGHT_PX),
+                    "wide": sum(name.startswith("xaxis") for name in spec["layout"]) > MANY_PLOTS
+                    if "layout" in spec
+                    else False,
                     "packed": "gzip" if small else "no",
                     "payload": Markup(_gzipped(text) if small else text),
                 }

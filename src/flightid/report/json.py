@@ -73,8 +73,8 @@ def _block(block: Block) -> dict[str, Any]:
         case KeyValues(items, title):
             pairs = [[key, value] for key, value in items]
             return {"kind": "key_values", "title": title, "items": pairs}
-        case Figure(spec, caption):
-            return {"kind": "figure", "caption": caption, "spec": dict(spec)}
+        case Figure(spec, caption, folded):
+            return {"kind": "figure", "caption": caption, "folded": folded, "spec": dict(spec)}
         case _:
             assert_never(block)
 
@@ -134,7 +134,9 @@ def _read_block(values: Mapping[str, Any]) -> Block:
             items = tuple((str(key), _read_cell(value)) for key, value in values["items"])
             return KeyValues(items, str(values["title"]))
         case "figure":
-            return Figure(dict(values["spec"]), str(values["caption"]))
+            return Figure(
+                dict(values["spec"]), str(values["caption"]), bool(values.get("folded", False))
+            )
         case other:
             raise ValueError(f"there is no block of kind {other!r}")
 

@@ -31,7 +31,7 @@ def design_blocks(design: PidDesign) -> tuple[Block, ...]:
     return (
         *result_blocks(design),
         *((TableBlock(design.plain.form_table()),) if design.plain and design.exists else ()),
-        TableBlock(design.worst_case_table()),
+        TableBlock(design.worst_case_table(), folded=design.exists),
         *(_pictures(design) if design.exists else ()),
         *((TableBlock(design.stage_table()),) if len(design.stages) > 1 else ()),
     )

@@ -16,6 +16,9 @@ from flightid.report.content import Block, Figure, Section, TableBlock
 from flightid.report.figures import figure_block
 from flightid.validation import Comparison, Mismatch, Verification
 
+SHOWN = 2
+"""Records whose pictures are open; those of others open on demand."""
+
 
 def verification_blocks(result: Verification | Comparison) -> tuple[Block, ...]:
     """Numbers and verdicts of one model or of several side by side, then a picture by record.
@@ -62,9 +65,9 @@ def _picture(result: Verification | Comparison, record: int) -> Figure:
     name = _first(result).predictions[record].measured.name
     if isinstance(result, Comparison):
         shown = f"{name}: measured, and predicted by each model{_from(result.first)}."
-        return figure_block(comparison(result, record), shown)
+        return figure_block(comparison(result, record), shown, folded=record >= SHOWN)
     shown = f"{name}: measured, and predicted{_from(result)}."
-    return figure_block(prediction(result.predictions[record]), shown)
+    return figure_block(prediction(result.predictions[record]), shown, folded=record >= SHOWN)
 
 
 def _from(verification: Verification) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from flightid.inspection.actuators import find_actuators
 from flightid.inspection.flight_phases import flight_phases
+from flightid.inspection.signals import find
 from flightid.inspection.stamps import log_span
 from flightid.logs import Log, read_log
 from flightid.review.filters import filter_review
@@ -82,5 +83,6 @@ def review_flight(
         vibrations=vibrations(opened, phases.airborne),
         noise=noise,
         filters=filter_review(opened, phases.airborne, noise, loops),
+        throttle=find(opened, "thrust"),
     )
     return replace(found, findings=judge_flight(found))

@@ -8,6 +8,7 @@ from flightid.conventions import Light
 from flightid.errors import UnknownNameError
 from flightid.findings import Finding, worst
 from flightid.inspection.flight_phases import FlightPhases
+from flightid.inspection.signals import Signal
 from flightid.result import Result
 from flightid.review import tables
 from flightid.review.filters import FilterReview
@@ -22,7 +23,9 @@ from flightid.uncertainty.estimate import Estimate
 
 
 @dataclass(frozen=True, repr=False)
-class FlightReview(Result, schema="flightid.flight_review/1"):
+class FlightReview(
+    Result, schema="flightid.flight_review/1", untold={"throttle": "a time history"}
+):
     """What one flight tells of its vehicle: loops, motors, vibration, who flew.
 
     Attributes
@@ -51,6 +54,8 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
         Filters with the phase that they cost, the noise in the outputs, and better ones.
     findings : tuple of Finding
         Verdicts with what to do.
+    throttle : Signal or None
+        Thrust that was asked for, share of the most; None where it is not logged.
 
     Example
     -------
@@ -74,6 +79,7 @@ class FlightReview(Result, schema="flightid.flight_review/1"):
     noise: GyroNoise
     filters: FilterReview
     findings: tuple[Finding, ...] = ()
+    throttle: Signal | None = None
 
     @property
     def verdict(self) -> Light:

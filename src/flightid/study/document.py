@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING
@@ -14,7 +14,13 @@ from flightid.findings import Finding
 from flightid.options import Options
 from flightid.plot.consistency import consistency
 from flightid.plot.fit import EstimateBar, parameter_intervals
-from flightid.plot.gains import overlaid_steps, promised_margins
+from flightid.plot.gains import (
+    has_both,
+    measured_and_predicted,
+    overlaid_steps,
+    promised_margins,
+)
+from flightid.plot.glance import flight_glance, has_glance
 from flightid.report.blocks import provenance, result_blocks
 from flightid.report.closed_loop import closed_loop_section
 from flightid.report.content import Block, Document, Figure, Lights, Paragraph, Section, TableBlock
@@ -35,8 +41,14 @@ from flightid.version import VERSION
 
 if TYPE_CHECKING:
     from flightid.conditioning.consistency_result import KinematicConsistency
+    from flightid.record import Record
+    from flightid.review import FlightReview
     from flightid.study.identified import ModelResults
     from flightid.uncertainty.estimate import Estimate
+
+
+MANY = 20
+"""Intervals above which their picture opens on demand."""
 
 
 def study_document(study: StudyResults) -> Document:
@@ -223,7 +235,36 @@ def _pictures(study: StudyResults) -> Iterator[Figure]:
 def _review(study: StudyResults) -> Iterator[Section]:
     """What the flight tells besides its models; its verdicts are not those of the models."""
     if study.review is not None:
-        yield section_of("The flight", partial(flight_blocks, repeats=True), study.review)
+        yield section_of("The flight", _flight, study, study.review)
+
+
+def _flight(study: StudyResults, review: FlightReview) -> Iterator[Block]:
+    if has_glance(review):
+        shown = "Throttle with the modes, shaded in the air; below it what the models were made of."
+        yield figure_block(flight_glance(review, _used(study)), shown)
+    designs = () if study.tuning is None else study.tuning.designs
+    if has_both(review, designs):
+        shown = (
+            "Steps of rate set-points with the flown gains: measured in ordinary flying with its "
+            "band, and dashed as the identified models have it."
+        )
+        yield figure_block(measured_and_predicted(review, designs), shown)
+    yield from flight_blocks(review, repeats=True, glance=False)
+
+
+def _used(study: StudyResults) -> dict[str, list[tuple[Record, Sequence[str]]]]:
+    """Records of the log by the model that they made."""
+    return {
+        item.name: [
+            (record, [each for each in channels if each in record.channels])
+            for channels in [(*item.fit.model.inputs, *item.fit.model.outputs)]
+            for name in item.settings.identify
+            for record in [study.records.get(name)]
+            if record is not None
+        ]
+        for item in study.identified
+        if item.fit is not None
+    }
 
 
 def _source_blocks(study: StudyResults) -> Iterator[Block]:
@@ -291,7 +332,8 @@ def _interval_figure(study: StudyResults) -> tuple[Figure, ...]:
     )
     if any(bar.truth == 0.0 for bar in estimates):
         caption += " Where that is zero, in percent of the estimate."
-    return (figure_block(parameter_intervals(estimates), caption),)
+    many = len(estimates) > MANY
+    return (figure_block(parameter_intervals(estimates), caption, folded=many),)
 
 
 def _options(study: StudyResults) -> dict[str, Cell]:

@@ -85,7 +85,7 @@ def _first(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
     title = "Parameters" if item.settings.structure is None else "Coefficients"
     yield from result_blocks(fit, title=title)
     if fit.details is not None:
-        yield from map(TableBlock, fit.details.tables())
+        yield from (TableBlock(table, folded=True) for table in fit.details.tables())
     if sum(each.count for each in fit.minima) > 1:
         yield TableBlock(minima_table(fit), folded=True)
     if item.settings.structure is None and fit.covariance is not None and len(fit.names) > 1:
@@ -94,7 +94,7 @@ def _first(item: ModelResults, truth: Truth | None) -> Iterator[Block]:
         yield from map(TableBlock, published_tables(item.settings.published, fit, item.on_unseen))
     yield from evidence_blocks(fit.evidence)
     if len(item.fits) > 1:
-        yield TableBlock(estimates_table(item, truth))
+        yield TableBlock(estimates_table(item, truth), folded=True)
     if item.settings.structure is None and item.response is not None and item.response.findings:
         yield Lights(item.response.findings, "Frequency response")
 

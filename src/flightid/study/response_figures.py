@@ -84,7 +84,9 @@ def _figure(
     response = item.response
     assert response is not None
     unit = response.pair(output, source).unit
-    grey = "; grey: beyond the band of the fit" if band else ""
+    ends = curves[0].omega_rad_s[[0, -1]]
+    beyond = band is not None and (ends[0] < band[0] or ends[1] > band[1])
+    grey = "; grey: beyond the band of the fit" if beyond else ""
     picture = bode(curves, unit=unit, minimum_coherence=_least(item), band_rad_s=band)
     return figure_block(picture, f"{said}{grey}.")
 

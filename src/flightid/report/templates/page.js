@@ -49,7 +49,7 @@
       spec.layout.margin = { ...spec.layout.margin, l: 52, r: 8 };
       spec.layout.font.size = 11;
     }
-    const options = { responsive: true, displaylogo: false, displayModeBar: "hover", scrollZoom: false,
+    const options = { responsive: true, displaylogo: false, displayModeBar: place.clientWidth < 520 ? false : "hover", scrollZoom: false,
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
       toImageButtonOptions: { format: "svg", filename: place.id } };
     library ??= unpack();
