@@ -105,6 +105,33 @@ def decoding(name: str, whole: str, action: str = "write or copy it again") -> I
         ) from error
 
 
+@contextmanager
+def of_file(name: str) -> Iterator[None]:
+    """Name the file in errors on what it holds: one of many may be at fault.
+
+    Parameters
+    ----------
+    name : str
+        Of the file.
+
+    Raises
+    ------
+    FlightidError
+        What was raised, its problem after the name.
+    """
+    try:
+        yield
+    except FlightidError as error:
+        if name in str(error):
+            raise
+        raise type(error)(
+            f"{name}: {error.problem}",
+            found=error.found,
+            needed=error.needed,
+            action=error.action,
+        ) from error
+
+
 def bounded_bytes(path: Path, most: int, error: type[FlightidError] = FileFormatError) -> bytes:
     """Content of a file, never more than a number of bytes.
 

@@ -14,7 +14,7 @@ import scipy.io
 
 from flightid import Record, read_records, run_study, write_records
 from flightid.cli.program import run
-from flightid.errors import FileFormatError, OptionError, UnknownNameError
+from flightid.errors import DataError, FileFormatError, OptionError, UnknownNameError
 from flightid.study.proposal import propose_study
 
 TIME_S = np.arange(600) * 0.1
@@ -162,6 +162,15 @@ def test_a_study_names_derives_and_globs(tmp_path: Path) -> None:
     run_study(study, output=tmp_path / "out")
     report = (tmp_path / "out" / "report.txt").read_text()
     assert report.index("all: a") < report.index("all: b")
+
+
+def test_of_many_files_the_one_at_fault_is_named(tmp_path: Path) -> None:
+    paths = [tmp_path / f"{name}.csv" for name in "abc"]
+    for path in paths:
+        path.write_text("time,u,y\n0,1,2\n1,2,3\n2,3,4\n3,4,5\n")
+    paths[1].write_text("time,u,y\n0,1,2\n1,2,3\n1.5,3,4\n3,4,5\n")
+    with pytest.raises(DataError, match=r"^b\.csv: time stamps are not uniform: found.*Next: "):
+        propose_study(paths, folder=tmp_path)
 
 
 def _element(kind: int, data: bytes) -> bytes:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from flightid.conventions import Role
 from flightid.errors import DataError, OptionError, UnknownNameError
 from flightid.files import sha256_of_file
+from flightid.reading import of_file
 from flightid.record.channel import DECLARED, Channel
 from flightid.record.checks import REMOVE_OUTLIERS, entry_steps
 from flightid.record.formats import ColumnTable, file_format
@@ -208,8 +209,10 @@ def read_records(
         history = (Step("read_records", dict(options), VERSION),)
         rows = {name: values[part] for name, values in columns.items()}
         beside = [(channel, stamps[part], values[part]) for channel, values in witnesses]
-        for grid, samples, more in _pieces(stamps[part], rows, wanted, base, beside):
-            records.append(_record(grid, samples, wanted, label or source.stem, (*history, *more)))
+        with of_file(source.name):
+            for grid, samples, more in _pieces(stamps[part], rows, wanted, base, beside):
+                name = label or source.stem
+                records.append(_record(grid, samples, wanted, name, (*history, *more)))
     records = _numbered(records)
     kept = base.hold_after(mean_spacing_s(stamps), wanted)
     return [_declared(item, InputShape(kept, period_s, loop)) for item in records]
