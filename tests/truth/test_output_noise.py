@@ -203,5 +203,10 @@ def test_filters_that_all_axes_share_cost_no_phase_where_nothing_is_tuned(tmp_pa
     )  # fmt: skip
     left = replace(tuning, refused=(RefusedAxis("pitch", "its fit is red"),))
     assert "the filters that it shares cost pitch" in left.left_out["roll"]
+    assert left.filters is not None
+    assert "ATC_RAT_PIT_FLTD" not in {each.name for each in left.filters.changes}
+    lost = loops["pitch"].with_gains(INS_GYRO_FILTER=slower.values["INS_GYRO_FILTER"])
+    phase = np.angle(lost.feedback([30.0]) / loops["pitch"].feedback([30.0]), deg=True)[0]
+    assert_close(left.filters.shared_deg["pitch"], phase, rtol=1e-9, why="its D filter stays")
     with pytest.raises(DataError):
         left.write(tmp_path / "gains.param")

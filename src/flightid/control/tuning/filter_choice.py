@@ -40,6 +40,8 @@ class AxisFilters:
         Rms of the output from the gyro's noise, and what it may be.
     unit : str
         Of the output.
+    phase_shared_deg, noise_shared : float
+        With the new ones of those filters alone that other axes share.
     noise_tuned : float or None
         With new gains too; None where none were tuned.
     """
@@ -52,6 +54,8 @@ class AxisFilters:
     noise_new: float
     noise_limit: float
     unit: str
+    phase_shared_deg: float
+    noise_shared: float
     noise_tuned: float | None = None
 
     @property
@@ -304,6 +308,9 @@ def _told(
         known = {name: value for name, value in values.items() if name in loop.gains}
         new = every[place][1][axis].with_gains(known)
         chosen[axis] = new.around_plant_of(loop)
+        others = {name for other in loops if other != axis for name in loops[other].gains}
+        own = {name: value for name, value in loop.gains.items() if name not in others}
+        alone = new.with_gains(own)
         told.append(
             AxisFilters(
                 axis,
@@ -314,6 +321,8 @@ def _told(
                 output_noise(new, spectra[axis], flown=loop).total,
                 limits[axis],
                 loop.output_unit,
+                phase_deg(alone, crossovers[axis]),
+                output_noise(alone, spectra[axis], flown=loop).total,
             )
         )
     return FilterChoice((*every[place][0], *moved), tuple(told), within, chosen, dict(spectra))

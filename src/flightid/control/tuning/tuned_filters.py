@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -33,6 +33,8 @@ class TunedFilters:
         Axes whose gains are new.
     reason : str
         Why no filters could be chosen; the flown ones stand.
+    shared_deg : mapping of str to float
+        By axis: phase that the filters of all axes alone save, deg.
 
     Example
     -------
@@ -44,6 +46,7 @@ class TunedFilters:
     axes: tuple[AxisFilters, ...] = ()
     tuned: tuple[str, ...] = ()
     reason: str = ""
+    shared_deg: Mapping[str, float] = field(default_factory=dict)
 
     def table(self) -> Table:
         """Phase and noise of each axis, as flown, with the filters, and with the gains too."""
@@ -81,8 +84,8 @@ class TunedFilters:
 
     def unjudged(self, left: Iterable[str]) -> dict[str, float]:
         """Phase that axes which stay as flown would lose to filters that all axes share, deg."""
-        lost = {each.axis: -each.phase_gained_deg for each in self.axes if self.changes}
-        return {axis: lost[axis] for axis in left if lost.get(axis, 0.0) > WORTH_DEG}
+        lost = {axis: -self.shared_deg.get(axis, 0.0) for axis in left}
+        return {axis: deg for axis, deg in lost.items() if deg > WORTH_DEG}
 
     def findings(self) -> tuple[Finding, ...]:
         """Verdicts."""
@@ -101,8 +104,8 @@ class TunedFilters:
                 )
                 mend = "balance propellers and damp the mount"
                 yield Finding(f"output-noise-{each.axis}", Light.AMBER, said, mend)
-        still = [each.axis for each in self.axes if each.axis not in self.tuned]
-        if self.changes and still:
+        still = [axis for axis, deg in self.shared_deg.items() if deg and axis not in self.tuned]
+        if still:
             said = f"{' and '.join(still)} fly the shared filters with their old gains, unjudged"
             yield Finding(
                 "filters-unjudged", Light.AMBER,
@@ -112,20 +115,24 @@ class TunedFilters:
 
 def tuned_filters(choice: FilterChoice, designs: Mapping[str, PidDesign]) -> TunedFilters:
     """Phase and noise of the filters with the gains that were tuned with them."""
+    tuned = tuple(axis for axis, design in designs.items() if design.exists)
     axes = tuple(
         _with_gains(each, designs[each.axis], choice.spectra[each.axis])
-        if each.axis in designs and designs[each.axis].exists
-        else each
+        if each.axis in tuned
+        else replace(each, phase_new_deg=each.phase_shared_deg, noise_new=each.noise_shared)
         for each in choice.axes
     )
-    return TunedFilters(choice.changes, axes, tuple(a for a, d in designs.items() if d.exists))
+    kept = {change for axis in tuned for change in choice.changes_of(axis)}
+    changes = tuple(change for change in choice.changes if change in kept)
+    shared = {each.axis: each.phase_shared_deg - each.phase_flown_deg for each in choice.axes}
+    return TunedFilters(changes, axes, tuned, shared_deg=shared)
 
 
 def _with_gains(told: AxisFilters, design: PidDesign, spectrum: GyroSpectrum) -> AxisFilters:
     crossing = design.worst_case("rate loop", "crossover").nominal or told.crossover_rad_s
     gains = design.flown.with_gains(design.gains)
     noise = output_noise(design.loop, spectrum, flown=design.flown).total
-    return AxisFilters(
-        told.axis, crossing, phase_deg(gains, crossing), phase_deg(design.loop, crossing),
-        told.noise_flown, told.noise_new, told.noise_limit, told.unit, noise,
+    return replace(
+        told, crossover_rad_s=crossing, phase_flown_deg=phase_deg(gains, crossing),
+        phase_new_deg=phase_deg(design.loop, crossing), noise_tuned=noise,
     )  # fmt: skip
