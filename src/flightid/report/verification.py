@@ -33,7 +33,9 @@ def verification_blocks(result: Verification | Comparison) -> tuple[Block, ...]:
     tuple of Block
     """
     title = "Errors of the predictions" if isinstance(result, Comparison) else "Errors"
-    pictures = [_picture(result, record) for record in range(len(_first(result).predictions))]
+    pictures = [
+        prediction_picture(result, record) for record in range(len(_first(result).predictions))
+    ]
     return (*result_blocks(result, title=title), *pictures, *_envelopes(result))
 
 
@@ -53,7 +55,7 @@ def verification_sections(result: Verification | Comparison) -> tuple[Section, .
     parts = [Section("Verdicts", (*result_blocks(result), *_envelopes(result)))]
     for record, item in enumerate(first.predictions):
         errors = figure_block(residuals(item), "Measured minus predicted.")
-        parts.append(Section(item.measured.name, (_picture(result, record), errors)))
+        parts.append(Section(item.measured.name, (prediction_picture(result, record), errors)))
     return tuple(parts)
 
 
@@ -61,7 +63,8 @@ def _first(result: Verification | Comparison) -> Verification:
     return result.first if isinstance(result, Comparison) else result
 
 
-def _picture(result: Verification | Comparison, record: int) -> Figure:
+def prediction_picture(result: Verification | Comparison, record: int) -> Figure:
+    """One record as it was measured, and as it is predicted."""
     name = _first(result).predictions[record].measured.name
     if isinstance(result, Comparison):
         shown = f"{name}: measured, and predicted by each model{_from(result.first)}."

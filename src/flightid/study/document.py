@@ -28,6 +28,7 @@ from flightid.report.figures import figure_block
 from flightid.report.flight import flight_blocks
 from flightid.report.handling_qualities import handling_qualities_blocks
 from flightid.report.tuning import gain_flight_blocks, tuning_section
+from flightid.report.verification import prediction_picture
 from flightid.study.answer import answer_of, models_in_short
 from flightid.study.estimate_tables import model_table
 from flightid.study.faults import section_of, whole_section
@@ -222,7 +223,7 @@ def _result(study: StudyResults) -> Iterator[Block]:
 
 
 def _pictures(study: StudyResults) -> Iterator[Figure]:
-    """What new gains do beside the flown ones, and what they promise, of all axes."""
+    """What new gains do and promise, of all axes; without gains, what a model predicts."""
     designs = () if study.tuning is None else study.tuning.designs
     made = [each for each in designs if each.exists]
     if made:
@@ -230,6 +231,9 @@ def _pictures(study: StudyResults) -> Iterator[Figure]:
         yield figure_block(overlaid_steps(made), shown)
         shown = "Margins of the worst vehicle that the data allow; upright: what was required."
         yield figure_block(promised_margins(made), shown)
+        return
+    checked = [found for item in study.identified for found in item.verifications.values()]
+    yield from (prediction_picture(found, 0) for found in checked[:1])
 
 
 def _review(study: StudyResults) -> Iterator[Section]:
