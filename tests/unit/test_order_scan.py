@@ -198,3 +198,21 @@ def test_every_kind_is_ranked_by_the_same_free_runs():
     assert_close(errors[0], best, rtol=1e-12, why="what is ranked is delivered")
     assert {row[0] for row in scan.summary(3).rows} == {each.kind for each in scan.trials}
     assert len(plot.order_scan(scan, scan.simplest.structure).data) == 4
+
+
+def test_a_fit_that_fails_whole_makes_way_for_the_next(monkeypatch):
+    truth = P(("u",), "y", 0.1, b=[[1.0]], f=[[1, -0.8]])
+    fitted, unseen = (flown(truth, seed, n=400, noise=0.1) for seed in (4, 5))
+    orders = {"kind": "oe", "nb": [1, 2], "nf": [1, 2]}
+    first = fid.scan_orders(fitted, unseen, **orders).trials[0].structure
+
+    def failing(structure, records):
+        if structure == first:
+            raise FitError("no statistics")
+        return fid.identify(structure, records)
+
+    monkeypatch.setattr("flightid.validation.order_scan.scan_orders.identify", failing)
+    trials = fid.scan_orders(fitted, unseen, **orders).trials
+    assert trials[-1].note == "no statistics"
+    assert trials[0].structure != first
+    assert trials[0].fit is not None

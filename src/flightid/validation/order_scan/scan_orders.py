@@ -288,10 +288,20 @@ def _fitted_trials(
                 trials[best] = replace(trials[best], fit=None)
             best = len(trials)
         trials.append(trial if best == len(trials) else replace(trial, fit=None))
-    if best is not None and trials[best].fit is None:
-        whole = identify(trials[best].structure, list(scan.fitted))
-        trials[best] = replace(trials[best], fit=whole)
+    while (place := _first_of(trials)) is not None and trials[place].fit is None:
+        structure = trials[place].structure
+        try:
+            whole = identify(structure, list(scan.fitted))
+            trials[place] = replace(trials[place], fit=whole)
+        except (DataError, FitError, OptionError) as error:
+            trials[place] = OrderTrial(structure, None, None, None, None, str(error))
     return trials
+
+
+def _first_of(trials: Sequence[OrderTrial]) -> int | None:
+    """Place of the trial that ranks first; None where none was fitted."""
+    places = [place for place, trial in enumerate(trials) if trial.model is not None]
+    return min(places, key=lambda place: rank_of(trials[place]), default=None)
 
 
 def _fitted_trial(structure: Structure, data: SampledChannels, scan: _Scan) -> OrderTrial:
